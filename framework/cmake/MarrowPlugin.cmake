@@ -1,0 +1,35 @@
+# marrow_add_plugin(NAME source.cpp [...] [LINK library ...])
+#
+# Builds the shared library marrow_NAME.so and, by running it, its manifest marrow_NAME.json beside it. Symbols are hidden,
+# so that two plugins with a same-named function or static never meet.
+function(marrow_add_plugin name)
+  cmake_parse_arguments(PARSE_ARGV 1 plugin "" "" "LINK")
+  set(target plugin_${name})
+  add_library(${target} MODULE ${plugin_UNPARSED_ARGUMENTS})
+  target_link_libraries(${target} PRIVATE marrow::marrow ${plugin_LINK})
+  target_compile_features(${target} PRIVATE cxx_std_20)
+  target_compile_options(${target} PRIVATE -Wall -Wextra)
+  if(PROJECT_NAME STREQUAL "marrow")
+    set(folder ${PROJECT_BINARY_DIR}/lib/marrow)
+  else()
+    set(folder ${CMAKE_CURRENT_BINARY_DIR})
+  endif()
+  set_target_properties(${target} PROPERTIES
+    PREFIX "" OUTPUT_NAME marrow_${name} LIBRARY_OUTPUT_DIRECTORY ${folder}
+    CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  # The command line lists and checks from manifests without loading a library, so each build writes a fresh one.
+  if(TARGET marrow_cli)
+    add_dependencies(${target} marrow_cli)
+    set(describe $<TARGET_FILE:marrow_cli>)
+  else()
+    set(describe $<TARGET_FILE:marrow::marrow_cli>)
+  endif()
+  add_custom_command(TARGET ${target} POST_BUILD
+    COMMAND ${describe} describe $<TARGET_FILE:${target}> --write
+    COMMENT "Describing ${name}" VERBATIM)
+  if(PROJECT_NAME STREQUAL "marrow")
+    include(GNUInstallDirs)
+    install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)
+    install(FILES ${folder}/marrow_${name}.json DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)
+  endif()
+endfunction()

@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <string>
+#include <tuple>
+#include <vector>
+
+namespace marrow {
+
+/// One edge pixel: sub-pixel position, unit direction of the gradient (towards brighter), and its magnitude in grey values
+/// per pixel.
+struct EdgePixel {
+  float u_px = 0, v_px = 0;
+  float direction_u = 0, direction_v = 0;
+  float magnitude = 0;
+  static constexpr auto fields() {
+    return std::make_tuple(&EdgePixel::u_px, &EdgePixel::v_px, &EdgePixel::direction_u, &EdgePixel::direction_v,
+                           &EdgePixel::magnitude);
+  }
+};
+
+/// The edges of one image, in row-major order of the pixels that they belong to (round(v), round(u)).
+struct EdgeMap {
+  int width_px = 0;
+  int height_px = 0;
+  std::vector<EdgePixel> pixels;
+  static constexpr auto fields() { return std::make_tuple(&EdgeMap::width_px, &EdgeMap::height_px, &EdgeMap::pixels); }
+};
+
+/// A straight piece of outline in an image. Both ends are pixel positions on the line.
+struct LineSegment {
+  Eigen::Vector2d from_px = Eigen::Vector2d::Zero();
+  Eigen::Vector2d to_px = Eigen::Vector2d::Zero();
+  static constexpr auto fields() { return std::make_tuple(&LineSegment::from_px, &LineSegment::to_px); }
+};
+
+/// The two outer borders of the shaft in one view, running the same way, `left` being on the left when looking from `from`
+/// to `to` with v down.
+struct ShaftLines {
+  LineSegment left;
+  LineSegment right;
+  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), and its score.
+  double width_mm = 0;
+  double log_likelihood = 0;
+  /// Rejected candidates, each with its reason in words, the best first.
+  struct Rejected {
+    LineSegment left, right;
+    std::string reason;
+    static constexpr auto fields() {
+      return std::make_tuple(&Rejected::left, &Rejected::right, &Rejected::reason);
+    }
+  };
+  std::vector<Rejected> rejected;
+  static constexpr auto fields() {
+    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::log_likelihood,
+                           &ShaftLines::rejected);
+  }
+};
+
+}  // namespace marrow

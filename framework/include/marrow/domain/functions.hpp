@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Functions that travel along the edges of a pipeline as values: a projector, a cost, an optimizer. All methods are const and
+// safe to call from several threads at once. A function may refer to the inputs of the node that made it: the runtime keeps
+// those alive as long as the function.
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "marrow/domain/camera.hpp"
+#include "marrow/domain/pose.hpp"
+
+namespace marrow {
+
+/// One point of a projected outline: position in the image and the unit normal that points away from the bone, and the
+/// surface point that it is the image of.
+struct OutlinePoint {
+  float u_px = 0, v_px = 0;
+  float normal_u = 0, normal_v = 0;
+  Eigen::Vector3f model_mm = Eigen::Vector3f::Zero();
+};
+
+/// Draws a model as a view would see it.
+class Projector {
+ public:
+  virtual ~Projector();
+  /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a fixed
+  /// order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
+  virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
+                                            double spacing_px) const = 0;
+};
+
+/// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond which
+/// a point counts as unmatched.
+struct CostLevel {
+  double contour_spacing_px = 1;
+  double reach_px = 8;
+};
+
+/// How badly a pose explains the images; smaller is better.
+class Cost {
+ public:
+  virtual ~Cost();
+  /// The cost at a pose. Finite for every finite pose: where nothing can be compared it is the worst value.
+  virtual double value(const RigidTransform& world_from_model) const = 0;
+  /// The costs of many poses, in their order; the default evaluates them in parallel.
+  virtual std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const;
+  /// The same cost at another resolution.
+  virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
+  /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then predicts
+  /// the covariance of the minimum. Absent where the cost has no noise model.
+  virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
+};
+
+/// A function R^n -> R to be minimised, knowing nothing of poses.
+struct MinimisationProblem {
+  std::function<double(const Eigen::VectorXd&)> function;
+  Eigen::VectorXd start;
+  Eigen::VectorXd initial_step;               ///< positive, per coordinate
+  Eigen::VectorXd lower, upper;               ///< empty = unbounded
+  int max_evaluations = 1000;
+  double step_tolerance = 1e-4;               ///< stop when steps fall below this fraction of initial_step
+  std::function<void(int evaluation, const Eigen::VectorXd&, double value)> observer;  ///< may be empty
+};
+struct MinimisationResult {
+  Eigen::VectorXd x;
+  double value = 0;
+  int evaluations = 0;
+  std::string stopped_because;
+};
+
+class Optimizer {
+ public:
+  virtual ~Optimizer();
+  /// The best point found. A function value that is not finite counts as the worst; exceptions of the function pass through.
+  virtual MinimisationResult minimise(const MinimisationProblem& problem) const = 0;
+};
+
+}  // namespace marrow

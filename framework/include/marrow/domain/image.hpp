@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <opencv2/core.hpp>
+#include <string>
+#include <tuple>
+
+namespace marrow {
+
+/// A fluoroscopic image: one channel, CV_8U, CV_16U or CV_32F; bright = air unless a node says otherwise. Pixel (0, 0) is
+/// the top left one, and integer coordinates are pixel centres (OpenCV's convention). cv::Mat shares its pixels: whoever
+/// receives an Image must not write to it.
+struct Image {
+  cv::Mat pixels;
+
+  int width() const { return pixels.cols; }
+  int height() const { return pixels.rows; }
+
+  static constexpr auto fields() { return std::make_tuple(&Image::pixels); }
+};
+
+/// A picture for people: CV_8UC3 in RGB order.
+struct Picture {
+  cv::Mat pixels;
+  static constexpr auto fields() { return std::make_tuple(&Picture::pixels); }
+};
+
+}  // namespace marrow

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "marrow/domain/mesh.hpp"
+#include "marrow/domain/transform.hpp"
+
+namespace marrow {
+
+/// Where a fragment is: maps the model (CT frame) to the world. `frame` says about which point and axes the covariance is
+/// meant: a small motion is x_model' = o + R(axes * r) (x_model - o) + axes * t, applied before world_from_model, with
+/// r the rotation [rad] and t the translation [mm] about and along the frame's axes.
+struct Pose {
+  RigidTransform world_from_model{"world", "ct"};
+  FragmentFrame frame;
+  /// Predicted covariance of (r, t) in rad and mm; absent where nothing predicted it.
+  std::optional<Matrix6d> covariance;
+  /// In words: a direction that the images do not determine, a limit that was reached.
+  std::vector<std::string> warnings;
+  double cost = 0;
+  int evaluations = 0;
+
+  static constexpr auto fields() {
+    return std::make_tuple(&Pose::world_from_model, &Pose::frame, &Pose::covariance, &Pose::warnings, &Pose::cost,
+                           &Pose::evaluations);
+  }
+};
+
+/// The pose moved by a small motion (r [rad], t [mm]) as defined at Pose.
+RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame& frame, const Vector6d& motion);
+
+/// The motion that leads from one pose to another, inverse of moved(): to = moved(from, frame, motion).
+Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, const FragmentFrame& frame);
+
+/// The exact pose of a fragment, known for simulated data. A type of its own, so that a pipeline cannot hand it to anything
+/// but `evaluate` and `render`.
+struct Truth {
+  RigidTransform world_from_model{"world", "ct"};
+  static constexpr auto fields() { return std::make_tuple(&Truth::world_from_model); }
+};
+
+/// One figure of merit with its unit ("deg", "mm", "px", "").
+struct Metric {
+  std::string name;
+  double value = 0;
+  std::string unit;
+  static constexpr auto fields() { return std::make_tuple(&Metric::name, &Metric::value, &Metric::unit); }
+};
+struct Metrics {
+  std::vector<Metric> items;
+  static constexpr auto fields() { return std::make_tuple(&Metrics::items); }
+};
+
+}  // namespace marrow

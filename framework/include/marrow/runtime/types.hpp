@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The value types that every plugin shares. A plugin's own types are registered in the plugin, from its own namespace.
+#include "marrow/domain/case.hpp"
+#include "marrow/domain/features.hpp"
+#include "marrow/domain/functions.hpp"
+#include "marrow/runtime/value.hpp"
+
+MARROW_VALUE_TYPE(marrow::Image, "image", 1)
+MARROW_VALUE_TYPE(marrow::Picture, "picture", 1)
+MARROW_VALUE_TYPE(marrow::Volume, "volume", 1)
+MARROW_VALUE_TYPE(marrow::SignedField, "signed_field", 1)
+MARROW_VALUE_TYPE(marrow::Seeds, "seeds", 1)
+MARROW_VALUE_TYPE(marrow::Mesh, "mesh", 1)
+MARROW_VALUE_TYPE(marrow::Camera, "camera", 1)
+MARROW_VALUE_TYPE(marrow::View, "view", 1)
+MARROW_VALUE_TYPE(marrow::EdgeMap, "edge_map", 1)
+MARROW_VALUE_TYPE(marrow::ShaftLines, "shaft_lines", 1)
+MARROW_VALUE_TYPE(marrow::Pose, "pose", 1)
+MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
+MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
+MARROW_VALUE_TYPE(marrow::Case, "case", 1)
+MARROW_FUNCTION_TYPE(marrow::Projector, "projector", 1)
+MARROW_FUNCTION_TYPE(marrow::Cost, "cost", 1)
+MARROW_FUNCTION_TYPE(marrow::Optimizer, "optimizer", 1)

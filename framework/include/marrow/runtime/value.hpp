@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/hash.hpp"
+
+namespace marrow {
+
+/// Specialised by MARROW_VALUE_TYPE for each type that may travel along an edge of a pipeline.
+template <class T>
+struct ValueType {};
+
+template <class T>
+concept Registered = requires { ValueType<T>::kId; };
+
+/// Registers a type as a value. Use at global scope. `id` is the name that pipelines and messages show; raise `version`
+/// whenever the meaning or layout changes. A function (projector, cost, optimizer) has no content, is keyed by its recipe and
+/// never stored.
+#define MARROW_VALUE_TYPE(Type, id, version)          \
+  template <>                                         \
+  struct marrow::ValueType<Type> {                    \
+    static constexpr const char* kId = id;            \
+    static constexpr int kVersion = version;          \
+    static constexpr bool kIsFunction = false;        \
+  };
+#define MARROW_FUNCTION_TYPE(Type, id, version)       \
+  template <>                                         \
+  struct marrow::ValueType<Type> {                    \
+    static constexpr const char* kId = id;            \
+    static constexpr int kVersion = version;          \
+    static constexpr bool kIsFunction = true;         \
+  };
+
+/// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different layout
+/// would pass for each other.)
+struct TypeInfo {
+  std::string id;
+  int version = 0;
+  std::size_t size = 0;
+  bool is_function = false;
+
+  bool operator==(const TypeInfo&) const = default;
+  template <Registered T>
+  static TypeInfo of() {
+    return {ValueType<T>::kId, ValueType<T>::kVersion, sizeof(T), ValueType<T>::kIsFunction};
+  }
+};
+
+/// A value on an edge: absent, one item, or items along an axis (each of which may again have an axis). Immutable and cheap
+/// to copy.
+struct Value {
+  TypeInfo type;
+  std::shared_ptr<const void> data;       ///< of one item
+  Digest (*hash)(const void*) = nullptr;  ///< content hash of one item; null for functions
+
+  std::string axis;  ///< of a list; empty for one item
+  std::vector<std::string> names;
+  std::vector<Value> items;
+
+  /// What identifies the value: the content hash of data, the recipe key of a function. Set by the executor.
+  Digest key;
+
+  bool is_list() const { return !axis.empty(); }
+  bool is_absent() const { return !data && !is_list(); }
+
+  template <Registered T>
+  static Value of(std::shared_ptr<const T> item) {
+    Value value;
+    value.type = TypeInfo::of<T>();
+    value.data = std::move(item);
+    if constexpr (!ValueType<T>::kIsFunction)
+      value.hash = [](const void* data) { return hash_of(*static_cast<const T*>(data)); };
+    return value;
+  }
+  template <Registered T>
+  static Value of(const List<T>& list, const std::string& axis) {
+    Value value;
+    value.type = TypeInfo::of<T>();
+    if (list.empty()) return value;  // an empty list is an absent value
+    value.axis = axis;
+    value.names = list.names();
+    for (std::size_t i = 0; i < list.size(); ++i) value.items.push_back(of<T>(list.shared(i)));
+    return value;
+  }
+  template <Registered T>
+  const T& as() const {
+    return *static_cast<const T*>(data.get());
+  }
+  template <Registered T>
+  List<T> as_list() const {
+    List<T> list;
+    for (std::size_t i = 0; i < items.size(); ++i)
+      list.add_shared(names[i], std::static_pointer_cast<const T>(items[i].data));
+    return list;
+  }
+};
+
+}  // namespace marrow

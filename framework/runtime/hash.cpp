@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/hash.hpp"
+
+#include <xxhash.h>
+
+#include <cstdio>
+
+namespace marrow {
+
+std::string Digest::hex() const {
+  char text[33];
+  std::snprintf(text, sizeof text, "%016llx%016llx", static_cast<unsigned long long>(high), static_cast<unsigned long long>(low));
+  return text;
+}
+
+Hasher::Hasher() : state_(XXH3_createState()) { XXH3_128bits_reset(static_cast<XXH3_state_t*>(state_)); }
+Hasher::~Hasher() { XXH3_freeState(static_cast<XXH3_state_t*>(state_)); }
+
+void Hasher::bytes(const void* data, std::size_t size) {
+  if (size) XXH3_128bits_update(static_cast<XXH3_state_t*>(state_), data, size);
+}
+
+Digest Hasher::digest() const {
+  const XXH128_hash_t hash = XXH3_128bits_digest(static_cast<XXH3_state_t*>(state_));
+  return {hash.low64, hash.high64};
+}
+
+void Hasher::add(const cv::Mat& image) {
+  add(std::int32_t(image.rows));
+  add(std::int32_t(image.cols));
+  add(std::int32_t(image.type()));
+  for (int row = 0; row < image.rows; ++row) bytes(image.ptr(row), image.elemSize() * std::size_t(image.cols));
+}
+
+}  // namespace marrow
