@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far the model's outline lies from the edges of the images at a pose. It needs no truth, so it can be used on real data.
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "edge_search.hpp"
+
+namespace {
+
+struct Options {
+  double spacing_px = 1;
+  double reach_px = 30;
+  double angle_deg = 30;
+};
+
+/// The distances of a view's outline points; a point with no edge in reach counts with the reach itself, so that parts that
+/// match nothing make the figures worse, not better.
+struct Distances {
+  std::vector<double> px, mm;
+  std::size_t matched = 0;
+};
+
+void check_edges(const marrow::View& view, const marrow::EdgeMap* edges) {
+  marrow::check_view(view);
+  const std::string what = "view '" + view.name + "'";
+  if (!edges) throw marrow::Error(what + ": there is no edge map of that name; make the edges from the same list of views");
+  if (edges->width_px != view.camera.width_px || edges->height_px != view.camera.height_px)
+    throw marrow::Error(what + ": the edge map is for " + std::to_string(edges->width_px) + " x " +
+                        std::to_string(edges->height_px) + " pixels, the image has " + std::to_string(view.camera.width_px) +
+                        " x " + std::to_string(view.camera.height_px));
+  if (edges->pixels.empty())
+    throw marrow::Error(what + ": the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
+}
+
+bool in_mask(const marrow::View& view, const marrow::OutlinePoint& point) {
+  if (view.mask.empty()) return true;
+  const int u = std::clamp(int(std::lround(point.u_px)), 0, view.mask.cols - 1);
+  const int v = std::clamp(int(std::lround(point.v_px)), 0, view.mask.rows - 1);
+  return view.mask.at<unsigned char>(v, u) != 0;
+}
+
+Distances measure(const marrow::RigidTransform& world_from_model, const marrow::Projector& projector, const marrow::View& view,
+                  const marrow::EdgeMap& edges, const Options& options) {
+  const marrow::evaluate::EdgeSearch search(edges);
+  const double least_cosine = std::cos(marrow::radians(options.angle_deg));
+  Distances distances;
+  for (const marrow::OutlinePoint& point : projector.outline(view.camera, world_from_model, options.spacing_px)) {
+    if (!in_mask(view, point)) continue;
+    const std::optional<double> found =
+        search.nearest(point.u_px, point.v_px, point.normal_u, point.normal_v, options.reach_px, least_cosine);
+    distances.matched += found.has_value();
+    const double px = found.value_or(options.reach_px);
+    const Eigen::Vector3d world_mm = world_from_model * point.model_mm.cast<double>();
+    distances.px.push_back(px);
+    distances.mm.push_back(px * marrow::pixel_size_at_mm(view.camera, world_mm));
+  }
+  return distances;
+}
+
+/// Quantile with linear interpolation between order statistics.
+double quantile(std::vector<double> values, double fraction) {
+  std::sort(values.begin(), values.end());
+  const double at = fraction * double(values.size() - 1);
+  const std::size_t below = std::size_t(at);
+  const std::size_t above = std::min(below + 1, values.size() - 1);
+  return values[below] + (at - double(below)) * (values[above] - values[below]);
+}
+
+void report(const std::string& prefix, const Distances& distances, marrow::Metrics& metrics) {
+  const auto add = [&](const char* name, double value, const char* unit) {
+    metrics.items.push_back({prefix + name, value, unit});
+  };
+  add("median_px", quantile(distances.px, 0.5), "px");
+  add("p90_px", quantile(distances.px, 0.9), "px");
+  add("median_mm", quantile(distances.mm, 0.5), "mm");
+  add("p90_mm", quantile(distances.mm, 0.9), "mm");
+  add("matched_percent", 100.0 * double(distances.matched) / double(distances.px.size()), "%");
+}
+
+marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Projector& projector,
+                                 const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
+                                 const Options& options, marrow::Context& context) {
+  marrow::check_rigid(pose.world_from_model, "pose");
+  marrow::Metrics per_view;
+  Distances all;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    context.check_cancelled();
+    const marrow::EdgeMap* of_view = edges.find(views.name(i));
+    check_edges(views[i], of_view);
+    const Distances distances = measure(pose.world_from_model, projector, views[i], *of_view, options);
+    if (distances.px.empty()) {
+      context.warn("view '" + views[i].name + "': no part of the outline is inside the image at this pose; the view is left out");
+      continue;
+    }
+    report(views[i].name + "_", distances, per_view);
+    all.px.insert(all.px.end(), distances.px.begin(), distances.px.end());
+    all.mm.insert(all.mm.end(), distances.mm.begin(), distances.mm.end());
+    all.matched += distances.matched;
+  }
+  if (all.px.empty())
+    throw marrow::Error("the outline is outside the image in every view (" + std::to_string(views.size()) +
+                        "), so there is no distance; check the pose and that the cameras and the model use the same world frame");
+  marrow::Metrics metrics;
+  report("", all, metrics);
+  metrics.items.insert(metrics.items.end(), per_view.items.begin(), per_view.items.end());
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.outline_distance", outline_distance)
+      .summary("Distance of the model's outline at a pose to the nearest image edges of the same direction; needs no truth")
+      .in("pose", "pose to judge")
+      .in("projector", "draws the outline")
+      .in("views", "X-ray views", marrow::over("view"))
+      .in("edges", "their edges", marrow::over("view"))
+      .out("metrics",
+           "median and 90th percentile in pixels and in mm at the object, and the share of the outline with an edge in reach: of "
+           "all views together, then of each")
+      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1), marrow::at_most(100))
+      .option("reach_px", &Options::reach_px, "how far an edge may be; points with none count with this distance",
+              marrow::at_least(1), marrow::at_most(10000))
+      .option("angle_deg", &Options::angle_deg, "largest angle between the outline's normal and an edge's gradient",
+              marrow::at_least(0), marrow::at_most(180));
+}

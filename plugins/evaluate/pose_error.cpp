@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a pose is from the truth, in the figures that every table of marrow uses. All of them belong to the small motion
+// that leads from the true pose to the found one, about the fragment's centroid and along its own axes.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+using marrow::degrees;
+
+struct Options {
+  int points = 500;
+};
+
+void check_frames(const marrow::RigidTransform& pose, const marrow::RigidTransform& truth, const marrow::Mesh& model) {
+  marrow::check_rigid(pose, "pose");
+  marrow::check_rigid(truth, "truth");
+  const auto name = [](const marrow::RigidTransform& t) { return t.target + "_from_" + t.source; };
+  if (pose.target != truth.target || pose.source != truth.source)
+    throw marrow::Error("the pose is " + name(pose) + ", but the truth is " + name(truth) +
+                        "; compare poses between the same two frames");
+  if (model.frame != pose.source)
+    throw marrow::Error("the model is in the frame '" + model.frame + "', but the pose takes points in '" + pose.source +
+                        "'; give the model that was registered");
+}
+
+/// Root mean square would hide outliers and the maximum is one point's: the mean distance is the usual mTRE.
+double mean_target_error_mm(const marrow::RigidTransform& pose, const marrow::RigidTransform& truth,
+                            const std::vector<Eigen::Vector3d>& targets_mm) {
+  double sum = 0;
+  for (const auto& target : targets_mm) sum += (pose * target - truth * target).norm();
+  return sum / double(targets_mm.size());
+}
+
+/// The covariance of the same small motion about another point and along other axes: r and t of frame `from` become
+/// to^T (from r) and to^T (from t + (from r) x (to's origin - from's origin)).
+marrow::Matrix6d in_frame(const marrow::Matrix6d& covariance, const marrow::FragmentFrame& from,
+                          const marrow::FragmentFrame& to) {
+  const Eigen::Vector3d arm = to.origin_mm - from.origin_mm;
+  Eigen::Matrix3d cross;  // cross * v = v x arm
+  cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
+  marrow::Matrix6d change = marrow::Matrix6d::Zero();
+  change.topLeftCorner<3, 3>() = to.axes.transpose() * from.axes;
+  change.bottomRightCorner<3, 3>() = change.topLeftCorner<3, 3>();
+  change.bottomLeftCorner<3, 3>() = to.axes.transpose() * cross * from.axes;
+  return change * covariance * change.transpose();
+}
+
+/// Standard deviation in the direction that is determined worst.
+double largest_deviation(const Eigen::Matrix3d& covariance) {
+  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]));
+}
+
+void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& frame, marrow::Metrics& metrics) {
+  // A direction that the images do not determine at all has no finite deviation: then there is nothing to print.
+  if (!pose.covariance || !pose.covariance->allFinite()) return;
+  const marrow::Matrix6d covariance = in_frame(*pose.covariance, pose.frame, frame);
+  const auto deviation = [&](int i) { return std::sqrt(std::max(0.0, covariance(i, i))); };
+  metrics.items.push_back({"predicted_frontal_deg", degrees(deviation(0)), "deg"});
+  metrics.items.push_back({"predicted_lateral_deg", degrees(deviation(1)), "deg"});
+  metrics.items.push_back({"predicted_axial_deg", degrees(deviation(2)), "deg"});
+  metrics.items.push_back({"predicted_max_deg", degrees(largest_deviation(covariance.topLeftCorner<3, 3>())), "deg"});
+  metrics.items.push_back({"predicted_along_mm", deviation(5), "mm"});
+  metrics.items.push_back({"predicted_max_mm", largest_deviation(covariance.bottomRightCorner<3, 3>()), "mm"});
+}
+
+marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth, const marrow::Mesh& model,
+                           const Options& options) {
+  const marrow::RigidTransform &found = pose.world_from_model, &exact = truth.world_from_model;
+  check_frames(found, exact, model);
+  const marrow::FragmentFrame frame = marrow::fragment_frame(model);
+  const marrow::Vector6d motion = marrow::motion_between(exact, found, frame);
+  const Eigen::Vector3d turn_rad = motion.head<3>(), shift_mm = motion.tail<3>();
+
+  marrow::Metrics metrics;
+  metrics.items = {
+      {"rotation_deg", degrees(marrow::geodesic_angle_rad(found.rotation, exact.rotation)), "deg"},
+      {"frontal_deg", degrees(turn_rad[0]), "deg"},
+      {"lateral_deg", degrees(turn_rad[1]), "deg"},
+      {"axial_deg", degrees(turn_rad[2]), "deg"},
+      {"translation_mm", shift_mm.norm(), "mm"},
+      {"along_mm", shift_mm[2], "mm"},
+      {"across_mm", std::hypot(shift_mm[0], shift_mm[1]), "mm"},
+      {"mtre_mm", mean_target_error_mm(found, exact, marrow::sample_surface(model, std::size_t(options.points))), "mm"},
+      {"chapter_rotation_deg", degrees(turn_rad.cwiseAbs().mean()), "deg"},
+      {"chapter_translation_mm", shift_mm.cwiseAbs().mean(), "mm"},
+  };
+  add_predictions(pose, frame, metrics);
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.pose_error", pose_error)
+      .summary("Rotation, translation and target registration error of a pose against the truth, with the predicted deviation")
+      .in("pose", "pose found")
+      .in("truth", "exact pose")
+      .in("model", "the fragment's surface: gives its axes, its centroid and the targets")
+      .out("metrics",
+           "geodesic angle; signed angles about the frontal, lateral and long axes; displacement of the centroid, signed along "
+           "the long axis and across it; mTRE; means of the absolute angles and translations; predicted standard deviations "
+           "where the pose has a covariance")
+      .option("points", &Options::points, "points spread over the surface for the mTRE", marrow::at_least(1), marrow::at_most(1e6));
+}

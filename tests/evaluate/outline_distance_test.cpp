@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/evaluate/outline_distance.cpp"
+
+#include <gtest/gtest.h>
+
+#include <map>
+
+namespace {
+
+/// An outline that is the vertical line u = 100 from v = 20 to 119, normal to the right; it ignores the pose.
+class LineProjector : public marrow::Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform&, double) const override {
+    std::vector<marrow::OutlinePoint> points;
+    if (camera.width_px <= 100) return points;
+    for (int v = 20; v < 120; ++v) points.push_back({100, float(v), 1, 0, Eigen::Vector3f(0, 0, 600)});
+    return points;
+  }
+};
+
+/// Focal length 1000 px, so that 1 px is 0.6 mm at the outline's depth of 600 mm.
+marrow::View view(const std::string& name, int width = 200) {
+  marrow::View view;
+  view.name = name;
+  view.image.pixels = cv::Mat(150, width, CV_8U, cv::Scalar(128));
+  view.camera.width_px = width;
+  view.camera.height_px = 150;
+  view.camera.intrinsics << 1000, 0, 100, 0, 1000, 75, 0, 0, 1;
+  return view;
+}
+
+marrow::EdgeMap line_of_edges(float u, float direction_u, int from_v = 0, int to_v = 150) {
+  marrow::EdgeMap edges{200, 150, {}};
+  for (int v = from_v; v < to_v; ++v) edges.pixels.push_back({u, float(v), direction_u, 0, 10});
+  return edges;
+}
+
+std::map<std::string, double> distances(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
+                                        const Options& options = {}) {
+  marrow::Context context;
+  std::map<std::string, double> values;
+  for (const auto& item : outline_distance({}, LineProjector(), views, edges, options, context).items)
+    values[item.name] = item.value;
+  return values;
+}
+
+template <class T>
+marrow::List<T> one(const std::string& name, T item) {
+  marrow::List<T> list;
+  list.add(name, std::move(item));
+  return list;
+}
+
+TEST(OutlineDistance, OfAParallelLine) {
+  auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(102.5f, 1)));
+  EXPECT_NEAR(found["median_px"], 2.5, 1e-6);
+  EXPECT_NEAR(found["p90_px"], 2.5, 1e-6);
+  EXPECT_NEAR(found["median_mm"], 2.5 * 0.6, 1e-6);
+  EXPECT_NEAR(found["matched_percent"], 100, 1e-9);
+  EXPECT_NEAR(found["frontal_median_px"], 2.5, 1e-6);
+}
+
+TEST(OutlineDistance, EdgesOfAnotherDirectionDoNotCount) {
+  marrow::EdgeMap edges = line_of_edges(109, 1);
+  for (const auto& edge : line_of_edges(101, -1).pixels) edges.pixels.push_back(edge);
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges))["median_px"], 9, 1e-6);
+  Options options;
+  options.angle_deg = 180;
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges), options)["median_px"], 1, 1e-6);
+}
+
+TEST(OutlineDistance, UnmatchedPointsCountWithTheReach) {
+  // Edges beside the upper 60 of 100 outline points only; the lower ones are more than the reach of 5 px away but for 4 of them
+  // (v = 80 to 83 reach the last edge at v = 79, 3 px to the side).
+  Options options;
+  options.reach_px = 5;
+  auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(103, 1, 0, 80)), options);
+  EXPECT_NEAR(found["median_px"], 3, 1e-6);
+  EXPECT_NEAR(found["p90_px"], 5, 1e-6);
+  EXPECT_NEAR(found["matched_percent"], 64, 1e-9);
+}
+
+TEST(OutlineDistance, ViewsTogetherAndEach) {
+  marrow::List<marrow::View> views;
+  views.add("frontal", view("frontal"));
+  views.add("lateral", view("lateral"));
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", line_of_edges(101, 1));
+  edges.add("lateral", line_of_edges(104, 1));
+  auto found = distances(views, edges);
+  EXPECT_NEAR(found["frontal_median_px"], 1, 1e-6);
+  EXPECT_NEAR(found["lateral_median_px"], 4, 1e-6);
+  EXPECT_NEAR(found["median_px"], 2.5, 1e-6);
+}
+
+TEST(OutlineDistance, MaskedPointsAreLeftOut) {
+  marrow::View masked = view("frontal");
+  masked.mask = cv::Mat(150, 200, CV_8U, cv::Scalar(0));
+  masked.mask.rowRange(0, 60).setTo(255);
+  auto found = distances(one("frontal", masked), one("frontal", line_of_edges(102, 1, 0, 60)));
+  EXPECT_NEAR(found["matched_percent"], 100, 1e-9);
+  EXPECT_NEAR(found["p90_px"], 2, 1e-6);
+}
+
+TEST(OutlineDistance, FindsFarEdgesAcrossCells) {
+  Options options;
+  options.reach_px = 500;
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(199, 1)), options)["p90_px"], 99, 1e-6);
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(0, 1)), options)["p90_px"], 100, 1e-6);
+}
+
+TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
+  marrow::List<marrow::View> views;
+  views.add("frontal", view("frontal"));
+  views.add("narrow", view("narrow", 90));
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", line_of_edges(101, 1));
+  marrow::EdgeMap narrow = line_of_edges(50, 1);
+  narrow.width_px = 90;
+  edges.add("narrow", narrow);
+  std::string warning;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view message, bool is_warning) { warning += is_warning ? message : ""; };
+  marrow::Context context(hooks);
+  EXPECT_EQ(outline_distance({}, LineProjector(), views, edges, {}, context).items.size(), 10u);
+  EXPECT_EQ(warning, "view 'narrow': no part of the outline is inside the image at this pose; the view is left out");
+}
+
+TEST(OutlineDistance, SaysWhatIsWrong) {
+  const auto message = [](const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) -> std::string {
+    try {
+      distances(views, edges);
+    } catch (const marrow::Error& error) {
+      return error.what();
+    }
+    return "no error";
+  };
+  EXPECT_EQ(message(one("frontal", view("frontal")), one("lateral", line_of_edges(101, 1))),
+            "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
+  EXPECT_EQ(message(one("frontal", view("frontal")), one("frontal", marrow::EdgeMap{200, 150, {}})),
+            "view 'frontal': the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
+  EXPECT_EQ(message(one("frontal", view("frontal")), one("frontal", marrow::EdgeMap{100, 150, {{}}})),
+            "view 'frontal': the edge map is for 100 x 150 pixels, the image has 200 x 150");
+  marrow::EdgeMap narrow = line_of_edges(50, 1);
+  narrow.width_px = 90;
+  EXPECT_EQ(message(one("frontal", view("frontal", 90)), one("frontal", narrow)),
+            "the outline is outside the image in every view (1), so there is no distance; check the pose and that the cameras "
+            "and the model use the same world frame");
+}
+
+TEST(OutlineDistance, DeclarationHasNoFault) {
+  marrow::Plugin plugin;
+  marrow_register_nodes(plugin);
+  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
+}
+
+}  // namespace
