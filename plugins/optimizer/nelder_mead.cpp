@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "nlopt_run.hpp"
+
+namespace {
+
+class NelderMead : public marrow::Optimizer {
+ public:
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return NloptRun(nlopt::LN_NELDERMEAD, problem).run();
+  }
+};
+
+std::shared_ptr<const marrow::Optimizer> nelder_mead() { return std::make_shared<NelderMead>(); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("optimizer.nelder_mead", nelder_mead)
+      .summary("Downhill simplex (Nelder and Mead, Computer Journal 1965; NLopt)")
+      .out("optimizer", "minimiser without derivatives");
+}

@@ -1,0 +1,269 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include <algorithm>
+#include <cmath>
+
+#include "surface_patches.hpp"
+#include "volume_border.hpp"
+
+namespace {
+
+struct Options {
+  double border_voxels = 2;
+};
+
+/// A camera and a pose as this projector uses them: everything relative to the model's own origin.
+struct Geometry {
+  Eigen::Vector3f source;          ///< in the model's axes
+  Eigen::Matrix3f pixel_matrix;    ///< homogeneous pixel = pixel_matrix * model point + pixel_offset
+  Eigen::Vector3f pixel_offset;
+  Eigen::Matrix3f line_matrix;     ///< image line of the plane through the source with a model normal
+};
+
+Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+                     const Eigen::Vector3d& origin_mm) {
+  const marrow::RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
+  const Eigen::Matrix3d& rotation = camera_from_model.rotation;
+  const Eigen::Vector3d origin_in_camera = camera_from_model * origin_mm;
+  Geometry g;
+  g.source = (-(rotation.transpose() * origin_in_camera)).cast<float>();
+  g.pixel_matrix = (camera.intrinsics * rotation).cast<float>();
+  g.pixel_offset = (camera.intrinsics * origin_in_camera).cast<float>();
+  g.line_matrix = (camera.intrinsics.inverse().transpose() * rotation).cast<float>();
+  return g;
+}
+
+/// A point of the border between the surface's parts that face the source and those that do not.
+struct ContourPoint {
+  float u, v;
+  Eigen::Vector3f normal;
+  Eigen::Vector3f model;
+  bool usable;  ///< in front of the source, and made by the bone
+};
+
+/// A piece of that border, the facing part on its left when seen from the source.
+struct ContourPiece {
+  ContourPoint from, to;
+};
+
+/// Finds the border on the surface as the zero line of g = n . (source - x), linear within each triangle. With the
+/// interpolated normals of the vertices it is a smooth curve, where the mesh's own edges zigzag.
+class ContourFinder {
+ public:
+  ContourFinder(const SurfacePatches& surface, const Geometry& geometry) : s_(surface), geometry_(geometry) {}
+
+  std::vector<ContourPiece> find() {
+    for (const auto& patch : s_.patches) {
+      const bool crossed = may_cross(patch);
+      if (!crossed && !patch.rim_count) continue;
+      evaluate(patch);
+      if (crossed)
+        for (std::uint32_t i = 0; i < patch.triangle_count; ++i) add_triangle(s_.triangles[patch.first_triangle + i]);
+      for (std::uint32_t i = 0; i < patch.rim_count; ++i) add_rim(s_.rims[patch.first_rim + i]);
+    }
+    return std::move(pieces_);
+  }
+
+ private:
+  /// Whether a normal of the patch can be perpendicular to a line of sight.
+  bool may_cross(const SurfacePatches::Patch& patch) const {
+    const Eigen::Vector3f sight = geometry_.source - patch.centre;
+    const float distance = sight.norm();
+    if (distance <= patch.radius) return true;
+    const float tilt_rad = std::asin(std::min(1.0f, std::abs(patch.axis.dot(sight)) / distance));
+    return tilt_rad <= patch.cone_rad + std::asin(patch.radius / distance) + 1e-3f;
+  }
+
+  void evaluate(const SurfacePatches::Patch& patch) {
+    first_ = patch.first_vertex;
+    const float sx = geometry_.source.x(), sy = geometry_.source.y(), sz = geometry_.source.z();
+    for (std::uint32_t i = 0; i < patch.vertex_count; ++i) {
+      const std::size_t k = first_ + i;
+      facing_[i] = s_.nx[k] * (sx - s_.x[k]) + s_.ny[k] * (sy - s_.y[k]) + s_.nz[k] * (sz - s_.z[k]);
+    }
+  }
+
+  void add_triangle(const std::array<std::uint8_t, 3>& t) {
+    const bool front[3] = {facing_[t[0]] > 0, facing_[t[1]] > 0, facing_[t[2]] > 0};
+    const int count = front[0] + front[1] + front[2];
+    if (count == 0 || count == 3) return;
+    // The corner that differs from the two others.
+    int lone = 0;
+    while (front[lone] != (count == 1)) ++lone;
+    const ContourPoint p = between(t[lone], t[(lone + 1) % 3]), q = between(t[lone], t[(lone + 2) % 3]);
+    pieces_.push_back(count == 1 ? ContourPiece{p, q} : ContourPiece{q, p});
+  }
+
+  /// The rim of an open surface bounds the facing part as well, but is no outline of a bone.
+  void add_rim(const std::array<std::uint8_t, 2>& rim) {
+    const bool from_front = facing_[rim[0]] > 0, to_front = facing_[rim[1]] > 0;
+    if (!from_front && !to_front) return;
+    ContourPiece piece{from_front ? point(rim[0], rim[0], 0) : between(rim[0], rim[1]),
+                       to_front ? point(rim[1], rim[1], 0) : between(rim[0], rim[1])};
+    piece.from.usable = piece.to.usable = false;
+    pieces_.push_back(piece);
+  }
+
+  ContourPoint between(std::uint8_t a, std::uint8_t b) const {
+    return point(a, b, facing_[a] / (facing_[a] - facing_[b]));
+  }
+
+  ContourPoint point(std::uint8_t a, std::uint8_t b, float t) const {
+    const std::size_t i = first_ + a, j = first_ + b;
+    const auto mix = [t](float p, float q) { return p + t * (q - p); };
+    ContourPoint point;
+    point.model = {mix(s_.x[i], s_.x[j]), mix(s_.y[i], s_.y[j]), mix(s_.z[i], s_.z[j])};
+    point.normal = {mix(s_.nx[i], s_.nx[j]), mix(s_.ny[i], s_.ny[j]), mix(s_.nz[i], s_.nz[j])};
+    const Eigen::Vector3f pixel = geometry_.pixel_matrix * point.model + geometry_.pixel_offset;
+    point.u = pixel.x() / pixel.z();
+    point.v = pixel.y() / pixel.z();
+    point.usable = pixel.z() > 0 && !s_.at_border[i] && !s_.at_border[j];
+    return point;
+  }
+
+  const SurfacePatches& s_;
+  const Geometry& geometry_;
+  std::size_t first_ = 0;
+  std::array<float, 256> facing_;
+  std::vector<ContourPiece> pieces_;
+};
+
+/// Where a piece of contour crosses a line of a square grid laid over the image.
+struct Crossing {
+  float at_px;           ///< position along the line
+  std::int32_t piece;
+  float fraction;        ///< along the piece
+  int layers;            ///< change of the number of facing layers when passing it upwards
+};
+
+/// Keeps, of all contour pieces, the points on the outer outline: those where the number of facing layers that cover a
+/// line of the image changes between none and some. The lines are the rows and columns of a grid, so that the points move
+/// smoothly with the pose; a row gives the points of an upright outline, a column those of a level one.
+class OuterOutline {
+ public:
+  OuterOutline(const std::vector<ContourPiece>& pieces, const marrow::Camera& camera, const Geometry& geometry,
+               double spacing_px, const Eigen::Vector3d& origin_mm)
+      : pieces_(pieces), geometry_(geometry), spacing_px_(float(spacing_px)), origin_(origin_mm.cast<float>()),
+        width_px_(camera.width_px), height_px_(camera.height_px) {}
+
+  std::vector<marrow::OutlinePoint> find() {
+    scan(true);
+    scan(false);
+    return std::move(points_);
+  }
+
+ private:
+  /// Coordinate across the lines (v for rows), and along them.
+  float across(const ContourPoint& p, bool rows) const { return rows ? p.v : p.u; }
+  float along(const ContourPoint& p, bool rows) const { return rows ? p.u : p.v; }
+
+  void scan(bool rows) {
+    const int lines = int((rows ? height_px_ - 1 : width_px_ - 1) / spacing_px_) + 1;
+    // Counting sort of the crossings by line.
+    std::vector<std::uint32_t> first(std::size_t(lines) + 1, 0);
+    each_crossing(rows, lines, [&](int line, const Crossing&) { ++first[std::size_t(line) + 1]; });
+    for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
+    std::vector<Crossing> sorted(first.back());
+    std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+    each_crossing(rows, lines, [&](int line, const Crossing& c) { sorted[next[std::size_t(line)]++] = c; });
+    for (int line = 0; line < lines; ++line)
+      walk(rows, sorted.begin() + first[std::size_t(line)], sorted.begin() + first[std::size_t(line) + 1]);
+  }
+
+  template <class Use>
+  void each_crossing(bool rows, int lines, Use&& use) const {
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      const ContourPiece& piece = pieces_[i];
+      const float a = across(piece.from, rows) / spacing_px_, b = across(piece.to, rows) / spacing_px_;
+      const float low = std::min(a, b), high = std::max(a, b);
+      if (!(low < float(lines) - 0.5f && high > 0)) continue;  // also refuses NaN
+      const int begin = std::max(0, int(std::ceil(low))), end = std::min(lines, int(std::ceil(std::min(high, float(lines)))));
+      for (int line = begin; line < end; ++line) {  // half open, so that a joint of two pieces is crossed once
+        const float t = (float(line) - a) / (b - a);
+        const float at = along(piece.from, rows) + t * (along(piece.to, rows) - along(piece.from, rows));
+        // The facing part lies on the left of the piece: passing rightwards one enters it where the piece runs down.
+        use(line, Crossing{at, std::int32_t(i), t, (b > a) == rows ? 1 : -1});
+      }
+    }
+  }
+
+  template <class Iterator>
+  void walk(bool rows, Iterator begin, Iterator end) {
+    constexpr float kGap_px = 3;  // a narrower gap between two parts of the bone shows no edges of its own
+    std::sort(begin, end, [](const Crossing& a, const Crossing& b) {
+      return a.at_px != b.at_px ? a.at_px < b.at_px : a.piece < b.piece;
+    });
+    int layers = 0;
+    for (Iterator i = begin; i != end; ++i) {
+      const int before = layers;
+      layers += i->layers;
+      if (before == 0 && layers != 0 && (i == begin || i->at_px - (i - 1)->at_px > kGap_px)) add(rows, *i, -1);
+      if (before != 0 && layers == 0 && (i + 1 == end || (i + 1)->at_px - i->at_px > kGap_px)) add(rows, *i, 1);
+    }
+  }
+
+  /// `outside`: the sense along the line in which the bone ends.
+  void add(bool rows, const Crossing& crossing, int outside) {
+    const ContourPiece& piece = pieces_[std::size_t(crossing.piece)];
+    if (!piece.from.usable || !piece.to.usable) return;
+    const float t = crossing.fraction;
+    const Eigen::Vector3f normal = piece.from.normal + t * (piece.to.normal - piece.from.normal);
+    // The tangent plane contains the ray, so its image is the tangent of the outline.
+    const Eigen::Vector2f image_normal = (geometry_.line_matrix * normal).head<2>().normalized();
+    const float cosine = image_normal[rows ? 0 : 1], sine = image_normal[rows ? 1 : 0];
+    if (cosine * float(outside) <= 0 || std::abs(cosine) < std::abs(sine)) return;
+    if (!rows && std::abs(cosine) == std::abs(sine)) return;
+    marrow::OutlinePoint point;
+    point.u_px = piece.from.u + t * (piece.to.u - piece.from.u);
+    point.v_px = piece.from.v + t * (piece.to.v - piece.from.v);
+    if (!(point.u_px >= 0 && point.v_px >= 0 && point.u_px <= float(width_px_ - 1) && point.v_px <= float(height_px_ - 1)))
+      return;
+    point.normal_u = image_normal[0];
+    point.normal_v = image_normal[1];
+    point.model_mm = origin_ + piece.from.model + t * (piece.to.model - piece.from.model);
+    points_.push_back(point);
+  }
+
+  const std::vector<ContourPiece>& pieces_;
+  const Geometry& geometry_;
+  const float spacing_px_;
+  const Eigen::Vector3f origin_;
+  const int width_px_, height_px_;
+  std::vector<marrow::OutlinePoint> points_;
+};
+
+class SilhouetteEdges : public marrow::Projector {
+ public:
+  explicit SilhouetteEdges(SurfacePatches surface) : surface_(std::move(surface)) {}
+
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+                                            double spacing_px) const override {
+    if (!(spacing_px > 0)) throw marrow::Error("the outline's spacing must be positive");
+    const Geometry geometry = geometry_of(camera, world_from_model, surface_.origin_mm);
+    const std::vector<ContourPiece> pieces = ContourFinder(surface_, geometry).find();
+    return OuterOutline(pieces, camera, geometry, spacing_px, surface_.origin_mm).find();
+  }
+
+ private:
+  SurfacePatches surface_;
+};
+
+std::shared_ptr<const marrow::Projector> silhouette_edges(const marrow::Mesh& mesh, const marrow::Volume* volume,
+                                                          const Options& options) {
+  marrow::check_mesh(mesh, "the mesh to project");
+  return std::make_shared<SilhouetteEdges>(
+      make_surface_patches(mesh, vertices_at_volume_border(mesh, volume, options.border_voxels)));
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("project.silhouette_edges", silhouette_edges)
+      .summary("Outer outline of a surface, exactly: where the surface turns away from the X-ray source")
+      .in("mesh", "surface of the bone")
+      .in("volume", "CT that the surface was made from: outline within border_voxels of its end is left out")
+      .out("projector", "draws the outline for any camera and pose")
+      .option("border_voxels", &Options::border_voxels, "how far the end of the CT is felt", marrow::at_least(0),
+              marrow::unit("voxels"));
+}

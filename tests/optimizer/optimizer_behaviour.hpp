@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What every optimizer must do, as functions that the test of each calls.
+#include <gtest/gtest.h>
+#include <marrow/domain/error.hpp>
+#include <marrow/domain/functions.hpp>
+
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+
+namespace optimizer_behaviour {
+
+inline marrow::MinimisationProblem valley() {
+  marrow::MinimisationProblem problem;
+  // A bent valley whose lowest point is (1, 1), value 3 (Rosenbrock's function, shifted).
+  problem.function = [](const Eigen::VectorXd& x) {
+    return 3 + std::pow(1 - x[0], 2) + 100 * std::pow(x[1] - x[0] * x[0], 2);
+  };
+  problem.start = Eigen::Vector2d(-1.2, 1);
+  problem.initial_step = Eigen::Vector2d(0.5, 0.5);
+  problem.max_evaluations = 2000;
+  problem.step_tolerance = 1e-7;
+  return problem;
+}
+
+inline void finds_the_minimum(const marrow::Optimizer& optimizer) {
+  const auto result = optimizer.minimise(valley());
+  EXPECT_NEAR(result.x[0], 1, 1e-3);
+  EXPECT_NEAR(result.x[1], 1, 1e-3);
+  EXPECT_NEAR(result.value, 3, 1e-6);
+  EXPECT_FALSE(result.stopped_because.empty());
+}
+
+inline void keeps_to_bounds_and_budget(const marrow::Optimizer& optimizer) {
+  auto problem = valley();
+  problem.lower = Eigen::Vector2d(-2, -2);
+  problem.upper = Eigen::Vector2d(0.5, 2);
+  int calls = 0;
+  problem.observer = [&](int evaluation, const Eigen::VectorXd& x, double) {
+    EXPECT_EQ(evaluation, ++calls);
+    EXPECT_LE(x[0], 0.5 + 1e-12);
+    EXPECT_GE(x[0], -2 - 1e-12);
+  };
+  const auto result = optimizer.minimise(problem);
+  EXPECT_NEAR(result.x[0], 0.5, 1e-3);
+  EXPECT_NEAR(result.x[1], 0.25, 1e-3);
+  EXPECT_EQ(result.evaluations, calls);
+
+  problem = valley();
+  problem.max_evaluations = 17;
+  const auto short_run = optimizer.minimise(problem);
+  EXPECT_LE(short_run.evaluations, 17);
+  EXPECT_EQ(short_run.stopped_because, "the budget of evaluations is spent");
+}
+
+inline void takes_nan_for_the_worst(const marrow::Optimizer& optimizer) {
+  auto problem = valley();
+  problem.function = [](const Eigen::VectorXd& x) {
+    return x[0] > 2 ? std::numeric_limits<double>::quiet_NaN() : (x - Eigen::Vector2d(1.9, -1)).squaredNorm();
+  };
+  const auto result = optimizer.minimise(problem);
+  EXPECT_NEAR(result.x[0], 1.9, 0.01);
+  EXPECT_NEAR(result.x[1], -1, 0.01);
+}
+
+inline void lets_exceptions_pass(const marrow::Optimizer& optimizer) {
+  auto problem = valley();
+  int calls = 0;
+  problem.function = [&](const Eigen::VectorXd& x) {
+    if (++calls == 5) throw marrow::Cancelled();
+    return x.squaredNorm();
+  };
+  EXPECT_THROW(optimizer.minimise(problem), marrow::Cancelled);
+  EXPECT_EQ(calls, 5);
+}
+
+inline void refuses_nonsense(const marrow::Optimizer& optimizer) {
+  const auto message = [&](const marrow::MinimisationProblem& problem) -> std::string {
+    try {
+      optimizer.minimise(problem);
+    } catch (const marrow::Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  auto problem = valley();
+  problem.initial_step[1] = 0;
+  EXPECT_EQ(message(problem), "the optimizer needs a finite start and one positive initial step per coordinate");
+  problem = valley();
+  problem.lower = Eigen::VectorXd::Zero(3);
+  EXPECT_EQ(message(problem), "the optimizer got bounds for 3 of 2 coordinates");
+  problem = valley();
+  problem.lower = Eigen::Vector2d(0, 0);
+  EXPECT_EQ(message(problem), "the optimizer's start lies outside the bounds");
+  problem = valley();
+  problem.max_evaluations = 0;
+  EXPECT_EQ(message(problem), "the optimizer needs at least one evaluation, got max_evaluations = 0");
+}
+
+}  // namespace optimizer_behaviour

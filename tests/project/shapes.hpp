@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Surfaces and cameras for the tests of projectors, costs and registration.
+#include <marrow/domain/camera.hpp>
+#include <marrow/domain/mesh.hpp>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+
+namespace shapes {
+
+/// A closed surface around an axis parallel to z: rings of points centre(z) + r(theta, z) in planes from z = 0 to `length`.
+inline marrow::Mesh around_axis(double length_mm, int rings, int around,
+                                const std::function<Eigen::Vector2d(double)>& centre,
+                                const std::function<double(double, double)>& radius) {
+  marrow::Mesh mesh;
+  for (int i = 0; i < rings; ++i) {
+    const double z = length_mm * i / (rings - 1);
+    for (int k = 0; k < around; ++k) {
+      const double angle = 2 * marrow::kPi * k / around, r = radius(angle, z);
+      mesh.vertices_mm.emplace_back(centre(z).x() + r * std::cos(angle), centre(z).y() + r * std::sin(angle), z);
+    }
+  }
+  const auto at = [&](int ring, int k) { return std::uint32_t(ring * around + k % around); };
+  for (int i = 0; i + 1 < rings; ++i)
+    for (int k = 0; k < around; ++k) {
+      mesh.triangles.push_back({at(i, k), at(i, k + 1), at(i + 1, k + 1)});
+      mesh.triangles.push_back({at(i, k), at(i + 1, k + 1), at(i + 1, k)});
+    }
+  for (const int ring : {0, rings - 1}) {
+    const double z = length_mm * ring / (rings - 1);
+    const auto middle = std::uint32_t(mesh.vertices_mm.size());
+    mesh.vertices_mm.emplace_back(centre(z).x(), centre(z).y(), z);
+    for (int k = 0; k < around; ++k) {
+      if (ring == 0) mesh.triangles.push_back({middle, at(0, k + 1), at(0, k)});
+      else mesh.triangles.push_back({middle, at(ring, k), at(ring, k + 1)});
+    }
+  }
+  return mesh;
+}
+
+/// The distal 200 mm of a femur-like bone: bowed, tapered, thicker from front to back, with a ridge behind and two unequal
+/// condyles below. +x to the left, +y to the back, +z to the head; about 70,000 triangles.
+inline marrow::Mesh distal_femur() {
+  const auto bump = [](double angle, double at, double width) {
+    return std::exp(-std::pow(std::remainder(angle - at, 2 * marrow::kPi) / width, 2));
+  };
+  const auto radius = [&](double angle, double z) {
+    const double widening = std::pow(std::clamp((80 - z) / 80, 0.0, 1.0), 1.5);
+    double r = 14 - 0.4 * std::cos(2 * angle) + 0.005 * std::max(0.0, 120 - z);
+    r += 3.5 * (1 - widening) * bump(angle, marrow::kPi / 2, 0.25);
+    r += widening * (26 * bump(angle, marrow::radians(35), 0.8) + 22 * bump(angle, marrow::radians(140), 0.75) +
+                     8 * bump(angle, -marrow::kPi / 2, 1.0));
+    const double rounding = std::clamp((25 - z) / 25, 0.0, 0.999);
+    return r * std::sqrt(1 - rounding * rounding);
+  };
+  return around_axis(200, 251, 140, [](double z) { return Eigen::Vector2d(0, (z - 100) * (z - 100) / 1800); }, radius);
+}
+
+inline marrow::Mesh cylinder(double radius_mm, double length_mm, int around = 200) {
+  return around_axis(length_mm, 101, around, [](double) { return Eigen::Vector2d(0, 0); },
+                     [&](double, double) { return radius_mm; });
+}
+
+/// Its lowest point at the origin.
+inline marrow::Mesh sphere(double radius_mm) {
+  constexpr int kRings = 161;
+  marrow::Mesh mesh = around_axis(kRings - 1, kRings, 300, [](double) { return Eigen::Vector2d(0, 0); },
+                                  [&](double, double ring) {
+                                    return radius_mm * std::max(1e-4, std::sin(marrow::kPi * ring / (kRings - 1)));
+                                  });
+  for (auto& v : mesh.vertices_mm) v.z() = radius_mm * (1 - std::cos(marrow::kPi * v.z() / (kRings - 1)));
+  return mesh;
+}
+
+/// The standard simulated C-arm: 1000 mm from source to detector, 600 to the isocentre, 512 x 512 pixels of 0.586 mm. At
+/// angle 0 the source is in front of the patient; at 90 degrees on the right side.
+inline marrow::Camera c_arm(double angle_deg, int size_px = 512) {
+  marrow::Camera camera;
+  camera.width_px = camera.height_px = size_px;
+  const double focal_px = 1000 / (0.586 * 512 / size_px);
+  camera.intrinsics << focal_px, 0, 0.5 * (size_px - 1), 0, focal_px, 0.5 * (size_px - 1), 0, 0, 1;
+  const double a = marrow::radians(angle_deg);
+  camera.camera_from_world.rotation << std::cos(a), -std::sin(a), 0, 0, 0, -1, std::sin(a), std::cos(a), 0;
+  camera.camera_from_world.translation_mm = {0, 0, 600};
+  return camera;
+}
+
+/// Puts a model point at the isocentre.
+inline marrow::RigidTransform centred_at(const Eigen::Vector3d& model_mm) {
+  marrow::RigidTransform world_from_model{"world", "ct"};
+  world_from_model.translation_mm = -model_mm;
+  return world_from_model;
+}
+
+}  // namespace shapes
