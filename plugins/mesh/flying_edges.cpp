@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <vtkCellArray.h>
+#include <vtkFlyingEdges3D.h>
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPolyData.h>
+
+#include <cstdlib>
+#include <marrow/plugin.hpp>
+
+#include "surface.hpp"
+
+namespace {
+
+using marrow::Mesh;
+using marrow::SignedField;
+
+struct Options {
+  bool largest_only = true;
+  int smoothing = 0;
+};
+
+/// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes half
+/// a voxel outside the last samples.
+void fill(vtkImageData& image, const SignedField& field) {
+  const auto& size = field.grid.size;
+  image.SetExtent(-1, size[0], -1, size[1], -1, size[2]);
+  image.AllocateScalars(VTK_FLOAT, 1);
+  float* out = static_cast<float*>(image.GetScalarPointer());
+  for (int z = -1; z <= size[2]; ++z)
+    for (int y = -1; y <= size[1]; ++y)
+      for (int x = -1; x <= size[0]; ++x) {
+        const float value = field.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1));
+        const float padded = field.grid.contains(x, y, z) ? value : std::abs(value);
+        *out++ = padded;
+      }
+}
+
+Mesh flying_edges(const SignedField& field, const Options& options) {
+  surface::check_field(field);
+  vtkNew<vtkImageData> image;
+  fill(*image, field);
+  vtkNew<vtkFlyingEdges3D> filter;
+  filter->SetInputData(image);
+  filter->SetValue(0, 0.0);
+  filter->ComputeNormalsOff();
+  filter->ComputeGradientsOff();
+  filter->ComputeScalarsOff();
+  filter->Update();  // on oneTBB, the run's pool; each row's place in the output is known before it is written
+  vtkPolyData* surface = filter->GetOutput();
+
+  Mesh mesh;
+  mesh.frame = field.grid.frame;
+  mesh.vertices_mm.resize(std::size_t(surface->GetNumberOfPoints()));
+  for (vtkIdType v = 0; v < surface->GetNumberOfPoints(); ++v)
+    mesh.vertices_mm[std::size_t(v)] = field.grid.point_from_index(Eigen::Vector3d(surface->GetPoint(v)));
+  vtkIdType count = 0;
+  const vtkIdType* corners = nullptr;
+  for (surface->GetPolys()->InitTraversal(); surface->GetPolys()->GetNextCell(count, corners);) {
+    std::array<std::uint32_t, 3> triangle{};
+    for (int k = 0; k < 3; ++k) triangle[k] = std::uint32_t(corners[2 - k]);  // VTK's normals point down the field
+    mesh.triangles.push_back(triangle);
+  }
+  if (options.largest_only) mesh = surface::largest_component(mesh);
+  surface::smooth(mesh, options.smoothing);
+  return mesh;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("mesh.flying_edges", flying_edges)
+      .summary("Flying edges of VTK (Schroeder, Maynard and Geveci, LDAV 2015)")
+      .in("field", "signed distance, negative inside")
+      .out("mesh", "closed surface of the field's zero level, normals outward")
+      .option("largest_only", &Options::largest_only,
+              "keep only the part that encloses the largest volume; drops specks and inner walls")
+      .option("smoothing", &Options::smoothing, "iterations of Taubin smoothing, which keeps the volume",
+              marrow::at_least(0), marrow::at_most(200));
+}

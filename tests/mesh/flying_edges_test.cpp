@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/mesh/flying_edges.cpp"
+
+#include "mesh/shapes.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using marrow::kPi;
+
+TEST(FlyingEdges, SphereInATurnedGrid) {
+  const shapes::Distance distance = [](const Vector3d& p) { return shapes::sphere(p, 15); };
+  const Mesh mesh = flying_edges(shapes::field_of(shapes::turned_grid({48, 48, 40}), distance), {});
+  EXPECT_EQ(mesh.frame, "scanner");
+  EXPECT_TRUE(marrow::is_closed(mesh));
+  EXPECT_EQ(shapes::euler_number(mesh), 2);
+  EXPECT_LT(shapes::largest_error_mm(mesh, distance), 0.012);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 3e-3);
+  EXPECT_TRUE(shapes::normals_point_outward(mesh, distance));
+}
+
+TEST(FlyingEdges, ClosesHalfAVoxelBeyondTheBorder) {
+  marrow::Grid grid;
+  grid.size = {40, 40, 11};
+  grid.spacing_mm = {1, 1, 2};
+  const Mesh mesh = flying_edges(
+      shapes::field_of(grid, [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; }), {});
+  EXPECT_TRUE(marrow::is_closed(mesh));
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (kPi * 100 * 22), 1, 8e-3);
+}
+
+TEST(FlyingEdges, KeepsTheLargestPart) {
+  const auto field = shapes::field_of(shapes::turned_grid({64, 64, 52}), [](const Vector3d& p) {
+    return std::min(std::abs(p.norm() - 12) - 2, (p - Vector3d(0, 0, 19)).norm() - 3);
+  });
+  const Mesh largest = flying_edges(field, {});
+  EXPECT_EQ(shapes::euler_number(largest), 2);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
+}
+
+TEST(FlyingEdges, SaysWhatIsWrongWithAField) {
+  SignedField field;
+  field.grid.size = {3, 3, 3};
+  field.values_mm.assign(27, 2.f);
+  try {
+    flying_edges(field, {});
+    FAIL() << "no error";
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(), "field: there is no surface, as no value is negative (inside); the segmentation found "
+                               "nothing: check its seeds and thresholds");
+  }
+}
+
+}  // namespace

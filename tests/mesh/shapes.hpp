@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Analytic fields and counts on meshes that the tests of this kind share.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "marrow/domain/mesh.hpp"
+#include "marrow/domain/volume.hpp"
+
+namespace shapes {
+
+using Distance = std::function<double(const Eigen::Vector3d&)>;
+
+inline double sphere(const Eigen::Vector3d& p, double radius_mm) { return p.norm() - radius_mm; }
+inline double torus(const Eigen::Vector3d& p, double ring_mm, double tube_mm) {
+  return std::hypot(std::hypot(p.x(), p.y()) - ring_mm, p.z()) - tube_mm;
+}
+
+/// A grid of CT-like spacing in a turned frame, centred on the origin.
+inline marrow::Grid turned_grid(std::array<int, 3> size) {
+  marrow::Grid grid;
+  grid.size = size;
+  grid.spacing_mm = {0.8, 0.8, 1.0};
+  grid.direction = Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()).toRotationMatrix();
+  grid.frame = "scanner";
+  const Eigen::Vector3d middle = Eigen::Vector3d(size[0] - 1, size[1] - 1, size[2] - 1) / 2.0;
+  grid.origin_mm = -(grid.direction * middle.cwiseProduct(grid.spacing_mm)) + Eigen::Vector3d(0.13, -0.21, 0.07);
+  return grid;
+}
+
+inline marrow::SignedField field_of(const marrow::Grid& grid, const Distance& distance_mm) {
+  marrow::SignedField field{grid, std::vector<float>(grid.count())};
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y)
+      for (int x = 0; x < grid.size[0]; ++x)
+        field.values_mm[grid.offset(x, y, z)] = float(distance_mm(grid.point_from_index(Eigen::Vector3d(x, y, z))));
+  return field;
+}
+
+/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour.
+inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed) {
+  marrow::SignedField field;
+  field.grid.size = size;
+  std::mt19937 random(seed);
+  for (std::size_t i = 0; i < field.grid.count(); ++i)
+    field.values_mm.push_back(float(random()) / float(std::mt19937::max()) - 0.5f);
+  return field;
+}
+
+/// Euler's number of a closed mesh: vertices - edges + faces, 2 for a sphere, 0 for a torus.
+inline long euler_number(const marrow::Mesh& mesh) {
+  return long(mesh.vertices_mm.size()) - long(mesh.triangles.size()) * 3 / 2 + long(mesh.triangles.size());
+}
+
+inline double largest_error_mm(const marrow::Mesh& mesh, const Distance& distance_mm) {
+  double largest = 0;
+  for (const auto& vertex : mesh.vertices_mm) largest = std::max(largest, std::abs(distance_mm(vertex)));
+  return largest;
+}
+
+/// True when the normal of every triangle with an area points up the distance.
+inline bool normals_point_outward(const marrow::Mesh& mesh, const Distance& distance_mm) {
+  for (const auto& t : mesh.triangles) {
+    const Eigen::Vector3d a = mesh.vertices_mm[t[0]], b = mesh.vertices_mm[t[1]], c = mesh.vertices_mm[t[2]];
+    const Eigen::Vector3d normal = (b - a).cross(c - a);
+    if (normal.norm() < 1e-3) continue;
+    const Eigen::Vector3d middle = (a + b + c) / 3, step = 0.1 * normal.normalized();
+    if (distance_mm(middle + step) <= distance_mm(middle - step)) return false;
+  }
+  return true;
+}
+
+}  // namespace shapes
