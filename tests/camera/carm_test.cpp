@@ -1,0 +1,120 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/camera/carm.cpp"
+
+#include <gtest/gtest.h>
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+marrow::Camera view(double alpha_deg, double beta_deg, Options options = {}) {
+  options.names = {"one"};
+  options.alpha_deg = {alpha_deg};
+  options.beta_deg = {beta_deg};
+  return carm(options)[0];
+}
+
+Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
+
+TEST(CarmCamera, FrontalHasDetectorInFrontHeadUpAndLooksFromTheSource) {
+  const marrow::Camera frontal = view(0, 0);
+  EXPECT_TRUE(towards_detector(frontal).isApprox(-Vector3d::UnitY()));
+  const Vector2d centre = project(frontal, Vector3d::Zero());
+  EXPECT_LT(project(frontal, {0, 0, 50}).y(), centre.y()) << "the head is up";
+  EXPECT_LT(project(frontal, {50, 0, 0}).x(), centre.x()) << "seen from the source, the patient's left is on the left";
+}
+
+TEST(CarmCamera, PositiveBetaTurnsTheDetectorToThePatientsLeft) {
+  EXPECT_TRUE(towards_detector(view(0, 90)).isApprox(Vector3d::UnitX()));
+  EXPECT_TRUE(towards_detector(view(0, -90)).isApprox(-Vector3d::UnitX()));
+  EXPECT_TRUE(towards_detector(view(0, 30)).isApprox(Vector3d(0.5, -std::sqrt(0.75), 0), 1e-12));
+  // A point in front of the isocentre: as the detector goes left and the source right, its image moves to +u.
+  EXPECT_GT(project(view(0, 20), {0, -50, 0}).x(), project(view(0, 0), {0, -50, 0}).x());
+}
+
+TEST(CarmCamera, PositiveAlphaTiltsTheDetectorTowardsTheHead) {
+  EXPECT_TRUE(towards_detector(view(90, 0)).isApprox(Vector3d::UnitZ()));
+  EXPECT_TRUE(towards_detector(view(20, 0)).isApprox(Vector3d(0, -std::cos(marrow::radians(20)), std::sin(marrow::radians(20)))));
+  // The source is then towards the feet, so a point in front of the isocentre lies below the central ray: v grows.
+  EXPECT_GT(project(view(20, 0), {0, -50, 0}).y(), project(view(0, 0), {0, -50, 0}).y());
+}
+
+TEST(CarmCamera, DirectionFollowsTheFormulaForBothAnglesTogether) {
+  const double s = marrow::radians(25), p = marrow::radians(-40);
+  const Vector3d expected(std::sin(p) * std::cos(s), -std::cos(p) * std::cos(s), std::sin(s));
+  EXPECT_TRUE(towards_detector(view(25, -40)).isApprox(expected, 1e-12));
+}
+
+TEST(CarmCamera, IsocentreProjectsToTheMiddleOfTheDetectorInEveryView) {
+  Options options;
+  options.isocentre_mm = {12, -7, 300};
+  options.width_px = 1024;
+  options.height_px = 768;
+  for (double alpha : {-30.0, 0.0, 45.0})
+    for (double beta : {-120.0, 0.0, 60.0, 90.0}) {
+      const marrow::Camera camera = view(alpha, beta, options);
+      EXPECT_LT((project(camera, options.isocentre_mm) - Vector2d(511.5, 383.5)).norm(), 1e-9);
+      // Isocentric: t is constant once the isocentre is the origin.
+      EXPECT_TRUE((camera.camera_from_world * options.isocentre_mm).isApprox(Vector3d(0, 0, 600), 1e-12));
+    }
+}
+
+TEST(CarmCamera, MagnificationIsDetectorDistanceOverIsocentreDistance) {
+  const marrow::Camera camera = view(0, 0);
+  const double shift_px = (project(camera, {0, 0, -9}) - project(camera, Vector3d::Zero())).y();
+  EXPECT_NEAR(shift_px * 0.586 / 9, 1000.0 / 600.0, 1e-12);
+  EXPECT_NEAR(pixel_size_at_mm(camera, Vector3d::Zero()), 0.586 * 0.6, 1e-12);
+  EXPECT_TRUE(source_position_mm(camera).isApprox(Vector3d(0, 600, 0)));
+}
+
+// Eq 4, corrected: dR = R_0^T R_b2 R_a2 (R_b1 R_a1)^T R_0, which is the identity for equal poses and W_2^T W_1.
+TEST(CarmCamera, RelativeMotionBetweenTwoPoses) {
+  const auto relative = [](double alpha_1, double beta_1, double alpha_2, double beta_2) {
+    const marrow::Camera first = view(alpha_1, beta_1), second = view(alpha_2, beta_2);
+    return second.camera_from_world * inverse(first.camera_from_world);
+  };
+  EXPECT_TRUE(relative(17, -33, 17, -33).rotation.isIdentity(1e-12));
+  EXPECT_LT(relative(17, -33, 17, -33).translation_mm.norm(), 1e-9);
+
+  const Eigen::Matrix3d w_1 = world_from_camera_rotation(marrow::radians(10), marrow::radians(20));
+  const Eigen::Matrix3d w_2 = world_from_camera_rotation(marrow::radians(-5), marrow::radians(110));
+  const marrow::RigidTransform motion = relative(10, 20, -5, 110);
+  EXPECT_TRUE(motion.rotation.isApprox(w_2.transpose() * w_1, 1e-12));
+  const Vector3d c_1 = -600 * w_1.col(2), c_2 = -600 * w_2.col(2);
+  EXPECT_TRUE(motion.translation_mm.isApprox(w_2.transpose() * (c_1 - c_2), 1e-12));
+  EXPECT_NEAR(marrow::degrees(marrow::geodesic_angle_rad(view(0, 0).camera_from_world.rotation,
+                                                         view(0, 90).camera_from_world.rotation)), 90, 1e-9);
+}
+
+TEST(CarmCamera, DefaultsAreTwoNamedViews) {
+  const auto cameras = carm(Options{});
+  EXPECT_EQ(cameras.names(), (std::vector<std::string>{"frontal", "lateral"}));
+  EXPECT_EQ(cameras[0].width_px, 512);
+}
+
+std::string message(const Options& options) {
+  try {
+    carm(options);
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(CarmCamera, DiagnosesWrongOptions) {
+  Options options;
+  options.alpha_deg = {0};
+  EXPECT_EQ(message(options), "names has 2 views, alpha_deg 1 and beta_deg 2 angles; give one of each per view");
+  options = {};
+  options.names = {"a", "a"};
+  EXPECT_EQ(message(options), "names: two views have the same name");
+  options = {};
+  options.source_to_isocentre_mm = 1200;
+  EXPECT_NE(message(options).find("must be less than source_to_detector_mm"), std::string::npos);
+  options = {};
+  options.names.clear();
+  EXPECT_EQ(message(options), "names: no view is named; name at least one");
+}
+
+}  // namespace
