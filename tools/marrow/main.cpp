@@ -1,1 +1,92 @@
-int main() { return 0; }
+// SPDX-License-Identifier: Apache-2.0
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace {
+
+void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& request) {
+  command->add_option("pipeline", request.file, "pipeline file (YAML)")->required();
+  command->add_option("inputs", request.inputs, "values of the pipeline's inputs, as name=value");
+  command->add_option("--set", request.overrides, "override, as node.option=value, node.uses=kind.name or node.in.port=reference")
+      ->take_all()->expected(1)->type_name("NODE.OPTION=VALUE");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace marrow::cli;
+  CLI::App app{"marrow finds the 3D pose of bone fragments in X-ray images, by pipelines of plugins described in YAML."};
+  app.require_subcommand(1);
+  app.footer("Plugins are looked for in the folders of MARROW_PLUGIN_PATH and beside the program's library; see 'marrow doctor'.");
+  int code = 0;
+
+  RunRequest run_request;
+  auto* run_command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
+  add_pipeline_arguments(run_command, run_request.pipeline);
+  run_command->add_option("--out", run_request.folder, "folder to write; new or empty (default: runs/NAME)");
+  run_command->add_option("--seed", run_request.seed, "seed of all randomness")->capture_default_str();
+  run_command->add_option("--threads", run_request.threads, "threads to use (default: all)")->check(CLI::Range(1, 1024));
+  run_command->add_flag("--quiet", run_request.quiet, "print only errors");
+  run_command->add_flag("--json", run_request.json, "print events as JSON, one a line");
+  run_command->callback([&] { code = run(run_request); });
+
+  PipelineRequest check_request;
+  bool check_json = false;
+  auto* check_command = app.add_subcommand("check", "check a pipeline and show every fault; loads no plugin");
+  add_pipeline_arguments(check_command, check_request);
+  check_command->add_flag("--json", check_json, "print the faults as JSON");
+  check_command->callback([&] { code = check(check_request, check_json); });
+
+  std::string kind;
+  bool list_json = false;
+  auto* list_command = app.add_subcommand("list", "list the nodes that can be used");
+  list_command->add_option("kind", kind, "only this kind");
+  list_command->add_flag("--json", list_json, "as JSON");
+  list_command->callback([&] { code = list(kind, list_json); });
+
+  std::string node;
+  bool inspect_yaml = false, inspect_json = false;
+  auto* inspect_command = app.add_subcommand("inspect", "show a node: inputs, outputs, options");
+  inspect_command->add_option("node", node, "kind.name")->required();
+  inspect_command->add_flag("--yaml", inspect_yaml, "print a snippet to paste into a pipeline");
+  inspect_command->add_flag("--json", inspect_json, "as JSON");
+  inspect_command->callback([&] { code = inspect(node, inspect_yaml, inspect_json); });
+
+  PipelineRequest graph_request;
+  bool dot = false;
+  auto* graph_command = app.add_subcommand("graph", "show a pipeline's graph, with what is called for each view or fragment");
+  add_pipeline_arguments(graph_command, graph_request);
+  graph_command->add_flag("--dot", dot, "as a DOT file for Graphviz");
+  graph_command->callback([&] { code = graph(graph_request, dot); });
+
+  std::filesystem::path schema_file;
+  auto* schema_command = app.add_subcommand("schema", "print the JSON Schema of pipelines, by which editors complete and check");
+  schema_command->add_option("--out", schema_file, "write it to this file");
+  schema_command->callback([&] { code = schema(schema_file); });
+
+  bool doctor_json = false;
+  auto* doctor_command = app.add_subcommand("doctor", "show the folders searched and the libraries found or refused, and why");
+  doctor_command->add_flag("--json", doctor_json, "as JSON");
+  doctor_command->callback([&] { code = doctor(doctor_json); });
+
+  std::filesystem::path library;
+  bool write = false;
+  auto* describe_command = app.add_subcommand("describe", "load one plugin library in a child process and print its manifest");
+  describe_command->add_option("library", library, "the .so file")->required();
+  describe_command->add_flag("--write", write, "write the manifest beside the library instead");
+  describe_command->callback([&] { code = describe(library, write); });
+
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    const int status = app.exit(error);
+    return status == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "marrow: error: %s\n", error.what());
+    return 2;
+  }
+  return code;
+}

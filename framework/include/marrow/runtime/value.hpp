@@ -59,6 +59,8 @@ struct Value {
   std::vector<std::string> names;
   std::vector<Value> items;
 
+  /// Of an absent item: why it could not be made ("node 'edges' failed"). Empty where there simply is none.
+  std::string missing;
   /// What identifies the value: the content hash of data, the recipe key of a function. Set by the executor.
   Digest key;
 

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <map>
+#include <string>
+#include <vector>
+
+namespace marrow {
+
+/// A place in a file: 1-based line and column; line 0 where there is none (a command-line argument).
+struct Place {
+  std::string file;
+  int line = 0;
+  int column = 0;
+};
+
+struct Diagnostic {
+  Place place;
+  std::string message;  ///< what is wrong, with what was got and expected
+  std::string hint;     ///< what to do; may be empty
+};
+
+/// Collects all faults of a file, so that they are shown together.
+class Diagnostics {
+ public:
+  void add(Place place, std::string message, std::string hint = {});
+  bool empty() const { return items_.empty(); }
+  std::size_t size() const { return items_.size(); }
+  /// By file, line and column.
+  std::vector<Diagnostic> sorted() const;
+  /// file:line:column: message, the source line with a caret, and the hint, for each.
+  std::string text() const;
+  /// Remembers a file's text, so that its lines can be shown.
+  void remember(const std::string& file, const std::string& text) { sources_[file] = text; }
+
+ private:
+  std::vector<Diagnostic> items_;
+  std::map<std::string, std::string> sources_;
+};
+
+/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string.
+std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known);
+
+/// "did you mean 'x'?" or, when nothing is near, "known: a, b, c".
+std::string suggestion(const std::string& wrong, const std::vector<std::string>& known);
+
+}  // namespace marrow

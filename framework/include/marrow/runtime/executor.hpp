@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "marrow/runtime/catalogue.hpp"
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow {
+
+/// What a run reports while it goes on. `item` names the place along the mapped axes ("lateral", "distal/final").
+struct RunEvent {
+  enum class Kind { started, progress, finished, failed, skipped, message, warning };
+  Kind kind = Kind::message;
+  std::string node, item, text;
+  double fraction = 0;
+  double seconds = 0;
+};
+
+struct RunSettings {
+  std::uint64_t seed = 1;
+  int threads = 0;  ///< 0 = as many as the machine has
+  const std::atomic<bool>* cancelled = nullptr;
+  std::function<void(const RunEvent&)> observer;  ///< called by one thread at a time
+};
+
+/// How one node fared.
+struct NodeRecord {
+  enum class Status { not_needed, done, skipped, failed, not_run, cancelled };
+  Status status = Status::not_needed;
+  std::string reason;          ///< of anything but done
+  double start_s = 0;          ///< after the run's start
+  double seconds = 0;          ///< of its calls together, wall time
+  int calls = 0;               ///< how often its function was called: once per item, once where recipes are the same
+  double peak_memory_mb = 0;   ///< most memory of the whole process while it ran
+  std::vector<Value> outputs;  ///< in the order of the node's outputs
+};
+const char* status_name(NodeRecord::Status status);
+
+struct RunResult {
+  std::vector<NodeRecord> nodes;  ///< in the order of Pipeline::nodes
+  double seconds = 0;
+  bool failed() const;
+  bool cancelled() const;
+};
+
+/// Evaluates what the pipeline's outputs need, independent nodes in parallel on one pool. A node that fails leaves the others
+/// going; what depends on it is not run. The same pipeline and seed give the same bytes at any number of threads.
+RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
+
+/// The value that a reference means in a result; absent where it could not be made. Throws Error for a name that a list
+/// does not have.
+Value value_of(const RunResult& result, const Reference& source);
+
+}  // namespace marrow

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/executor.hpp"
+
+namespace marrow {
+
+/// The folder that a run leaves behind: pipeline.yaml (resolved), run.json (what ran, with what, how long), log.txt, and
+/// outputs/ in formats that other programs open. Nothing that was there before is overwritten: the folder must be new or empty.
+class RunFolder {
+ public:
+  /// Throws Error when the folder holds anything or cannot be written to.
+  RunFolder(const std::filesystem::path& folder, const Pipeline& pipeline);
+
+  struct Written {
+    std::string output;
+    std::vector<std::string> files;  ///< relative to the folder
+    std::string fault;               ///< why it was not written; empty when it was
+  };
+  /// Writes the pipeline's outputs, as far as they were made.
+  std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue);
+  void append_log(const std::string& line);
+  void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings, const Catalogue& catalogue,
+                    const PipelineArguments& arguments, const std::vector<Written>& written);
+
+  const std::filesystem::path& path() const { return folder_; }
+  /// A folder name that is free: base, base-2, ...
+  static std::filesystem::path free_name(const std::filesystem::path& base);
+
+ private:
+  std::filesystem::path folder_;
+};
+
+/// The widest instruction set that run-time dispatch finds on this machine.
+std::string cpu_level();
+
+}  // namespace marrow

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/catalogue.hpp"
+
+#include <algorithm>
+#include <cstdlib>
+#include <sstream>
+
+#include "marrow/plugin.hpp"
+#include "marrow/runtime/kinds.hpp"
+
+namespace marrow {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> Catalogue::default_folders() {
+  std::vector<fs::path> folders;
+  if (const char* path = std::getenv("MARROW_PLUGIN_PATH")) {
+    std::istringstream stream(path);
+    for (std::string folder; std::getline(stream, folder, ':');)
+      if (!folder.empty()) folders.emplace_back(folder);
+  }
+  folders.push_back(framework_file().parent_path() / "marrow");
+  return folders;
+}
+
+Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders)) {
+  const Digest framework = file_digest(framework_file());
+  for (const fs::path& folder : folders_) {
+    std::vector<fs::path> files;
+    std::error_code error;
+    for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+      if (at->path().extension() == ".so") files.push_back(at->path());
+    std::sort(files.begin(), files.end());
+    for (const fs::path& file : files) {
+      try {
+        libraries_.push_back(library_info(file, framework));
+      } catch (const Error& error) {
+        libraries_.push_back({});
+        libraries_.back().file = file;
+        libraries_.back().refused = error.what();
+      }
+    }
+  }
+  for (std::size_t l = 0; l < libraries_.size(); ++l) {
+    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i) nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i) writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
+  }
+}
+
+Catalogue::~Catalogue() = default;
+
+std::vector<std::string> Catalogue::node_names() const {
+  std::vector<std::string> names;
+  for (const auto& [name, entry] : nodes_) names.push_back(name);
+  return names;
+}
+
+const NodeInfo* Catalogue::find(const std::string& name) const {
+  const auto found = nodes_.find(name);
+  return found == nodes_.end() ? nullptr : &libraries_[found->second.library].nodes[found->second.index];
+}
+
+const LibraryInfo* Catalogue::library_of(const std::string& name) const {
+  const auto found = nodes_.find(name);
+  return found == nodes_.end() ? nullptr : &libraries_[found->second.library];
+}
+
+std::vector<PortInfo> Catalogue::ports_of_kind(const std::string& kind) const {
+  std::vector<PortInfo> ports;
+  const auto add = [&](PortInfo port) {
+    if (std::none_of(ports.begin(), ports.end(), [&](const PortInfo& p) { return p.name == port.name; })) ports.push_back(std::move(port));
+  };
+  for (const auto& [name, entry] : nodes_) {
+    const NodeInfo& node = libraries_[entry.library].nodes[entry.index];
+    if (node.kind() == kind)
+      for (const PortInfo& port : node.inputs) add(port);
+  }
+  if (const Kind* contract = find_kind(kind))
+    for (const KindPort& port : contract->inputs) {
+      PortInfo info;
+      info.name = port.name;
+      info.type.id = port.type;
+      info.axis = port.axis;
+      add(std::move(info));
+    }
+  return ports;
+}
+
+const WriterInfo* Catalogue::find_writer(const TypeInfo& type) const {
+  const auto found = writers_.find(type.id);
+  if (found == writers_.end()) return nullptr;
+  const WriterInfo& writer = libraries_[found->second.library].writers[found->second.index];
+  return writer.type == type ? &writer : nullptr;
+}
+
+const Plugin& Catalogue::load_plugin(std::size_t library) const {
+  const std::scoped_lock lock(mutex_);
+  std::unique_ptr<Plugin>& plugin = loaded_[library];
+  if (!plugin) plugin = load_library(libraries_[library].file);
+  return *plugin;
+}
+
+const NodeDefinition& Catalogue::load(const std::string& name) const {
+  const Entry& entry = nodes_.at(name);
+  const Plugin& plugin = load_plugin(entry.library);
+  if (entry.index >= plugin.nodes.size() || plugin.nodes[entry.index].info.name != name)
+    throw Error(libraries_[entry.library].file.string() + " does not hold the node '" + name + "' that its manifest promises; describe it anew");
+  return plugin.nodes[entry.index];
+}
+
+const WriterDefinition& Catalogue::load_writer(const TypeInfo& type) const {
+  const Entry& entry = writers_.at(type.id);
+  return load_plugin(entry.library).writers.at(entry.index);
+}
+
+}  // namespace marrow

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cstdint>
+#include <vector>
+
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow {
+
+/// The recipe of one call of a node: its name, the options that affect its result (a path by the content of all that it
+/// names) and the keys of its inputs. Without the build id, so that a rebuilt plugin draws the same random numbers.
+Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
+
+/// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
+Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
+
+/// The seed that a call draws from.
+std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed);
+
+}  // namespace marrow

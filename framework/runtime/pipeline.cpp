@@ -1,0 +1,405 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a written pipeline to a checked graph: names looked up, options converted, wires typed, axes found.
+#include "marrow/runtime/pipeline.hpp"
+
+#include <algorithm>
+#include <set>
+#include <sstream>
+
+#include "marrow/runtime/kinds.hpp"
+#include "pipeline_text.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
+  return parts;
+}
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& items) {
+  std::vector<std::string> names;
+  for (const T& item : items) names.push_back(item.name);
+  return names;
+}
+
+bool contains(const std::vector<std::string>& list, const std::string& item) {
+  return std::find(list.begin(), list.end(), item) != list.end();
+}
+
+std::string joined(const std::vector<std::string>& list, const char* separator) {
+  std::string text;
+  for (const std::string& item : list) text += (text.empty() ? "" : separator) + item;
+  return text;
+}
+
+class Resolver {
+ public:
+  Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics)
+      : written_(written), catalogue_(catalogue), diagnostics_(diagnostics) {}
+
+  Pipeline resolve() {
+    pipeline_.name = written_.name.empty() ? written_.file.stem().string() : written_.name;
+    pipeline_.help = written_.help;
+    pipeline_.file = written_.file;
+    pipeline_.notes = written_.notes;
+    for (const WrittenNode& node : written_.nodes) resolve_node(node);
+    for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
+    for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
+    if (diagnostics_.empty()) sort_nodes();
+    if (diagnostics_.empty())
+      for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) find_axes(i);
+    if (diagnostics_.empty()) check_outputs();
+    return std::move(pipeline_);
+  }
+
+ private:
+  void resolve_node(const WrittenNode& written) {
+    PipelineNode node;
+    node.id = written.id;
+    node.place = written.place;
+    if (const NodeInfo* info = catalogue_.find(written.uses)) {
+      node.info = *info;
+      resolve_options(written, node);
+    } else if (!written.uses.empty()) {
+      const std::vector<std::string> names = catalogue_.node_names();
+      const std::string kind = written.uses.substr(0, written.uses.find('.'));
+      std::vector<std::string> siblings;
+      for (const std::string& name : names)
+        if (name.starts_with(kind + ".")) siblings.push_back(name);
+      std::string hint = suggestion(written.uses, siblings.empty() ? names : siblings);
+      for (const LibraryInfo& library : catalogue_.libraries())
+        if (!library.refused.empty() && library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
+          hint += "; " + library.file.filename().string() + " was refused: it " + library.refused;
+      diagnostics_.add(written.uses_place, "unknown node '" + written.uses + "'", hint);
+    }
+    pipeline_.nodes.push_back(std::move(node));
+  }
+
+  void resolve_options(const WrittenNode& written, PipelineNode& node) {
+    const std::vector<std::string> known = names_of(node.info.options);
+    for (const auto& [name, value] : written.options)
+      if (!contains(known, name))
+        diagnostics_.add(value.place, "'" + node.info.name + "' has no option '" + name + "'", suggestion(name, known));
+    for (const OptionInfo& option : node.info.options) {
+      OptionValue result = option.default_value;
+      const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
+      if (given != written.options.end()) {
+        const WrittenValue& value = given->second;
+        StrictYaml yaml(value.place.file, diagnostics_);
+        const auto substitute = [&](const std::string& text, const Place& place) { return substituted(text, place.line ? place : value.place); };
+        const auto converted = yaml.option(value.value, value.place, option, "option '" + option.name + "' of " + node.info.name, substitute);
+        if (converted) result = in_folder(*converted, option.type, value.folder);
+      } else if (option.required) {
+        diagnostics_.add(written.place, "node '" + node.id + "': option '" + option.name + "' of " + node.info.name + " must be given", option.help);
+      }
+      node.options.push_back(std::move(result));
+    }
+  }
+
+  std::string substituted(const std::string& text, const Place& place) {
+    std::string result;
+    for (std::size_t i = 0; i < text.size(); ++i) {
+      if (text[i] != '$') {
+        result += text[i];
+        continue;
+      }
+      std::size_t end = i + 1;
+      while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
+      const std::string name = text.substr(i + 1, end - i - 1);
+      const auto input = written_.inputs.find(name);
+      if (input != written_.inputs.end()) {
+        result += input->second;
+      } else {
+        std::vector<std::string> names;
+        for (const auto& [known, value] : written_.inputs) names.push_back(known);
+        diagnostics_.add(place, "the pipeline has no input '" + name + "'", suggestion(name, names));
+      }
+      i = end - 1;
+    }
+    return result;
+  }
+
+  static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
+    const auto full = [&](const std::string& text) { return text.empty() ? text : (folder / text).lexically_normal().string(); };
+    if (type == OptionType::path) return full(std::get<std::string>(value));
+    if (type == OptionType::paths)
+      for (std::string& text : std::get<std::vector<std::string>>(value)) text = full(text);
+    return value;
+  }
+
+  void resolve_wires(std::size_t index) {
+    const WrittenNode& written = written_.nodes[index];
+    PipelineNode& node = pipeline_.nodes[index];
+    if (node.info.name.empty()) return;
+    const std::vector<PortInfo> of_kind = catalogue_.ports_of_kind(node.info.kind());
+    for (const auto& [name, value] : written.wires) {
+      const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+      const bool own = port != node.info.inputs.end();
+      const auto sibling = std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+      if (!own && sibling == of_kind.end()) {
+        diagnostics_.add(value.place, "'" + node.info.name + "' has no input '" + name + "'", suggestion(name, names_of(of_kind)));
+        continue;
+      }
+      // A port that only siblings use is checked like any other, and then left unwired.
+      Wire wire = resolve_wire(value, own ? *port : *sibling, node);
+      wire.port = own ? int(port - node.info.inputs.begin()) : -1;
+      if (own) node.wires.push_back(std::move(wire));
+    }
+    for (const PortInfo& port : node.info.inputs)
+      if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(), [&](const auto& wire) { return wire.first == port.name; }))
+        diagnostics_.add(written.place, "node '" + node.id + "': input '" + port.name + "' of " + node.info.name + " is not wired",
+                         "add  in: {" + port.name + ": ...}  with a " + port.type.id + " (" + port.help + ")");
+  }
+
+  Wire resolve_wire(const WrittenValue& value, const PortInfo& port, const PipelineNode& node) {
+    Wire wire;
+    const auto add = [&](const YAML::Node& text, const Place& place) {
+      if (!text.IsScalar()) {
+        diagnostics_.add(place, "input '" + port.name + "' must name a node", "write it as  " + port.name + ": node  or  node.output");
+        return;
+      }
+      Reference source = resolve_reference(text.Scalar(), place, &port.type);
+      check_type(source, port, node);
+      wire.sources.push_back(std::move(source));
+    };
+    if (!value.value.IsSequence()) {
+      add(value.value, value.place);
+      return wire;
+    }
+    wire.is_list_literal = true;
+    if (port.axis.empty()) {
+      diagnostics_.add(value.place, "input '" + port.name + "' of " + node.info.name + " takes one " + port.type.id + ", not a list");
+      return wire;
+    }
+    StrictYaml yaml(value.place.file, diagnostics_);
+    for (const YAML::Node& item : value.value) add(item, value.place.line ? yaml.place(item) : value.place);
+    return wire;
+  }
+
+  Reference resolve_reference(const std::string& text, const Place& place, const TypeInfo* type) {
+    Reference source{text, place, -1, -1, {}};
+    std::vector<std::string> parts = split(text), ids;
+    for (const PipelineNode& node : pipeline_.nodes) ids.push_back(node.id);
+    const auto found = std::find(ids.begin(), ids.end(), parts.empty() ? "" : parts[0]);
+    if (found == ids.end()) {
+      diagnostics_.add(place, "there is no node '" + (parts.empty() ? text : parts[0]) + "'", suggestion(parts.empty() ? text : parts[0], ids));
+      return source;
+    }
+    const std::size_t index = std::size_t(found - ids.begin());
+    const std::vector<PortInfo>& outputs = pipeline_.nodes[index].info.outputs;
+    if (outputs.empty()) return source;  // its node is unknown, which has been said
+    std::size_t used = 1;
+    int output = -1;
+    for (std::size_t i = 0; i < outputs.size(); ++i)
+      if (parts.size() > 1 && outputs[i].name == parts[1]) output = int(i);
+    if (output >= 0) {
+      used = 2;
+    } else {
+      output = default_output(outputs, type, parts.size() > 1);
+    }
+    if (output < 0) {
+      if (parts.size() > 1)
+        diagnostics_.add(place, "node '" + parts[0] + "' has no output '" + parts[1] + "'", suggestion(parts[1], names_of(outputs)));
+      else
+        diagnostics_.add(place, "node '" + parts[0] + "' has several outputs" + (type ? " and not just one " + type->id : ""),
+                         "say which: " + parts[0] + "." + joined(names_of(outputs), ", " ));
+      return source;
+    }
+    source.node = int(index);
+    source.output = output;
+    source.items.assign(parts.begin() + std::ptrdiff_t(used), parts.end());
+    return source;
+  }
+
+  /// The output that a bare node's name means: its only one, or the only one of the wanted type.
+  static int default_output(const std::vector<PortInfo>& outputs, const TypeInfo* type, bool picks_item) {
+    if (outputs.size() == 1) return 0;
+    if (picks_item || !type) return -1;
+    int found = -1;
+    for (std::size_t i = 0; i < outputs.size(); ++i)
+      if (outputs[i].type.id == type->id) {
+        if (found >= 0) return -1;
+        found = int(i);
+      }
+    return found;
+  }
+
+  void check_type(const Reference& source, const PortInfo& port, const PipelineNode& node) {
+    if (source.node < 0) return;
+    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
+    const PortInfo& output = from.info.outputs[std::size_t(source.output)];
+    const bool contract_only = port.type.size == 0;
+    const Kind* kind = find_kind(node.info.kind());
+    if (output.type.id == "truth" && (!kind || !kind->sees_truth)) {
+      diagnostics_.add(source.place, "the truth may be wired only to nodes that evaluate or render, not to " + node.info.name,
+                       "a method that sees the truth proves nothing");
+    } else if (contract_only ? output.type.id != port.type.id : output.type != port.type) {
+      const bool layout = output.type.id == port.type.id;
+      diagnostics_.add(source.place,
+                       "input '" + port.name + "' of " + node.info.name + " expects " + port.type.id + ", but '" + source.text + "' is " +
+                           output.type.id + " (" + output.help + ")",
+                       layout ? "the two plugins were built with different versions of this type; rebuild both" : "");
+    }
+  }
+
+  void resolve_output(const std::string& name, const WrittenValue& value) {
+    if (name.find('/') != std::string::npos || name.empty() || name[0] == '.')
+      diagnostics_.add(value.place, "an output's name becomes a file name: '" + name + "' cannot be one");
+    if (!value.value.IsScalar()) {
+      diagnostics_.add(value.place, "output '" + name + "' must name a node or one of its outputs");
+      return;
+    }
+    pipeline_.outputs.push_back({name, resolve_reference(value.value.Scalar(), value.place, nullptr)});
+  }
+
+  /// Sources before users, in the file's order otherwise.
+  void sort_nodes() {
+    std::vector<PipelineNode>& nodes = pipeline_.nodes;
+    std::vector<int> place_of(nodes.size(), -1);
+    std::vector<PipelineNode> sorted;
+    for (bool moved = true; moved && sorted.size() < nodes.size();) {
+      moved = false;
+      for (std::size_t i = 0; i < nodes.size(); ++i) {
+        if (place_of[i] >= 0) continue;
+        bool ready = true;
+        for (const Wire& wire : nodes[i].wires)
+          for (const Reference& source : wire.sources) ready = ready && place_of[std::size_t(source.node)] >= 0;
+        if (!ready) continue;
+        place_of[i] = int(sorted.size());
+        sorted.push_back(nodes[i]);
+        moved = true;
+      }
+    }
+    if (sorted.size() < nodes.size()) {
+      std::vector<std::string> stuck;
+      std::size_t first = nodes.size();
+      for (std::size_t i = 0; i < nodes.size(); ++i)
+        if (place_of[i] < 0) {
+          stuck.push_back(nodes[i].id);
+          first = std::min(first, i);
+        }
+      diagnostics_.add(nodes[first].place, "these nodes wait for each other in a circle: " + joined(stuck, ", "));
+      return;
+    }
+    for (PipelineNode& node : sorted)
+      for (Wire& wire : node.wires)
+        for (Reference& source : wire.sources) source.node = place_of[std::size_t(source.node)];
+    for (PipelineOutput& output : pipeline_.outputs) output.source.node = place_of[std::size_t(output.source.node)];
+    nodes = std::move(sorted);
+  }
+
+  void check_picks(const Reference& source) {
+    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
+    const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
+    if (source.items.size() > axes)
+      diagnostics_.add(source.place, "'" + source.text + "' picks '" + source.items[axes] + "', but " +
+                                         (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
+  }
+
+  void find_axes(std::size_t index) {
+    PipelineNode& node = pipeline_.nodes[index];
+    for (const Wire& wire : node.wires) {
+      const std::string& consumed = node.info.inputs[std::size_t(wire.port)].axis;
+      for (const Reference& source : wire.sources) {
+        check_picks(source);
+        if (!diagnostics_.empty()) return;
+        for (const std::string& axis : pipeline_.axes_of(source)) {
+          if (axis == consumed && wire.is_list_literal)
+            diagnostics_.add(source.place, "'" + source.text + "' is already a list over '" + axis + "'", "pick one item of it");
+          else if (axis != consumed && !contains(node.mapped_axes, axis))
+            node.mapped_axes.push_back(axis);
+        }
+      }
+    }
+    for (const PortInfo& output : node.info.outputs)
+      if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
+        diagnostics_.add(node.place, "node '" + node.id + "' is called for each item along '" + output.axis + "', but its output '" +
+                                         output.name + "' is itself a list over it", "pick one item of its input");
+  }
+
+  void check_outputs() {
+    for (const PipelineOutput& output : pipeline_.outputs) check_picks(output.source);
+  }
+
+  const WrittenPipeline& written_;
+  const Catalogue& catalogue_;
+  Diagnostics& diagnostics_;
+  Pipeline pipeline_;
+};
+
+}  // namespace
+
+std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
+  const PipelineNode& node = nodes[std::size_t(source.node)];
+  std::vector<std::string> axes = node.mapped_axes;
+  const std::string& own = node.info.outputs[std::size_t(source.output)].axis;
+  if (!own.empty()) axes.push_back(own);
+  axes.erase(axes.begin(), axes.begin() + std::ptrdiff_t(std::min(axes.size(), source.items.size())));
+  return axes;
+}
+
+std::vector<bool> Pipeline::needed() const {
+  std::vector<bool> result(nodes.size(), false);
+  for (const PipelineOutput& output : outputs) result[std::size_t(output.source.node)] = true;
+  for (std::size_t i = nodes.size(); i-- > 0;)
+    if (result[i])
+      for (const Wire& wire : nodes[i].wires)
+        for (const Reference& source : wire.sources) result[std::size_t(source.node)] = true;
+  return result;
+}
+
+Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue, Diagnostics& diagnostics,
+                       bool inputs_required) {
+  const WrittenPipeline written = read_written_pipeline(file, arguments, diagnostics, inputs_required);
+  if (written.nodes.empty()) return {};
+  return Resolver(written, catalogue, diagnostics).resolve();
+}
+
+std::string resolved_yaml(const Pipeline& pipeline) {
+  YAML::Emitter out;
+  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value << pipeline.name;
+  out << YAML::Key << "nodes" << YAML::Value << YAML::BeginMap;
+  out.SetDoublePrecision(17);
+  for (const PipelineNode& node : pipeline.nodes) {
+    out << YAML::Key << node.id << YAML::Value << YAML::BeginMap << YAML::Key << "uses" << YAML::Value << node.info.name;
+    if (!node.wires.empty()) {
+      out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
+      for (const Wire& wire : node.wires) {
+        out << YAML::Key << node.info.inputs[std::size_t(wire.port)].name << YAML::Value;
+        if (wire.is_list_literal) out << YAML::BeginSeq;
+        for (const Reference& source : wire.sources) out << source.text;
+        if (wire.is_list_literal) out << YAML::EndSeq;
+      }
+      out << YAML::EndMap;
+    }
+    if (!node.options.empty()) {
+      out << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
+      for (std::size_t i = 0; i < node.options.size(); ++i) {
+        out << YAML::Key << node.info.options[i].name << YAML::Value;
+        std::visit([&](const auto& value) {
+          if constexpr (requires { value.begin(); value.push_back(value[0]); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
+            out << YAML::Flow << YAML::BeginSeq;
+            for (const auto& item : value) out << item;
+            out << YAML::EndSeq;
+          } else {
+            out << value;
+          }
+        }, node.options[i]);
+      }
+      out << YAML::EndMap;
+    }
+    out << YAML::EndMap;
+  }
+  out << YAML::EndMap << YAML::Key << "outputs" << YAML::Value << YAML::BeginMap;
+  for (const PipelineOutput& output : pipeline.outputs) out << YAML::Key << output.name << YAML::Value << output.source.text;
+  out << YAML::EndMap << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace marrow

@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline_text.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <sstream>
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Reader {
+ public:
+  Reader(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics, bool inputs_required)
+      : arguments_(arguments), diagnostics_(diagnostics), inputs_required_(inputs_required), yaml_(file.string(), diagnostics) {
+    pipeline_.file = file;
+    folder_ = fs::absolute(file).parent_path();
+  }
+
+  WrittenPipeline read() {
+    std::ifstream stream(pipeline_.file, std::ios::binary);
+    if (!stream || fs::is_directory(pipeline_.file)) {
+      diagnostics_.add({pipeline_.file.string()}, "the pipeline file cannot be read", "check the path");
+      return pipeline_;
+    }
+    std::ostringstream text;
+    text << stream.rdbuf();
+    diagnostics_.remember(pipeline_.file.string(), text.str());
+    const YAML::Node root = yaml_.parse(text.str());
+    if (!diagnostics_.empty()) return pipeline_;
+    read_root(root);
+    for (const auto& [key, value] : arguments_.overrides) apply_override(key, value);
+    return pipeline_;
+  }
+
+ private:
+  void read_root(const YAML::Node& root) {
+    static const std::vector<std::string> kKeys{"marrow", "name", "help", "inputs", "nodes", "outputs"};
+    const Place start{pipeline_.file.string(), 1, 1};
+    bool versioned = false, has_nodes = false, has_outputs = false;
+    for (const YamlEntry& entry : yaml_.map(root, start, "the pipeline", &kKeys)) {
+      if (entry.key == "marrow") {
+        versioned = true;
+        const auto version = yaml_.integer(entry.value, entry.place, "marrow");
+        if (version && *version != 1)
+          yaml_.fault(entry.place, "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+      }
+      if (entry.key == "name") pipeline_.name = yaml_.text(entry.value, entry.place, "name").value_or("");
+      if (entry.key == "help") pipeline_.help = yaml_.text(entry.value, entry.place, "help").value_or("");
+      if (entry.key == "inputs") read_inputs(entry);
+      if (entry.key == "nodes") {
+        has_nodes = true;
+        for (const YamlEntry& node : yaml_.map(entry.value, entry.place, "nodes")) read_node(node);
+      }
+      if (entry.key == "outputs") {
+        has_outputs = true;
+        for (const YamlEntry& output : yaml_.map(entry.value, entry.place, "outputs"))
+          pipeline_.outputs.emplace_back(output.key, WrittenValue{output.place, output.value, folder_});
+      }
+    }
+    if (!root.IsMap()) return;
+    if (!versioned) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
+    if (!has_nodes) yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
+    if (!has_outputs) yaml_.fault(start, "the key 'outputs' is missing", "name what the pipeline is to compute, as  outputs: {name: node}");
+    check_given_inputs();
+  }
+
+  void read_inputs(const YamlEntry& section) {
+    static const std::vector<std::string> kKeys{"type", "default", "help"};
+    static const std::vector<std::string> kTypes{"path", "text", "number", "integer", "boolean"};
+    for (const YamlEntry& input : yaml_.map(section.value, section.place, "inputs")) {
+      declared_.push_back(input.key);
+      OptionInfo info;
+      info.type = OptionType::text;
+      std::optional<WrittenValue> value;
+      for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input '" + input.key + "'", &kKeys)) {
+        if (entry.key == "help") yaml_.text(entry.value, entry.place, "help");
+        if (entry.key == "default") value = WrittenValue{entry.place, entry.value, folder_};
+        if (entry.key != "type") continue;
+        const auto type = yaml_.text(entry.value, entry.place, "type");
+        if (!type) continue;
+        if (std::find(kTypes.begin(), kTypes.end(), *type) == kTypes.end())
+          yaml_.fault(entry.place, "unknown type '" + *type + "' of input '" + input.key + "'", suggestion(*type, kTypes));
+        if (*type == "path") info.type = OptionType::path;
+        if (*type == "number") info.type = OptionType::number;
+        if (*type == "integer") info.type = OptionType::integer;
+        if (*type == "boolean") info.type = OptionType::boolean;
+      }
+      for (const auto& [name, text] : arguments_.inputs)
+        if (name == input.key) value = WrittenValue{{name + "=" + text}, YAML::Node(text), fs::current_path()};
+      set_input(input, info, value);
+    }
+  }
+
+  void set_input(const YamlEntry& input, const OptionInfo& info, const std::optional<WrittenValue>& value) {
+    if (!value) {
+      pipeline_.missing_inputs.push_back(input.key);
+      pipeline_.inputs[input.key] = info.type == OptionType::path || info.type == OptionType::text ? "" : "0";
+      if (info.type == OptionType::boolean) pipeline_.inputs[input.key] = "false";
+      if (inputs_required_)
+        yaml_.fault(input.place, "input '" + input.key + "' has no value", "give it on the command line as  " + input.key + "=VALUE");
+      return;
+    }
+    const auto no_names = [](const std::string& text, const Place&) { return text; };
+    if (!yaml_.option(value->value, value->place, info, "input '" + input.key + "'", no_names)) return;
+    std::string text = value->value.Scalar();
+    if (info.type == OptionType::path) text = (value->folder / text).lexically_normal().string();
+    pipeline_.inputs[input.key] = text;
+  }
+
+  void check_given_inputs() {
+    for (const auto& [name, text] : arguments_.inputs)
+      if (std::find(declared_.begin(), declared_.end(), name) == declared_.end())
+        diagnostics_.add({name + "=" + text}, "the pipeline has no input '" + name + "'", suggestion(name, declared_));
+  }
+
+  void read_node(const YamlEntry& entry) {
+    static const std::vector<std::string> kKeys{"uses", "with", "in"};
+    WrittenNode node;
+    node.id = entry.key;
+    node.place = entry.place;
+    node.uses_place = entry.place;
+    if (entry.key.find('.') != std::string::npos)
+      yaml_.fault(entry.place, "the node's name '" + entry.key + "' has a dot", "dots are for outputs, as in case.views");
+    bool has_uses = false;
+    for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node '" + entry.key + "'", &kKeys)) {
+      if (part.key == "uses") {
+        has_uses = true;
+        node.uses_place = yaml_.place(part.value);
+        node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
+      } else {
+        auto& target = part.key == "with" ? node.options : node.wires;
+        for (const YamlEntry& item : yaml_.map(part.value, part.place, "'" + part.key + "' of node '" + node.id + "'"))
+          target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
+      }
+    }
+    if (!has_uses && entry.value.IsMap()) yaml_.fault(entry.place, "node '" + entry.key + "' does not say what it uses", "add  uses: kind.name");
+    pipeline_.nodes.push_back(std::move(node));
+  }
+
+  void apply_override(const std::string& key, const std::string& text) {
+    const Place place{"--set " + key + "=" + text};
+    StrictYaml yaml(place.file, diagnostics_);
+    const std::size_t dot = key.find('.');
+    std::vector<std::string> ids;
+    for (const WrittenNode& node : pipeline_.nodes) ids.push_back(node.id);
+    const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(), [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
+    if (dot == std::string::npos || dot + 1 == key.size()) {
+      diagnostics_.add(place, "an override is node.option=value, node.uses=kind.name or node.in.port=reference");
+      return;
+    }
+    if (node == pipeline_.nodes.end()) {
+      diagnostics_.add(place, "the pipeline has no node '" + key.substr(0, dot) + "'", suggestion(key.substr(0, dot), ids));
+      return;
+    }
+    const std::string what = key.substr(dot + 1);
+    const WrittenValue value{place, yaml.parse(text), fs::current_path()};
+    if (what == "uses") {
+      // `with` was written for the node that is replaced: its options mean nothing to another one.
+      if (text != node->uses && !node->options.empty()) {
+        pipeline_.notes.push_back("node '" + node->id + "': the options written for " + node->uses + " are not used by " + text);
+        node->options.clear();
+      }
+      node->uses = text;
+      node->uses_place = place;
+      return;
+    }
+    auto& target = what.starts_with("in.") ? node->wires : node->options;
+    const std::string name = what.starts_with("in.") ? what.substr(3) : what;
+    const auto old = std::find_if(target.begin(), target.end(), [&](const auto& item) { return item.first == name; });
+    if (old != target.end()) old->second = value;
+    else target.emplace_back(name, value);
+  }
+
+  const PipelineArguments& arguments_;
+  Diagnostics& diagnostics_;
+  bool inputs_required_;
+  StrictYaml yaml_;
+  WrittenPipeline pipeline_;
+  fs::path folder_;
+  std::vector<std::string> declared_;
+};
+
+}  // namespace
+
+WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics,
+                                      bool inputs_required) {
+  return Reader(file, arguments, diagnostics, inputs_required).read();
+}
+
+}  // namespace marrow

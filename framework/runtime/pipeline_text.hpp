@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/pipeline.hpp"
+#include "strict_yaml.hpp"
+
+namespace marrow {
+
+/// A value as written, with the place it was written at and the folder that relative paths in it start from.
+struct WrittenValue {
+  Place place;
+  YAML::Node value;
+  std::filesystem::path folder;
+};
+
+struct WrittenNode {
+  std::string id;
+  Place place;
+  std::string uses;
+  Place uses_place;
+  std::vector<std::pair<std::string, WrittenValue>> options;
+  std::vector<std::pair<std::string, WrittenValue>> wires;
+};
+
+/// A pipeline file as written, with the command line's overrides applied and before any name in it was looked up.
+struct WrittenPipeline {
+  std::string name, help;
+  std::filesystem::path file;
+  std::map<std::string, std::string> inputs;     ///< values, as texts
+  std::vector<std::string> missing_inputs;       ///< declared, with neither a value nor a default
+  std::vector<WrittenNode> nodes;
+  std::vector<std::pair<std::string, WrittenValue>> outputs;
+  std::vector<std::string> notes;
+};
+
+WrittenPipeline read_written_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
+                                      Diagnostics& diagnostics, bool inputs_required);
+
+}  // namespace marrow

@@ -1,0 +1,173 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/run_folder.hpp"
+
+#include <chrono>
+#include <ctime>
+#include <fstream>
+#include <set>
+#include <thread>
+
+#include "manifest.hpp"
+#include "mapping.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+void write_file(const fs::path& file, const std::string& text) {
+  std::ofstream stream(file, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
+}
+
+/// An item's name becomes a file name.
+std::string file_name(std::string name) {
+  for (char& c : name)
+    if (c == '/' || c == '\\' || c == '\0') c = '_';
+  return name.empty() || name[0] == '.' ? "_" + name : name;
+}
+
+void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue, RunFolder::Written& written) {
+  if (value.is_list()) {
+    fs::create_directories(stem);
+    for (std::size_t i = 0; i < value.items.size(); ++i)
+      write_value(value.items[i], stem / file_name(value.names[i]), root, catalogue, written);
+    return;
+  }
+  if (value.is_absent()) {
+    if (!value.missing.empty()) written.fault = "not made: " + value.missing;
+    return;
+  }
+  const WriterInfo* writer = catalogue.find_writer(value.type);
+  if (!writer) {
+    written.fault = "no plugin writes values of type '" + value.type.id + "'";
+    return;
+  }
+  const fs::path file = stem.string() + writer->extension;
+  try {
+    catalogue.load_writer(value.type).write(value.data.get(), file.string());
+    written.files.push_back(fs::relative(file, root).string());
+  } catch (const std::exception& error) {
+    written.fault = error.what();
+  }
+}
+
+std::string utc_now() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  gmtime_r(&now, &parts);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", &parts);
+  return text;
+}
+
+json json_of(const NodeRecord& record, const PipelineNode& node) {
+  json j = {{"id", node.id},
+            {"uses", node.info.name},
+            {"status", status_name(record.status)},
+            {"calls", record.calls},
+            {"start_s", record.start_s},
+            {"seconds", record.seconds},
+            {"peak_process_memory_mb", record.peak_memory_mb},
+            {"keys", json::object()}};
+  if (!record.reason.empty()) j["reason"] = record.reason;
+  for (std::size_t i = 0; i < record.outputs.size(); ++i) j["keys"][node.info.outputs[i].name] = key_of(record.outputs[i]).hex();
+  return j;
+}
+
+json plugins_used(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue) {
+  json list = json::array();
+  std::set<fs::path> seen;
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    const LibraryInfo* library = catalogue.library_of(pipeline.nodes[i].info.name);
+    if (result.nodes[i].status == NodeRecord::Status::not_needed || !library || !seen.insert(library->file).second) continue;
+    json linked = json::array();
+    for (const LinkedLibrary& one : library->linked) linked.push_back(fs::path(one.path).filename().string());
+    list.push_back({{"file", library->file.filename().string()}, {"build_id", library->build_id.hex()}, {"links", linked}});
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string cpu_level() {
+#if defined(__x86_64__)
+  if (__builtin_cpu_supports("avx512f")) return "x86-64 with AVX-512";
+  if (__builtin_cpu_supports("avx2")) return "x86-64 with AVX2";
+  if (__builtin_cpu_supports("avx")) return "x86-64 with AVX";
+  return "x86-64";
+#else
+  return "arm64";
+#endif
+}
+
+RunFolder::RunFolder(const fs::path& folder, const Pipeline& pipeline) : folder_(folder) {
+  std::error_code error;
+  if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error)))
+    throw Error("the output folder " + folder.string() + " is already there and not empty; choose another with --out, or remove it");
+  fs::create_directories(folder / "outputs", error);
+  if (error) throw Error("cannot make the output folder " + folder.string() + ": " + error.message() + "; choose another with --out");
+  write_file(folder / "pipeline.yaml", resolved_yaml(pipeline));
+  write_file(folder / "log.txt", "");
+}
+
+std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue) {
+  std::vector<Written> all;
+  for (const PipelineOutput& output : pipeline.outputs) {
+    Written written{output.name, {}, ""};
+    try {
+      write_value(value_of(result, output.source), folder_ / "outputs" / output.name, folder_, catalogue, written);
+    } catch (const std::exception& error) {
+      written.fault = error.what();
+    }
+    all.push_back(std::move(written));
+  }
+  return all;
+}
+
+void RunFolder::append_log(const std::string& line) {
+  std::ofstream stream(folder_ / "log.txt", std::ios::app);
+  stream << line << '\n';
+}
+
+void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings, const Catalogue& catalogue,
+                             const PipelineArguments& arguments, const std::vector<Written>& written) {
+  json record = {{"marrow", MARROW_VERSION},
+                 {"framework", file_digest(framework_file()).hex()},
+                 {"pipeline", pipeline.name},
+                 {"finished", utc_now()},
+                 {"status", result.cancelled() ? "cancelled" : result.failed() ? "failed" : "done"},
+                 {"seconds", result.seconds},
+                 {"seed", settings.seed},
+                 {"threads", settings.threads > 0 ? settings.threads : int(std::thread::hardware_concurrency())},
+                 {"cpu_level", cpu_level()},
+                 {"inputs", json::object()},
+                 {"overrides", json::array()},
+                 {"nodes", json::array()},
+                 {"plugins", plugins_used(pipeline, result, catalogue)},
+                 {"outputs", json::array()}};
+  for (const auto& [name, value] : arguments.inputs) record["inputs"][name] = value;
+  for (const auto& [name, value] : arguments.overrides) record["overrides"].push_back(name + "=" + value);
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    if (result.nodes[i].status != NodeRecord::Status::not_needed) record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i]));
+  for (const Written& output : written) {
+    record["outputs"].push_back({{"name", output.output}, {"files", output.files}});
+    if (!output.fault.empty()) record["outputs"].back()["fault"] = output.fault;
+  }
+  write_file(folder_ / "run.json", record.dump(1) + "\n");
+}
+
+fs::path RunFolder::free_name(const fs::path& base) {
+  std::error_code error;
+  if (!fs::exists(base, error)) return base;
+  for (int i = 2;; ++i) {
+    const fs::path candidate = base.string() + "-" + std::to_string(i);
+    if (!fs::exists(candidate, error)) return candidate;
+  }
+}
+
+}  // namespace marrow

@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "strict_yaml.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+namespace marrow {
+namespace {
+
+std::string describe(const YAML::Node& node) {
+  if (!node.IsDefined() || node.IsNull()) return "nothing";
+  if (node.IsMap()) return "a map";
+  if (node.IsSequence()) return "a list";
+  return "'" + node.Scalar() + "'";
+}
+
+/// A quoted scalar is a text even when it looks like a number.
+bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
+
+std::string show(double value) {
+  std::ostringstream out;
+  out << value;
+  return out.str();
+}
+
+}  // namespace
+
+YAML::Node StrictYaml::parse(const std::string& text) {
+  try {
+    return YAML::Load(text);
+  } catch (const YAML::ParserException& error) {
+    fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
+  } catch (const YAML::Exception& error) {
+    fault({file_, error.mark.line + 1, error.mark.column + 1}, "cannot be read as YAML: " + error.msg);
+  }
+  return {};
+}
+
+Place StrictYaml::place(const YAML::Node& node) const {
+  const YAML::Mark mark = node.Mark();
+  return {file_, mark.line + 1, mark.column + 1};
+}
+
+std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& where, const std::string& what,
+                                       const std::vector<std::string>* known) {
+  std::vector<YamlEntry> entries;
+  if (!node.IsMap()) {
+    fault(where, what + " must be a map, got " + describe(node), "write it as  key: value  lines");
+    return entries;
+  }
+  for (const auto& item : node) {
+    const Place key_place = place(item.first);
+    if (!item.first.IsScalar()) {
+      fault(key_place, "a key in " + what + " must be a name, got " + describe(item.first));
+      continue;
+    }
+    const std::string key = item.first.Scalar();
+    if (key == "<<") {
+      fault(key_place, "merge keys (<<) are not supported", "repeat the entries");
+      continue;
+    }
+    const auto twin = std::find_if(entries.begin(), entries.end(), [&](const YamlEntry& entry) { return entry.key == key; });
+    if (twin != entries.end()) {
+      fault(key_place, "'" + key + "' is given twice in " + what, "the first is at line " + std::to_string(twin->place.line));
+      continue;
+    }
+    if (known && std::find(known->begin(), known->end(), key) == known->end()) {
+      fault(key_place, "unknown key '" + key + "' in " + what, suggestion(key, *known));
+      continue;
+    }
+    entries.push_back({key, key_place, item.second});
+  }
+  return entries;
+}
+
+std::optional<std::string> StrictYaml::text(const YAML::Node& node, const Place& where, const std::string& what) {
+  if (node.IsScalar()) return node.Scalar();
+  fault(where, what + ": expected a text, got " + describe(node));
+  return std::nullopt;
+}
+
+std::optional<bool> StrictYaml::boolean(const YAML::Node& node, const Place& where, const std::string& what) {
+  if (is_plain(node) && node.Scalar() == "true") return true;
+  if (is_plain(node) && node.Scalar() == "false") return false;
+  fault(where, what + ": expected true or false, got " + describe(node));
+  return std::nullopt;
+}
+
+std::optional<std::int64_t> StrictYaml::integer(const YAML::Node& node, const Place& where, const std::string& what) {
+  if (is_plain(node)) {
+    const std::string& text = node.Scalar();
+    std::int64_t value = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+    const std::size_t digits = text.starts_with("-") ? 1 : 0;
+    const bool leading_zero = text.size() > digits + 1 && text[digits] == '0';
+    if (error == std::errc() && end == text.data() + text.size() && !leading_zero) return value;
+    if (leading_zero) {
+      fault(where, what + ": expected an integer, got " + describe(node), "write it without leading zeros");
+      return std::nullopt;
+    }
+  }
+  fault(where, what + ": expected an integer, got " + describe(node));
+  return std::nullopt;
+}
+
+std::optional<double> StrictYaml::number(const YAML::Node& node, const Place& where, const std::string& what) {
+  if (is_plain(node)) {
+    const std::string& text = node.Scalar();
+    double value = 0;
+    const char* begin = text.data() + (text.starts_with("+") ? 1 : 0);
+    const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
+    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
+  }
+  fault(where, what + ": expected a number, got " + describe(node));
+  return std::nullopt;
+}
+
+bool StrictYaml::check_range(double value, const Place& where, const OptionInfo& info, const std::string& what) {
+  const std::string unit = info.unit.empty() ? "" : " " + info.unit;
+  if (info.minimum && value < *info.minimum) {
+    fault(where, what + ": " + show(value) + " is below the least allowed, " + show(*info.minimum) + unit);
+    return false;
+  }
+  if (info.maximum && value > *info.maximum) {
+    fault(where, what + ": " + show(value) + " is above the most allowed, " + show(*info.maximum) + unit);
+    return false;
+  }
+  return true;
+}
+
+std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const Place& where, const OptionInfo& info,
+                                              const std::string& what,
+                                              const std::function<std::string(const std::string&, const Place&)>& substitute) {
+  const auto replaced = [&](const YAML::Node& node) {
+    if (!node.IsScalar() || node.Scalar().find('$') == std::string::npos) return node;
+    return YAML::Node(substitute(node.Scalar(), place(node)));
+  };
+  const YAML::Node node = replaced(original);
+  switch (info.type) {
+    case OptionType::boolean:
+      if (const auto value = boolean(node, where, what)) return *value;
+      return std::nullopt;
+    case OptionType::integer:
+      if (const auto value = integer(node, where, what); value && check_range(double(*value), where, info, what)) return *value;
+      return std::nullopt;
+    case OptionType::number:
+      if (const auto value = number(node, where, what); value && check_range(*value, where, info, what)) return *value;
+      return std::nullopt;
+    case OptionType::text:
+    case OptionType::path: {
+      const auto value = text(node, where, what);
+      if (!value) return std::nullopt;
+      if (!info.choices.empty() && std::find(info.choices.begin(), info.choices.end(), *value) == info.choices.end()) {
+        fault(where, what + ": '" + *value + "' is not one of its choices", suggestion(*value, info.choices));
+        return std::nullopt;
+      }
+      return *value;
+    }
+    default: break;
+  }
+  if (!node.IsSequence()) {
+    fault(where, what + ": expected a list, got " + describe(node), "write it as [a, b, c]");
+    return std::nullopt;
+  }
+  std::vector<double> numbers;
+  std::vector<std::string> texts;
+  bool good = true;
+  for (const YAML::Node& item : node) {
+    const YAML::Node value = replaced(item);
+    if (info.type == OptionType::numbers) {
+      const auto n = number(value, place(item), what);
+      good = n && check_range(*n, place(item), info, what) && good;
+      if (n) numbers.push_back(*n);
+    } else {
+      const auto t = text(value, place(item), what);
+      good = t.has_value() && good;
+      if (t) texts.push_back(*t);
+    }
+  }
+  if (!good) return std::nullopt;
+  if (info.length && numbers.size() != info.length) {
+    fault(where, what + ": expected " + std::to_string(info.length) + " numbers, got " + std::to_string(numbers.size()));
+    return std::nullopt;
+  }
+  if (info.type == OptionType::numbers) return numbers;
+  return texts;
+}
+
+}  // namespace marrow

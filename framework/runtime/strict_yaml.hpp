@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <yaml-cpp/yaml.h>
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "marrow/runtime/diagnostics.hpp"
+#include "marrow/runtime/node.hpp"
+
+namespace marrow {
+
+/// One entry of a map, with the place of its key.
+struct YamlEntry {
+  std::string key;
+  Place place;
+  YAML::Node value;
+};
+
+/// The one way in which marrow's runtime reads YAML. yaml-cpp accepts duplicate keys, does not merge `<<`, reads 010 as 8 and
+/// yes as true; here each of these is a diagnostic at its place.
+class StrictYaml {
+ public:
+  StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
+
+  /// Parses a text; a syntax error is a diagnostic and gives a null node.
+  YAML::Node parse(const std::string& text);
+  Place place(const YAML::Node& node) const;
+  /// The entries of a map in their order. `what` names the map in messages; with `known`, other keys are faults.
+  std::vector<YamlEntry> map(const YAML::Node& node, const Place& where, const std::string& what,
+                             const std::vector<std::string>* known = nullptr);
+  std::optional<std::string> text(const YAML::Node& node, const Place& where, const std::string& what);
+  std::optional<bool> boolean(const YAML::Node& node, const Place& where, const std::string& what);
+  std::optional<std::int64_t> integer(const YAML::Node& node, const Place& where, const std::string& what);
+  std::optional<double> number(const YAML::Node& node, const Place& where, const std::string& what);
+  /// A value for an option, converted and checked against its range, choices and length. `substitute` replaces $names in
+  /// texts before they are read.
+  std::optional<OptionValue> option(const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
+                                    const std::function<std::string(const std::string&, const Place&)>& substitute);
+
+  void fault(const Place& place, std::string message, std::string hint = {}) {
+    diagnostics_.add(place, std::move(message), std::move(hint));
+  }
+
+ private:
+  bool check_range(double value, const Place& where, const OptionInfo& info, const std::string& what);
+
+  std::string file_;
+  Diagnostics& diagnostics_;
+};
+
+}  // namespace marrow

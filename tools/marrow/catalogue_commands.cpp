@@ -1,0 +1,214 @@
+// SPDX-License-Identifier: Apache-2.0
+// list, inspect, doctor, describe: what can be used, from manifests alone.
+#include <cstdio>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/diagnostics.hpp"
+#include "marrow/runtime/kinds.hpp"
+#include "marrow/runtime/library.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using nlohmann::json;
+
+const char* type_name(OptionType type) {
+  static constexpr const char* kNames[] = {"true/false", "integer", "number", "text", "path", "list of numbers", "list of texts", "list of paths"};
+  return kNames[int(type)];
+}
+
+std::string number_text(double value) {
+  std::ostringstream out;
+  out.precision(10);
+  out << value;
+  return out.str();
+}
+
+bool plain_scalar(const std::string& text) {
+  return !text.empty() && text.find_first_of(":#{}[]&*!|>'\"%@`,$ ") == std::string::npos && text != "true" && text != "false";
+}
+
+json option_json(const OptionInfo& option) {
+  json j = {{"name", option.name}, {"help", option.help}, {"unit", option.unit}, {"type", type_name(option.type)}, {"required", option.required}};
+  std::visit([&](const auto& value) { j["default"] = value; }, option.default_value);
+  if (option.minimum) j["minimum"] = *option.minimum;
+  if (option.maximum) j["maximum"] = *option.maximum;
+  if (!option.choices.empty()) j["choices"] = option.choices;
+  return j;
+}
+
+json node_json(const NodeInfo& node) {
+  json j = {{"name", node.name}, {"summary", node.summary}, {"random", node.random}, {"inputs", json::array()}, {"outputs", json::array()}, {"options", json::array()}};
+  for (const PortInfo& port : node.inputs) j["inputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"optional", port.optional}, {"help", port.help}});
+  for (const PortInfo& port : node.outputs) j["outputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"help", port.help}});
+  for (const OptionInfo& option : node.options) j["options"].push_back(option_json(option));
+  return j;
+}
+
+void print_ports(const char* title, const std::vector<PortInfo>& ports, bool inputs) {
+  if (ports.empty()) return;
+  std::printf("\n%s\n", title);
+  for (const PortInfo& port : ports)
+    std::printf("  %-14s %-28s %s%s\n", port.name.c_str(), port_text(port).c_str(), inputs && port.optional ? "(optional) " : "", port.help.c_str());
+}
+
+void print_snippet(const NodeInfo& node) {
+  std::printf("  %s:\n    uses: %s  # %s\n", node.name.substr(node.name.find('.') + 1).c_str(), node.name.c_str(), node.summary.c_str());
+  if (!node.inputs.empty()) {
+    std::printf("    in:\n");
+    for (const PortInfo& port : node.inputs)
+      std::printf("      %s%s: %s  # %s%s: %s\n", port.optional ? "# " : "", port.name.c_str(), "NODE", port.optional ? "optional " : "", port_text(port).c_str(), port.help.c_str());
+  }
+  if (node.options.empty()) return;
+  std::printf("    with:\n");
+  for (const OptionInfo& option : node.options)
+    std::printf("      %s: %s  # %s (%s)\n", option.name.c_str(), option.required ? "VALUE" : yaml_text(option.default_value).c_str(), option.help.c_str(), range_text(option).c_str());
+}
+
+void print_node(const NodeInfo& node, const LibraryInfo& library) {
+  std::printf("%s\n  %s\n", node.name.c_str(), node.summary.c_str());
+  if (const Kind* kind = find_kind(node.kind())) std::printf("\nKind\n  %s: %s\n", kind->name.c_str(), kind->help.c_str());
+  print_ports("Inputs", node.inputs, true);
+  print_ports("Outputs", node.outputs, false);
+  if (!node.options.empty()) std::printf("\nOptions\n");
+  for (const OptionInfo& option : node.options) {
+    std::printf("  %-26s %s\n", option.name.c_str(), option.help.c_str());
+    std::printf("  %-26s %s; %s\n", "", range_text(option).c_str(), option.required ? "must be given" : ("default " + yaml_text(option.default_value)).c_str());
+  }
+  if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
+  std::printf("\nLibrary\n  %s\n  build id %s\n", library.file.c_str(), library.build_id.hex().c_str());
+}
+
+}  // namespace
+
+std::string port_text(const PortInfo& port) {
+  return port.axis.empty() ? port.type.id : "list of " + port.type.id + " over " + port.axis;
+}
+
+std::string yaml_text(const OptionValue& value) {
+  return std::visit([](const auto& v) -> std::string {
+    using T = std::decay_t<decltype(v)>;
+    if constexpr (std::is_same_v<T, bool>) return v ? "true" : "false";
+    else if constexpr (std::is_same_v<T, std::int64_t>) return std::to_string(v);
+    else if constexpr (std::is_same_v<T, double>) return number_text(v);
+    else if constexpr (std::is_same_v<T, std::string>) return plain_scalar(v) ? v : "\"" + v + "\"";
+    else {
+      std::string text;
+      for (const auto& item : v) text += (text.empty() ? "" : ", ") + yaml_text(OptionValue(item));
+      return "[" + text + "]";
+    }
+  }, value);
+}
+
+std::string range_text(const OptionInfo& option) {
+  if (!option.choices.empty()) {
+    std::string text;
+    for (const std::string& choice : option.choices) text += (text.empty() ? "one of: " : ", ") + choice;
+    return text;
+  }
+  std::string text = type_name(option.type);
+  if (option.length) text = std::to_string(option.length) + " numbers";
+  if (option.minimum && option.maximum) text += ", " + number_text(*option.minimum) + " to " + number_text(*option.maximum);
+  else if (option.minimum) text += ", at least " + number_text(*option.minimum);
+  else if (option.maximum) text += ", at most " + number_text(*option.maximum);
+  return option.unit.empty() ? text : text + " [" + option.unit + "]";
+}
+
+int list(const std::string& kind, bool as_json) {
+  const Catalogue catalogue;
+  json all = json::array();
+  std::string previous;
+  int shown = 0;
+  for (const std::string& name : catalogue.node_names()) {
+    const NodeInfo& node = *catalogue.find(name);
+    if (!kind.empty() && node.kind() != kind) continue;
+    ++shown;
+    if (as_json) {
+      all.push_back(node_json(node));
+      continue;
+    }
+    if (node.kind() != previous) {
+      const Kind* contract = find_kind(node.kind());
+      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", node.kind().c_str(), contract ? ": " : "", contract ? contract->help.c_str() : "");
+      previous = node.kind();
+    }
+    std::printf("  %-34s %s\n", name.c_str(), node.summary.c_str());
+  }
+  if (as_json) std::printf("%s\n", all.dump(1).c_str());
+  if (!kind.empty() && shown == 0) {
+    std::vector<std::string> kinds_known;
+    for (const Kind& one : kinds()) kinds_known.push_back(one.name);
+    std::fprintf(stderr, "marrow: error: no node of kind '%s'; %s\n", kind.c_str(), suggestion(kind, kinds_known).c_str());
+    return 2;
+  }
+  if (!as_json)
+    for (const LibraryInfo& library : catalogue.libraries())
+      if (!library.refused.empty()) std::fprintf(stderr, "marrow: note: %s was refused (see 'marrow doctor')\n", library.file.filename().c_str());
+  return 0;
+}
+
+int inspect(const std::string& name, bool yaml, bool as_json) {
+  const Catalogue catalogue;
+  const NodeInfo* node = catalogue.find(name);
+  if (!node) {
+    std::fprintf(stderr, "marrow: error: there is no node '%s'; %s\n", name.c_str(), suggestion(name, catalogue.node_names()).c_str());
+    return 2;
+  }
+  if (yaml) print_snippet(*node);
+  else if (as_json) std::printf("%s\n", node_json(*node).dump(1).c_str());
+  else print_node(*node, *catalogue.library_of(name));
+  return 0;
+}
+
+int doctor(bool as_json) {
+  const Catalogue catalogue;
+  json all = {{"folders", json::array()}, {"libraries", json::array()}};
+  int refused = 0;
+  if (!as_json) std::printf("Folders searched, in this order (add some with MARROW_PLUGIN_PATH):\n");
+  for (const auto& folder : catalogue.folders()) {
+    const bool there = std::filesystem::is_directory(folder);
+    all["folders"].push_back({{"path", folder.string()}, {"exists", there}});
+    if (!as_json) std::printf("  %s%s\n", folder.c_str(), there ? "" : "  (does not exist)");
+  }
+  if (!as_json) std::printf("\nLibraries:\n");
+  for (const LibraryInfo& library : catalogue.libraries()) {
+    refused += !library.refused.empty();
+    json nodes = json::array();
+    std::string text;
+    for (const NodeInfo& node : library.nodes) {
+      nodes.push_back(node.name);
+      const bool hidden = catalogue.library_of(node.name) != &library;
+      text += (text.empty() ? "" : ", ") + node.name + (hidden ? " (hidden by an earlier library)" : "");
+    }
+    for (const WriterInfo& writer : library.writers) text += (text.empty() ? "writes " : ", writes ") + writer.type.id;
+    all["libraries"].push_back({{"file", library.file.string()}, {"refused", library.refused}, {"note", library.note}, {"nodes", nodes}, {"build_id", library.build_id.hex()}});
+    if (as_json) continue;
+    if (library.refused.empty()) std::printf("  good     %s: %s\n", library.file.filename().c_str(), text.c_str());
+    else std::printf("  REFUSED  %s: it %s\n", library.file.c_str(), library.refused.c_str());
+    if (!library.note.empty()) std::printf("           note: %s\n", library.note.c_str());
+  }
+  if (as_json) std::printf("%s\n", all.dump(1).c_str());
+  else std::printf("\n%zu libraries, %d refused, %zu nodes\n", catalogue.libraries().size(), refused, catalogue.node_names().size());
+  return refused ? 1 : 0;
+}
+
+int describe(const std::filesystem::path& file, bool write) {
+  const LibraryInfo info = describe_library(file);
+  if (!info.refused.empty()) {
+    std::fprintf(stderr, "marrow: error: %s %s\n", file.c_str(), info.refused.c_str());
+    return 1;
+  }
+  if (write) {
+    write_manifest(info);
+    return 0;
+  }
+  json all = json::array();
+  for (const NodeInfo& node : info.nodes) all.push_back(node_json(node));
+  std::printf("%s\n", all.dump(1).c_str());
+  return 0;
+}
+
+}  // namespace marrow::cli

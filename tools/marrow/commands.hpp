@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The commands of the program, a file each. Each returns the exit code: 0 done, 1 a node or a library failed, 2 the request or
+// a file is at fault, 130 stopped by Ctrl-C.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/executor.hpp"
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow::cli {
+
+struct PipelineRequest {
+  std::filesystem::path file;
+  std::vector<std::string> inputs;     ///< name=value
+  std::vector<std::string> overrides;  ///< node.option=value
+};
+
+struct RunRequest {
+  PipelineRequest pipeline;
+  std::filesystem::path folder;  ///< empty = runs/NAME, with a number where that is taken
+  std::uint64_t seed = 1;
+  int threads = 0;
+  bool quiet = false;
+  bool json = false;
+};
+
+int run(const RunRequest& request);
+int check(const PipelineRequest& request, bool json);
+int list(const std::string& kind, bool json);
+int inspect(const std::string& node, bool yaml, bool json);
+int graph(const PipelineRequest& request, bool dot);
+int schema(const std::filesystem::path& file);
+int doctor(bool json);
+int describe(const std::filesystem::path& library, bool write);
+
+/// Splits name=value texts. Throws Error for one without '='.
+PipelineArguments arguments_of(const PipelineRequest& request);
+/// Reads the pipeline; prints all its faults and returns false when there are any.
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json = false);
+
+/// "edge_map", "list of view over view".
+std::string port_text(const PortInfo& port);
+/// An option's default as it is written in YAML.
+std::string yaml_text(const OptionValue& value);
+/// "number, 0 to 100 px", "one of: a, b".
+std::string range_text(const OptionInfo& option);
+
+/// Prints what a person wants to see of results at once: poses and figures of merit.
+void print_results(const Pipeline& pipeline, const RunResult& result);
+
+}  // namespace marrow::cli

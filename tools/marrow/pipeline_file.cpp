@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace marrow::cli {
+namespace {
+
+std::vector<std::pair<std::string, std::string>> pairs(const std::vector<std::string>& texts, const char* form) {
+  std::vector<std::pair<std::string, std::string>> result;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0) throw Error("'" + text + "' is not of the form " + form);
+    result.emplace_back(text.substr(0, equals), text.substr(equals + 1));
+  }
+  return result;
+}
+
+void print_json(const Diagnostics& diagnostics) {
+  nlohmann::json list = nlohmann::json::array();
+  for (const Diagnostic& item : diagnostics.sorted())
+    list.push_back({{"file", item.place.file}, {"line", item.place.line}, {"column", item.place.column}, {"message", item.message}, {"hint", item.hint}});
+  std::printf("%s\n", list.dump(1).c_str());
+}
+
+}  // namespace
+
+PipelineArguments arguments_of(const PipelineRequest& request) {
+  return {pairs(request.inputs, "name=value"), pairs(request.overrides, "node.option=value")};
+}
+
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json) {
+  Diagnostics diagnostics;
+  pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
+  if (json) print_json(diagnostics);
+  if (diagnostics.empty()) return true;
+  if (!json)
+    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(), diagnostics.size() == 1 ? "" : "s");
+  return false;
+}
+
+int check(const PipelineRequest& request, bool json) {
+  const Catalogue catalogue;
+  Pipeline pipeline;
+  if (!load(request, catalogue, pipeline, false, json)) return 2;
+  if (json) return 0;
+  std::printf("%s: good; %zu nodes, %zu outputs\n", request.file.c_str(), pipeline.nodes.size(), pipeline.outputs.size());
+  for (const PipelineNode& node : pipeline.nodes) {
+    std::string axes;
+    for (const std::string& axis : node.mapped_axes) axes += (axes.empty() ? "" : " and ") + axis;
+    if (!axes.empty()) std::printf("  %s is called for each %s\n", node.id.c_str(), axes.c_str());
+  }
+  const std::vector<bool> needed = pipeline.needed();
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    if (!needed[i]) std::printf("  note: %s feeds no output and is not run\n", pipeline.nodes[i].id.c_str());
+  for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", note.c_str());
+  return 0;
+}
+
+}  // namespace marrow::cli

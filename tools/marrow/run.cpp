@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <map>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/run_folder.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using nlohmann::json;
+using Kind = RunEvent::Kind;
+
+std::atomic<bool> interrupted{false};
+
+extern "C" void on_interrupt(int) {
+  if (interrupted.exchange(true)) _exit(130);  // asked twice: do not wait for the nodes
+}
+
+/// Shows a run's events: lines that stay for what has ended, one that is rewritten for what goes on.
+class Progress {
+ public:
+  Progress(const RunRequest& request, RunFolder& folder) : request_(request), folder_(folder), is_terminal_(isatty(STDERR_FILENO)) {}
+
+  void operator()(const RunEvent& event) {
+    const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+    if (request_.json) print_json(event);
+    switch (event.kind) {
+      case Kind::finished: line(where, seconds_text(event.seconds)); break;
+      case Kind::skipped: line(where, "skipped: " + event.text); break;
+      case Kind::failed: error_line("error: " + event.text); break;
+      case Kind::warning: line(where, "warning: " + event.text); break;
+      case Kind::message: folder_.append_log(where + ": " + event.text); break;
+      case Kind::progress: moving_line(where, event); break;
+      case Kind::started: break;
+    }
+  }
+
+  void clear() {
+    if (is_terminal_ && !silent()) std::fprintf(stderr, "\r\033[K");
+  }
+
+ private:
+  bool silent() const { return request_.quiet || request_.json; }
+
+  static std::string seconds_text(double seconds) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.3f s", seconds);
+    return text;
+  }
+
+  void line(const std::string& where, const std::string& text) {
+    folder_.append_log(where + ": " + text);
+    if (silent()) return;
+    clear();
+    std::fprintf(stderr, "  %-32s %s\n", where.c_str(), text.c_str());
+  }
+
+  void error_line(const std::string& text) {
+    folder_.append_log(text);
+    clear();
+    std::fprintf(stderr, "marrow: %s\n", text.c_str());
+  }
+
+  /// On a terminal at most ten times a second; in a log file every five seconds.
+  void moving_line(const std::string& where, const RunEvent& event) {
+    const auto now = std::chrono::steady_clock::now();
+    if (silent() || now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))) return;
+    last_ = now;
+    clear();
+    std::fprintf(stderr, "  %-32s %3.0f %% %s%s", where.c_str(), 100 * event.fraction, event.text.c_str(), is_terminal_ ? "" : "\n");
+  }
+
+  static void print_json(const RunEvent& event) {
+    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning"};
+    json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
+    if (!event.item.empty()) j["item"] = event.item;
+    if (!event.text.empty()) j["text"] = event.text;
+    if (event.kind == Kind::progress) j["fraction"] = event.fraction;
+    if (event.kind == Kind::finished) j["seconds"] = event.seconds;
+    std::printf("%s\n", j.dump().c_str());
+    std::fflush(stdout);
+  }
+
+  const RunRequest& request_;
+  RunFolder& folder_;
+  bool is_terminal_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+};
+
+void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+  std::printf("\n%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    const NodeRecord& record = result.nodes[i];
+    if (record.status == NodeRecord::Status::not_needed) continue;
+    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls,
+                status_name(record.status), record.reason.empty() ? "" : ": ", record.reason.c_str());
+  }
+  std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
+  print_results(pipeline, result);
+  std::printf("results in %s\n", folder.path().c_str());
+  for (const RunFolder::Written& output : written) {
+    for (const std::string& file : output.files) std::printf("  %s\n", file.c_str());
+    if (!output.fault.empty()) std::printf("  %s: %s\n", output.output.c_str(), output.fault.c_str());
+  }
+}
+
+void print_json_summary(const RunResult& result, const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+  json files = json::object();
+  for (const RunFolder::Written& output : written) files[output.output] = output.files;
+  const json end = {{"event", "ended"}, {"status", result.cancelled() ? "cancelled" : result.failed() ? "failed" : "done"},
+                    {"seconds", result.seconds}, {"folder", folder.path().string()}, {"files", files}};
+  std::printf("%s\n", end.dump().c_str());
+}
+
+}  // namespace
+
+int run(const RunRequest& request) {
+  const Catalogue catalogue;
+  Pipeline pipeline;
+  if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
+  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / pipeline.name) : request.folder, pipeline);
+  std::signal(SIGINT, on_interrupt);
+  std::signal(SIGTERM, on_interrupt);
+
+  Progress progress(request, folder);
+  RunSettings settings;
+  settings.seed = request.seed;
+  settings.threads = request.threads;
+  settings.cancelled = &interrupted;
+  settings.observer = [&](const RunEvent& event) { progress(event); };
+  for (const std::string& note : pipeline.notes) {
+    folder.append_log("note: " + note);
+    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", note.c_str());
+  }
+  const RunResult result = run_pipeline(pipeline, catalogue, settings);
+  progress.clear();
+  const std::vector<RunFolder::Written> written = folder.write_outputs(pipeline, result, catalogue);
+  folder.write_record(pipeline, result, settings, catalogue, arguments_of(request.pipeline), written);
+
+  bool faulty = result.failed();
+  for (const RunFolder::Written& output : written) {
+    if (output.fault.empty()) continue;
+    if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), output.fault.c_str());
+    faulty = true;
+  }
+  if (request.json) print_json_summary(result, written, folder);
+  else if (!request.quiet) print_summary(pipeline, result, written, folder);
+  if (result.cancelled()) {
+    std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", folder.path().c_str());
+    return 130;
+  }
+  return faulty ? 1 : 0;
+}
+
+}  // namespace marrow::cli

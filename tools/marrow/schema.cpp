@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// The JSON Schema (draft 7) of pipeline files, made from exactly the nodes that are installed here.
+#include <cstdio>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+#include "commands.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using json = nlohmann::ordered_json;
+
+json scalar_schema(const OptionInfo& option) {
+  // A value may be the name of an input ("$case"), whatever the option's type.
+  const json name = {{"type", "string"}, {"pattern", "\\$"}};
+  json value;
+  switch (option.type) {
+    case OptionType::boolean: value = {{"type", "boolean"}}; break;
+    case OptionType::integer: value = {{"type", "integer"}}; break;
+    case OptionType::number:
+    case OptionType::numbers: value = {{"type", "number"}}; break;
+    default: value = {{"type", {"string", "number", "boolean"}}}; break;
+  }
+  if (option.minimum) value["minimum"] = *option.minimum;
+  if (option.maximum) value["maximum"] = *option.maximum;
+  if (!option.choices.empty()) value = {{"enum", option.choices}};
+  return {{"anyOf", {value, name}}};
+}
+
+json option_schema(const OptionInfo& option) {
+  json schema = scalar_schema(option);
+  if (option.type == OptionType::numbers || option.type == OptionType::texts || option.type == OptionType::paths) {
+    schema = {{"type", "array"}, {"items", schema}};
+    if (option.length) schema["minItems"] = schema["maxItems"] = option.length;
+  }
+  schema["description"] = option.help + " (" + range_text(option) + ")";
+  if (!option.required) std::visit([&](const auto& value) { schema["default"] = value; }, option.default_value);
+  return schema;
+}
+
+json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
+  json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", json::object()}};
+  json required = json::array();
+  for (const OptionInfo& option : node.options) {
+    with["properties"][option.name] = option_schema(option);
+    if (option.required) required.push_back(option.name);
+  }
+  if (!required.empty()) with["required"] = required;
+  const json reference = {{"type", "string"}};
+  json in = {{"type", "object"}, {"additionalProperties", false}, {"properties", json::object()}};
+  for (const PortInfo& port : catalogue.ports_of_kind(node.kind()))
+    in["properties"][port.name] = {{"description", port_text(port) + (port.help.empty() ? "" : ": " + port.help)},
+                                   {"anyOf", {reference, {{"type", "array"}, {"items", reference}}}}};
+  json wired = json::array();
+  for (const PortInfo& port : node.inputs)
+    if (!port.optional) wired.push_back(port.name);
+  json properties = {{"uses", {{"const", node.name}, {"description", node.summary}}}, {"with", with}, {"in", in}};
+  json schema = {{"properties", properties}};
+  json needs = json::array();
+  if (!required.empty()) needs.push_back("with");
+  if (!wired.empty()) {
+    schema["properties"]["in"]["required"] = wired;
+    needs.push_back("in");
+  }
+  if (!needs.empty()) schema["required"] = needs;
+  return {{"if", {{"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
+}
+
+json pipeline_schema(const Catalogue& catalogue) {
+  json uses = json::array(), conditions = json::array();
+  for (const std::string& name : catalogue.node_names()) {
+    uses.push_back({{"const", name}, {"description", catalogue.find(name)->summary}});
+    conditions.push_back(node_schema(*catalogue.find(name), catalogue));
+  }
+  const json node = {{"type", "object"},
+                     {"required", {"uses"}},
+                     {"additionalProperties", false},
+                     {"properties", {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
+                                     {"with", {{"type", "object"}, {"description", "options"}}},
+                                     {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}}}},
+                     {"allOf", conditions}};
+  const json input = {{"type", "object"},
+                      {"additionalProperties", false},
+                      {"properties", {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},
+                                      {"default", {{"type", {"string", "number", "boolean"}}}},
+                                      {"help", {{"type", "string"}}}}}};
+  return {{"$schema", "http://json-schema.org/draft-07/schema#"},
+          {"title", "marrow pipeline"},
+          {"type", "object"},
+          {"required", {"marrow", "nodes", "outputs"}},
+          {"additionalProperties", false},
+          {"properties", {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
+                          {"name", {{"type", "string"}}},
+                          {"help", {{"type", "string"}}},
+                          {"inputs", {{"type", "object"}, {"additionalProperties", input}}},
+                          {"nodes", {{"type", "object"}, {"additionalProperties", node}}},
+                          {"outputs", {{"type", "object"}, {"additionalProperties", {{"type", "string"}}}}}}}};
+}
+
+}  // namespace
+
+int schema(const std::filesystem::path& file) {
+  const std::string text = pipeline_schema(Catalogue()).dump(1) + "\n";
+  if (file.empty()) {
+    std::fputs(text.c_str(), stdout);
+    return 0;
+  }
+  std::ofstream stream(file);
+  stream << text;
+  stream.close();
+  if (!stream) throw Error("cannot write " + file.string());
+  return 0;
+}
+
+}  // namespace marrow::cli
