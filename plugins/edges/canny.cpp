@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Canny's detector (IEEE TPAMI 1986) as OpenCV has it, on a Gaussian gradient. Its magnitude is counted above the median of a
+// window and in multiples of the noise, so that the same thresholds serve an 8 bit and a 16 bit image, its bright and its dark
+// parts, and the smooth slope of a round thigh, on which noise makes ridges.
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <marrow/plugin.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "gradient.hpp"
+#include "refine.hpp"
+#include "window.hpp"
+
+namespace {
+
+using namespace marrow::edges;
+
+struct Options {
+  double sigma_px = 1.5;
+  bool logarithm = true;
+  int window_px = 80;
+  double low = 2, high = 5;
+};
+
+constexpr float kUnit = 64;  // of the 16 bit gradient that OpenCV wants, per standard deviation of the noise
+
+marrow::EdgeMap canny(const marrow::View& view, const Options& options) {
+  if (options.low > options.high)
+    throw marrow::Error("the lower threshold " + std::to_string(options.low) + " is above the upper one " +
+                        std::to_string(options.high));
+  const Prepared image = prepare(view, options.sigma_px, options.logarithm);
+  const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
+  const cv::Mat noise = block_noise(image, gradient, options.sigma_px);
+  const cv::Mat median = window_percentiles(gradient, image.usable, options.window_px, {50, 50, 50})[0];
+  double steepest = 0;
+  cv::minMaxLoc(gradient.magnitude, nullptr, &steepest);
+  const float largest_scale = float(32000 / std::max(steepest, 1e-30));  // 16 bits must hold the steepest gradient
+  cv::Mat du(image.values.size(), CV_16S), dv(image.values.size(), CV_16S);
+  tbb::parallel_for(0, image.values.rows, [&](int v) {
+    std::vector<float> noise_row(image.values.cols), median_row(image.values.cols);
+    interpolate_row(noise, v, noise_row);
+    interpolate_row(median, v, median_row);
+    for (int u = 0; u < image.values.cols; ++u) {
+      const float magnitude = gradient.magnitude.at<float>(v, u);
+      const float above = magnitude > median_row[u] ? 1 - median_row[u] / magnitude : 0.0f;
+      const float scale = above * std::min(kUnit / noise_row[u], largest_scale);
+      du.at<short>(v, u) = cv::saturate_cast<short>(scale * gradient.du.at<float>(v, u));
+      dv.at<short>(v, u) = cv::saturate_cast<short>(scale * gradient.dv.at<float>(v, u));
+    }
+  });
+  cv::Mat marked;
+  cv::Canny(du, dv, marked, options.low * kUnit, options.high * kUnit, true);
+  marked.setTo(0, image.usable == 0);
+  return refined(image, gradient, marked);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("edges.canny", canny)
+      .summary("Canny's edge detector (IEEE TPAMI 1986), thresholds in multiples of the image's noise")
+      .in("view", "X-ray view")
+      .out("edges", "edge pixels at sub-pixel positions")
+      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7), marrow::at_most(10))
+      .option("logarithm", &Options::logarithm, "seek edges of the attenuation (logarithm of the grey value)")
+      .option("window_px", &Options::window_px, "side of the window of the median, in effect an odd multiple of 16", marrow::at_least(16))
+      .option("low", &Options::low, "lower hysteresis threshold above the window's median, in standard deviations of the noise",
+              marrow::at_least(0))
+      .option("high", &Options::high, "upper hysteresis threshold above the window's median, in standard deviations of the noise",
+              marrow::at_least(0));
+}
