@@ -9,17 +9,19 @@
 
 namespace marrow::evaluate {
 
-/// Finds the nearest edge pixel whose gradient has nearly a given direction. Edge pixels are sorted into square cells; cells are
-/// visited in growing square rings about the point.
+/// Finds the nearest edge pixel whose gradient has nearly a given direction. Edge pixels are sorted into square cells;
+/// cells are visited in growing square rings about the point.
 class EdgeSearch {
  public:
   explicit EdgeSearch(const EdgeMap& edges)
-      : columns_(edges.width_px / kCell + 1), rows_(edges.height_px / kCell + 1), cells_(std::size_t(columns_) * rows_) {
+      : columns_(edges.width_px / kCell + 1),
+        rows_(edges.height_px / kCell + 1),
+        cells_(std::size_t(columns_) * rows_) {
     for (const EdgePixel& edge : edges.pixels) cells_[index(column(edge.u_px), row(edge.v_px))].push_back(edge);
   }
 
-  /// Distance in pixels to the nearest edge within `reach_px` whose direction makes an angle with (normal_u, normal_v) of at
-  /// most acos(least_cosine); nothing where there is none. The normal has unit length.
+  /// Distance in pixels to the nearest edge within `reach_px` whose direction makes an angle with (normal_u, normal_v)
+  /// of at most acos(least_cosine); nothing where there is none. The normal has unit length.
   std::optional<double> nearest(double u, double v, double normal_u, double normal_v, double reach_px,
                                 double least_cosine) const {
     double best = reach_px;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far the model's outline lies from the edges of the images at a pose. It needs no truth, so it can be used on real data.
+// How far the model's outline lies from the edges of the images at a pose. It needs no truth, so it can be used on real
+// data.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -14,8 +15,8 @@ struct Options {
   double angle_deg = 30;
 };
 
-/// The distances of a view's outline points; a point with no edge in reach counts with the reach itself, so that parts that
-/// match nothing make the figures worse, not better.
+/// The distances of a view's outline points; a point with no edge in reach counts with the reach itself, so that parts
+/// that match nothing make the figures worse, not better.
 struct Distances {
   std::vector<double> px, mm;
   std::size_t matched = 0;
@@ -24,13 +25,15 @@ struct Distances {
 void check_edges(const marrow::View& view, const marrow::EdgeMap* edges) {
   marrow::check_view(view);
   const std::string what = "view '" + view.name + "'";
-  if (!edges) throw marrow::Error(what + ": there is no edge map of that name; make the edges from the same list of views");
+  if (!edges)
+    throw marrow::Error(what + ": there is no edge map of that name; make the edges from the same list of views");
   if (edges->width_px != view.camera.width_px || edges->height_px != view.camera.height_px)
     throw marrow::Error(what + ": the edge map is for " + std::to_string(edges->width_px) + " x " +
-                        std::to_string(edges->height_px) + " pixels, the image has " + std::to_string(view.camera.width_px) +
-                        " x " + std::to_string(view.camera.height_px));
+                        std::to_string(edges->height_px) + " pixels, the image has " +
+                        std::to_string(view.camera.width_px) + " x " + std::to_string(view.camera.height_px));
   if (edges->pixels.empty())
-    throw marrow::Error(what + ": the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
+    throw marrow::Error(
+        what + ": the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
 }
 
 bool in_mask(const marrow::View& view, const marrow::OutlinePoint& point) {
@@ -40,8 +43,8 @@ bool in_mask(const marrow::View& view, const marrow::OutlinePoint& point) {
   return view.mask.at<unsigned char>(v, u) != 0;
 }
 
-Distances measure(const marrow::RigidTransform& world_from_model, const marrow::Projector& projector, const marrow::View& view,
-                  const marrow::EdgeMap& edges, const Options& options) {
+Distances measure(const marrow::RigidTransform& world_from_model, const marrow::Projector& projector,
+                  const marrow::View& view, const marrow::EdgeMap& edges, const Options& options) {
   const marrow::evaluate::EdgeSearch search(edges);
   const double least_cosine = std::cos(marrow::radians(options.angle_deg));
   Distances distances;
@@ -90,7 +93,8 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Project
     check_edges(views[i], of_view);
     const Distances distances = measure(pose.world_from_model, projector, views[i], *of_view, options);
     if (distances.px.empty()) {
-      context.warn("view '" + views[i].name + "': no part of the outline is inside the image at this pose; the view is left out");
+      context.warn("view '" + views[i].name +
+                   "': no part of the outline is inside the image at this pose; the view is left out");
       continue;
     }
     report(views[i].name + "_", distances, per_view);
@@ -99,8 +103,9 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Project
     all.matched += distances.matched;
   }
   if (all.px.empty())
-    throw marrow::Error("the outline is outside the image in every view (" + std::to_string(views.size()) +
-                        "), so there is no distance; check the pose and that the cameras and the model use the same world frame");
+    throw marrow::Error(
+        "the outline is outside the image in every view (" + std::to_string(views.size()) +
+        "), so there is no distance; check the pose and that the cameras and the model use the same world frame");
   marrow::Metrics metrics;
   report("", all, metrics);
   metrics.items.insert(metrics.items.end(), per_view.items.begin(), per_view.items.end());
@@ -111,15 +116,18 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Project
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.outline_distance", outline_distance)
-      .summary("Distance of the model's outline at a pose to the nearest image edges of the same direction; needs no truth")
+      .summary(
+          "Distance of the model's outline at a pose to the nearest image edges of the same direction; needs no truth")
       .in("pose", "pose to judge")
       .in("projector", "draws the outline")
       .in("views", "X-ray views", marrow::over("view"))
       .in("edges", "their edges", marrow::over("view"))
       .out("metrics",
-           "median and 90th percentile in pixels and in mm at the object, and the share of the outline with an edge in reach: of "
+           "median and 90th percentile in pixels and in mm at the object, and the share of the outline with an edge in "
+           "reach: of "
            "all views together, then of each")
-      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1), marrow::at_most(100))
+      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1),
+              marrow::at_most(100))
       .option("reach_px", &Options::reach_px, "how far an edge may be; points with none count with this distance",
               marrow::at_least(1), marrow::at_most(10000))
       .option("angle_deg", &Options::angle_deg, "largest angle between the outline's normal and an edge's gradient",

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a pose is from the truth, in the figures that every table of marrow uses. All of them belong to the small motion
-// that leads from the true pose to the found one, about the fragment's centroid and along its own axes.
+// How far a pose is from the truth, in the figures that every table of marrow uses. All of them belong to the small
+// motion that leads from the true pose to the found one, about the fragment's centroid and along its own axes.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -22,8 +22,8 @@ void check_frames(const marrow::RigidTransform& pose, const marrow::RigidTransfo
     throw marrow::Error("the pose is " + name(pose) + ", but the truth is " + name(truth) +
                         "; compare poses between the same two frames");
   if (model.frame != pose.source)
-    throw marrow::Error("the model is in the frame '" + model.frame + "', but the pose takes points in '" + pose.source +
-                        "'; give the model that was registered");
+    throw marrow::Error("the model is in the frame '" + model.frame + "', but the pose takes points in '" +
+                        pose.source + "'; give the model that was registered");
 }
 
 /// Root mean square would hide outliers and the maximum is one point's: the mean distance is the usual mTRE.
@@ -95,13 +95,18 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.pose_error", pose_error)
-      .summary("Rotation, translation and target registration error of a pose against the truth, with the predicted deviation")
+      .summary(
+          "Rotation, translation and target registration error of a pose against the truth, with the predicted "
+          "deviation")
       .in("pose", "pose found")
       .in("truth", "exact pose")
       .in("model", "the fragment's surface: gives its axes, its centroid and the targets")
       .out("metrics",
-           "geodesic angle; signed angles about the frontal, lateral and long axes; displacement of the centroid, signed along "
-           "the long axis and across it; mTRE; means of the absolute angles and translations; predicted standard deviations "
+           "geodesic angle; signed angles about the frontal, lateral and long axes; displacement of the centroid, "
+           "signed along "
+           "the long axis and across it; mTRE; means of the absolute angles and translations; predicted standard "
+           "deviations "
            "where the pose has a covariance")
-      .option("points", &Options::points, "points spread over the surface for the mTRE", marrow::at_least(1), marrow::at_most(1e6));
+      .option("points", &Options::points, "points spread over the surface for the mTRE", marrow::at_least(1),
+              marrow::at_most(1e6));
 }

@@ -13,8 +13,12 @@ constexpr int kShift = 4;  // OpenCV draws at positions of 1/16 pixel
 constexpr int kRowHeight = 24;
 
 /// True when a position can be drawn: fixed-point coordinates overflow far outside.
-bool drawable(cv::Point2d p) { return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5; }
-cv::Point fixed_point(cv::Point2d p) { return {int(std::lround(p.x * (1 << kShift))), int(std::lround(p.y * (1 << kShift)))}; }
+bool drawable(cv::Point2d p) {
+  return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5;
+}
+cv::Point fixed_point(cv::Point2d p) {
+  return {int(std::lround(p.x * (1 << kShift))), int(std::lround(p.y * (1 << kShift)))};
+}
 
 float percentile(std::vector<float> values, double fraction) {
   const auto at = values.begin() + std::ptrdiff_t(fraction * double(values.size() - 1));
@@ -22,8 +26,8 @@ float percentile(std::vector<float> values, double fraction) {
   return *at;
 }
 
-/// Detector values fall exponentially with the thickness passed, so their logarithm shows bone under much and little tissue
-/// alike. The floor keeps dead pixels from taking the whole range.
+/// Detector values fall exponentially with the thickness passed, so their logarithm shows bone under much and little
+/// tissue alike. The floor keeps dead pixels from taking the whole range.
 void take_logarithm(cv::Mat& values) {
   double largest = 0;
   cv::minMaxLoc(values, nullptr, &largest);
@@ -41,7 +45,8 @@ cv::Mat stretched(const cv::Mat& image, const cv::Mat& mask, Contrast contrast) 
   std::vector<float> used;
   for (int v = 0; v < values.rows; ++v)
     for (int u = 0; u < values.cols; ++u)
-      if (finite.at<unsigned char>(v, u) && (mask.empty() || mask.at<unsigned char>(v, u))) used.push_back(values.at<float>(v, u));
+      if (finite.at<unsigned char>(v, u) && (mask.empty() || mask.at<unsigned char>(v, u)))
+        used.push_back(values.at<float>(v, u));
   const float low = used.empty() ? 0 : percentile(used, 0.005), high = used.empty() ? 0 : percentile(used, 0.995);
   cv::Mat grey(values.size(), CV_8U, cv::Scalar(128));
   if (high > low) values.convertTo(grey, CV_8U, 255.0 / (high - low), -255.0 * low / (high - low));
@@ -67,7 +72,8 @@ Panel make_panel(const View& view, const cv::Rect& part, int size_px, Contrast c
   panel.scale = double(size_px) / std::max(grey.cols, grey.rows);
   const auto scaled = [&](int length) { return std::max(1, int(std::lround(length * panel.scale))); };
   cv::Mat resized;
-  cv::resize(grey, resized, {scaled(grey.cols), scaled(grey.rows)}, 0, 0, panel.scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
+  cv::resize(grey, resized, {scaled(grey.cols), scaled(grey.rows)}, 0, 0,
+             panel.scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
   cv::cvtColor(resized, panel.pixels, cv::COLOR_GRAY2RGB);
   return panel;
 }
@@ -88,7 +94,8 @@ void draw_dashes(cv::Mat& canvas, cv::Point2d from, cv::Point2d to, const cv::Sc
 
 void draw_dot(cv::Mat& canvas, cv::Point2d at, double radius, const cv::Scalar& colour) {
   if (!drawable(at)) return;
-  cv::circle(canvas, fixed_point(at), int(std::lround(radius * (1 << kShift))), colour, cv::FILLED, cv::LINE_AA, kShift);
+  cv::circle(canvas, fixed_point(at), int(std::lround(radius * (1 << kShift))), colour, cv::FILLED, cv::LINE_AA,
+             kShift);
 }
 
 void draw_text(cv::Mat& canvas, const std::string& text, cv::Point at, const cv::Scalar& colour, double size) {
@@ -101,8 +108,8 @@ cv::Size text_size(const std::string& text, double size) {
 }
 
 void draw_segment(Panel& panel, const LineSegment& segment, const cv::Scalar& colour, int thickness) {
-  draw_line(panel.pixels, panel.at(segment.from_px.x(), segment.from_px.y()), panel.at(segment.to_px.x(), segment.to_px.y()),
-            colour, thickness);
+  draw_line(panel.pixels, panel.at(segment.from_px.x(), segment.from_px.y()),
+            panel.at(segment.to_px.x(), segment.to_px.y()), colour, thickness);
 }
 
 void draw_edges(Panel& panel, const EdgeMap& edges, const cv::Scalar& colour) {

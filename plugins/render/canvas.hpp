@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the pictures of a view share: the X-ray in grey at a readable size, thin antialiased lines at sub-pixel positions, text.
+// What the pictures of a view share: the X-ray in grey at a readable size, thin antialiased lines at sub-pixel
+// positions, text.
 #include <marrow/domain/camera.hpp>
 #include <marrow/domain/features.hpp>
 #include <opencv2/core.hpp>
@@ -14,8 +15,9 @@ inline const cv::Scalar kOrange(230, 159, 0), kSkyBlue(86, 180, 233), kGreen(0, 
     kPurple(204, 121, 167), kVermilion(213, 94, 0), kBlue(0, 114, 178), kWhite(255, 255, 255), kBlack(0, 0, 0),
     kGrey(150, 150, 150), kDark(32, 32, 32);
 
-/// How grey values become brightness. linear, logarithmic: between the 0.5th and 99.5th percentile of the pixels inside the
-/// mask. local: then equalised by region with limited contrast (CLAHE), which shows bone borders under any thickness.
+/// How grey values become brightness. linear, logarithmic: between the 0.5th and 99.5th percentile of the pixels inside
+/// the mask. local: then equalised by region with limited contrast (CLAHE), which shows bone borders under any
+/// thickness.
 enum class Contrast { linear, logarithmic, local };
 /// By the name of an option: "linear", "logarithmic" or "local".
 Contrast contrast_of(const std::string& name);
@@ -32,10 +34,12 @@ struct Panel {
   }
 };
 
-/// A part of the view's image in grey, its longer side `size_px` long. A constant image becomes mid grey; pixels that are not
-/// finite are black.
+/// A part of the view's image in grey, its longer side `size_px` long. A constant image becomes mid grey; pixels that
+/// are not finite are black.
 Panel make_panel(const View& view, const cv::Rect& part, int size_px, Contrast contrast);
-inline cv::Rect whole_image(const View& view) { return {0, 0, view.image.width(), view.image.height()}; }
+inline cv::Rect whole_image(const View& view) {
+  return {0, 0, view.image.width(), view.image.height()};
+}
 
 /// An antialiased line between sub-pixel positions; positions that are not finite or far outside draw nothing.
 void draw_line(cv::Mat& canvas, cv::Point2d from, cv::Point2d to, const cv::Scalar& colour, int thickness = 1);

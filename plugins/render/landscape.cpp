@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): shows how wide the valley is, where
-// its floor lies, and which direction is poorly determined.
+// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): shows how wide the valley
+// is, where its floor lies, and which direction is poorly determined.
 #include <cmath>
 #include <cstdio>
 #include <marrow/plugin.hpp>
@@ -18,8 +18,8 @@ struct Options {
   int samples = 81;
 };
 
-constexpr std::array<const char*, 6> kTitles{"rotation about the frontal axis", "rotation about the lateral axis",
-                                             "rotation about the long axis",    "translation along the frontal axis",
+constexpr std::array<const char*, 6> kTitles{"rotation about the frontal axis",    "rotation about the lateral axis",
+                                             "rotation about the long axis",       "translation along the frontal axis",
                                              "translation along the lateral axis", "translation along the long axis"};
 
 /// The cost along one axis; offsets in degrees for the first three axes and in mm for the others.
@@ -55,8 +55,8 @@ std::string title(int axis, const Profile& profile) {
   return name + text + (axis < 3 ? "deg" : "mm");
 }
 
-marrow::Picture landscape(const marrow::Cost& cost, const marrow::Pose& pose, const marrow::Truth* truth, const Options& options,
-                          marrow::Context& context) {
+marrow::Picture landscape(const marrow::Cost& cost, const marrow::Pose& pose, const marrow::Truth* truth,
+                          const Options& options, marrow::Context& context) {
   marrow::check_rigid(pose.world_from_model, "pose");
   constexpr int kWidth = 460, kHeight = 300;
   cv::Mat canvas(2 * kHeight, 3 * kWidth, CV_8UC3, kWhite);
@@ -66,8 +66,13 @@ marrow::Picture landscape(const marrow::Cost& cost, const marrow::Pose& pose, co
     context.check_cancelled();
     context.progress(axis / 6.0, kTitles[std::size_t(axis)]);
     const Profile profile = sample(cost, pose, axis, options);
-    Plot plot{title(axis, profile), axis < 3 ? "offset from the pose [deg]" : "offset from the pose [mm]", "cost",
-              profile.offsets, profile.costs, {{0, kSkyBlue}}, profile.least};
+    Plot plot{title(axis, profile),
+              axis < 3 ? "offset from the pose [deg]" : "offset from the pose [mm]",
+              "cost",
+              profile.offsets,
+              profile.costs,
+              {{0, kSkyBlue}},
+              profile.least};
     if (to_truth) plot.marks.push_back({axis < 3 ? marrow::degrees((*to_truth)[axis]) : (*to_truth)[axis], kOrange});
     draw_plot(canvas, {axis % 3 * kWidth, axis / 3 * kHeight, kWidth, kHeight}, plot);
   }
@@ -85,7 +90,9 @@ MARROW_PLUGIN(plugin) {
       .in("pose", "pose in the middle of the plots; its frame gives the axes")
       .in("truth", "exact pose, marked in the plots")
       .out("picture", "six plots")
-      .option("range_deg", &Options::range_deg, "rotations shown to either side", marrow::at_least(1e-3), marrow::at_most(180))
-      .option("range_mm", &Options::range_mm, "translations shown to either side", marrow::at_least(1e-3), marrow::at_most(1000))
+      .option("range_deg", &Options::range_deg, "rotations shown to either side", marrow::at_least(1e-3),
+              marrow::at_most(180))
+      .option("range_mm", &Options::range_mm, "translations shown to either side", marrow::at_least(1e-3),
+              marrow::at_most(1000))
       .option("samples", &Options::samples, "points of a curve", marrow::at_least(3), marrow::at_most(2001));
 }

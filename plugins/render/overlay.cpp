@@ -21,24 +21,25 @@ struct Options {
 struct Layer {
   std::string text;
   cv::Scalar colour;
+  int thickness;
   std::vector<marrow::OutlinePoint> outline;
 };
 
-Layer make_layer(const std::string& text, const cv::Scalar& colour, const marrow::Projector& projector, const marrow::View& view,
-                 const marrow::RigidTransform& pose, const Options& options) {
+Layer make_layer(const std::string& text, const cv::Scalar& colour, int thickness, const marrow::Projector& projector,
+                 const marrow::View& view, const marrow::RigidTransform& pose, const Options& options) {
   marrow::check_rigid(pose, "pose '" + text + "'");
-  Layer layer{text, colour, projector.outline(view.camera, pose, options.spacing_px)};
+  Layer layer{text, colour, thickness, projector.outline(view.camera, pose, options.spacing_px)};
   if (layer.outline.empty()) layer.text += ": outside the image";
   return layer;
 }
 
-/// The points of an outline are not promised to follow each other, so each is drawn as a short stroke along the outline.
+/// The points of an outline are not promised to follow each other, so each is drawn as a short stroke along the
+/// outline.
 void draw_outline(Panel& panel, const Layer& layer, double spacing_px) {
-  const int thickness = panel.pixels.cols >= 600 ? 2 : 1;
   const double half = 0.5 * spacing_px * panel.scale;
   for (const marrow::OutlinePoint& point : layer.outline) {
     const cv::Point2d at = panel.at(point.u_px, point.v_px), along(-point.normal_v * half, point.normal_u * half);
-    draw_line(panel.pixels, at - along, at + along, layer.colour, thickness);
+    draw_line(panel.pixels, at - along, at + along, layer.colour, layer.thickness);
   }
 }
 
@@ -58,8 +59,9 @@ cv::Rect region(const marrow::View& view, const std::vector<Layer>& layers) {
   return part.empty() ? whole : part;
 }
 
-cv::Mat draw(const marrow::View& view, const std::string& title, const std::vector<Layer>& layers, const marrow::EdgeMap* edges,
-             const marrow::ShaftLines* lines, const cv::Rect& part, const Options& options) {
+cv::Mat draw(const marrow::View& view, const std::string& title, const std::vector<Layer>& layers,
+             const marrow::EdgeMap* edges, const marrow::ShaftLines* lines, const cv::Rect& part,
+             const Options& options) {
   Panel panel = make_panel(view, part, options.size_px, contrast_of(options.contrast));
   if (edges) draw_edges(panel, *edges, kPurple);
   if (lines)
@@ -74,14 +76,14 @@ marrow::Picture overlay(const marrow::Pose& pose, const marrow::Projector& proje
                         const marrow::ShaftLines* lines, const Options& options) {
   marrow::check_view(view);
   std::vector<Layer> layers;
-  const auto add = [&](const char* text, const cv::Scalar& colour, const marrow::RigidTransform& at) {
-    layers.push_back(make_layer(text, colour, projector, view, at, options));
+  const auto add = [&](const char* text, const cv::Scalar& colour, int thickness, const marrow::RigidTransform& at) {
+    layers.push_back(make_layer(text, colour, thickness, projector, view, at, options));
   };
-  if (truth) add("truth", kYellow, truth->world_from_model);
+  if (truth) add("truth", kYellow, 3, truth->world_from_model);
   std::vector<Layer> after = layers;
-  if (start) add("start", kOrange, start->world_from_model);
+  if (start) add("start", kOrange, 1, start->world_from_model);
   const std::vector<Layer> before = layers;
-  add("result", kSkyBlue, pose.world_from_model);
+  add("result", kSkyBlue, 1, pose.world_from_model);
 
   std::vector<LegendItem> legend;
   for (const Layer& layer : layers) legend.push_back({layer.text, layer.colour});
@@ -107,12 +109,14 @@ MARROW_PLUGIN(plugin) {
       .in("projector", "draws the outline")
       .in("view", "X-ray view")
       .in("start", "pose before registration: adds a panel on the left")
-      .in("truth", "exact pose, drawn beneath the others")
+      .in("truth", "exact pose, drawn wider beneath the others")
       .in("edges", "edges of the view, as faint dots")
       .in("lines", "the shaft's borders")
       .out("picture", "view with outlines and a legend")
       .option("size_px", &Options::size_px, "longer side of a panel", marrow::at_least(64), marrow::at_most(8192))
-      .option("contrast", &Options::contrast, "how grey values are shown", marrow::one_of({"local", "logarithmic", "linear"}))
-      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1), marrow::at_most(100))
+      .option("contrast", &Options::contrast, "how grey values are shown",
+              marrow::one_of({"local", "logarithmic", "linear"}))
+      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1),
+              marrow::at_most(100))
       .option("zoom", &Options::zoom, "show only the part of the image around the outlines");
 }

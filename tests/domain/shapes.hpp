@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Meshes of known size and place for tests.
+#include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/domain/mesh.hpp>
 

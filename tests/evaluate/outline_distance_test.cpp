@@ -10,7 +10,8 @@ namespace {
 /// An outline that is the vertical line u = 100 from v = 20 to 119, normal to the right; it ignores the pose.
 class LineProjector : public marrow::Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform&, double) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform&,
+                                            double) const override {
     std::vector<marrow::OutlinePoint> points;
     if (camera.width_px <= 100) return points;
     for (int v = 20; v < 120; ++v) points.push_back({100, float(v), 1, 0, Eigen::Vector3f(0, 0, 600)});
@@ -35,8 +36,8 @@ marrow::EdgeMap line_of_edges(float u, float direction_u, int from_v = 0, int to
   return edges;
 }
 
-std::map<std::string, double> distances(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
-                                        const Options& options = {}) {
+std::map<std::string, double> distances(const marrow::List<marrow::View>& views,
+                                        const marrow::List<marrow::EdgeMap>& edges, const Options& options = {}) {
   marrow::Context context;
   std::map<std::string, double> values;
   for (const auto& item : outline_distance({}, LineProjector(), views, edges, options, context).items)
@@ -70,8 +71,8 @@ TEST(OutlineDistance, EdgesOfAnotherDirectionDoNotCount) {
 }
 
 TEST(OutlineDistance, UnmatchedPointsCountWithTheReach) {
-  // Edges beside the upper 60 of 100 outline points only; the lower ones are more than the reach of 5 px away but for 4 of them
-  // (v = 80 to 83 reach the last edge at v = 79, 3 px to the side).
+  // Edges beside the upper 60 of 100 outline points only; the lower ones are more than the reach of 5 px away but for 4
+  // of them (v = 80 to 83 reach the last edge at v = 79, 3 px to the side).
   Options options;
   options.reach_px = 5;
   auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(103, 1, 0, 80)), options);
@@ -105,8 +106,10 @@ TEST(OutlineDistance, MaskedPointsAreLeftOut) {
 TEST(OutlineDistance, FindsFarEdgesAcrossCells) {
   Options options;
   options.reach_px = 500;
-  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(199, 1)), options)["p90_px"], 99, 1e-6);
-  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(0, 1)), options)["p90_px"], 100, 1e-6);
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(199, 1)), options)["p90_px"], 99,
+              1e-6);
+  EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(0, 1)), options)["p90_px"], 100,
+              1e-6);
 }
 
 TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
@@ -127,7 +130,8 @@ TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
 }
 
 TEST(OutlineDistance, SaysWhatIsWrong) {
-  const auto message = [](const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) -> std::string {
+  const auto message = [](const marrow::List<marrow::View>& views,
+                          const marrow::List<marrow::EdgeMap>& edges) -> std::string {
     try {
       distances(views, edges);
     } catch (const marrow::Error& error) {
@@ -137,14 +141,16 @@ TEST(OutlineDistance, SaysWhatIsWrong) {
   };
   EXPECT_EQ(message(one("frontal", view("frontal")), one("lateral", line_of_edges(101, 1))),
             "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
-  EXPECT_EQ(message(one("frontal", view("frontal")), one("frontal", marrow::EdgeMap{200, 150, {}})),
-            "view 'frontal': the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
+  EXPECT_EQ(
+      message(one("frontal", view("frontal")), one("frontal", marrow::EdgeMap{200, 150, {}})),
+      "view 'frontal': the edge map is empty, so there is nothing to measure to; lower the edge detector's thresholds");
   EXPECT_EQ(message(one("frontal", view("frontal")), one("frontal", marrow::EdgeMap{100, 150, {{}}})),
             "view 'frontal': the edge map is for 100 x 150 pixels, the image has 200 x 150");
   marrow::EdgeMap narrow = line_of_edges(50, 1);
   narrow.width_px = 90;
   EXPECT_EQ(message(one("frontal", view("frontal", 90)), one("frontal", narrow)),
-            "the outline is outside the image in every view (1), so there is no distance; check the pose and that the cameras "
+            "the outline is outside the image in every view (1), so there is no distance; check the pose and that the "
+            "cameras "
             "and the model use the same world frame");
 }
 

@@ -12,11 +12,13 @@ namespace {
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
 
-// A shaft away from the origin with its long axis oblique in the frame's y-z plane. By the convention of FragmentFrame its
-// frontal axis is +x and its lateral axis (0, 0.6, 0.8) x (1, 0, 0) = (0, 0.8, -0.6).
+// A shaft away from the origin with its long axis oblique in the frame's y-z plane. By the convention of FragmentFrame
+// its frontal axis is +x and its lateral axis (0, 0.6, 0.8) x (1, 0, 0) = (0, 0.8, -0.6).
 const Vector3d kCentre(40, -30, 250), kLong(0, 0.6, 0.8), kFrontal(1, 0, 0), kLateral(0, 0.8, -0.6);
 
-marrow::Mesh shaft() { return marrow::test::cylinder(kCentre, kLong, 10, 100, 64); }
+marrow::Mesh shaft() {
+  return marrow::test::cylinder(kCentre, kLong, 10, 100, 64);
+}
 
 marrow::Truth some_truth() {
   marrow::Truth truth;
@@ -156,7 +158,8 @@ TEST(PoseError, SaysWhatIsWrong) {
             "the model is in the frame 'stl', but the pose takes points in 'ct'; give the model that was registered");
   pose = {};
   pose.world_from_model.translation_mm[1] = std::nan("");
-  EXPECT_EQ(message_of([&] { pose_error(pose, {}, shaft(), {}); }), "pose: the transform has a number that is not finite");
+  EXPECT_EQ(message_of([&] { pose_error(pose, {}, shaft(), {}); }),
+            "pose: the transform has a number that is not finite");
   EXPECT_EQ(message_of([&] { pose_error({}, {}, {}, {}); }), "fragment frame: the surface has no triangles");
 }
 

@@ -8,7 +8,8 @@ namespace {
 /// A bowl about a known pose: squared offset in degrees and mm about a frame away from the origin.
 class Bowl : public marrow::Cost {
  public:
-  Bowl(marrow::RigidTransform floor, marrow::FragmentFrame frame) : floor_(std::move(floor)), frame_(std::move(frame)) {}
+  Bowl(marrow::RigidTransform floor, marrow::FragmentFrame frame)
+      : floor_(std::move(floor)), frame_(std::move(frame)) {}
   double value(const marrow::RigidTransform& pose) const override {
     const marrow::Vector6d motion = marrow::motion_between(floor_, pose, frame_);
     return motion.head<3>().squaredNorm() * marrow::degrees(1) * marrow::degrees(1) + motion.tail<3>().squaredNorm();
@@ -49,7 +50,8 @@ TEST(Landscape, FindsTheFloorAlongEachAxis) {
     EXPECT_NEAR(profile.least->y, 0, 1e-9);
     EXPECT_NEAR(profile.costs[40], 6.25, 1e-6);   // at the pose itself
     EXPECT_NEAR(profile.costs[80], 56.25, 1e-6);  // 10 - 2.5 squared
-    EXPECT_EQ(title(axis, profile), std::string(kTitles[std::size_t(axis)]) + ": least at +2.50 " + (axis < 3 ? "deg" : "mm"));
+    EXPECT_EQ(title(axis, profile),
+              std::string(kTitles[std::size_t(axis)]) + ": least at +2.50 " + (axis < 3 ? "deg" : "mm"));
   }
 }
 
@@ -59,8 +61,7 @@ TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
   motion[0] = marrow::radians(5);
   const marrow::Truth truth{marrow::moved(pose.world_from_model, pose.frame, motion)};
   marrow::Context context;
-  const cv::Mat picture =
-      landscape(Bowl(truth.world_from_model, pose.frame), pose, &truth, {}, context).pixels;
+  const cv::Mat picture = landscape(Bowl(truth.world_from_model, pose.frame), pose, &truth, {}, context).pixels;
   EXPECT_EQ(picture.cols, 3 * 460);
   EXPECT_GT(picture.rows, 600);
   const auto count = [&](const cv::Rect& area, const cv::Scalar& colour) {

@@ -8,8 +8,8 @@ namespace {
 /// A square outline of 40 px about the image point of the model's origin.
 class SquareProjector : public marrow::Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
-                                            double) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
+                                            const marrow::RigidTransform& world_from_model, double) const override {
     const Eigen::Vector2d c = marrow::project(camera, world_from_model.translation_mm);
     std::vector<marrow::OutlinePoint> points;
     const auto add = [&](double u, double v, float normal_u, float normal_v) {
@@ -58,7 +58,8 @@ Options tripled() {
 
 bool has(const cv::Mat& picture, cv::Point pixel, const cv::Scalar& colour) {
   const auto value = picture.at<cv::Vec3b>(pixel);
-  return std::abs(value[0] - colour[0]) < 40 && std::abs(value[1] - colour[1]) < 40 && std::abs(value[2] - colour[2]) < 40;
+  return std::abs(value[0] - colour[0]) < 40 && std::abs(value[1] - colour[1]) < 40 &&
+         std::abs(value[2] - colour[2]) < 40;
 }
 
 /// Pixels of a colour anywhere above the legend.
@@ -71,7 +72,8 @@ bool contains(const cv::Mat& picture, int height, const cv::Scalar& colour) {
 
 // Pixel u of the image has its centre at 3 u + 1 in a panel of three times the size.
 TEST(Overlay, DrawsTheResultWhereTheProjectorSays) {
-  const marrow::Picture picture = overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled());
+  const marrow::Picture picture =
+      overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled());
   EXPECT_EQ(picture.pixels.type(), CV_8UC3);
   EXPECT_EQ(picture.pixels.cols, 600);
   EXPECT_GT(picture.pixels.rows, 300);  // the legend lies beneath
@@ -83,7 +85,8 @@ TEST(Overlay, DrawsTheResultWhereTheProjectorSays) {
 TEST(Overlay, BeforeIsOnTheLeftAndAfterOnTheRight) {
   const marrow::Pose start = pose_at(-40);
   const marrow::Truth truth{at(10)};
-  const cv::Mat picture = overlay(pose_at(40), SquareProjector(), view(), &start, &truth, nullptr, nullptr, tripled()).pixels;
+  const cv::Mat picture =
+      overlay(pose_at(40), SquareProjector(), view(), &start, &truth, nullptr, nullptr, tripled()).pixels;
   EXPECT_EQ(picture.cols, 1200);
   EXPECT_TRUE(has(picture, {241, 151}, kOrange));
   EXPECT_TRUE(has(picture, {391, 151}, kYellow));
@@ -98,23 +101,28 @@ TEST(Overlay, DrawsEdgesAndShaftLines) {
   marrow::ShaftLines lines;
   lines.left = {{20, 30}, {20, 90}};
   lines.right = {{30, 30}, {30, 90}};
-  const cv::Mat picture = overlay(pose_at(0), SquareProjector(), view(), nullptr, nullptr, &edges, &lines, tripled()).pixels;
+  const cv::Mat picture =
+      overlay(pose_at(0), SquareProjector(), view(), nullptr, nullptr, &edges, &lines, tripled()).pixels;
   EXPECT_TRUE(has(picture, {61, 151}, kGreen));
   EXPECT_TRUE(has(picture, {91, 151}, kGreen));
   EXPECT_TRUE(has(picture, {451, 211}, {166, 124, 147})) << "halfway between grey and the colour of edges";
 }
 
 TEST(Overlay, SaysWhenTheOutlineIsOutside) {
-  const cv::Mat picture = overlay(pose_at(500), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled()).pixels;
+  const cv::Mat picture =
+      overlay(pose_at(500), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled()).pixels;
   EXPECT_FALSE(contains(picture, 300, kSkyBlue));
-  EXPECT_EQ(make_layer("result", kSkyBlue, SquareProjector(), view(), at(500), {}).text, "result: outside the image");
+  EXPECT_EQ(make_layer("result", kSkyBlue, 1, SquareProjector(), view(), at(500), {}).text,
+            "result: outside the image");
 }
 
 TEST(Overlay, ZoomShowsTheOutlinesAndAMargin) {
   Options options = tripled();
   options.zoom = true;
-  const cv::Mat picture = overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, options).pixels;
-  EXPECT_EQ(region(view(), {make_layer("", {}, SquareProjector(), view(), at(10), options)}), cv::Rect(82, 22, 57, 57));
+  const cv::Mat picture =
+      overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, options).pixels;
+  EXPECT_EQ(region(view(), {make_layer("", {}, 1, SquareProjector(), view(), at(10), options)}),
+            cv::Rect(82, 22, 57, 57));
   EXPECT_EQ(picture.cols, 600);
   EXPECT_TRUE(has(picture, {int((130 - 82 + 0.5) * 600 / 57), 300}, kSkyBlue));
 }

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <marrow/domain/camera.hpp>
+
+#include "domain/message_of.hpp"
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+using marrow::test::message_of;
+
+/// Source 1000 mm from the detector and 600 mm before the world's origin, pixels of 0.5 mm by 0.25 mm, principal point
+/// off the centre. It looks along the world's +y (from the front of the patient to the back); u runs along +x and v
+/// along -z.
+marrow::Camera frontal() {
+  marrow::Camera camera;
+  camera.width_px = 400;
+  camera.height_px = 800;
+  camera.intrinsics << 2000, 0, 210, 0, 4000, 390, 0, 0, 1;
+  camera.camera_from_world.rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  camera.camera_from_world.translation_mm = {0, 0, 600};
+  return camera;
+}
+
+TEST(Camera, ProjectsByTheChaptersEquations) {
+  // Eq 1: x = 30, y = -z = -12 in the camera at depth 600 + 150 = 750 give 1000 * 30 / 750 = 40 mm and -16 mm on the
+  // detector; Eq 3: 40 / 0.5 + 210 and -16 / 0.25 + 390 pixels.
+  EXPECT_TRUE(project(frontal(), {30, 150, 12}).isApprox(Vector2d(290, 326)));
+  EXPECT_TRUE(project(frontal(), {0, 0, 0}).isApprox(Vector2d(210, 390)));
+}
+
+TEST(Camera, SkewCounts) {
+  marrow::Camera camera = frontal();
+  camera.intrinsics(0, 1) = 100;
+  EXPECT_TRUE(project(camera, {30, 150, 12}).isApprox(Vector2d(290 - 100 * 12 / 750.0, 326)));
+}
+
+TEST(Camera, PointsBehindTheSourceHaveNoPixel) {
+  EXPECT_TRUE(std::isnan(project(frontal(), {0, -601, 0}).x()));
+  EXPECT_TRUE(std::isnan(project(frontal(), {0, -600, 0}).y()));
+}
+
+TEST(Camera, SourceAndRays) {
+  EXPECT_TRUE(source_position_mm(frontal()).isApprox(Vector3d(0, -600, 0)));
+  const Vector3d point(30, 150, 12);
+  EXPECT_TRUE(ray_direction(frontal(), {290, 326}).isApprox((point - Vector3d(0, -600, 0)).normalized()));
+}
+
+TEST(Camera, BackProjectedPlaneHoldsTheSourceAndTheLine) {
+  const Vector2d from(50, 700), to(300, 20);
+  const Vector3d line = from.homogeneous().cross(to.homogeneous());
+  const marrow::Plane plane = back_project_line(frontal(), line);
+  EXPECT_NEAR(plane.normal.norm(), 1, 1e-12);
+  EXPECT_NEAR(plane.normal.dot(source_position_mm(frontal())), plane.offset_mm, 1e-9);
+  for (const Vector2d& pixel : {from, to, Vector2d(0.5 * (from + to))})
+    for (double depth_mm : {1.0, 500.0, 900.0}) {
+      const Vector3d point = source_position_mm(frontal()) + depth_mm * ray_direction(frontal(), pixel);
+      EXPECT_NEAR(plane.normal.dot(point), plane.offset_mm, 1e-8);
+    }
+  const Vector3d beside = source_position_mm(frontal()) + 900 * ray_direction(frontal(), from + Vector2d(10, 0));
+  EXPECT_GT(std::abs(plane.normal.dot(beside) - plane.offset_mm), 1);
+}
+
+TEST(Camera, PixelSizeShrinksTowardsTheSource) {
+  marrow::Camera camera = frontal();
+  camera.intrinsics(1, 1) = 2000;
+  EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {0, 0, 0}), 0.3);
+  EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {50, 400, -20}), 0.5);
+}
+
+TEST(Camera, CheckNamesTheFault) {
+  EXPECT_EQ(message_of([] { check_camera(frontal(), "view 'a'"); }), "no error");
+  marrow::Camera camera = frontal();
+  camera.height_px = 0;
+  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
+            "view 'a': image size 400 x 0 pixels is not positive");
+  camera = frontal();
+  camera.intrinsics(1, 1) = -1;
+  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
+            "view 'a': the camera matrix needs positive focal lengths in its first two diagonal places");
+  camera = frontal();
+  camera.intrinsics(0, 2) = std::nan("");
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }), "no error");
+  camera = frontal();
+  camera.camera_from_world.rotation *= 2;
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("not a rotation"), std::string::npos);
+}
+
+TEST(View, CheckNamesTheFault) {
+  marrow::View view{"lateral", {cv::Mat(800, 400, CV_8U, cv::Scalar(0))}, frontal(), {}};
+  EXPECT_EQ(message_of([&] { check_view(view); }), "no error");
+  view.mask = cv::Mat(800, 401, CV_8U, cv::Scalar(0));
+  EXPECT_EQ(message_of([&] { check_view(view); }),
+            "view 'lateral': the mask has 401 x 800 pixels, the image 400 x 800");
+  view.image.pixels = cv::Mat(512, 512, CV_8U, cv::Scalar(0));
+  EXPECT_EQ(message_of([&] { check_view(view); }),
+            "view 'lateral': the image has 512 x 512 pixels, but its camera is for 400 x 800; give the camera that "
+            "belongs to "
+            "this image");
+  view.image.pixels = cv::Mat();
+  EXPECT_EQ(message_of([&] { check_view(view); }), "view 'lateral': the image is empty");
+}
+
+}  // namespace

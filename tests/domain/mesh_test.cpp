@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <marrow/domain/mesh.hpp>
+
+#include "domain/message_of.hpp"
+#include "domain/shapes.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using marrow::Mesh;
+using marrow::test::box;
+using marrow::test::cylinder;
+using marrow::test::message_of;
+
+TEST(Mesh, ClosedMeansEachEdgeTwiceInOppositeSenses) {
+  Mesh mesh = box({5, 6, 7}, {20, 30, 40});
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_TRUE(is_closed(cylinder({0, 0, 0}, Vector3d::UnitZ(), 5, 10, 7)));
+  std::swap(mesh.triangles[3][0], mesh.triangles[3][1]);
+  EXPECT_FALSE(is_closed(mesh)) << "one triangle is flipped";
+  mesh = box({5, 6, 7}, {20, 30, 40});
+  mesh.triangles.pop_back();
+  EXPECT_FALSE(is_closed(mesh)) << "one triangle is missing";
+  mesh.triangles.pop_back();
+  EXPECT_FALSE(is_closed(mesh)) << "an even number of open edges";
+  EXPECT_FALSE(is_closed(Mesh{}));
+  mesh = box({5, 6, 7}, {20, 30, 40});
+  mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+  EXPECT_FALSE(is_closed(mesh)) << "each edge is used four times";
+}
+
+TEST(Mesh, VolumeAndAreaAwayFromTheOrigin) {
+  const Mesh mesh = box({500, -600, 700}, {20, 30, 40});
+  EXPECT_NEAR(enclosed_volume_mm3(mesh), 24000, 1e-6);
+  EXPECT_NEAR(surface_area_mm2(mesh), 2 * (600 + 800 + 1200), 1e-9);
+  Mesh inside_out = mesh;
+  for (auto& triangle : inside_out.triangles) std::swap(triangle[0], triangle[1]);
+  EXPECT_NEAR(enclosed_volume_mm3(inside_out), -24000, 1e-6);
+  EXPECT_TRUE(is_closed(inside_out));
+}
+
+TEST(Mesh, SamplesLieEvenlyOnTheSurface) {
+  const Mesh mesh = box({5, 6, 7}, {20, 30, 40});
+  const auto points = sample_surface(mesh, 500);
+  ASSERT_EQ(points.size(), 500u);
+  int on_top = 0;
+  for (const Vector3d& point : points) {
+    const Vector3d from_centre = (point - Vector3d(5, 6, 7)).cwiseAbs() - Vector3d(10, 15, 20);
+    EXPECT_NEAR(from_centre.maxCoeff(), 0, 1e-9);
+    on_top += std::abs(point.z() - 27) < 1e-9;
+  }
+  EXPECT_NEAR(on_top, 500 * 600.0 / 5200, 2);
+  EXPECT_EQ(sample_surface(mesh, 500)[123], points[123]) << "the pattern is fixed";
+  EXPECT_EQ(sample_surface(mesh, 1).size(), 1u);
+}
+
+TEST(FragmentFrame, LongAxisAndCentroidOfACylinderOffTheOrigin) {
+  const Vector3d centre(40, -30, 250), along = Vector3d(0, 0.6, 0.8);
+  const marrow::FragmentFrame frame = fragment_frame(cylinder(centre, along, 10, 100, 32));
+  EXPECT_TRUE(frame.origin_mm.isApprox(centre, 1e-9));
+  EXPECT_LT((frame.axes.col(2) - along).norm(), 1e-6);
+  EXPECT_LT((frame.axes.col(0) - Vector3d(1, 0, 0)).norm(), 1e-6);
+  EXPECT_LT((frame.axes.col(1) - Vector3d(0, 0.8, -0.6)).norm(), 1e-6) << "lateral = long x frontal";
+  EXPECT_NEAR(frame.axes.determinant(), 1, 1e-9);
+}
+
+TEST(FragmentFrame, LongAxisAgreesWithPlusZ) {
+  const marrow::FragmentFrame frame = fragment_frame(cylinder({1, 2, 3}, Vector3d(0.6, 0, -0.8), 10, 100, 32));
+  EXPECT_LT((frame.axes.col(2) - Vector3d(-0.6, 0, 0.8)).norm(), 1e-6);
+  EXPECT_LT((frame.axes.col(0) - Vector3d(0.8, 0, 0.6)).norm(), 1e-6) << "+x made orthogonal to the long axis";
+}
+
+TEST(FragmentFrame, UsesAnotherReferenceWhenTheBoneLiesAlongX) {
+  const marrow::FragmentFrame frame =
+      fragment_frame(cylinder({1, 2, 3}, Vector3d(0.99, 0, 0.141067359796658844), 10, 100, 32));
+  EXPECT_LT((frame.axes.col(0) - Vector3d(0, 1, 0)).norm(), 1e-6);
+  EXPECT_NEAR(frame.axes.determinant(), 1, 1e-9);
+}
+
+TEST(Mesh, CheckNamesTheFault) {
+  Mesh mesh = box({0, 0, 0}, {1, 1, 1});
+  EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "no error");
+  mesh.vertices_mm[3].y() = std::nan("");
+  EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "model: a vertex is not finite");
+  mesh.triangles[2][1] = 8;
+  EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "model: a triangle names vertex 8, but there are only 8");
+  EXPECT_EQ(message_of([&] { check_mesh(Mesh{}, "model"); }), "model: the surface has no triangles");
+  EXPECT_EQ(message_of([&] { fragment_frame(Mesh{}); }), "fragment frame: the surface has no triangles");
+}
+
+}  // namespace

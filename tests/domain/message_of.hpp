@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <marrow/domain/error.hpp>
+#include <string>
+
+namespace marrow::test {
+
+/// The text of the Error that `function` throws, or "no error".
+template <class Function>
+std::string message_of(Function function) {
+  try {
+    function();
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+}  // namespace marrow::test

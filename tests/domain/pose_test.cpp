@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <marrow/domain/pose.hpp>
+
+#include "domain/message_of.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using marrow::FragmentFrame;
+using marrow::RigidTransform;
+using marrow::Vector6d;
+
+FragmentFrame some_frame() {
+  return {Vector3d(40, -30, 250), marrow::rotation_from_vector({0.4, -0.1, 0.2})};
+}
+
+RigidTransform some_pose() {
+  return {"world", "ct", marrow::rotation_from_vector({-0.3, 0.8, 0.1}), {12, -7, 100}};
+}
+
+TEST(Moved, AppliesTheMotionInTheModelBeforeThePose) {
+  Vector6d motion;
+  motion << 0.02, -0.05, 0.3, 1, 2, -3;
+  const FragmentFrame frame = some_frame();
+  const RigidTransform result = moved(some_pose(), frame, motion);
+  const Vector3d x(10, 20, 300);
+  // The definition at Pose: x' = o + R(axes r) (x - o) + axes t.
+  const Vector3d in_model = frame.origin_mm +
+                            marrow::rotation_from_vector(frame.axes * motion.head<3>()) * (x - frame.origin_mm) +
+                            frame.axes * motion.tail<3>();
+  EXPECT_LT((result * x - some_pose() * in_model).norm(), 1e-10);
+  EXPECT_EQ(result.target, "world");
+  EXPECT_EQ(result.source, "ct");
+}
+
+TEST(Moved, ARotationKeepsTheOriginOfTheFrame) {
+  Vector6d motion = Vector6d::Zero();
+  motion[2] = 0.5;
+  const RigidTransform result = moved(some_pose(), some_frame(), motion);
+  EXPECT_LT((result * some_frame().origin_mm - some_pose() * some_frame().origin_mm).norm(), 1e-10);
+  const Vector3d on_axis = some_frame().origin_mm + 50 * some_frame().axes.col(2);
+  EXPECT_LT((result * on_axis - some_pose() * on_axis).norm(), 1e-10);
+}
+
+TEST(MotionBetween, UndoesMoved) {
+  for (double size : {1e-7, 0.01, 1.0}) {
+    Vector6d motion;
+    motion << 0.3, -0.5, 0.7, 10, 20, -30;
+    motion *= size;
+    const RigidTransform to = moved(some_pose(), some_frame(), motion);
+    EXPECT_LT((motion_between(some_pose(), to, some_frame()) - motion).norm(), 1e-9 + 1e-7 * motion.norm()) << size;
+  }
+  EXPECT_LT(motion_between(some_pose(), some_pose(), some_frame()).norm(), 1e-9);
+}
+
+TEST(MotionBetween, RefusesPosesInDifferentFrames) {
+  RigidTransform other = some_pose();
+  other.target = "table";
+  EXPECT_EQ(marrow::test::message_of([&] { motion_between(some_pose(), other, some_frame()); }),
+            "cannot compose ct_from_world with table_from_ct: the first takes points in 'world', the second gives "
+            "points in 'table'");
+}
+
+}  // namespace
