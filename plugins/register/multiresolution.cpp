@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include <cmath>
+
+#include "predicted_covariance.hpp"
+
+namespace {
+
+struct Options {
+  double scan_rotation_deg = 15;
+  double scan_rotation_step_deg = 3;
+  double scan_translation_mm = 15;
+  double scan_translation_step_mm = 3;
+  std::vector<double> contour_spacing_px{8, 4, 2};
+  std::vector<double> reach_px{24, 12, 6};
+  std::vector<double> step_deg{3, 1, 0.3};
+  std::vector<double> step_mm{3, 1, 0.3};
+  int max_evaluations = 400;
+  double step_tolerance = 0.02;
+  double warn_above_deg = 3;
+  double warn_above_mm = 5;
+};
+
+struct Result {
+  marrow::Pose pose;
+  marrow::List<marrow::Pose> stages;
+};
+
+constexpr int kAxialRotation = 2, kAxialTranslation = 5;
+
+/// The search: the pose found so far, moved about the fragment's own axes.
+class Search {
+ public:
+  Search(const marrow::Optimizer& optimizer, const marrow::Pose& initial, const Options& options,
+         marrow::Context& context)
+      : optimizer_(optimizer), frame_(initial.frame), pose_(initial.world_from_model), options_(options), context_(context) {}
+
+  const marrow::RigidTransform& pose() const { return pose_; }
+  int evaluations() const { return evaluations_; }
+
+  /// Tries a grid of axial rotations and translations and goes to the best: the stage before leaves these two open, and the
+  /// cost has other minima within their range.
+  void scan(const marrow::Cost& cost) {
+    const auto steps = [](double range, double step) { return range > 0 ? int(std::floor(range / step + 1e-9)) : 0; };
+    const int turns = steps(options_.scan_rotation_deg, options_.scan_rotation_step_deg);
+    const int shifts = steps(options_.scan_translation_mm, options_.scan_translation_step_mm);
+    std::vector<marrow::RigidTransform> poses;
+    for (int turn = -turns; turn <= turns; ++turn)
+      for (int shift = -shifts; shift <= shifts; ++shift) {
+        marrow::Vector6d motion = marrow::Vector6d::Zero();
+        motion[kAxialRotation] = turn * options_.scan_rotation_step_deg;
+        motion[kAxialTranslation] = shift * options_.scan_translation_step_mm;
+        poses.push_back(moved_by_units(pose_, frame_, motion));
+      }
+    const std::vector<double> values = cost.values(poses);
+    evaluations_ += int(values.size());
+    pose_ = poses[std::size_t(std::min_element(values.begin(), values.end()) - values.begin())];
+  }
+
+  /// Minimises over the given axes from the pose found so far, and goes there.
+  void refine(const marrow::Cost& cost, const std::vector<int>& axes, std::size_t level, double done, double share) {
+    const auto n = Eigen::Index(axes.size());
+    const auto pose_at = [&](const Eigen::VectorXd& x) {
+      marrow::Vector6d motion = marrow::Vector6d::Zero();
+      for (Eigen::Index i = 0; i < n; ++i) motion[axes[std::size_t(i)]] = x[i];
+      return moved_by_units(pose_, frame_, motion);
+    };
+    marrow::MinimisationProblem problem;
+    problem.start = Eigen::VectorXd::Zero(n);
+    problem.initial_step.resize(n);
+    for (Eigen::Index i = 0; i < n; ++i)
+      problem.initial_step[i] = axes[std::size_t(i)] < 3 ? options_.step_deg[level] : options_.step_mm[level];
+    problem.max_evaluations = options_.max_evaluations;
+    problem.step_tolerance = options_.step_tolerance;
+    problem.function = [&](const Eigen::VectorXd& x) {
+      context_.check_cancelled();
+      return cost.value(pose_at(x));
+    };
+    problem.observer = [&](int evaluation, const Eigen::VectorXd&, double) {
+      if (evaluation % 50 == 0)
+        context_.progress(done + share * std::min(1.0, double(evaluation) / options_.max_evaluations), "registration");
+    };
+    const marrow::MinimisationResult result = optimizer_.minimise(problem);
+    evaluations_ += result.evaluations;
+    pose_ = pose_at(result.x);
+  }
+
+ private:
+  const marrow::Optimizer& optimizer_;
+  const marrow::FragmentFrame& frame_;
+  marrow::RigidTransform pose_;
+  const Options& options_;
+  marrow::Context& context_;
+  int evaluations_ = 0;
+};
+
+void check_options(const Options& options) {
+  const std::size_t levels = options.contour_spacing_px.size();
+  const auto check = [&](const std::vector<double>& values, const char* name) {
+    if (values.empty() || values.size() != levels)
+      throw marrow::Error(std::string(name) + " has " + std::to_string(values.size()) +
+                          " numbers, but contour_spacing_px has " + std::to_string(levels) +
+                          "; give each of contour_spacing_px, reach_px, step_deg and step_mm one number per level");
+    for (const double value : values)
+      if (!(value > 0)) throw marrow::Error(std::string(name) + ": each number must be positive");
+  };
+  check(options.contour_spacing_px, "contour_spacing_px");
+  check(options.reach_px, "reach_px");
+  check(options.step_deg, "step_deg");
+  check(options.step_mm, "step_mm");
+}
+
+Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose& initial,
+                       const Options& options, marrow::Context& context) {
+  check_options(options);
+  marrow::check_rigid(initial.world_from_model, "the pose to start from");
+  std::vector<std::shared_ptr<const marrow::Cost>> levels;
+  for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
+    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i]}));
+  Search search(optimizer, initial, options, context);
+
+  Result result;
+  const auto add_stage = [&](const char* name) {
+    marrow::Pose pose = initial;
+    pose.world_from_model = search.pose();
+    pose.covariance.reset();
+    pose.cost = levels.back()->value(search.pose());
+    pose.evaluations = search.evaluations();
+    result.stages.add(name, pose);
+    result.pose = std::move(pose);
+  };
+  add_stage("start");
+  const double share = 1.0 / double(levels.size() + 1);
+  search.scan(*levels.front());
+  search.refine(*levels.front(), {kAxialRotation, kAxialTranslation}, 0, 0, share);
+  add_stage("axial");
+  for (std::size_t i = 0; i < levels.size(); ++i)
+    search.refine(*levels[i], {0, 1, 2, 3, 4, 5}, i, share * double(i + 1), share);
+  add_stage("final");
+
+  if (const auto factor = levels.back()->likelihood_factor(search.pose())) {
+    const PredictedCovariance predicted(*levels.back(), search.pose(), initial.frame, *factor);
+    result.pose.covariance = predicted.covariance();
+    result.pose.evaluations += predicted.evaluations();
+    for (const std::string& warning : predicted.warnings(options.warn_above_deg, options.warn_above_mm)) {
+      context.warn(warning);
+      result.pose.warnings.push_back(warning);
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("register.multiresolution", multiresolution)
+      .summary("Coarse to fine: first axial rotation and translation, then all six, with shrinking steps")
+      .in("cost", "what a pose costs")
+      .in("optimizer", "minimiser without derivatives")
+      .in("initial", "pose to start from, and the fragment's axes")
+      .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
+      .out("stages", &Result::stages, "poses on the way: start, axial, final", marrow::over("stage"))
+      .option("scan_rotation_deg", &Options::scan_rotation_deg, "axial rotations tried, to either side", marrow::at_least(0),
+              marrow::at_most(180))
+      .option("scan_rotation_step_deg", &Options::scan_rotation_step_deg, "distance between these", marrow::at_least(0.01))
+      .option("scan_translation_mm", &Options::scan_translation_mm, "axial translations tried, to either side",
+              marrow::at_least(0))
+      .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these", marrow::at_least(0.01))
+      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
+      .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .option("step_deg", &Options::step_deg, "per level: first step of the rotations")
+      .option("step_mm", &Options::step_mm, "per level: first step of the translations")
+      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost per level", marrow::at_least(1))
+      .option("step_tolerance", &Options::step_tolerance, "a level ends when steps fall below this part of its first step",
+              marrow::at_least(1e-9), marrow::at_most(1), marrow::unit(""))
+      .option("warn_above_deg", &Options::warn_above_deg, "predicted standard deviation of a rotation that gives a warning",
+              marrow::at_least(0))
+      .option("warn_above_mm", &Options::warn_above_mm, "predicted standard deviation of a translation that gives a warning",
+              marrow::at_least(0));
+}

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "nearest_edges.hpp"
+
+namespace {
+
+struct Options {
+  double contour_spacing_px = 2;
+  double reach_px = 6;
+  double scale_px = 1;
+  double direction_tolerance_deg = 40;
+  double edge_offset_px = 0;
+  bool estimate_offset = true;
+};
+
+/// One point of the outline against the edge nearest to it.
+struct Residual {
+  float along_normal;  ///< signed, positive where the edge lies outside the outline
+  float beyond;        ///< how far the edge lies beyond the point along the outline: 0 on an edge without gaps
+  float u, v;
+};
+
+struct Matches {
+  std::vector<Residual> residuals;
+  std::size_t points = 0;  ///< compared, with or without an edge
+};
+
+/// sqrt(s^2 + d^2) - s: quadratic near zero, then the distance itself as in the chapter, and no more than at the reach.
+class Loss {
+ public:
+  Loss(double scale, double reach) : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
+  double worst() const { return worst_; }
+  double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
+  bool counts(double distance2) const { return distance2 < reach2_; }
+  /// Derivative by the distance, divided by it.
+  double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
+  double second_derivative(double distance2) const {
+    return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0;
+  }
+
+ private:
+  double raw(double distance2) const { return std::sqrt(scale2_ + distance2) - scale_; }
+  double scale2_, scale_, reach2_, worst_;
+};
+
+/// What does not depend on the level: made once, shared by all.
+struct Scene {
+  const marrow::Projector* projector;
+  marrow::List<marrow::View> views;
+  std::vector<NearestEdges> edges;
+  Options options;
+};
+
+class ContourDistance : public marrow::Cost {
+ public:
+  ContourDistance(std::shared_ptr<const Scene> scene, marrow::CostLevel level)
+      : scene_(std::move(scene)), level_(level), loss_(scene_->options.scale_px, level.reach_px) {}
+
+  double value(const marrow::RigidTransform& world_from_model) const override {
+    const std::vector<Matches> views = match(world_from_model);
+    const double offset = offset_of(views);
+    double sum = 0;
+    for (const Matches& view : views) {
+      double of_view = 0;
+      for (const Residual& r : view.residuals) of_view += loss_(distance2(r, offset));
+      // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
+      const double points = std::max(double(view.points), least_points());
+      of_view += (points - double(view.residuals.size())) * loss_.worst();
+      sum += of_view / points;
+    }
+    return sum / double(views.size());
+  }
+
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+    return std::make_shared<ContourDistance>(scene_, level);
+  }
+
+  /// Ratio between the curvature of the cost and the variance of its slope, both by the residuals at this pose (the sandwich of
+  /// M-estimation: Huber 1981, 6.3). Errors along the outline are related to each other, so the slopes are first summed over
+  /// blocks of the image, and the sums taken as independent.
+  std::optional<double> likelihood_factor(const marrow::RigidTransform& world_from_model) const override {
+    constexpr float kBlock_px = 32;
+    constexpr double kLeastNoise_px = 0.05;  // no edge is known better than this
+    const std::vector<Matches> views = match(world_from_model);
+    const double offset = offset_of(views);
+    double curvature = 0, variance = 0;
+    for (const Matches& view : views) {
+      const double points = std::max(double(view.points), least_points());
+      std::map<std::pair<int, int>, double> blocks;
+      double least = 0;
+      for (const Residual& r : view.residuals) {
+        const double d2 = distance2(r, offset);
+        if (!loss_.counts(d2)) continue;
+        curvature += loss_.second_derivative(d2) / points;
+        blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}] += loss_.weight(d2) * (double(r.along_normal) - offset);
+        least += std::pow(kLeastNoise_px * loss_.weight(0), 2);
+      }
+      double squares = 0;
+      for (const auto& [block, sum] : blocks) squares += sum * sum;
+      variance += std::max(squares, least) / (points * points);
+    }
+    const double n = double(views.size());
+    if (curvature <= 0) return std::nullopt;
+    return curvature / n / (variance / (n * n));
+  }
+
+ private:
+  /// Fewer points in a view than this many are filled up with unmatched ones.
+  double least_points() const { return 60 / level_.contour_spacing_px; }
+
+  static double distance2(const Residual& r, double offset) {
+    const double across = double(r.along_normal) - offset;
+    return across * across + double(r.beyond) * double(r.beyond);
+  }
+
+  std::vector<Matches> match(const marrow::RigidTransform& world_from_model) const {
+    std::vector<Matches> views(scene_->views.size());
+    tbb::parallel_for(std::size_t(0), views.size(), [&](std::size_t i) { views[i] = match(i, world_from_model); });
+    return views;
+  }
+
+  Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
+    constexpr float kMargin_px = 3;   // edge detectors see nothing at the very border of an image
+    constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
+    const marrow::View& view = scene_->views[index];
+    const float right = float(view.camera.width_px - 1) - kMargin_px, bottom = float(view.camera.height_px - 1) - kMargin_px;
+    Matches matches;
+    const auto outline = scene_->projector->outline(view.camera, world_from_model, level_.contour_spacing_px);
+    matches.residuals.reserve(outline.size());
+    for (const marrow::OutlinePoint& p : outline) {
+      if (p.u_px < kMargin_px || p.v_px < kMargin_px || p.u_px > right || p.v_px > bottom) continue;
+      if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
+      ++matches.points;
+      const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v);
+      if (!edge) continue;
+      const float du = edge->u_px - p.u_px, dv = edge->v_px - p.v_px;
+      const float along = std::abs(dv * p.normal_u - du * p.normal_v);
+      matches.residuals.push_back(
+          {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px});
+    }
+    return matches;
+  }
+
+  /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie
+  /// inside its silhouette, and a segmented model may be too fat or too thin. The value that costs least at this pose, by
+  /// iteratively reweighted means.
+  double offset_of(const std::vector<Matches>& views) const {
+    constexpr double kMost_px = 3;
+    constexpr int kRounds = 5;
+    double offset = scene_->options.edge_offset_px;
+    if (!scene_->options.estimate_offset) return offset;
+    const double low = offset - kMost_px, high = offset + kMost_px;
+    for (int round = 0; round < kRounds; ++round) {
+      double sum = 0, weights = 0;
+      for (const Matches& view : views) {
+        const double of_view = 1 / std::max(double(view.points), least_points());
+        for (const Residual& r : view.residuals) {
+          const double weight = of_view * loss_.weight(distance2(r, offset));
+          sum += weight * double(r.along_normal);
+          weights += weight;
+        }
+      }
+      if (weights <= 0) break;
+      offset = std::clamp(sum / weights, low, high);
+    }
+    return offset;
+  }
+
+  std::shared_ptr<const Scene> scene_;
+  const marrow::CostLevel level_;
+  const Loss loss_;
+};
+
+void check_inputs(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
+  if (views.size() != edges.size())
+    throw marrow::Error("there are " + std::to_string(views.size()) + " views, but edge maps of " +
+                        std::to_string(edges.size()) + "; give the edges of each view");
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+    marrow::check_camera(views[i].camera, "view '" + views.name(i) + "'");
+    if (edges[i].pixels.empty())
+      throw marrow::Error("view '" + views.name(i) +
+                          "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, "
+                          "or check that the image shows the bone");
+    if (edges[i].width_px != views[i].camera.width_px || edges[i].height_px != views[i].camera.height_px)
+      throw marrow::Error("view '" + views.name(i) + "': the edge map has " + size(edges[i].width_px, edges[i].height_px) +
+                          " pixels, but the camera " + size(views[i].camera.width_px, views[i].camera.height_px) +
+                          "; give the edges of this view's own image");
+  }
+}
+
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
+                                                     const marrow::List<marrow::View>& views,
+                                                     const marrow::List<marrow::EdgeMap>& edges, const Options& options) {
+  check_inputs(views, edges);
+  auto scene = std::make_shared<Scene>();
+  scene->projector = &projector;
+  scene->views = views;
+  scene->options = options;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    scene->edges.emplace_back(edges[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
+    if (scene->edges.back().empty())
+      throw marrow::Error("view '" + views.name(i) + "': no edge lies inside the mask; widen the mask");
+  }
+  return std::make_shared<ContourDistance>(std::move(scene),
+                                           marrow::CostLevel{options.contour_spacing_px, options.reach_px});
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("similarity.contour_distance", contour_distance)
+      .summary("Mean distance from the points of the projected outline to the nearest edges of like direction, over all views")
+      .in("projector", "draws the outline of the model")
+      .in("views", "views with their cameras and masks", marrow::over("view"))
+      .in("edges", "edge pixels of each view", marrow::over("view"))
+      .out("cost", "mean distance [px]")
+      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between points of the outline",
+              marrow::at_least(0.25))
+      .option("reach_px", &Options::reach_px, "distance from which on a point counts as unmatched", marrow::at_least(0.5))
+      .option("scale_px", &Options::scale_px, "distances below this count by their squares", marrow::at_least(0.01))
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
+              "by how much the directions of edge and outline may differ", marrow::at_least(10), marrow::at_most(180))
+      .option("edge_offset_px", &Options::edge_offset_px,
+              "how far edges lie outside the model's outline; where it is estimated, the middle of the +-3 px that are tried")
+      .option("estimate_offset", &Options::estimate_offset,
+              "find, at each pose, the edge offset common to all views that fits best");
+}

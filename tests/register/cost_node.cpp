@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: Apache-2.0
+#define marrow_plugin_entry marrow_plugin_entry_of_cost
+#include "nodes.hpp"
+#include "plugins/similarity/contour_distance.cpp"
+
+std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+                                              const marrow::List<marrow::EdgeMap>& edges) {
+  return contour_distance(projector, views, edges, Options{});
+}

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/register/multiresolution.cpp"
+
+#include <gtest/gtest.h>
+#include <oneapi/tbb/global_control.h>
+
+#include "ideal_edges.hpp"
+#include "nodes.hpp"
+
+namespace {
+
+/// Errors (frontal, lateral, axial rotation [deg]; then translations [mm]).
+marrow::Vector6d error_of(const marrow::Pose& pose, const marrow::Pose& truth) {
+  marrow::Vector6d error = marrow::motion_between(truth.world_from_model, pose.world_from_model, truth.frame);
+  error.head<3>() *= marrow::degrees(1);
+  return error;
+}
+
+marrow::Vector6d motion(double rx, double ry, double rz, double tx, double ty, double tz) {
+  marrow::Vector6d deg_and_mm;
+  deg_and_mm << rx, ry, rz, tx, ty, tz;
+  return deg_and_mm;
+}
+
+/// A fragment at a known pose, seen from given angles.
+struct Trial {
+  Trial(marrow::Mesh surface, double height_mm) : mesh(std::move(surface)), projector(outline_node(mesh)) {
+    truth.frame = marrow::fragment_frame(mesh);
+    truth.world_from_model = moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
+  }
+  Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
+             const Options& options = {}) const {
+    const ideal_edges::Scene scene = ideal_edges::scene_of(*projector, truth.world_from_model, angles_deg, faults);
+    const auto cost = cost_node(*projector, scene.views, scene.edges);
+    marrow::Pose start = truth;
+    start.world_from_model = moved_by_units(truth.world_from_model, truth.frame, away);
+    marrow::Context context;
+    return multiresolution(*cost, *optimizer_node(), start, options, context);
+  }
+
+  marrow::Mesh mesh;
+  std::shared_ptr<const marrow::Projector> projector;
+  marrow::Pose truth;
+};
+
+const Trial& femur() {
+  static const Trial trial(shapes::distal_femur(), 85);
+  return trial;
+}
+
+}  // namespace
+
+TEST(Multiresolution, PerfectEdgesGiveTheTruth) {
+  const Result result = femur().run({0, 90}, {}, motion(1, -1.5, 9, -2, 1.5, -9));
+  const marrow::Vector6d error = error_of(result.pose, femur().truth);
+  EXPECT_LT(error.head<3>().norm(), 0.06) << error.transpose();
+  EXPECT_LT(error.tail<3>().norm(), 0.06) << error.transpose();
+  EXPECT_TRUE(result.pose.warnings.empty());
+  ASSERT_EQ(result.stages.names(), (std::vector<std::string>{"start", "axial", "final"}));
+  EXPECT_NEAR(error_of(result.stages[0], femur().truth)[2], 9, 0.5);
+  EXPECT_LT(result.stages[2].cost, result.stages[0].cost);
+  EXPECT_GT(result.pose.evaluations, 100);
+}
+
+TEST(Multiresolution, SurvivesNoiseGapsOutliersAndAFatModel) {
+  ideal_edges::Faults faults{0.5, 0.25, 800, -1.5, true, 3};
+  const std::vector<marrow::Vector6d> starts{motion(1.5, -1, 10, 2, 2, 10), motion(-1, 1, -10, -2, 1, 10),
+                                             motion(1, 1.5, 10, 1, -2, -10), motion(-1.5, -1, -10, 2, -1, -10)};
+  for (const auto& away : starts) {
+    const Result result = femur().run({0, 90}, faults, away);
+    const marrow::Vector6d error = error_of(result.pose, femur().truth);
+    // The gaps may hide one of the condyles, from which the axial rotation is seen: the prediction knows.
+    const double axial_sd_deg = marrow::degrees(std::sqrt((*result.pose.covariance)(2, 2)));
+    EXPECT_LT(axial_sd_deg, 1.5);
+    EXPECT_LT(std::abs(error[2]), 1.5) << error.transpose();
+    EXPECT_LT(error.head<2>().norm(), 0.3) << error.transpose();
+    EXPECT_LT(error.tail<3>().norm(), 0.3) << error.transpose();
+    ++faults.seed;
+  }
+}
+
+TEST(Multiresolution, PredictsItsScatter) {
+  marrow::Vector6d squares = marrow::Vector6d::Zero(), predicted = squares;
+  constexpr int kRuns = 16;
+  for (int run = 0; run < kRuns; ++run) {
+    ideal_edges::Faults faults;
+    faults.noise_px = 0.5;
+    faults.seed = unsigned(run) + 1;
+    const Result result = femur().run({0, 90}, faults, motion(0.5, -0.5, 3, 1, 1, -2));
+    const marrow::Vector6d error = error_of(result.pose, femur().truth);
+    squares += error.cwiseProduct(error) / kRuns;
+    ASSERT_TRUE(result.pose.covariance.has_value());
+    marrow::Vector6d variance = result.pose.covariance->diagonal();
+    variance.head<3>() *= std::pow(marrow::degrees(1), 2);
+    predicted += variance / kRuns;
+  }
+  for (int axis = 0; axis < 6; ++axis) {
+    const double actual = std::sqrt(squares[axis]), expected = std::sqrt(predicted[axis]);
+    EXPECT_LT(actual, 2 * expected + 0.01) << "axis " << axis;
+    EXPECT_GT(actual, expected / 2) << "axis " << axis;
+  }
+}
+
+TEST(Multiresolution, OneViewAndThree) {
+  const Result one = femur().run({90}, {}, motion(0.3, -0.3, 2, 1, 1, -2));
+  marrow::Vector6d error = error_of(one.pose, femur().truth);
+  error[3] = 0;  // about the depth one view says little
+  EXPECT_LT(error.norm(), 1) << error.transpose();
+  EXPECT_GT(std::sqrt((*one.pose.covariance)(3, 3)), 5 * std::sqrt((*one.pose.covariance)(4, 4)));
+  const Result three = femur().run({0, 60, 120}, {}, motion(1, -1.5, 9, -2, 1.5, -9));
+  error = error_of(three.pose, femur().truth);
+  EXPECT_LT(error.norm(), 0.1) << error.transpose();
+}
+
+TEST(Multiresolution, WarnsThatACylinderTurnsUnseen) {
+  const Trial trial(shapes::cylinder(14, 120), 60);
+  ideal_edges::Faults faults;
+  faults.noise_px = 0.3;
+  const Result result = trial.run({0, 90}, faults, motion(0.5, 0.5, 0, 1, 1, 3));
+  ASSERT_EQ(result.pose.warnings.size(), 1u);
+  EXPECT_EQ(result.pose.warnings[0],
+            "axial rotation is not determined by these images: the cost hardly changes within 16 degrees");
+  EXPECT_GT(marrow::degrees(std::sqrt((*result.pose.covariance)(2, 2))), 90);
+  EXPECT_LT(std::sqrt((*result.pose.covariance)(5, 5)), 0.5);
+}
+
+TEST(Multiresolution, SameBytesAtAnyNumberOfThreads) {
+  const ideal_edges::Faults faults{0.5, 0.2, 300, 0, false, 5};
+  const auto run = [&](std::size_t threads) {
+    tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
+    return femur().run({0, 90}, faults, motion(1, 1, 5, 1, 1, 5)).pose;
+  };
+  const marrow::Pose a = run(1), b = run(4);
+  EXPECT_EQ(a.world_from_model.rotation, b.world_from_model.rotation);
+  EXPECT_EQ(a.world_from_model.translation_mm, b.world_from_model.translation_mm);
+  EXPECT_EQ(*a.covariance, *b.covariance);
+}
+
+TEST(Multiresolution, RefusesLevelsThatDoNotAgree) {
+  Options options;
+  options.reach_px = {10, 5};
+  try {
+    femur().run({0}, {}, motion(0, 0, 0, 0, 0, 0), options);
+    FAIL();
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "reach_px has 2 numbers, but contour_spacing_px has 3; give each of contour_spacing_px, reach_px, step_deg "
+                 "and step_mm one number per level");
+  }
+}
+
+TEST(Multiresolution, StopsWhenCancelled) {
+  const ideal_edges::Scene scene = ideal_edges::scene_of(*femur().projector, femur().truth.world_from_model, {0, 90}, {});
+  const auto cost = cost_node(*femur().projector, scene.views, scene.edges);
+  const std::atomic<bool> cancelled{true};
+  marrow::Context::Hooks hooks;
+  hooks.cancelled = &cancelled;
+  marrow::Context context(hooks);
+  EXPECT_THROW(multiresolution(*cost, *optimizer_node(), femur().truth, {}, context), marrow::Cancelled);
+}

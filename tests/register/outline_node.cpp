@@ -1,0 +1,8 @@
+// SPDX-License-Identifier: Apache-2.0
+#define marrow_plugin_entry marrow_plugin_entry_of_outline  // several plugins in one program
+#include "nodes.hpp"
+#include "plugins/project/silhouette_edges.cpp"
+
+std::shared_ptr<const marrow::Projector> outline_node(const marrow::Mesh& mesh, const marrow::Volume* volume) {
+  return silhouette_edges(mesh, volume, Options{});
+}

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/similarity/contour_distance.cpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "project/shapes.hpp"
+
+namespace {
+
+/// An outline that is a straight upright line at u = 100 + the pose's x in mm, for v from 50 to 149, facing left.
+class LineProjector : public marrow::Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
+                                            double spacing_px) const override {
+    std::vector<marrow::OutlinePoint> points;
+    for (double v = 50; v < 150; v += spacing_px)
+      points.push_back({float(100 + pose.translation_mm.x()), float(v + pose.translation_mm.z()), -1, 0, Eigen::Vector3f::Zero()});
+    return points;
+  }
+};
+
+marrow::List<marrow::View> one_view(const cv::Mat& mask = {}) {
+  marrow::List<marrow::View> views;
+  views.add("lateral", marrow::View{"lateral", {}, shapes::c_arm(0, 200), mask});
+  return views;
+}
+
+/// Upright edges at u, with a gradient towards `direction`.
+marrow::EdgeMap line_at(double u, float direction) {
+  marrow::EdgeMap map{200, 200, {}};
+  for (int v = 0; v < 200; ++v) map.pixels.push_back({float(u), float(v), direction, 0, 1});
+  return map;
+}
+
+marrow::List<marrow::EdgeMap> edge_maps(const marrow::EdgeMap& map) {
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("lateral", map);
+  return edges;
+}
+
+marrow::RigidTransform shifted(double x, double z = 0) {
+  marrow::RigidTransform pose{"world", "ct"};
+  pose.translation_mm = {x, 0, z};
+  return pose;
+}
+
+Options fixed_offset(double offset_px = 0) {
+  Options options;
+  options.estimate_offset = false;
+  options.edge_offset_px = offset_px;
+  options.contour_spacing_px = 1;
+  options.reach_px = 10;
+  return options;
+}
+
+const LineProjector kLine;
+
+std::string message(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
+  try {
+    contour_distance(kLine, views, edges, Options{});
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+}  // namespace
+
+TEST(ContourDistance, IsTheDistanceThatOneComputesByHand) {
+  const auto cost = contour_distance(kLine, one_view(), edge_maps(line_at(100.25, -1)), fixed_offset());
+  for (const double x : {-7.0, -2.0, 0.25, 1.0, 4.0}) {
+    const double distance = x - 0.25;
+    EXPECT_NEAR(cost->value(shifted(x)), std::sqrt(1 + distance * distance) - 1, 1e-5) << x;
+  }
+  EXPECT_NEAR(cost->value(shifted(30)), std::sqrt(101.0) - 1, 1e-5) << "beyond the reach";
+}
+
+TEST(ContourDistance, EdgesOfTheOtherDirectionDoNotCount) {
+  marrow::EdgeMap map = line_at(100, -1);
+  for (const auto& edge : line_at(103, 1).pixels) map.pixels.push_back(edge);
+  const auto cost = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  EXPECT_NEAR(cost->value(shifted(3)), std::sqrt(10.0) - 1, 1e-5);
+}
+
+TEST(ContourDistance, OffsetIsGivenOrFound) {
+  // The edges lie 2 px to the right of u = 100, which for an outline facing left is 2 px inside.
+  const auto edges = edge_maps(line_at(102, -1));
+  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(-2))->value(shifted(0)), 0, 1e-5);
+  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1, 1e-5);
+  Options found = fixed_offset();
+  found.estimate_offset = true;
+  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, found)->value(shifted(0)), 0, 1e-5);
+  // No more than 3 px are put down to the offset.
+  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, found)->value(shifted(-3)), std::sqrt(5.0) - 1, 1e-5);
+}
+
+TEST(ContourDistance, PointsOutsideImageAndMaskDoNotPay) {
+  marrow::EdgeMap map = line_at(100, -1);
+  for (auto& edge : map.pixels)
+    if (edge.v_px > 95) edge.u_px = 150;
+  const auto all = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  EXPECT_GT(all->value(shifted(0)), 2);
+  cv::Mat mask(200, 200, CV_8U, cv::Scalar(1));
+  mask.rowRange(85, 200).setTo(0);
+  Options options = fixed_offset();
+  options.contour_spacing_px = 0.5;  // 69 points of the upper part remain
+  EXPECT_NEAR(contour_distance(kLine, one_view(mask), edge_maps(map), options)->value(shifted(0)),
+              51.0 / 120 * all->value(shifted(100)), 1e-5) << "60 px of outline are the least that is evidence";
+  EXPECT_NEAR(all->value(shifted(0, 500)), std::sqrt(101.0) - 1, 1e-5) << "nothing to compare is the worst";
+}
+
+TEST(ContourDistance, LevelsAndLikelihood) {
+  marrow::EdgeMap map = line_at(100, -1);
+  for (std::size_t i = 0; i < map.pixels.size(); ++i) map.pixels[i].u_px += (i / 40) % 2 ? 0.5f : -0.5f;
+  const auto cost = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  const auto coarse = cost->at_level({5, 4});
+  EXPECT_NEAR(coarse->value(shifted(30)), std::sqrt(17.0) - 1, 1e-5);
+  const auto factor = cost->likelihood_factor(shifted(0));
+  ASSERT_TRUE(factor.has_value());
+  // 100 points in 4 to 5 blocks that err together by 0.5 px: the mean is known to about 0.5 / sqrt(4.5) = 0.24 px.
+  const double h = 0.1, curvature = (cost->value(shifted(h)) - 2 * cost->value(shifted(0)) + cost->value(shifted(-h))) / (h * h);
+  const double sd = 1 / std::sqrt(*factor * curvature);
+  EXPECT_GT(sd, 0.12);
+  EXPECT_LT(sd, 0.48);
+  EXPECT_FALSE(cost->likelihood_factor(shifted(50)).has_value()) << "nothing is near";
+}
+
+TEST(ContourDistance, SaysWhatIsWrong) {
+  EXPECT_EQ(message(one_view(), edge_maps(marrow::EdgeMap{200, 200, {}})),
+            "view 'lateral': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, or "
+            "check that the image shows the bone");
+  marrow::EdgeMap small = line_at(50, 1);
+  small.width_px = 100;
+  EXPECT_EQ(message(one_view(), edge_maps(small)),
+            "view 'lateral': the edge map has 100 x 200 pixels, but the camera 200 x 200; give the edges of this view's own image");
+  EXPECT_EQ(message(one_view(), {}), "there are 1 views, but edge maps of 0; give the edges of each view");
+  EXPECT_EQ(message(one_view(cv::Mat(200, 200, CV_8U, cv::Scalar(0))), edge_maps(line_at(50, 1))),
+            "view 'lateral': no edge lies inside the mask; widen the mask");
+}
+
+TEST(NearestEdges, AgreesWithASearchThroughAll) {
+  // Single edges far apart, so that no smoothing moves them.
+  marrow::EdgeMap map{120, 90, {}};
+  for (int i = 0; i < 40; ++i) {
+    const double angle = 0.7 * i;
+    map.pixels.push_back({float((i * 37) % 119), float((i * 53) % 89), float(std::cos(angle)), float(std::sin(angle)), 1});
+  }
+  const NearestEdges nearest(map, {}, marrow::kPi);  // any direction
+  for (int v = 0; v < 90; v += 3)
+    for (int u = 0; u < 120; u += 3) {
+      double best = 1e9;
+      for (const auto& e : map.pixels) best = std::min(best, std::hypot(double(e.u_px) - u, double(e.v_px) - v));
+      const marrow::EdgePixel* found = nearest.find(float(u), float(v), 0.6f, 0.8f);
+      ASSERT_NE(found, nullptr);
+      EXPECT_LE(std::hypot(double(found->u_px) - u, double(found->v_px) - v), best + 3) << "cells of 2 px, half a cell at each end";
+    }
+}
