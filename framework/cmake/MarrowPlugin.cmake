@@ -1,15 +1,17 @@
-# marrow_add_plugin(NAME source.cpp [...] [LINK library ...])
+# marrow_add_plugin(NAME source.cpp [...] [LINK library ...] [FOLDER folder])
 #
 # Builds the shared library marrow_NAME.so and, by running it, its manifest marrow_NAME.json beside it. Symbols are hidden,
 # so that two plugins with a same-named function or static never meet.
 function(marrow_add_plugin name)
-  cmake_parse_arguments(PARSE_ARGV 1 plugin "" "" "LINK")
+  cmake_parse_arguments(PARSE_ARGV 1 plugin "" "FOLDER" "LINK")
   set(target plugin_${name})
   add_library(${target} MODULE ${plugin_UNPARSED_ARGUMENTS})
   target_link_libraries(${target} PRIVATE marrow::marrow ${plugin_LINK})
   target_compile_features(${target} PRIVATE cxx_std_20)
   target_compile_options(${target} PRIVATE -Wall -Wextra)
-  if(PROJECT_NAME STREQUAL "marrow")
+  if(plugin_FOLDER)
+    set(folder ${plugin_FOLDER})
+  elseif(PROJECT_NAME STREQUAL "marrow")
     set(folder ${PROJECT_BINARY_DIR}/lib/marrow)
   else()
     set(folder ${CMAKE_CURRENT_BINARY_DIR})
@@ -27,7 +29,7 @@ function(marrow_add_plugin name)
   add_custom_command(TARGET ${target} POST_BUILD
     COMMAND ${describe} describe $<TARGET_FILE:${target}> --write
     COMMENT "Describing ${name}" VERBATIM)
-  if(PROJECT_NAME STREQUAL "marrow")
+  if(PROJECT_NAME STREQUAL "marrow" AND NOT plugin_FOLDER)
     include(GNUInstallDirs)
     install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)
     install(FILES ${folder}/marrow_${name}.json DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)

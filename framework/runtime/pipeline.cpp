@@ -3,7 +3,7 @@
 #include "marrow/runtime/pipeline.hpp"
 
 #include <algorithm>
-#include <set>
+#include <optional>
 #include <sstream>
 
 #include "marrow/runtime/kinds.hpp"
@@ -102,8 +102,10 @@ class Resolver {
     }
   }
 
-  std::string substituted(const std::string& text, const Place& place) {
+  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none.
+  std::optional<std::string> substituted(const std::string& text, const Place& place) {
     std::string result;
+    bool known = true;
     for (std::size_t i = 0; i < text.size(); ++i) {
       if (text[i] != '$') {
         result += text[i];
@@ -115,14 +117,17 @@ class Resolver {
       const auto input = written_.inputs.find(name);
       if (input != written_.inputs.end()) {
         result += input->second;
+      } else if (contains(written_.missing_inputs, name)) {
+        known = false;
       } else {
-        std::vector<std::string> names;
+        known = false;
+        std::vector<std::string> names = written_.missing_inputs;
         for (const auto& [known, value] : written_.inputs) names.push_back(known);
         diagnostics_.add(place, "the pipeline has no input '" + name + "'", suggestion(name, names));
       }
       i = end - 1;
     }
-    return result;
+    return known ? std::optional(result) : std::nullopt;
   }
 
   static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {

@@ -96,13 +96,11 @@ class Reader {
   void set_input(const YamlEntry& input, const OptionInfo& info, const std::optional<WrittenValue>& value) {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
-      pipeline_.inputs[input.key] = info.type == OptionType::path || info.type == OptionType::text ? "" : "0";
-      if (info.type == OptionType::boolean) pipeline_.inputs[input.key] = "false";
       if (inputs_required_)
         yaml_.fault(input.place, "input '" + input.key + "' has no value", "give it on the command line as  " + input.key + "=VALUE");
       return;
     }
-    const auto no_names = [](const std::string& text, const Place&) { return text; };
+    const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
     if (!yaml_.option(value->value, value->place, info, "input '" + input.key + "'", no_names)) return;
     std::string text = value->value.Scalar();
     if (info.type == OptionType::path) text = (value->folder / text).lexically_normal().string();

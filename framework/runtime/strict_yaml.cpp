@@ -132,12 +132,16 @@ bool StrictYaml::check_range(double value, const Place& where, const OptionInfo&
 
 std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const Place& where, const OptionInfo& info,
                                               const std::string& what,
-                                              const std::function<std::string(const std::string&, const Place&)>& substitute) {
+                                              const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute) {
+  bool known = true;  // every $name has a value
   const auto replaced = [&](const YAML::Node& node) {
     if (!node.IsScalar() || node.Scalar().find('$') == std::string::npos) return node;
-    return YAML::Node(substitute(node.Scalar(), place(node)));
+    const auto text = substitute(node.Scalar(), place(node));
+    known = known && text;
+    return YAML::Node(text.value_or(""));
   };
   const YAML::Node node = replaced(original);
+  if (!known) return std::nullopt;
   switch (info.type) {
     case OptionType::boolean:
       if (const auto value = boolean(node, where, what)) return *value;
@@ -169,6 +173,7 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
   bool good = true;
   for (const YAML::Node& item : node) {
     const YAML::Node value = replaced(item);
+    if (!known) return std::nullopt;
     if (info.type == OptionType::numbers) {
       const auto n = number(value, place(item), what);
       good = n && check_range(*n, place(item), info, what) && good;

@@ -38,9 +38,9 @@ class StrictYaml {
   std::optional<std::int64_t> integer(const YAML::Node& node, const Place& where, const std::string& what);
   std::optional<double> number(const YAML::Node& node, const Place& where, const std::string& what);
   /// A value for an option, converted and checked against its range, choices and length. `substitute` replaces $names in
-  /// texts before they are read.
+  /// texts before they are read; where it gives nothing, neither does this.
   std::optional<OptionValue> option(const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
-                                    const std::function<std::string(const std::string&, const Place&)>& substitute);
+                                    const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute);
 
   void fault(const Place& place, std::string message, std::string hint = {}) {
     diagnostics_.add(place, std::move(message), std::move(hint));

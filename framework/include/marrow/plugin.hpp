@@ -254,8 +254,9 @@ class NodeBuilder {
     return *this;
   }
   /// A member of the struct returned.
-  template <class M>
-  NodeBuilder& out(std::string name, M R::*member, std::string help, Over axis = {}) {
+  template <class M, class S>
+  NodeBuilder& out(std::string name, M S::*member, std::string help, Over axis = {}) {
+    static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
     return add_output<M>(std::move(name), std::move(help), axis,
                          [member, axis = axis.axis](const std::shared_ptr<const R>& whole) {
                            return detail::Returned<M>::value(whole, (*whole).*member, axis);

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is wrong with a declaration is found when the plugin registers.
+#include <gtest/gtest.h>
+
+#include "marrow/plugin.hpp"
+
+namespace {
+
+using marrow::List;
+using marrow::Metrics;
+using marrow::Plugin;
+
+struct Options { double size_mm = 1; std::string word = "a"; };
+Metrics plain(const Metrics&, const Options&) { return {}; }
+List<Metrics> listed(const List<Metrics>&) { return {}; }
+std::tuple<Metrics, marrow::Pose> two() { return {}; }
+Metrics sees(const marrow::Truth&) { return {}; }
+marrow::EdgeMap edges(const marrow::View&) { return {}; }
+int nothing_registered() { return 1; }
+
+std::string faults(const Plugin& plugin) {
+  std::string text;
+  for (const std::string& fault : plugin.nodes.back().faults) text += fault + "\n";
+  return text;
+}
+
+TEST(Declaration, GoodOneHasNoFaults) {
+  Plugin plugin;
+  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("size_mm", &Options::size_mm, "h", marrow::at_least(0));
+  EXPECT_EQ(faults(plugin), "");
+  const marrow::NodeInfo& info = plugin.nodes.back().info;
+  EXPECT_EQ(info.options[0].unit, "mm") << "read off the name";
+  EXPECT_EQ(info.inputs[0].type.id, "metrics");
+  EXPECT_EQ(info.kind(), "test");
+}
+TEST(Declaration, TooFewInputs) {
+  Plugin plugin;
+  plugin.node("test.plain", plain).summary("s").out("b", "h");
+  EXPECT_NE(faults(plugin).find("the function takes 1 inputs, but .in() names 0"), std::string::npos);
+}
+TEST(Declaration, ListWithoutAxis) {
+  Plugin plugin;
+  plugin.node("test.listed", listed).summary("s").in("a", "h").out("b", "h");
+  EXPECT_NE(faults(plugin).find("input 'a': a List needs over(\"axis\")"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("output 'b': a List needs over(\"axis\")"), std::string::npos);
+}
+TEST(Declaration, NoSummaryNoOutputBadName) {
+  Plugin plugin;
+  plugin.node("Plain", plain).in("a", "h");
+  EXPECT_NE(faults(plugin).find("has no summary"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("has no output"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("a node's name is kind.name in lower_case"), std::string::npos);
+}
+TEST(Declaration, DefaultNotAmongChoices) {
+  Plugin plugin;
+  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
+  EXPECT_NE(faults(plugin).find("option 'word': its default 'a' is not one of its choices"), std::string::npos);
+}
+TEST(Declaration, PortNamedTwice) {
+  Plugin plugin;
+  plugin.node("test.two", two).summary("s").out("a", "h").out("a", "h");
+  EXPECT_NE(faults(plugin).find("output 'a' is named twice"), std::string::npos);
+}
+TEST(Declaration, TupleHasFewerItems) {
+  Plugin plugin;
+  plugin.node("test.two", two).summary("s").out("a", "h").out("b", "h").out("c", "h");
+  EXPECT_NE(faults(plugin).find("output 'c': the returned tuple has fewer items"), std::string::npos);
+}
+TEST(Declaration, UnregisteredReturnType) {
+  Plugin plugin;
+  plugin.node("test.nothing", nothing_registered).summary("s").out("a", "h");
+  EXPECT_NE(faults(plugin).find("the returned type is not registered with MARROW_VALUE_TYPE"), std::string::npos);
+}
+TEST(Declaration, TruthOnlyWhereItMayBeSeen) {
+  Plugin plugin;
+  plugin.node("register.cheat", sees).summary("s").in("truth", "h").out("pose", "h");
+  EXPECT_NE(faults(plugin).find("input 'truth': only nodes that evaluate or render may be given the truth"), std::string::npos);
+}
+TEST(Declaration, KindContract) {
+  Plugin plugin;
+  plugin.node("edges.other", edges).summary("s").in("view", "h").out("map", "h");
+  EXPECT_NE(faults(plugin).find("output 'map': the kind 'edges' has none of that name"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("output 'edges' is missing: every node of the kind 'edges' has it"), std::string::npos);
+}
+
+}  // namespace

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+// Every diagnostic of a pipeline file, at its place.
+#include "runtime/fixture.hpp"
+
+namespace {
+
+using marrow::Diagnostics;
+using marrow::Pipeline;
+using marrow::PipelineArguments;
+
+class PipelineTest : public testing::Test {
+ protected:
+  Pipeline read(const std::string& text, const PipelineArguments& arguments = {}) {
+    diagnostics = Diagnostics();
+    return marrow::read_pipeline(scratch.write("p.yaml", text), arguments, test_catalogue(), diagnostics);
+  }
+  /// That there is one fault, at that place, whose message and hint hold the texts.
+  void expect_fault(const std::string& text, int line, int column, const std::string& message, const std::string& hint = "",
+                    const PipelineArguments& arguments = {}) {
+    read(text, arguments);
+    ASSERT_EQ(diagnostics.size(), 1u) << text << diagnostics.text();
+    const marrow::Diagnostic fault = diagnostics.sorted()[0];
+    EXPECT_EQ(fault.place.line, line) << diagnostics.text();
+    EXPECT_EQ(fault.place.column, column) << diagnostics.text();
+    EXPECT_NE(fault.message.find(message), std::string::npos) << diagnostics.text();
+    EXPECT_NE(fault.hint.find(hint), std::string::npos) << diagnostics.text();
+  }
+  void expect_node_fault(const std::string& node, int column, const std::string& message, const std::string& hint = "") {
+    expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  s: {uses: test.sides}\n  n: " + node + "\noutputs: {o: c}\n", 5, column, message, hint);
+  }
+  Scratch scratch;
+  Diagnostics diagnostics;
+};
+
+TEST_F(PipelineTest, GoodFileIsResolved) {
+  const Pipeline p = read("marrow: 1\ninputs: {v: {type: number, default: 3}}\nnodes:\n  add: {uses: test.add, in: {a: c, b: s.left}}\n"
+                          "  c: {uses: test.constant, with: {value: $v, word: two, point: [1, 2, 3]}}\n  s: {uses: test.sides}\noutputs: {o: add}\n");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  ASSERT_EQ(p.nodes.size(), 3u);
+  EXPECT_EQ(p.nodes[2].id, "add") << "sources come before users";
+  EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 3.0);
+  EXPECT_EQ(std::get<std::string>(p.nodes[0].options[3]), "two");
+}
+
+TEST_F(PipelineTest, ResolvedYamlGivesTheSamePipeline) {
+  const std::string text = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 0.1, numbers: [1.5, 2]}}\n  s: {uses: test.sides}\n"
+                           "  n: {uses: test.sum, in: {items: [c, s.left]}}\noutputs: {o: n, p: s.both.a}\n";
+  const std::string once = marrow::resolved_yaml(read(text));
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(marrow::resolved_yaml(read(once)), once);
+  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+}
+
+TEST_F(PipelineTest, SyntaxError) { expect_fault("marrow: 1\nnodes: {a: [\n", 3, 1, "not valid YAML"); }
+TEST_F(PipelineTest, UnreadableFile) {
+  marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
+  EXPECT_NE(diagnostics.text().find("the pipeline file cannot be read"), std::string::npos);
+}
+TEST_F(PipelineTest, NoMap) { expect_fault("- a\n", 1, 1, "the pipeline must be a map, got a list"); }
+TEST_F(PipelineTest, MissingVersion) { expect_fault("nodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1, "the key 'marrow' is missing"); }
+TEST_F(PipelineTest, OtherVersion) {
+  expect_fault("marrow: 2\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 1, 1, "this file is of format 2, this program reads format 1");
+}
+TEST_F(PipelineTest, MissingOutputs) { expect_fault("marrow: 1\nnodes: {c: {uses: test.constant}}\n", 1, 1, "the key 'outputs' is missing"); }
+TEST_F(PipelineTest, UnknownKey) {
+  expect_fault("marrow: 1\nnode: {}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 2, 1, "unknown key 'node'", "did you mean 'nodes'?");
+}
+TEST_F(PipelineTest, DuplicateKey) {
+  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  c: {uses: test.sides}\noutputs: {o: c}\n", 4, 3, "'c' is given twice", "line 3");
+}
+TEST_F(PipelineTest, MergeKey) {
+  expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant, <<: {with: {}}}\noutputs: {o: c}\n", 3, 28, "merge keys (<<) are not supported");
+}
+TEST_F(PipelineTest, UnknownNode) { expect_node_fault("{uses: test.constnat}", 13, "unknown node 'test.constnat'", "did you mean 'test.constant'?"); }
+TEST_F(PipelineTest, MissingUses) { expect_node_fault("{with: {value: 1}}", 3, "node 'n' does not say what it uses"); }
+TEST_F(PipelineTest, DotInName) {
+  expect_fault("marrow: 1\nnodes:\n  a.b: {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3, "has a dot");
+}
+TEST_F(PipelineTest, UnknownOption) { expect_node_fault("{uses: test.constant, with: {vlaue: 1}}", 35, "has no option 'vlaue'", "did you mean 'value'?"); }
+TEST_F(PipelineTest, NumberExpected) { expect_node_fault("{uses: test.constant, with: {value: big}}", 35, "expected a number, got 'big'"); }
+TEST_F(PipelineTest, QuotedNumberIsText) { expect_node_fault("{uses: test.constant, with: {value: \"1\"}}", 35, "expected a number, got '1'"); }
+TEST_F(PipelineTest, NotANumber) { expect_node_fault("{uses: test.constant, with: {value: nan}}", 35, "expected a number, got 'nan'"); }
+TEST_F(PipelineTest, BelowRange) { expect_node_fault("{uses: test.constant, with: {value: -2000}}", 35, "-2000 is below the least allowed, -1000"); }
+TEST_F(PipelineTest, AboveRange) { expect_node_fault("{uses: test.constant, with: {value: 2000}}", 35, "2000 is above the most allowed, 1000"); }
+TEST_F(PipelineTest, OctalLookingInteger) {
+  expect_node_fault("{uses: test.constant, with: {count: 010}}", 35, "expected an integer, got '010'", "write it without leading zeros");
+}
+TEST_F(PipelineTest, FractionForInteger) { expect_node_fault("{uses: test.constant, with: {count: 1.5}}", 35, "expected an integer, got '1.5'"); }
+TEST_F(PipelineTest, YesIsNotTrue) { expect_node_fault("{uses: test.constant, with: {flag: yes}}", 35, "expected true or false, got 'yes'"); }
+TEST_F(PipelineTest, UnknownChoice) { expect_node_fault("{uses: test.constant, with: {word: tow}}", 35, "'tow' is not one of its choices", "did you mean 'two'?"); }
+TEST_F(PipelineTest, ListExpected) { expect_node_fault("{uses: test.constant, with: {numbers: 3}}", 35, "expected a list, got '3'", "[a, b, c]"); }
+TEST_F(PipelineTest, WrongLength) { expect_node_fault("{uses: test.constant, with: {point: [1, 2]}}", 35, "expected 3 numbers, got 2"); }
+TEST_F(PipelineTest, UnknownInputName) { expect_node_fault("{uses: test.constant, with: {value: $v}}", 42, "the pipeline has no input 'v'"); }
+TEST_F(PipelineTest, UnknownPort) { expect_node_fault("{uses: test.add, in: {a: c, bb: c}}", 34, "has no input 'bb'", "did you mean 'b'?"); }
+TEST_F(PipelineTest, UnwiredPort) { expect_node_fault("{uses: test.add, in: {b: c}}", 3, "input 'a' of test.add is not wired"); }
+TEST_F(PipelineTest, UnknownSource) { expect_node_fault("{uses: test.add, in: {a: d}}", 28, "there is no node 'd'", "did you mean 'c'?"); }
+TEST_F(PipelineTest, UnknownOutput) { expect_node_fault("{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'", "did you mean 'left'?"); }
+TEST_F(PipelineTest, AmbiguousOutput) { expect_node_fault("{uses: test.add, in: {a: s}}", 28, "node 's' has several outputs and not just one metrics"); }
+TEST_F(PipelineTest, ListForSingle) { expect_node_fault("{uses: test.add, in: {a: [c, c]}}", 28, "takes one metrics, not a list"); }
+TEST_F(PipelineTest, TooManyPicks) { expect_node_fault("{uses: test.add, in: {a: s.left.x}}", 28, "'s.left.x' picks 'x', but it is no list"); }
+TEST_F(PipelineTest, WrongType) {
+  expect_fault("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.apply, in: {adder: c, to: c}}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 4, 30,
+               "input 'adder' of test.apply expects adder, but 'c' is metrics");
+}
+TEST_F(PipelineTest, TruthOnlyForEvaluation) {
+  expect_fault("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.add, in: {a: t}}\noutputs: {o: a}\n", 4, 28,
+               "the truth may be wired only to nodes that evaluate or render, not to test.add");
+  read("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: evaluate.test, in: {of: c, truth: t}}\noutputs: {o: a}\n");
+  EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+}
+TEST_F(PipelineTest, Circle) {
+  expect_fault("marrow: 1\nnodes:\n  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {o: a}\n", 3, 3,
+               "these nodes wait for each other in a circle: a, b");
+}
+TEST_F(PipelineTest, MissingInputValue) {
+  expect_fault("marrow: 1\ninputs:\n  v: {type: number}\nnodes: {c: {uses: test.constant, with: {value: $v}}}\noutputs: {o: c}\n", 3, 3,
+               "input 'v' has no value", "v=VALUE");
+}
+TEST_F(PipelineTest, UnknownInputType) {
+  expect_fault("marrow: 1\ninputs:\n  v: {type: nummber, default: 1}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 3, 7, "unknown type 'nummber'",
+               "did you mean 'number'?");
+}
+TEST_F(PipelineTest, UnknownGivenInput) {
+  expect_fault("marrow: 1\ninputs: {value: {type: number, default: 1}}\nnodes: {c: {uses: test.constant}}\noutputs: {o: c}\n", 0, 0,
+               "the pipeline has no input 'valu'", "did you mean 'value'?", {{{"valu", "2"}}, {}});
+}
+
+const char* const kTwoNodes = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 2}}\n  a: {uses: test.add, in: {a: c}}\noutputs: {o: a}\n";
+TEST_F(PipelineTest, Overrides) {
+  const Pipeline p = read(kTwoNodes, {{}, {{"c.value", "7"}, {"a.in.b", "c"}}});
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(std::get<double>(p.nodes[0].options[0]), 7.0);
+  EXPECT_EQ(p.nodes[1].wires.size(), 2u);
+}
+TEST_F(PipelineTest, OverriddenNodeLeavesItsOptionsBehind) {
+  const Pipeline p = read(kTwoNodes, {{}, {{"c.uses", "test.draw"}}});
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(p.nodes[0].info.name, "test.draw");
+  ASSERT_EQ(p.notes.size(), 1u);
+}
+TEST_F(PipelineTest, OverrideOfUnknownNode) { expect_fault(kTwoNodes, 0, 0, "the pipeline has no node 'cc'", "did you mean 'c'?", {{}, {{"cc.value", "7"}}}); }
+TEST_F(PipelineTest, OverrideOfUnknownOption) { expect_fault(kTwoNodes, 0, 0, "has no option 'valu'", "did you mean 'value'?", {{}, {{"c.valu", "7"}}}); }
+TEST_F(PipelineTest, OverrideWithoutOption) { expect_fault(kTwoNodes, 0, 0, "an override is node.option=value", "", {{}, {{"c", "7"}}}); }
+
+TEST_F(PipelineTest, TenMistakesGiveTenDiagnostics) {
+  read("marrow: 1\n"
+       "colour: red\n"                                                // 2 unknown key
+       "inputs:\n"
+       "  v: {type: nubmer, default: 1}\n"                            // 4 unknown type
+       "nodes:\n"
+       "  c: {uses: test.constant, with: {value: abc}}\n"             // 6 no number
+       "  d: {uses: test.constant, with: {word: four}}\n"             // 7 no choice
+       "  e: {uses: test.nothing_known}\n"                            // 8 unknown node
+       "  f: {uses: test.add, in: {a: c, z: c}}\n"                    // 9 unknown port
+       "  g: {uses: test.add, in: {b: c}}\n"                          // 10 unwired
+       "  h: {uses: test.apply, in: {adder: c, to: c}}\n"             // 11 type
+       "  h: {uses: test.constant}\n"                                 // 12 twice
+       "outputs: {o: missing}\n");                                    // 13 no such node
+  std::vector<int> lines;
+  for (const marrow::Diagnostic& fault : diagnostics.sorted()) lines.push_back(fault.place.line);
+  EXPECT_EQ(lines, (std::vector<int>{2, 4, 6, 7, 8, 9, 10, 11, 12, 13})) << diagnostics.text();
+}
+
+TEST_F(PipelineTest, SourceLineIsShown) {
+  read("marrow: 1\nnodes:\n  c: {uses: test.constnat}\noutputs: {o: c}\n");
+  EXPECT_NE(diagnostics.text().find("p.yaml:3:13: error: unknown node 'test.constnat'\n    c: {uses: test.constnat}\n              ^\n"), std::string::npos)
+      << diagnostics.text();
+}
+
+TEST_F(PipelineTest, AxesAreFound) {
+  const Pipeline p = read("marrow: 1\nnodes:\n  s: {uses: test.sides}\n  l: {uses: test.letters}\n  a: {uses: test.add, in: {a: s.both, b: l}}\n"
+                          "  n: {uses: test.sum, in: {items: a}}\noutputs: {o: n}\n");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(p.nodes[2].mapped_axes, (std::vector<std::string>{"side", "letter"}));
+  EXPECT_EQ(p.nodes[3].mapped_axes, (std::vector<std::string>{"letter"})) << "the axis 'side' is consumed";
+}
+
+}  // namespace
