@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "camera_file.hpp"
+
+#include <Eigen/SVD>
+#include <charconv>
+#include <cmath>
+#include <fstream>
+
+#include "marrow/domain/error.hpp"
+#include "yaml_values.hpp"
+
+namespace marrow::read {
+namespace {
+
+/// XMALab's text, line by line.
+class XmalabText {
+ public:
+  explicit XmalabText(const std::filesystem::path& path) : path_(path) {
+    std::error_code failure;
+    if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
+    if (!std::filesystem::is_regular_file(path, failure) || std::filesystem::file_size(path, failure) > 65536)
+      throw Error(path.string() + ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "
+                                  "matrix, rotation, translation)");
+    stream_.open(path);
+    if (!stream_) throw Error(path.string() + ": cannot be read");
+  }
+
+  /// Skips empty lines and expects a line with just this title.
+  void title(const std::string& expected) {
+    std::string line = next_line();
+    while (line.empty() && stream_) line = next_line();
+    if (line != expected) fail("expected '" + expected + "', got '" + line.substr(0, 40) + "'");
+  }
+
+  std::vector<double> numbers(std::size_t count) {
+    const std::string line = next_line();
+    std::vector<double> values;
+    const char *at = line.data(), *end = line.data() + line.size();
+    while (at != end) {
+      while (at != end && (*at == ' ' || *at == ',' || *at == '\t')) ++at;
+      if (at == end) break;
+      double value = 0;
+      const auto [stop, failure] = std::from_chars(at, end, value);
+      if (failure != std::errc() || !std::isfinite(value)) break;
+      values.push_back(value);
+      at = stop;
+    }
+    if (values.size() != count || at != end)
+      fail("expected " + std::to_string(count) + " numbers, got '" + line.substr(0, 60) + "'");
+    return values;
+  }
+
+  [[noreturn]] void fail(const std::string& text) const {
+    throw Error(path_.string() + ":" + std::to_string(line_number_) + ": " + text +
+                "; an XMALab camera has the blocks image size, camera matrix, rotation, translation");
+  }
+
+ private:
+  std::string next_line() {
+    std::string line;
+    std::getline(stream_, line);
+    ++line_number_;
+    while (!line.empty() && (line.back() == '\r' || line.back() == ' ')) line.pop_back();
+    return line;
+  }
+
+  std::filesystem::path path_;
+  std::ifstream stream_;
+  int line_number_ = 0;
+};
+
+Eigen::Matrix3d read_matrix(XmalabText& text) {
+  Eigen::Matrix3d matrix;
+  for (int r = 0; r < 3; ++r) {
+    const std::vector<double> row = text.numbers(3);
+    matrix.row(r) = Eigen::RowVector3d(row[0], row[1], row[2]);
+  }
+  return matrix;
+}
+
+Camera read_xmalab(const std::filesystem::path& path) {
+  XmalabText text(path);
+  Camera camera;
+  text.title("image size");
+  const std::vector<double> size = text.numbers(2);  // height, width (equal in every file seen)
+  if (size[0] < 1 || size[1] < 1 || size[0] > 65536 || size[1] > 65536) text.fail("the image size is out of range");
+  camera.height_px = int(size[0]);
+  camera.width_px = int(size[1]);
+  text.title("camera matrix");
+  camera.intrinsics = read_matrix(text);
+  text.title("rotation");
+  const Eigen::Matrix3d rotation = read_matrix(text);
+  // Printed with 12 digits; a rotation to the last bit is the nearest one.
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d nearest_rotation = svd.matrixU() * svd.matrixV().transpose();
+  if ((nearest_rotation - rotation).cwiseAbs().maxCoeff() > 1e-4 || nearest_rotation.determinant() < 0)
+    text.fail("the matrix under 'rotation' is not a rotation");
+  camera.camera_from_world.rotation = nearest_rotation;
+  text.title("translation");
+  for (int i = 0; i < 3; ++i) camera.camera_from_world.translation_mm[i] = text.numbers(1)[0];
+  check_camera(camera, path.string());
+  return camera;
+}
+
+}  // namespace
+
+Camera read_camera_file(const std::filesystem::path& path) {
+  if (path.extension() != ".yaml" && path.extension() != ".yml") return read_xmalab(path);
+  YamlFile file(path);
+  const auto camera = camera_from(file.root(), file);
+  if (!file.root()["marrow-camera"]) file.fault(file.root().Mark(), "camera: key 'marrow-camera' is missing");
+  file.finish();
+  return *camera;
+}
+
+}  // namespace marrow::read

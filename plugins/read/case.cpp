@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: Apache-2.0
+// A case: one patient's folder with case.yaml, which names everything else in it (docs/case.md).
+#include <marrow/plugin.hpp>
+
+#include "camera_file.hpp"
+#include "volume_file.hpp"
+#include "yaml_values.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using marrow::read::YamlFile;
+using marrow::read::YamlMap;
+
+struct Options {
+  fs::path path;
+};
+
+/// The file that a key names. A path option counts by the content of the folder it names, so no file outside that folder may
+/// be opened.
+std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, const std::string& key) {
+  const auto text = map.text(key);
+  if (!text) return std::nullopt;
+  const fs::path inside = fs::path(*text).lexically_normal();
+  if (inside.is_absolute() || *inside.begin() == "..") {
+    map.fault(key, key + ": '" + *text + "' lies outside the case's folder; copy it into the folder");
+    return std::nullopt;
+  }
+  std::error_code failure;
+  const fs::path file = fs::canonical(folder / inside, failure);
+  if (failure) {
+    map.fault(key, key + ": there is no '" + *text + "' in the case's folder");
+    return std::nullopt;
+  }
+  const fs::path from_folder = file.lexically_relative(fs::canonical(folder));
+  if (from_folder.empty() || *from_folder.begin() == "..") {
+    map.fault(key, key + ": '" + *text + "' is a link to a place outside the case's folder; copy it into the folder");
+    return std::nullopt;
+  }
+  return folder / inside;
+}
+
+/// Calls a reader; what it throws becomes a fault at the key.
+template <class Read>
+auto read_or_fault(const YamlMap& map, const std::string& key, Read read) -> std::optional<decltype(read())> {
+  try {
+    return read();
+  } catch (const marrow::Error& error) {
+    map.fault(key, key + ": " + error.what());
+    return std::nullopt;
+  }
+}
+
+void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+  const auto node = map.required("ct");
+  if (!node) return;
+  marrow::read::VolumeReading reading;
+  std::optional<fs::path> file;
+  if (node->IsMap()) {
+    const YamlMap ct(map.file(), *node, "ct", {"file", "voxel_size_mm", "flip", "value_offset_hu", "series_uid"});
+    file = file_in(folder, ct, "file");
+    if (ct.has("voxel_size_mm"))
+      if (const auto size = ct.vector3("voxel_size_mm")) reading.voxel_size_mm.assign(size->begin(), size->end());
+    reading.flip = ct.texts_or_none("flip");
+    if (ct.has("value_offset_hu")) reading.value_offset_hu = ct.number("value_offset_hu").value_or(0);
+    if (ct.has("series_uid")) reading.series_uid = ct.text("series_uid").value_or("");
+  } else {
+    file = file_in(folder, map, "ct");
+  }
+  if (!file) return;
+  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::read::read_volume_file(*file, reading); }))
+    result.ct = std::move(*volume);
+}
+
+std::optional<marrow::Camera> read_camera(const fs::path& folder, const YamlMap& map) {
+  const auto node = map.required("camera");
+  if (!node) return std::nullopt;
+  if (node->IsMap()) return marrow::read::camera_from(*node, map.file());
+  const auto file = file_in(folder, map, "camera");
+  if (!file) return std::nullopt;
+  return read_or_fault(map, "camera", [&] { return marrow::read::read_camera_file(*file); });
+}
+
+std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& map, const std::string& key) {
+  const auto file = file_in(folder, map, key);
+  if (!file) return std::nullopt;
+  return read_or_fault(map, key, [&] { return marrow::read::read_image_file(*file); });
+}
+
+void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+  const auto name = map.text("name");
+  const auto image = read_image(folder, map, "image");
+  const auto camera = read_camera(folder, map);
+  marrow::View view;
+  if (map.has("mask")) {
+    const auto mask = read_image(folder, map, "mask");
+    if (!mask) return;
+    view.mask = mask->pixels;
+    if (view.mask.type() != CV_8U) map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
+  }
+  if (!name || !image || !camera) return;
+  if (result.views.find(*name)) return map.fault("name", "name: two views are named '" + *name + "'");
+  view.name = *name;
+  view.image = *image;
+  view.camera = *camera;
+  try {
+    check_view(view);
+  } catch (const marrow::Error& error) {
+    return map.fault("image", error.what());
+  }
+  result.views.add(*name, std::move(view));
+}
+
+void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
+  const auto views = map.required("views");
+  if (!views) return;
+  if (!views->IsSequence() || views->size() == 0)
+    return map.fault("views", "views: expected a list of views, each with name, image and camera");
+  for (const auto& item : *views) {
+    const YamlMap view(map.file(), item, "a view", {"name", "image", "camera", "mask"});
+    if (view.valid()) read_view(folder, view, result);
+  }
+}
+
+std::optional<marrow::RigidTransform> read_transform(const YamlMap& fragment, const std::string& key) {
+  const YamlMap map(fragment.file(), fragment.node(key), key, marrow::read::transform_keys());
+  return marrow::read::transform_from(map, marrow::Pose{}.world_from_model);
+}
+
+void read_fragments(const YamlMap& map, marrow::Case& result) {
+  const auto fragments = map.required("fragments");
+  if (!fragments) return;
+  if (!fragments->IsMap() || fragments->size() == 0)
+    return map.fault("fragments", "fragments: expected at least one fragment by name, with its seeds");
+  std::vector<std::string> registered, with_start, with_truth;
+  for (const auto& item : *fragments) {
+    const std::string name = item.first.Scalar();
+    if (result.seeds.find(name)) map.file().fault(item.first.Mark(), "fragments: '" + name + "' is given twice");
+    const YamlMap fragment(map.file(), item.second, "fragment '" + name + "'", {"seeds", "register", "start", "truth"});
+    if (!fragment.valid()) continue;
+    marrow::Seeds seeds = marrow::read::seeds_from(fragment, name);
+    const bool wanted = seeds.wanted;
+    result.seeds.add(name, std::move(seeds));
+    if (wanted) registered.push_back(name);
+    // Lists on one axis go in step, so only what is registered has a start and a truth.
+    if (fragment.has("start"))
+      if (const auto start = read_transform(fragment, "start"); start && wanted) {
+        marrow::Pose pose;
+        pose.world_from_model = *start;
+        result.start.add(name, pose);
+      }
+    if (fragment.has("truth"))
+      if (const auto truth = read_transform(fragment, "truth"); truth && wanted) result.truth.add(name, {*truth});
+    if (fragment.has("start") && wanted) with_start.push_back(name);
+    if (fragment.has("truth") && wanted) with_truth.push_back(name);
+  }
+  if (registered.empty()) map.fault("fragments", "fragments: every fragment has register: false; register at least one");
+  if (!with_start.empty() && with_start != registered)
+    map.fault("fragments", "fragments: some of the fragments to register have a start; give it for all of them or for none");
+  if (!with_truth.empty() && with_truth != registered)
+    map.fault("fragments", "fragments: some of the fragments to register have a truth; give it for all of them or for none");
+}
+
+marrow::Case read_case(const Options& options) {
+  std::error_code failure;
+  if (!fs::is_directory(options.path, failure))
+    throw marrow::Error(options.path.string() + ": expected the folder of a case, which holds case.yaml" +
+                        (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
+  YamlFile file(options.path / "case.yaml");
+  const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "views", "fragments"});
+  marrow::read::check_version(map, "marrow-case");
+  marrow::Case result;
+  read_fragments(map, result);
+  read_views(options.path, map, result);
+  read_ct(options.path, map, result);
+  file.finish();
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  using marrow::Case;
+  plugin.node("read.case", read_case)
+      .summary("One patient: CT, views with cameras, seeds per fragment, and start and truth where known")
+      .out("ct", &Case::ct, "CT in Hounsfield units")
+      .out("seeds", &Case::seeds, "points inside each fragment", marrow::over("fragment"))
+      .out("views", &Case::views, "X-ray views with cameras", marrow::over("view"))
+      .out("start", &Case::start, "pose to start from", marrow::over("fragment"))
+      .out("truth", &Case::truth, "exact pose, of simulated cases", marrow::over("fragment"))
+      .option("path", &Options::path, "folder of the case", marrow::required());
+}

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "volume_file.hpp"
+
+namespace {
+
+struct Options {
+  std::filesystem::path path;
+};
+
+marrow::Image image(const Options& options) { return marrow::read::read_image_file(options.path); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.image", image)
+      .summary("Grey image from PNG or TIFF (8 or 16 bit, or float)")
+      .out("image", "the grey values as stored")
+      .option("path", &Options::path, "image file", marrow::required());
+}

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mesh_file.hpp"
+
+#include <marrow/plugin.hpp>
+
+namespace {
+
+struct Options {
+  std::filesystem::path path;
+  double scale = 1;
+};
+
+marrow::Mesh mesh(const Options& options, marrow::Context& context) {
+  marrow::Mesh mesh = marrow::read::read_mesh_file(options.path, options.scale);
+  const auto largest = [&] {
+    Eigen::AlignedBox3d box;
+    for (const auto& vertex : mesh.vertices_mm) box.extend(vertex);
+    return box.sizes().maxCoeff();
+  }();
+  if (largest < 1)
+    context.warn(options.path.string() + ": the surface is only " + std::to_string(largest) +
+                 " mm large; is it in metres? Then give scale: 1000");
+  return mesh;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.mesh", mesh)
+      .summary("Triangle surface from STL or PLY, equal vertices merged")
+      .out("mesh", "the surface in mm")
+      .option("path", &Options::path, "STL or PLY file", marrow::required())
+      .option("scale", &Options::scale, "factor to mm: 1000 for a file in metres", marrow::at_least(1e-6));
+}

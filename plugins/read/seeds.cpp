@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "yaml_values.hpp"
+
+namespace {
+
+struct Options {
+  std::filesystem::path path;
+};
+
+marrow::List<marrow::Seeds> seeds(const Options& options) { return marrow::read::read_seeds_file(options.path); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.seeds", seeds)
+      .summary("Points inside each bone fragment, from marrow's YAML")
+      .out("seeds", "points per fragment in CT coordinates", marrow::over("fragment"))
+      .option("path", &Options::path, "file of seeds", marrow::required());
+}

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "camera_file.hpp"
+#include "volume_file.hpp"
+
+namespace {
+
+struct Options {
+  std::vector<std::string> names;
+  std::vector<std::filesystem::path> images;
+  std::vector<std::filesystem::path> cameras;
+};
+
+void check_options(const marrow::List<marrow::Camera>* cameras, const Options& options) {
+  if (options.names.empty()) throw marrow::Error("names: no view is named; name at least one");
+  if (options.images.size() != options.names.size())
+    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, images " +
+                        std::to_string(options.images.size()) + " files; give one image per view");
+  for (std::size_t i = 0; i < options.names.size(); ++i)
+    if (std::count(options.names.begin(), options.names.end(), options.names[i]) > 1)
+      throw marrow::Error("names: two views are named '" + options.names[i] + "'");
+  if (bool(cameras) == !options.cameras.empty())
+    throw marrow::Error("give the cameras either as the option (files) or as the input (values)");
+  if (!cameras && options.cameras.size() != options.names.size())
+    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, cameras " +
+                        std::to_string(options.cameras.size()) + " files; give one camera per view");
+}
+
+marrow::Camera camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
+  if (const marrow::Camera* camera = cameras.find(name)) return *camera;
+  std::string known;
+  for (const std::string& other : cameras.names()) known += (known.empty() ? "'" : ", '") + other + "'";
+  throw marrow::Error("view '" + name + "' has no camera of that name; there are " + known);
+}
+
+marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
+  check_options(cameras, options);
+  marrow::List<marrow::View> views;
+  for (std::size_t i = 0; i < options.names.size(); ++i) {
+    marrow::View view;
+    view.name = options.names[i];
+    view.image = marrow::read::read_image_file(options.images[i]);
+    view.camera = cameras ? camera_of(view.name, *cameras) : marrow::read::read_camera_file(options.cameras[i]);
+    check_view(view);
+    views.add(options.names[i], std::move(view));
+  }
+  return views;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.views", views)
+      .summary("X-ray views: images and their cameras")
+      .in("camera", "geometry per view, by the views' names, where no camera files are given", marrow::over("view"))
+      .out("views", "the views", marrow::over("view"))
+      .option("names", &Options::names, "one name per view", marrow::required())
+      .option("images", &Options::images, "one image file (PNG, TIFF) per view", marrow::required())
+      .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view");
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "volume_file.hpp"
+
+namespace {
+
+struct Options {
+  std::filesystem::path path;
+  std::vector<double> voxel_size_mm;
+  std::vector<std::string> flip;
+  double value_offset_hu = 0;
+  std::string series_uid;
+};
+
+marrow::Volume volume(const Options& options) {
+  return marrow::read::read_volume_file(
+      options.path, {options.voxel_size_mm, options.flip, options.value_offset_hu, options.series_uid});
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.volume", volume)
+      .summary("CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its data)")
+      .out("volume", "CT in Hounsfield units; patient axes are LPS")
+      .option("path", &Options::path, "file, or folder of one series", marrow::required())
+      .option("voxel_size_mm", &Options::voxel_size_mm, "size of a voxel [x, y, z]; needed for TIFF, replaces the file's own")
+      .option("flip", &Options::flip, "axes of the grid (x, y, z) along which the samples are reversed")
+      .option("value_offset_hu", &Options::value_offset_hu, "added to every sample: -1024 where the file holds HU + 1024")
+      .option("series_uid", &Options::series_uid, "SeriesInstanceUID, where a DICOM folder holds several series");
+}

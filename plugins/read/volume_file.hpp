@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/domain/image.hpp"
+#include "marrow/domain/volume.hpp"
+
+namespace marrow::read {
+
+/// What a file does not say of itself.
+struct VolumeReading {
+  std::vector<double> voxel_size_mm;  ///< 3 numbers, or none: as the file says
+  std::vector<std::string> flip;      ///< axes of the grid (x, y, z) along which the samples are reversed
+  double value_offset_hu = 0;         ///< added to every sample
+  std::string series_uid;             ///< of DICOM; empty: the only one
+};
+
+/// A CT volume from MHA, NRRD, NIfTI, multi-page TIFF, or a folder: a DICOM series, or an MHD or NHDR header with the file
+/// that it names. Patient axes are LPS. Throws Error.
+Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& reading);
+
+/// One grey image from PNG or TIFF, with 8 or 16 bits or float. Throws Error.
+Image read_image_file(const std::filesystem::path& path);
+
+}  // namespace marrow::read

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// Folders: a view, and a whole case as read.case takes it (docs/case.md).
+#include <algorithm>
+#include <cctype>
+#include <marrow/plugin.hpp>
+
+#include "atomic_write.hpp"
+#include "picture_out.hpp"
+#include "yaml_text.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using marrow::write::quoted;
+
+/// PNG for 8 and 16 bits, TIFF for float.
+std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
+
+/// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png, or with an empty stem image.png, camera.yaml and mask.png.
+struct ViewFiles {
+  std::string image, camera, mask;
+};
+ViewFiles write_view_files(const marrow::View& view, const fs::path& folder, const std::string& stem) {
+  const std::string dot = stem.empty() ? "" : stem + ".";
+  ViewFiles files{(stem.empty() ? "image" : stem) + image_name(view.image), dot + "camera.yaml", ""};
+  marrow::write::write_pixels(folder / files.image, view.image.pixels);
+  marrow::write::write_text_plainly(folder / files.camera, marrow::write::camera(view.camera));
+  if (!view.mask.empty()) {
+    files.mask = dot + "mask.png";
+    marrow::write::write_pixels(folder / files.mask, view.mask);
+  }
+  return files;
+}
+
+void view(const marrow::View& view, const std::string& path) {
+  marrow::write::write_atomically(path, [&](const fs::path& folder) {
+    fs::create_directory(folder);
+    write_view_files(view, folder, "");
+  });
+}
+
+/// A view's name as the name of its files.
+std::string file_stem(const std::string& name, std::size_t index) {
+  const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+    return std::isalnum(c) || c == '_' || c == '-';
+  });
+  return plain ? name : "view-" + std::to_string(index + 1);
+}
+
+std::string views_text(const marrow::Case& value, const fs::path& folder) {
+  std::string text = "views:\n";
+  for (std::size_t i = 0; i < value.views.size(); ++i) {
+    const ViewFiles files = write_view_files(value.views[i], folder, file_stem(value.views.name(i), i));
+    text += "  - name: " + quoted(value.views.name(i)) + "\n    image: " + files.image + "\n    camera: " + files.camera + "\n";
+    if (!files.mask.empty()) text += "    mask: " + files.mask + "\n";
+  }
+  return text;
+}
+
+std::string fragments_text(const marrow::Case& value) {
+  std::string text = "fragments:\n";
+  for (std::size_t i = 0; i < value.seeds.size(); ++i) {
+    const std::string& name = value.seeds.name(i);
+    text += "  " + quoted(name) + ":\n" + marrow::write::seeds(value.seeds[i], "    ");
+    if (const marrow::Pose* start = value.start.find(name))
+      text += "    start:\n" + marrow::write::transform(start->world_from_model, "      ");
+    if (const marrow::Truth* truth = value.truth.find(name))
+      text += "    truth:\n" + marrow::write::transform(truth->world_from_model, "      ");
+  }
+  return text;
+}
+
+/// That read.case will take what is written.
+void check_case(const marrow::Case& value, const std::string& path) {
+  if (value.views.empty()) throw marrow::Error(path + ": the case has no view");
+  if (value.seeds.empty()) throw marrow::Error(path + ": the case has no fragment with seeds");
+  const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
+    for (const std::string& name : names)
+      if (!value.seeds.find(name)) throw marrow::Error(path + ": fragment '" + name + "' has a " + what + " but no seeds");
+  };
+  check(value.start.names(), "start");
+  check(value.truth.names(), "truth");
+}
+
+void write_case(const marrow::Case& value, const std::string& path) {
+  check_case(value, path);
+  marrow::write::write_atomically(path, [&](const fs::path& folder) {
+    fs::create_directory(folder);
+    marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
+    marrow::write::write_text_plainly(folder / "case.yaml",
+                                      "marrow-case: 1\nct: ct.mha\n" + views_text(value, folder) + fragments_text(value));
+  });
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.writer<marrow::View>("", view, "folder with image.png, camera.yaml and mask.png");
+  plugin.writer<marrow::Case>("", write_case, "folder with case.yaml, ct.mha, images and cameras, as read.case takes it");
+}

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <bit>
+#include <cstring>
+#include <marrow/plugin.hpp>
+
+#include "atomic_write.hpp"
+
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "the file says that its numbers are little-endian");
+
+template <class T>
+void append(std::string& bytes, const T& value) {
+  const char* first = reinterpret_cast<const char*>(&value);
+  bytes.append(first, sizeof value);
+}
+
+/// Binary PLY with double coordinates, so that what is read back is the same to the last bit.
+void mesh(const marrow::Mesh& mesh, const std::string& path) {
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + mesh.frame + "\nelement vertex " +
+                      std::to_string(mesh.vertices_mm.size()) +
+                      "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
+                      std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
+  bytes.reserve(bytes.size() + mesh.vertices_mm.size() * 24 + mesh.triangles.size() * 13);
+  for (const Eigen::Vector3d& vertex : mesh.vertices_mm)
+    for (const double coordinate : vertex) append(bytes, coordinate);
+  for (const auto& triangle : mesh.triangles) {
+    append(bytes, std::uint8_t(3));
+    for (const std::uint32_t corner : triangle) append(bytes, std::int32_t(corner));
+  }
+  marrow::write::write_text(path, bytes);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) { plugin.writer<marrow::Mesh>(".ply", mesh, "PLY surface in mm (MeshLab, Slicer, Blender open it)"); }

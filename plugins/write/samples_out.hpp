@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The narrow door to ITK for writing: its headers bring an Eigen of their own.
+#include <array>
+#include <filesystem>
+
+namespace marrow::write {
+
+enum class Sample { u8, u16, f32 };
+
+/// A grid of float samples, x fastest, as compressed MHA. Throws Error when the file did not become whole.
+struct GridOut {
+  std::array<int, 3> size;
+  std::array<double, 3> spacing_mm, origin_mm;
+  std::array<std::array<double, 3>, 3> axes;  ///< axes[k]: direction of grid axis k
+};
+void write_mha(const std::filesystem::path& path, const GridOut& grid, const float* values);
+
+/// An image, rows from the top, pixels without gaps: PNG for u8 and u16, TIFF for f32. Throws Error when the file did not
+/// become whole.
+void write_pixels(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels);
+
+}  // namespace marrow::write

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+#include <nlohmann/json.hpp>
+
+#include "atomic_write.hpp"
+#include "yaml_text.hpp"
+
+namespace {
+
+using marrow::write::write_text;
+
+void pose(const marrow::Pose& pose, const std::string& path) { write_text(path, marrow::write::pose(pose)); }
+
+void truth(const marrow::Truth& truth, const std::string& path) { write_text(path, marrow::write::truth(truth)); }
+
+void camera(const marrow::Camera& camera, const std::string& path) { write_text(path, marrow::write::camera(camera)); }
+
+void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
+  write_text(path, marrow::write::shaft_lines(lines));
+}
+
+void seeds(const marrow::Seeds& seeds, const std::string& path) {
+  write_text(path, "marrow-seeds: 1\nfragments:\n  " + marrow::write::quoted(seeds.fragment) + ":\n" +
+                       marrow::write::seeds(seeds, "    "));
+}
+
+void metrics(const marrow::Metrics& metrics, const std::string& path) {
+  nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};
+  for (const marrow::Metric& metric : metrics.items)
+    json["metrics"].push_back({{"name", metric.name}, {"value", metric.value}, {"unit", metric.unit}});
+  write_text(path, json.dump(2) + "\n");
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.writer<marrow::Pose>(".yaml", pose, "pose with its frames, 4x4 matrix, predicted deviations and warnings");
+  plugin.writer<marrow::Truth>(".yaml", truth, "exact pose with its frames and 4x4 matrix");
+  plugin.writer<marrow::Camera>(".yaml", camera, "camera with its matrices");
+  plugin.writer<marrow::ShaftLines>(".yaml", shaft_lines, "the pair of borders, and the rejected ones with reasons");
+  plugin.writer<marrow::Seeds>(".yaml", seeds, "points of one fragment");
+  plugin.writer<marrow::Metrics>(".json", metrics, "figures of merit with units");
+}
