@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: Apache-2.0
+import json
+import os
+import resource
+import signal
+import subprocess
+import time
+
+from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow
+
+WORK = """marrow: 1
+nodes:
+  a: {uses: test.work, with: {value: 2}}
+  b: {uses: test.work, with: {value: 2.000001}}
+outputs: {a: a, b: b}
+"""
+NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
+
+
+class Commands(Case):
+    def test_help_everywhere(self):
+        for command in ([], ["run"], ["check"], ["list"], ["inspect"], ["graph"], ["schema"], ["doctor"], ["describe"]):
+            result = marrow(*command, "--help")
+            self.assertEqual(result.returncode, 0)
+            self.assertIn("--help", result.stdout)
+
+    def test_a_wrong_command_line_is_code_2(self):
+        self.assertEqual(marrow("rnu").returncode, 2)
+        result = marrow("inspect", "mesh.marching_cbues")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("did you mean 'mesh.marching_cubes'?", result.stderr)
+
+    def test_list_check_inspect_load_no_plugin_and_are_quick(self):
+        for command in (["list"], ["check", SOURCE / "pipelines" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
+            loads = marrow(*command, extra_environment={"LD_DEBUG": "files"})
+            self.assertEqual(loads.returncode, 0, loads.stdout)
+            self.assertNotIn("calling init: " + str(BUILD / "lib" / "marrow"), loads.stderr)
+            times = []
+            for _ in range(9):
+                start = time.perf_counter()
+                marrow(*command)
+                times.append(time.perf_counter() - start)
+            print(command[0], "median %.1f ms" % (1000 * sorted(times)[4]))
+
+    def test_inspect_yaml_can_be_pasted(self):
+        snippet = marrow("inspect", "mesh.marching_cubes", "--yaml").stdout.replace("NODE", "bone")
+        text = "marrow: 1\nnodes:\n  bone: {uses: segment.threshold, in: {volume: ct}}\n  ct: {uses: read.volume, with: {path: x}}\n" + snippet
+        result = marrow("check", self.write("p.yaml", text + "outputs: {mesh: marching_cubes}\n"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_run_writes_its_record(self):
+        out = self.scratch / "out"
+        result = marrow("run", self.write("p.yaml", NUMBER), "--out", out, "--seed", 5, "--set", "c.value=4", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 0, result.stderr)
+        record = json.loads((out / "run.json").read_text())
+        self.assertEqual(record["seed"], 5)
+        self.assertEqual(record["overrides"], ["c.value=4"])
+        self.assertEqual(record["status"], "done")
+        self.assertEqual(record["nodes"][0]["calls"], 1)
+        self.assertEqual(len(record["plugins"][0]["build_id"]), 32)
+        self.assertIn("value: 4", (out / "pipeline.yaml").read_text())
+        self.assertEqual(marrow("check", out / "pipeline.yaml", plugins=[TEST_PLUGINS]).returncode, 0)
+
+    def test_events_as_json(self):
+        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "out", "--json", plugins=[TEST_PLUGINS])
+        events = [json.loads(line) for line in result.stdout.splitlines()]
+        self.assertEqual([event["event"] for event in events], ["started", "finished", "ended"])
+        self.assertEqual(events[-1]["status"], "done")
+
+    def test_quiet_prints_nothing(self):
+        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "out", "--quiet", plugins=[TEST_PLUGINS])
+        self.assertEqual((result.stdout, result.stderr), ("", ""))
+
+    def test_nothing_is_overwritten(self):
+        (self.scratch / "out").mkdir()
+        (self.scratch / "out" / "mine.txt").write_text("keep")
+        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "out", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("is already there and not empty", result.stderr)
+        self.assertEqual([path.name for path in (self.scratch / "out").iterdir()], ["mine.txt"])
+
+    def test_unwritable_folder(self):
+        self.write("file", "")
+        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "file" / "out", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("cannot make the output folder", result.stderr)
+
+    def test_a_failed_node_is_code_1_and_the_others_results_stay(self):
+        text = NUMBER.replace("outputs:", "  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\noutputs:").replace("number: c", "number: c, f: f")
+        result = marrow("run", self.write("p.yaml", text), "--out", self.scratch / "out", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("node 'f' (test.fail_above) failed: the number is too large; give a smaller one (its inputs: a = c)", result.stderr)
+        self.assertTrue((self.scratch / "out" / "outputs" / "number.json").exists())
+
+    def test_two_slow_nodes_overlap(self):
+        path = self.write("p.yaml", WORK)
+        before = resource.getrusage(resource.RUSAGE_CHILDREN)
+        start = time.perf_counter()
+        self.assertEqual(marrow("run", path, "--out", self.scratch / "out", plugins=[TEST_PLUGINS]).returncode, 0)
+        wall = time.perf_counter() - start
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        print("two slow nodes: CPU %.0f %%" % (100 * cpu / wall))
+        nodes = json.loads((self.scratch / "out" / "run.json").read_text())["nodes"]
+        self.assertLess(abs(nodes[0]["start_s"] - nodes[1]["start_s"]), 1)
+
+    def test_control_c_ends_cleanly(self):
+        path = self.write("p.yaml", WORK.replace("2.000001", "60").replace("outputs: {", "  c: {uses: test.constant}\noutputs: {c: c, "))
+        environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
+        process = subprocess.Popen([str(MARROW), "run", str(path), "--out", str(self.scratch / "out")], env=environment, stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.PIPE, text=True)
+        while not (self.scratch / "out" / "log.txt").exists() or "c" not in (self.scratch / "out" / "log.txt").read_text():
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        errors = process.communicate(timeout=30)[1]
+        self.assertEqual(process.returncode, 130)
+        self.assertIn("stopped by Ctrl-C; what was done is in", errors)
+        self.assertEqual(json.loads((self.scratch / "out" / "run.json").read_text())["status"], "cancelled")
+        self.assertTrue((self.scratch / "out" / "outputs" / "c.json").exists())
+
+    def test_graph(self):
+        text = marrow("graph", SOURCE / "pipelines" / "femur.yaml").stdout
+        self.assertIn("for each view", text)
+        dot = marrow("graph", SOURCE / "pipelines" / "femur.yaml", "--dot").stdout
+        self.assertTrue(dot.startswith("digraph"))
+        self.assertIn("style=dashed", dot)
+
+    def test_no_name_of_a_node_in_framework_or_tools(self):
+        names = [node["name"] for node in json.loads(marrow("list", "--json").stdout)]
+        self.assertGreater(len(names), 20)
+        for folder in ("framework", "tools"):
+            for path in (SOURCE / folder).rglob("*"):
+                if path.is_file() and "__pycache__" not in path.parts:
+                    text = path.read_text()
+                    for name in names:
+                        self.assertNotIn(name, text, str(path))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the command line share: where things are, and how to run the program."""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE = pathlib.Path(sys.argv[1])
+BUILD = pathlib.Path(sys.argv[2])
+MARROW = BUILD / "bin" / "marrow"
+TEST_PLUGINS = BUILD / "tests" / "plugins"
+
+
+def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None):
+    environment = dict(os.environ)
+    environment["MARROW_PLUGIN_PATH"] = ":".join(str(folder) for folder in plugins)
+    environment.update(extra_environment or {})
+    return subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=cwd, timeout=timeout,
+                          env=environment, errors="replace")
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cli-"))
+
+    def tearDown(self):
+        shutil.rmtree(self.scratch, ignore_errors=True)
+
+    def write(self, name, text):
+        path = self.scratch / name
+        path.write_text(text)
+        return path
+
+
+def main():
+    unittest.main(argv=sys.argv[:1], verbosity=2)

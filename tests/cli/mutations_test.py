@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: Apache-2.0
+"""200 random mutations of the shipped pipelines: each is either still good or diagnosed, and none crashes the program."""
+import json
+import random
+
+from marrow_cli import SOURCE, Case, main, marrow
+
+
+def mutated(text, chance):
+    """The text with one change, and the line it was made on."""
+    lines = text.splitlines()
+    candidates = [i for i, line in enumerate(lines) if line.strip() and not line.lstrip().startswith("#")]
+    at = chance.choice(candidates)
+    line = lines[at]
+    column = chance.randrange(len(line))
+    kind = chance.randrange(5)
+    if kind == 0:
+        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column:]
+    elif kind == 1:
+        line = line[:column] + line[column + 1:]
+    elif kind == 2:
+        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column + 1:]
+    elif kind == 3:
+        line = line[:column] + line[column:][::-1]
+    else:
+        lines.insert(at, line)
+    lines[at] = line
+    return "\n".join(lines) + "\n", at + 1
+
+
+class Mutations(Case):
+    def test_each_is_good_or_diagnosed(self):
+        chance = random.Random(20261121)
+        files = sorted((SOURCE / "pipelines").glob("*.yaml"))
+        self.assertGreater(len(files), 2)
+        good = at_line = elsewhere = 0
+        for number in range(200):
+            path = files[number % len(files)]
+            text, line = mutated(path.read_text(), chance)
+            copy = self.scratch / path.name
+            copy.write_text(text)
+            result = marrow("check", copy, "--json")
+            self.assertIn(result.returncode, (0, 2), "%s\n%s" % (text, result.stderr))
+            faults = json.loads(result.stdout)
+            self.assertEqual(bool(faults), result.returncode == 2)
+            if not faults:
+                good += 1
+            elif any(abs(fault["line"] - line) <= 1 for fault in faults):
+                at_line += 1
+            else:
+                # A change of YAML's structure or of a node's name shows where it is missed: later in the file.
+                elsewhere += 1
+                print("line %d changed, diagnosed at %s" % (line, sorted({fault["line"] for fault in faults})))
+                print("   ", text.splitlines()[line - 1])
+        print("%d still good, %d diagnosed at the line, %d where the change is missed" % (good, at_line, elsewhere))
+        self.assertEqual(good + at_line + elsewhere, 200)
+        self.assertLess(elsewhere, 40)
+
+
+if __name__ == "__main__":
+    main()
