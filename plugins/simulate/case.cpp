@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// Puts a simulated CT and images together with seeds and the exact truth.
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "phantom.hpp"
+
+namespace {
+
+using namespace marrow;
+using simulate::Fragment;
+using simulate::Phantom;
+
+struct CaseOptions {
+  std::vector<std::string> wanted{"distal"};
+};
+
+/// The fragment's seeds that lie in the CT, two voxels from its border at least.
+std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm) {
+  constexpr double kBorder = 2;
+  std::vector<Eigen::Vector3d> inside;
+  for (const auto& point : points_mm) {
+    const Eigen::Vector3d index = grid.index_from_point(point);
+    bool is_inside = true;
+    for (int k = 0; k < 3; ++k)
+      is_inside = is_inside && index[k] >= kBorder && index[k] <= grid.size[std::size_t(k)] - 1 - kBorder;
+    if (is_inside) inside.push_back(point);
+  }
+  return inside;
+}
+
+Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
+  simulate::check_phantom(phantom, "simulate.case");
+  check_volume(ct, "simulate.case: CT");
+  Case result;
+  result.ct = ct;
+  result.views = views;
+  for (const std::string& name : options.wanted) {
+    std::string known;
+    bool found = false;
+    for (const Fragment& fragment : phantom.fragments) {
+      found = found || fragment.name == name;
+      known += (known.empty() ? "" : ", ") + fragment.name;
+    }
+    if (!found) throw Error("simulate.case: the option 'register' names the fragment '" + name + "', but there are: " + known);
+  }
+  for (const Fragment& fragment : phantom.fragments) {
+    Seeds seeds{fragment.name, within(ct.grid, fragment.seeds_mm),
+                std::find(options.wanted.begin(), options.wanted.end(), fragment.name) != options.wanted.end()};
+    if (seeds.wanted) result.truth.add(fragment.name, Truth{fragment.world_from_ct});
+    if (!seeds.points_mm.empty()) {
+      result.seeds.add(fragment.name, std::move(seeds));
+    } else if (seeds.wanted) {
+      throw Error("simulate.case: fragment '" + fragment.name +
+                  "' has no seed within the CT; let simulate.ct cover more of it (range_mm)");
+    }
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.case", assemble)
+      .summary("case of a simulated patient: CT, views, seeds and the exact truth, with no pose to start from")
+      .in("volume", "CT of the phantom")
+      .in("views", "X-ray images of the phantom", over("view"))
+      .in("phantom", "fragments with their seeds and truth")
+      .out("case", "CT, views, seeds and truth")
+      .option("register", &CaseOptions::wanted, "fragments whose pose is wanted; the others are only kept apart in the CT");
+}
