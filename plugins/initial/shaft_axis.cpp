@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// The chapter's first stage (3.4): the bone's axis from the shaft lines of the views, and the model's axis laid onto it. The
+// chapter back-projects at right angles to the image; here the planes go through the X-ray source, which takes away an error
+// of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from the silhouette that the
+// model would show in the same stretches of the same views, so that a bow, a taper or a ridge moves both axes alike.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "axis.hpp"
+#include "model_borders.hpp"
+
+namespace {
+
+using namespace marrow::initial;
+using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, marrow::RigidTransform, marrow::ShaftLines, marrow::View;
+
+struct Options {
+  int rounds = 10;
+  double tolerance_mm = 1.0;
+};
+
+std::string number(double value) {
+  char buffer[40];
+  std::snprintf(buffer, sizeof buffer, "%.1f", value);
+  return buffer;
+}
+
+/// What one view says: the pair of borders, and the plane in which the axis lies.
+struct Sight {
+  std::string name;
+  const Camera* camera;
+  const ShaftLines* lines;
+  Plane plane;
+};
+
+std::vector<Sight> sights_of(const List<ShaftLines>& lines, const List<View>& views) {
+  if (lines.empty()) throw marrow::Error("there are no shaft lines; wire the lines of at least one view");
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string& name = lines.name(i);
+    const View* view = views.find(name);
+    if (!view) throw marrow::Error("there are shaft lines of a view '" + name + "', but no view of that name");
+    marrow::check_camera(view->camera, "view '" + name + "'");
+    for (const marrow::LineSegment* border : {&lines[i].left, &lines[i].right})
+      if (!border->from_px.allFinite() || !border->to_px.allFinite() || (border->to_px - border->from_px).norm() < 1)
+        throw marrow::Error("view '" + name + "': a border of the shaft has no length");
+    sights.push_back({name, &view->camera, &lines[i], bisecting_plane(view->camera, lines[i].left, lines[i].right)});
+  }
+  return sights;
+}
+
+/// Distance of a pair's borders in the middle of their stretch, across it.
+double width_px(const ShaftLines& lines) {
+  const Eigen::Vector2d along = (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
+  const Eigen::Vector2d between = 0.5 * (lines.right.from_px + lines.right.to_px - lines.left.from_px - lines.left.to_px);
+  return std::abs(along.x() * between.y() - along.y() * between.x());
+}
+
+/// The model's borders in every view at a pose.
+std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model, const std::vector<Sight>& sights,
+                                     double tolerance_mm) {
+  std::vector<ModelBorders> borders;
+  for (const Sight& sight : sights) {
+    const double pixel_mm = marrow::pixel_size_at_mm(*sight.camera, Eigen::Vector3d::Zero());
+    auto found = model_borders(model, world_from_model, *sight.camera, *sight.lines, tolerance_mm / std::abs(pixel_mm));
+    if (!found)
+      throw marrow::Error("view '" + sight.name + "': where the image shows the shaft, the model at its start does not appear; "
+                          "give a start nearer to the bone");
+    borders.push_back(std::move(*found));
+  }
+  return borders;
+}
+
+/// With two or more views the planes meet in the axis (Eq 7), of the image and of the model alike.
+RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor) {
+  std::vector<Plane> target, model;
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    target.push_back(sights[i].plane);
+    model.push_back(bisecting_plane(*sights[i].camera, borders[i].left, borders[i].right));
+  }
+  return world_from_world_move(axis_of_planes(model), axis_of_planes(target), anchor);
+}
+
+/// One view knows the plane of the axis. The depth follows from the angle under which the bone's own width is seen: for a
+/// cylinder r = D sin(half angle), so two depths are as the widths of the image inversely. How far the axis leans out of the
+/// image stays as it was.
+RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor) {
+  const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
+  const double nearer = borders.width_px / width_px(*sight.lines);
+  // The model's own axis is laid into the plane that its borders span, so that a perfect start is left where it is.
+  const Plane model_plane = bisecting_plane(*sight.camera, borders.left, borders.right);
+  const auto into = [&](const Plane& plane, const Eigen::Vector3d& vector) {
+    return Eigen::Vector3d(vector - plane.normal * plane.normal.dot(vector));
+  };
+  Axis model, target;
+  model.direction = into(model_plane, borders.axis.direction).normalized();
+  model.point_mm = source + into(model_plane, borders.axis.point_mm - source);
+  target.direction = into(sight.plane, model.direction).normalized();
+  target.point_mm = source + nearer * into(sight.plane, model.point_mm - source);
+  return world_from_world_move(model, target, anchor);
+}
+
+/// In words, where the lines of a view cannot be those of this model.
+std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor) {
+  std::vector<std::string> warnings;
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, anchor);
+    const double seen_mm = width_px(*sights[i].lines) * pixel_mm, model_mm = borders[i].width_px * pixel_mm;
+    if (sights.size() > 1 && std::abs(seen_mm - model_mm) > 0.15 * model_mm)
+      warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) + " mm apart, where the model is " +
+                         number(model_mm) + " mm wide; they may belong to something else");
+    const Plane model = bisecting_plane(*sights[i].camera, borders[i].left, borders[i].right);
+    const double turned_deg = marrow::degrees(std::acos(std::clamp(std::abs(model.normal.dot(sights[i].plane.normal)), 0.0, 1.0)));
+    if (turned_deg > 1)
+      warnings.push_back("view '" + sights[i].name + "': its shaft lines disagree with those of the other views by " + number(turned_deg) +
+                         " degrees");
+  }
+  return warnings;
+}
+
+Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start, const Options& options) {
+  marrow::check_mesh(model, "model");
+  const std::vector<Sight> sights = sights_of(lines, views);
+  Pose pose;
+  if (start) pose.world_from_model = start->world_from_model;
+  else pose.world_from_model.source = model.frame;
+  marrow::check_rigid(pose.world_from_model, "start");
+  pose.frame = marrow::fragment_frame(model);
+  for (int round = 0; round < options.rounds; ++round) {
+    const std::vector<ModelBorders> borders = borders_of(model, pose.world_from_model, sights, options.tolerance_mm);
+    const Eigen::Vector3d anchor = pose.world_from_model * pose.frame.origin_mm;
+    const RigidTransform move = sights.size() == 1 ? move_by_width(sights[0], borders[0], anchor) : move_by_planes(sights, borders, anchor);
+    pose.world_from_model = move * pose.world_from_model;
+    ++pose.evaluations;
+    const double shift_mm = (pose.world_from_model * pose.frame.origin_mm - anchor).norm();
+    if (shift_mm < 1e-3 && marrow::geodesic_angle_rad(move.rotation, Eigen::Matrix3d::Identity()) < 1e-5) break;
+  }
+  pose.warnings = doubts(sights, borders_of(model, pose.world_from_model, sights, options.tolerance_mm), pose.world_from_model * pose.frame.origin_mm);
+  return pose;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("initial.shaft_axis", shaft_axis)
+      .summary("Lays the model's shaft axis onto that of the images (the chapter's first stage, Eq 7 and 8)")
+      .in("model", "surface of the fragment")
+      .in("lines", "outer borders of the shaft", marrow::over("view"))
+      .in("views", "X-ray views, for their cameras", marrow::over("view"))
+      .in("start", "nominal placement, which keeps its rotation about the axis and its place along it")
+      .out("pose", "four degrees of freedom from the views, two from the start")
+      .option("rounds", &Options::rounds, "most times that the model's axis is measured anew", marrow::at_least(1), marrow::at_most(100))
+      .option("tolerance_mm", &Options::tolerance_mm,
+              "largest distance, at the isocentre, of a silhouette point from the model's border line", marrow::at_least(0.01));
+}
