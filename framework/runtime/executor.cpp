@@ -50,7 +50,8 @@ struct Call {
 class Executor {
  public:
   Executor(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings)
-      : pipeline_(pipeline), catalogue_(catalogue), settings_(settings), needed_(pipeline.needed()), states_(pipeline.nodes.size()) {
+      : pipeline_(pipeline), catalogue_(catalogue), settings_(settings),
+        needed_(pipeline.needed([&](const std::string& id) { return settings.given.count(id) > 0; })), states_(pipeline.nodes.size()) {
     result_.nodes.resize(pipeline.nodes.size());
   }
 
@@ -62,6 +63,8 @@ class Executor {
     tbb::task_arena arena(threads, 0);
     arena_ = &arena;
     for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) {
+      const auto given = settings_.given.find(pipeline_.nodes[i].id);
+      if (given != settings_.given.end()) result_.nodes[i].outputs = given->second;
       if (!needed_[i]) continue;
       ++unfinished_;
       states_[i].waiting_for = count_sources(i);
@@ -94,7 +97,8 @@ class Executor {
   int count_sources(std::size_t index) const {
     std::vector<int> sources;
     for (const Wire& wire : pipeline_.nodes[index].wires)
-      for (const Reference& source : wire.sources) sources.push_back(source.node);
+      for (const Reference& source : wire.sources)
+        if (needed_[std::size_t(source.node)]) sources.push_back(source.node);
     std::sort(sources.begin(), sources.end());
     return int(std::unique(sources.begin(), sources.end()) - sources.begin());
   }

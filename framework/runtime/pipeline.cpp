@@ -349,13 +349,15 @@ std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
   return axes;
 }
 
-std::vector<bool> Pipeline::needed() const {
+std::vector<bool> Pipeline::needed(const std::function<bool(const std::string&)>& given) const {
   std::vector<bool> result(nodes.size(), false);
   for (const PipelineOutput& output : outputs) result[std::size_t(output.source.node)] = true;
-  for (std::size_t i = nodes.size(); i-- > 0;)
-    if (result[i])
-      for (const Wire& wire : nodes[i].wires)
-        for (const Reference& source : wire.sources) result[std::size_t(source.node)] = true;
+  for (std::size_t i = nodes.size(); i-- > 0;) {
+    if (result[i] && given && given(nodes[i].id)) result[i] = false;
+    if (!result[i]) continue;
+    for (const Wire& wire : nodes[i].wires)
+      for (const Reference& source : wire.sources) result[std::size_t(source.node)] = true;
+  }
   return result;
 }
 

@@ -104,6 +104,16 @@ TEST_F(ExecutorTest, OnlyWhatTheOutputsNeedRuns) {
   EXPECT_EQ(result.nodes[1].status, Status::not_needed);
 }
 
+TEST_F(ExecutorTest, GivenValuesAreNotComputedAgain) {
+  const std::string nodes = "  c: {uses: test.constant, with: {value: 5}}\n  d: {uses: test.add, in: {a: c, b: c}}\n  e: {uses: test.add, in: {a: d, b: d}}\n";
+  const RunResult first = run(nodes, "o: e");
+  settings.given["d"] = first.nodes[1].outputs;
+  const RunResult second = run(nodes, "o: e");
+  EXPECT_EQ(number(second), 20);
+  EXPECT_EQ(second.nodes[0].status, Status::not_needed);
+  EXPECT_EQ(second.nodes[1].status, Status::not_needed);
+}
+
 TEST_F(ExecutorTest, SameRecipeIsComputedOnce) {
   const RunResult result = run("  a: {uses: test.constant, with: {value: 3}}\n  b: {uses: test.constant, with: {value: 3}}\n  c: {uses: test.constant, with: {value: 4}}\n",
                                "a: a, b: b, c: c");

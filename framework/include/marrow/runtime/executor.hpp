@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <functional>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -26,6 +27,9 @@ struct RunSettings {
   int threads = 0;  ///< 0 = as many as the machine has
   const std::atomic<bool>* cancelled = nullptr;
   std::function<void(const RunEvent&)> observer;  ///< called by one thread at a time
+  /// Outputs of nodes that are already known, by the node's name: they and what only they need are not run. A program that
+  /// holds the model and the images in memory registers new ones this way.
+  std::map<std::string, std::vector<Value>> given;
 };
 
 /// How one node fared.

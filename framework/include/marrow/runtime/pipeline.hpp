@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <string>
 #include <utility>
@@ -52,8 +53,8 @@ struct Pipeline {
 
   /// The axes of an output of a node, outermost first.
   std::vector<std::string> axes_of(const Reference& source) const;
-  /// The nodes that the outputs need.
-  std::vector<bool> needed() const;
+  /// The nodes that must be run for the outputs; `given(id)` tells which ones are known already.
+  std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
 
 struct PipelineArguments {
