@@ -40,6 +40,11 @@ struct Raster {
   std::array<int, 3> size;
 };
 
+/// x0 <= x < x1, y0 <= y < y1; empty where x0 >= x1.
+struct Rectangle {
+  int x0, x1, y0, y1;
+};
+
 Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e300), high = -low;
   for (const auto& fragment : phantom.fragments)
@@ -105,36 +110,45 @@ class Scanner {
         }) {
     for (int k = 0; k < 3; ++k)
       spread_[std::size_t(k)] = point_spread(options.blur_mm, raster_.spacing_mm[k], raster_.halo[std::size_t(k)]);
-    background_ = background();
+    background_fine_ = background();
+    background_.resize(std::size_t(grid.size[0]) * std::size_t(grid.size[1]));
+    blur(background_fine_, {0, raster_.size[0], 0, raster_.size[1]}, background_);
   }
 
   /// Slices first to last - 1 without noise.
   void scan(int first, int last, std::vector<float>& values) const {
-    const std::size_t slice = std::size_t(grid_.size[0]) * std::size_t(grid_.size[1]);
+    const std::size_t slice = background_.size();
     const int fine_first = first * raster_.steps[2], fine_last = (last - 1) * raster_.steps[2] + 2 * raster_.halo[2] + 1;
-    std::vector<double> sums(slice * std::size_t(last - first), 0.0);
+    std::vector<double> sums;
+    for (int z = first; z < last; ++z) sums.insert(sums.end(), background_.begin(), background_.end());
     const auto crossings = rays_.bundle().crossings(fine_first, fine_last);
-    std::size_t next = 0;
-    std::vector<double> plane;
-    for (int row = fine_first; row < fine_last; ++row) {
-      plane = background_;
-      std::vector<simulate::Crossing> of_row;
-      for (; next < crossings.size() && int(crossings[next].row) == row; ++next) of_row.push_back(crossings[next]);
-      draw(of_row, row, plane);
-      const std::vector<double> blurred = sampled(plane);
+    std::vector<double> plane(background_fine_.size(), 0.0), blurred(slice, 0.0);
+    for (auto at = crossings.begin(); at != crossings.end();) {
+      const auto row_end = std::find_if(at, crossings.end(), [&](const auto& crossing) { return crossing.row != at->row; });
+      const int row = int(at->row);
+      const Rectangle bone = draw({at, row_end}, row, plane);
+      const Rectangle seen = blur(plane, bone, blurred);
       for (int z = first; z < last; ++z) {
         const int tap = row - z * raster_.steps[2];
         if (tap < 0 || tap > 2 * raster_.halo[2]) continue;
         const double weight = spread_[2][std::size_t(tap)];
-        double* sum = sums.data() + slice * std::size_t(z - first);
-        for (std::size_t i = 0; i < slice; ++i) sum[i] += weight * blurred[i];
+        for (int y = seen.y0; y < seen.y1; ++y) {
+          const std::size_t line = std::size_t(y) * std::size_t(grid_.size[0]);
+          double* sum = sums.data() + slice * std::size_t(z - first) + line;
+          for (int x = seen.x0; x < seen.x1; ++x) sum[x] += weight * blurred[line + std::size_t(x)];
+        }
       }
+      for (int y = bone.y0; y < bone.y1; ++y) {
+        double* line = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]);
+        std::fill(line + bone.x0, line + bone.x1, 0.0);
+      }
+      at = row_end;
     }
     std::copy(sums.begin(), sums.end(), values.begin() + std::ptrdiff_t(slice * std::size_t(first)));
   }
 
  private:
-  /// Muscle, fat and air on the fine raster; the same for all z.
+  /// Muscle, fat and air on the fine raster.
   std::vector<double> background() const {
     const auto& bone = phantom_.bone;
     std::vector<double> plane;
@@ -148,15 +162,17 @@ class Scanner {
     return plane;
   }
 
-  /// Puts the bone of one fine row of rays into the plane, each bin by the length that the bone takes of it.
-  void draw(const std::vector<simulate::Crossing>& crossings, int row, std::vector<double>& plane) const {
+  /// Adds what bone changes in one fine row of rays to the plane, in each bin by the length that the bone takes of it. Returns
+  /// where.
+  Rectangle draw(std::span<const simulate::Crossing> crossings, int row, std::vector<double>& plane) const {
+    Rectangle touched{raster_.size[0], 0, raster_.size[1], 0};
     const double z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
     std::vector<Interval> intervals;
     simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
       rays_.intervals(ray, intervals);
       const int y = int(ray.front().column);
       double* bins = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]);
-      const double* empty = background_.data() + std::size_t(y) * std::size_t(raster_.size[0]);
+      const double* empty = background_fine_.data() + std::size_t(y) * std::size_t(raster_.size[0]);
       for (const Interval& interval : intervals) {
         const auto bone_from_ct = inverse(phantom_.fragments[std::size_t(interval.fragment)].ct_from_bone);
         const double x_ct = raster_.origin_mm.x() + 0.5 * (interval.from + interval.to) * raster_.spacing_mm.x();
@@ -165,34 +181,43 @@ class Scanner {
         const double hu = fraction * options_.cortical_hu + (1 - fraction) * options_.marrow_hu;
         const int first = std::max(0, int(std::floor(interval.from + 0.5)));
         const int last = std::min(raster_.size[0] - 1, int(std::floor(interval.to + 0.5)));
+        touched = {std::min(touched.x0, first), std::max(touched.x1, last + 1), std::min(touched.y0, y), std::max(touched.y1, y + 1)};
         for (int x = first; x <= last; ++x) {
           const double share = std::min(interval.to, x + 0.5) - std::max(interval.from, x - 0.5);
           bins[x] += std::max(0.0, share) * (hu - empty[x]);
         }
       }
     });
+    return touched;
   }
 
-  /// A fine plane blurred in x and y, at the grid's positions.
-  std::vector<double> sampled(const std::vector<double>& plane) const {
-    const int nx = grid_.size[0], ny = grid_.size[1];
-    std::vector<double> rows(std::size_t(nx) * std::size_t(raster_.size[1]));
-    for (int y = 0; y < raster_.size[1]; ++y)
-      for (int x = 0; x < nx; ++x) {
-        const double* from = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]) + std::size_t(x * raster_.steps[0]);
+  /// A fine plane that is zero outside `bone`, blurred in x and y, at the grid's positions. Returns where the result is set.
+  Rectangle blur(const std::vector<double>& plane, const Rectangle& bone, std::vector<double>& blurred) const {
+    const int nx = grid_.size[0], ny = grid_.size[1], sx = raster_.steps[0], sy = raster_.steps[1];
+    const int hx = raster_.halo[0], hy = raster_.halo[1];
+    // Position i takes the fine samples i * step to i * step + 2 * halo.
+    const auto first = [](int fine, int halo, int step) { return std::max(0, (fine - 2 * halo + step - 1) / step); };
+    const Rectangle seen{first(bone.x0, hx, sx), std::min(nx, (bone.x1 - 1) / sx + 1), first(bone.y0, hy, sy),
+                         std::min(ny, (bone.y1 - 1) / sy + 1)};
+    const int width = std::max(0, seen.x1 - seen.x0);
+    std::vector<double> rows(std::size_t(width) * std::size_t(std::max(0, bone.y1 - bone.y0)));
+    for (int y = bone.y0; y < bone.y1; ++y)
+      for (int x = seen.x0; x < seen.x1; ++x) {
+        const double* from = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]) + std::size_t(x * sx);
         double sum = 0;
         for (double weight : spread_[0]) sum += weight * *from++;
-        rows[std::size_t(y) * std::size_t(nx) + std::size_t(x)] = sum;
+        rows[std::size_t(y - bone.y0) * std::size_t(width) + std::size_t(x - seen.x0)] = sum;
       }
-    std::vector<double> result(std::size_t(nx) * std::size_t(ny), 0.0);
-    for (int y = 0; y < ny; ++y)
-      for (std::size_t tap = 0; tap < spread_[1].size(); ++tap) {
-        const double weight = spread_[1][tap];
-        const double* from = rows.data() + (std::size_t(y * raster_.steps[1]) + tap) * std::size_t(nx);
-        double* to = result.data() + std::size_t(y) * std::size_t(nx);
-        for (int x = 0; x < nx; ++x) to[x] += weight * from[x];
+    for (int y = seen.y0; y < seen.y1; ++y) {
+      double* to = blurred.data() + std::size_t(y) * std::size_t(nx) + std::size_t(seen.x0);
+      std::fill(to, to + width, 0.0);
+      for (int fine = std::max(bone.y0, y * sy); fine < std::min(bone.y1, y * sy + 2 * hy + 1); ++fine) {
+        const double weight = spread_[1][std::size_t(fine - y * sy)];
+        const double* from = rows.data() + std::size_t(fine - bone.y0) * std::size_t(width);
+        for (int x = 0; x < width; ++x) to[x] += weight * from[x];
       }
-    return result;
+    }
+    return seen;
   }
 
   const Phantom& phantom_;
@@ -202,7 +227,7 @@ class Scanner {
   simulate::Fill fill_;
   simulate::SolidRays rays_;
   std::array<std::vector<double>, 3> spread_;
-  std::vector<double> background_;
+  std::vector<double> background_fine_, background_;  ///< without bone, the same for all z
 };
 
 Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) {

@@ -29,7 +29,7 @@ struct FemurOptions {
   int shape_seed = 1;
   double variation = 0;
   double ripple_mm = 0.3;
-  double resolution_mm = 0.8;
+  double resolution_mm = 1.2;
   double isocentre_from_distal_end_mm = 70;
   double thigh_radius_mm = 80;
   double fat_mm = 12;

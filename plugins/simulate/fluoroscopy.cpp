@@ -28,7 +28,7 @@ struct FluoroscopyOptions {
 
 constexpr int kSubsamples = 2;  // rays per pixel in each direction
 constexpr int kBandRows = 8;    // image rows that one task renders
-constexpr double kTissueGrey = 40000;  // where the image behind soft tissue alone lies, of 65535
+constexpr double kTissueGrey = 12000;  // where the image behind soft tissue alone lies, of 65535
 constexpr double kNearestMm = 10;
 
 /// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables) and the share of the detected
@@ -156,16 +156,18 @@ cv::Mat1d primary_image(const XRay& xray, const Camera& camera, Context& context
   return primary;
 }
 
-/// Scatter: the primary image, blurred widely. Made at an eighth of the size, where the blur is still many pixels wide.
-cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& options) {
-  if (options.scatter_to_primary == 0) return cv::Mat1d(primary.size(), 0.0);
-  constexpr int kShrink = 8;
-  const double sigma_px = std::max(1.0, options.scatter_px / kShrink);
-  cv::Mat1d small, scatter;
-  cv::resize(primary, small, {std::max(1, primary.cols / kShrink), std::max(1, primary.rows / kShrink)}, 0, 0, cv::INTER_AREA);
+/// Scatter as a blurred image of its source, T ln(1 / T) for a transmission T: none in air, little behind much tissue (Ohnesorge,
+/// Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). Scaled so that wide soft tissue gets the wanted ratio to the primary radiation.
+cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& options, double behind_tissue) {
+  if (options.scatter_to_primary == 0 || !(behind_tissue < 1)) return cv::Mat1d(primary.size(), 0.0);
+  constexpr int kShrink = 8;  // made at an eighth of the size, where the blur is still many pixels wide
+  cv::Mat1d source = primary.clone(), small, scatter;
+  for (double& t : source) t *= std::log(1 / t);
+  cv::resize(source, small, {std::max(1, primary.cols / kShrink), std::max(1, primary.rows / kShrink)}, 0, 0, cv::INTER_AREA);
+  const double sigma_px = options.scatter_px / kShrink;
   cv::GaussianBlur(small, small, {0, 0}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
   cv::resize(small, scatter, primary.size(), 0, 0, cv::INTER_LINEAR);
-  return options.scatter_to_primary * scatter;
+  return options.scatter_to_primary / std::log(1 / behind_tissue) * scatter;
 }
 
 /// Photons drawn for each pixel from its own stream of random numbers.
@@ -184,11 +186,11 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   check_camera(camera, "simulate.fluoroscopy: camera '" + name + "'");
   const XRay xray(phantom, camera);
   cv::Mat1d signal = primary_image(xray, camera, context);
-  const cv::Mat1d scatter = scatter_image(signal, options);
   // Exposure control: the dose is set so that soft tissue alone, at its thickest, gets the wanted photons.
   const double radius = std::max(phantom.bone.thigh_radius_mm, 0.0), fat = std::min(phantom.bone.fat_mm, radius);
-  const double behind_tissue = transmission({0, 0, 2 * (radius - fat), 2 * fat}) * (1 + options.scatter_to_primary);
-  signal += scatter;
+  const double tissue = transmission({0, 0, 2 * (radius - fat), 2 * fat});
+  signal += scatter_image(signal, options, tissue);
+  const double behind_tissue = tissue * (1 + options.scatter_to_primary);
   if (options.photons > 0) {
     signal *= options.photons / behind_tissue;
     add_quantum_noise(signal, seed);

@@ -152,40 +152,41 @@ Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   return mesh;
 }
 
-/// The middle of every stretch of bone along lines in x and in y through the bone's centre, at several heights: in thick cortex, and
-/// in cancellous bone where it is dense enough to be told from marrow.
-std::vector<Eigen::Vector3d> seeds_in(const Phantom& phantom, const Fragment& fragment) {
+/// The middle of every stretch of bone along lines in x (`along` 0) or y (1) through the bone's centre, at several heights: in
+/// thick cortex, and in cancellous bone where it is dense enough to be told from marrow.
+void add_seeds(const Phantom& phantom, const Fragment& fragment, int along, std::vector<Eigen::Vector3d>& seeds) {
   constexpr int kHeights = 14;
   constexpr double kThickMm = 3, kDense = 0.12;
-  Phantom alone{phantom.bone, phantom.fracture, {fragment}};
+  const int across = 1 - along;
   const Box box = bounds(phantom.bone.outer);
+  const double low = box.low[across], step = (box.high.z() - box.low.z()) / kHeights, first_z = box.low.z() + 0.5 * step;
+  const int lines = int(box.high[across] - low) + 1;  // 1 mm apart
+  // (y, z, x) and (z, x, y) are right-handed.
+  const simulate::SolidRays rays({phantom.bone, phantom.fracture, {fragment}}, along == 0 ? lines : kHeights,
+                                 along == 0 ? kHeights : lines, [&](const Fragment&) {
+    return [=](const Eigen::Vector3d& p) {
+      const double side = p[across] - low, up = (p.z() - first_z) / step;
+      return along == 0 ? simulate::RayVertex{side, up, p.x()} : simulate::RayVertex{up, side, p.y()};
+    };
+  });
+  std::vector<Eigen::Vector2d> centres;
+  for (int i = 0; i < kHeights; ++i) centres.push_back(centre_at(phantom.bone.outer, first_z + i * step));
   const simulate::Fill fill(phantom.bone);
-  std::vector<Eigen::Vector3d> seeds;
   std::vector<simulate::Interval> intervals;
-  for (int i = 0; i < kHeights; ++i) {
-    const double z = box.low.z() + (i + 0.5) / kHeights * (box.high.z() - box.low.z());
-    const Eigen::Vector2d centre = centre_at(phantom.bone.outer, z);
-    for (int along = 0; along < 2; ++along) {  // a bundle of one ray
-      const int across = 1 - along;
-      const simulate::SolidRays line(alone, 1, 1, [&](const Fragment&) {
-        return [&, along, across](const Eigen::Vector3d& p) {
-          // (y, z, x) and (z, x, y) are right-handed.
-          const double side = p[across] - centre[across], up = p.z() - z;
-          return along == 0 ? simulate::RayVertex{side, up, p.x()} : simulate::RayVertex{up, side, p.y()};
-        };
-      });
-      const auto crossings = line.bundle().crossings(0, 1);
-      line.intervals(crossings, intervals);
-      for (const auto& interval : intervals) {
-        const bool bone = interval.cortical ? interval.to - interval.from >= kThickMm : fill.at(z) >= kDense;
-        if (!bone) continue;
-        Eigen::Vector3d point(centre.x(), centre.y(), z);
-        point[along] = 0.5 * (interval.from + interval.to);
-        seeds.push_back(fragment.ct_from_bone * point);
-      }
+  const auto crossings = rays.bundle().crossings(0, rays.bundle().rows());
+  simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
+    const std::uint32_t line = along == 0 ? ray[0].column : ray[0].row, height = along == 0 ? ray[0].row : ray[0].column;
+    if (line != std::uint32_t(std::lround(centres[height][across] - low))) return;
+    Eigen::Vector3d point;
+    point[across] = low + line;
+    point.z() = first_z + height * step;
+    rays.intervals(ray, intervals);
+    for (const auto& interval : intervals) {
+      if (interval.cortical ? interval.to - interval.from < kThickMm : fill.at(point.z()) < kDense) continue;
+      point[along] = 0.5 * (interval.from + interval.to);
+      seeds.push_back(fragment.ct_from_bone * point);
     }
-  }
-  return seeds;
+  });
 }
 
 Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<double, 3>& translation_mm) {
@@ -217,7 +218,8 @@ Phantom fracture(const Bone& bone, const FractureOptions& options) {
                                           : motion(options.proximal_rotation_deg, options.proximal_translation_mm));
     phantom.fragments.push_back(fragment);
   }
-  for (Fragment& fragment : phantom.fragments) fragment.seeds_mm = seeds_in(phantom, fragment);
+  for (Fragment& fragment : phantom.fragments)
+    for (const int along : {0, 1}) add_seeds(phantom, fragment, along, fragment.seeds_mm);
   simulate::check_phantom(phantom, "simulate.fracture");
   return phantom;
 }

@@ -47,9 +47,9 @@ class RayBundle {
   std::vector<std::vector<std::uint32_t>> bands_;  // the triangles that reach into each band of rows
 };
 
-/// Splits crossings into the runs of single rays and calls visit(std::span<const Crossing>) for each.
+/// Splits ordered crossings into the runs of single rays and calls visit(std::span<const Crossing>) for each.
 template <class Visit>
-void for_each_ray(const std::vector<Crossing>& crossings, Visit&& visit) {
+void for_each_ray(std::span<const Crossing> crossings, Visit&& visit) {
   for (std::size_t first = 0, last; first < crossings.size(); first = last) {
     for (last = first + 1; last < crossings.size() && crossings[last].column == crossings[first].column &&
                            crossings[last].row == crossings[first].row;)
