@@ -113,13 +113,13 @@ void draw_segment(Panel& panel, const LineSegment& segment, const cv::Scalar& co
 }
 
 void draw_edges(Panel& panel, const EdgeMap& edges, const cv::Scalar& colour) {
+  const int size = std::max(1, int(std::lround(panel.scale)));  // one image pixel
   for (const EdgePixel& edge : edges.pixels) {
     const cv::Point2d at = panel.at(edge.u_px, edge.v_px);
     if (!drawable(at)) continue;
-    const cv::Point pixel(int(std::lround(at.x)), int(std::lround(at.y)));
-    if (!cv::Rect({0, 0}, panel.pixels.size()).contains(pixel)) continue;
-    auto& value = panel.pixels.at<cv::Vec3b>(pixel);
-    for (int k = 0; k < 3; ++k) value[k] = cv::saturate_cast<unsigned char>(0.5 * value[k] + 0.5 * colour[k]);
+    const cv::Point corner(int(std::lround(at.x - 0.5 * (size - 1))), int(std::lround(at.y - 0.5 * (size - 1))));
+    cv::Mat dot = panel.pixels(cv::Rect(corner, cv::Size(size, size)) & cv::Rect({0, 0}, panel.pixels.size()));
+    if (!dot.empty()) cv::addWeighted(dot, 0.5, cv::Mat(dot.size(), CV_8UC3, colour), 0.5, 0, dot);
   }
 }
 
@@ -144,7 +144,8 @@ cv::Mat with_legend(const cv::Mat& picture, const std::vector<LegendItem>& items
 }
 
 void draw_title(Panel& panel, const std::string& title) {
-  draw_text(panel.pixels, title, {11, 23}, kBlack, 0.6);  // a shadow keeps it readable over air
+  const cv::Rect box({0, 0}, cv::Size(text_size(title, 0.6).width + 20, 32));
+  panel.pixels(box & cv::Rect({0, 0}, panel.pixels.size())).setTo(kDark);  // readable over air as over bone
   draw_text(panel.pixels, title, {10, 22}, kWhite, 0.6);
 }
 

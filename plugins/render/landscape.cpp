@@ -58,7 +58,7 @@ std::string title(int axis, const Profile& profile) {
 marrow::Picture landscape(const marrow::Cost& cost, const marrow::Pose& pose, const marrow::Truth* truth,
                           const Options& options, marrow::Context& context) {
   marrow::check_rigid(pose.world_from_model, "pose");
-  constexpr int kWidth = 460, kHeight = 300;
+  constexpr int kWidth = 500, kHeight = 300;
   cv::Mat canvas(2 * kHeight, 3 * kWidth, CV_8UC3, kWhite);
   std::optional<marrow::Vector6d> to_truth;
   if (truth) to_truth = marrow::motion_between(pose.world_from_model, truth->world_from_model, pose.frame);

@@ -62,7 +62,7 @@ TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
   const marrow::Truth truth{marrow::moved(pose.world_from_model, pose.frame, motion)};
   marrow::Context context;
   const cv::Mat picture = landscape(Bowl(truth.world_from_model, pose.frame), pose, &truth, {}, context).pixels;
-  EXPECT_EQ(picture.cols, 3 * 460);
+  EXPECT_EQ(picture.cols, 3 * 500);
   EXPECT_GT(picture.rows, 600);
   const auto count = [&](const cv::Rect& area, const cv::Scalar& colour) {
     int pixels = 0;
@@ -72,9 +72,9 @@ TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
     return pixels;
   };
   for (int axis = 0; axis < 6; ++axis)
-    EXPECT_GT(count({axis % 3 * 460, axis / 3 * 300, 460, 300}, kBlue), 100) << "curve " << axis;
-  // The axis of the first plot runs from 64 to 446 for -10 to +10 degrees: the truth at +5 lies at 350.5.
-  EXPECT_GT(count({348, 28, 6, 228}, kOrange), 50);
+    EXPECT_GT(count({axis % 3 * 500, axis / 3 * 300, 500, 300}, kBlue), 100) << "curve " << axis;
+  // The axis of the first plot runs from 64 to 486 for -10 to +10 degrees: the truth at +5 lies at 380.5.
+  EXPECT_GT(count({378, 28, 6, 228}, kOrange), 50);
 }
 
 TEST(Landscape, CostsThatAreNotFiniteGiveAPictureThatSaysSo) {
