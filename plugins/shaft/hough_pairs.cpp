@@ -162,8 +162,39 @@ std::string allowed_widths(const Options& options) {
   return list;
 }
 
+/// Mean brightness of the image inside the pair, and of strips of 3 mm beyond 1 mm outside its borders.
+struct Brightness {
+  double inside = 0, outside_left = 0, outside_right = 0;
+};
+Brightness brightness_of(const cv::Mat& image, const Pair& pair, double pixel_mm) {
+  const auto mean_between = [&](auto from_at, auto to_at) {
+    constexpr int kAlong = 24, kAcross = 12;
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < kAlong; ++i) {
+      const double s = pair.stretch.from + (i + 0.5) / kAlong * pair.stretch.length();
+      const Eigen::Vector2d from = from_at(s), to = to_at(s);
+      for (int k = 0; k < kAcross; ++k) {
+        const Eigen::Vector2d at = from + (k + 0.5) / kAcross * (to - from);
+        const cv::Point pixel(int(std::lround(at.x())), int(std::lround(at.y())));
+        if (pixel.x < 0 || pixel.y < 0 || pixel.x >= image.cols || pixel.y >= image.rows) continue;
+        sum += image.depth() == CV_8U ? image.at<uchar>(pixel) : image.depth() == CV_16U ? image.at<std::uint16_t>(pixel) : image.at<float>(pixel);
+        ++count;
+      }
+    }
+    return count ? sum / count : std::numeric_limits<double>::infinity();  // outside the image nothing contradicts
+  };
+  const auto beside = [&](const Border& border, double distance_mm) {
+    return [&pair, &border, shift = distance_mm / pixel_mm](double s) -> Eigen::Vector2d {
+      return point_at(border, pair.stretch.along, s) + shift * border.normal;
+    };
+  };
+  return {mean_between(beside(pair.left, 0), beside(pair.right, 0)), mean_between(beside(pair.left, 1), beside(pair.left, 4)),
+          mean_between(beside(pair.right, 1), beside(pair.right, 4))};
+}
+
 /// Fills stretch, width, score, or the reason why the pair is not the shaft.
-void judge(const EdgeMap& edges, const Scale& scale, const Options& options, Pair& pair) {
+void judge(const EdgeMap& edges, const cv::Mat& image, const Scale& scale, const Options& options, Pair& pair) {
   const Eigen::Vector2d direction = direction_of(pair.left, pair.right);
   int supported = 0;
   pair.stretch = common_stretch(edges, pair.left, pair.right, scale.support, direction, scale.gap_px, supported);
@@ -183,10 +214,16 @@ void judge(const EdgeMap& edges, const Scale& scale, const Options& options, Pai
   else if (deviations > 3)
     pair.reason = text("its width of %.1f mm is not that of a shaft (", pair.width_mm) + allowed_widths(options) +
                   " mm, at most 3 deviations)";
+  if (!pair.reason.empty()) return;
+  const Brightness mean = brightness_of(image, pair, scale.pixel_mm);
+  if (mean.inside >= std::min(mean.outside_left, mean.outside_right))
+    pair.reason = text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)", mean.inside,
+                       mean.outside_left, mean.outside_right);
 }
 
 /// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first.
-std::vector<Pair> pairs_of(const EdgeMap& edges, const std::vector<Border>& borders, const Scale& scale, const Options& options) {
+std::vector<Pair> pairs_of(const EdgeMap& edges, const cv::Mat& image, const std::vector<Border>& borders, const Scale& scale,
+                           const Options& options) {
   std::vector<Pair> pairs;
   const double cosine = std::cos(marrow::radians(options.max_angle_deg));
   for (std::size_t i = 0; i < borders.size(); ++i)
@@ -195,7 +232,7 @@ std::vector<Pair> pairs_of(const EdgeMap& edges, const std::vector<Border>& bord
       Pair pair;
       pair.left = borders[i];
       pair.right = borders[j];
-      judge(edges, scale, options, pair);
+      judge(edges, image, scale, options, pair);
       if (pair.supported_mm > 0.2 * options.min_length_mm) pairs.push_back(std::move(pair));
     }
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
@@ -206,12 +243,12 @@ std::vector<Pair> pairs_of(const EdgeMap& edges, const std::vector<Border>& bord
 
 /// Both borders fitted again over the stretch that they share, until that stretch settles, so that both tell of the same piece
 /// of the bone.
-Pair settled(const EdgeMap& edges, Pair pair, const Scale& scale, const Options& options) {
+Pair settled(const EdgeMap& edges, const cv::Mat& image, Pair pair, const Scale& scale, const Options& options) {
   for (int round = 0; round < 3 && pair.reason.empty(); ++round) {
     pair.left = refit(edges, pair.left, scale.support, pair.stretch, 0);
     pair.right = refit(edges, pair.right, scale.support, pair.stretch, 0);
     if (pair.left.pixels == 0 || pair.right.pixels == 0) pair.reason = "a border loses its edge pixels when it is fitted again";
-    else judge(edges, scale, options, pair);
+    else judge(edges, image, scale, options, pair);
   }
   return pair;
 }
@@ -223,6 +260,9 @@ marrow::LineSegment segment_of(const Border& border, const Stretch& stretch) {
 void check_inputs(const EdgeMap& edges, const View& view, const Options& options) {
   marrow::check_view(view);
   const std::string what = "view '" + view.name + "': ";
+  const int type = view.image.pixels.type();
+  if (type != CV_8UC1 && type != CV_16UC1 && type != CV_32FC1)
+    throw marrow::Error(what + "the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   if (edges.width_px != view.camera.width_px || edges.height_px != view.camera.height_px)
     throw marrow::Error(what + "the edge map is for " + std::to_string(edges.width_px) + " x " + std::to_string(edges.height_px) +
                         " pixels, the view has " + std::to_string(view.camera.width_px) + " x " +
@@ -241,9 +281,9 @@ ShaftLines hough_pairs(const EdgeMap& edges, const View& view, const Options& op
   check_inputs(edges, view, options);
   const Scale scale = scale_of(view, options);
   const std::vector<Border> borders = hough_lines(edges, scale, options.lines);
-  std::vector<Pair> pairs = pairs_of(edges, borders, scale, options);
+  std::vector<Pair> pairs = pairs_of(edges, view.image.pixels, borders, scale, options);
   for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 6); ++i)
-    if (pairs[i].reason.empty()) pairs[i] = settled(edges, pairs[i], scale, options);
+    if (pairs[i].reason.empty()) pairs[i] = settled(edges, view.image.pixels, pairs[i], scale, options);
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     return a.reason.empty() != b.reason.empty() ? a.reason.empty() : a.score > b.score;
   });
@@ -275,7 +315,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("shaft.hough_pairs", hough_pairs)
       .summary("Shaft borders: Hough lines, paired by the likelihood of their outer diameter (the chapter's 3.2)")
       .in("edges", "edge pixels of the view")
-      .in("view", "X-ray view, for its name and camera")
+      .in("view", "X-ray view, for its camera and brightness")
       .out("lines", "the two outer borders of the shaft, and what was turned away")
       .option("width_mm", &Options::width_mm, "mean outer diameters, one for each direction from which the bone may be seen")
       .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations")

@@ -31,6 +31,13 @@ View empty_view(int size = 512) {
   return view;
 }
 
+/// A view that is darker between two columns.
+View dark_between(int from_u, int to_u) {
+  View view = empty_view();
+  view.image.pixels.colRange(from_u, to_u) = 500;
+  return view;
+}
+
 /// Adds exact edge pixels along a segment, one each pixel, with the bright side towards `bright`.
 void draw(EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Eigen::Vector2d& bright) {
   const Eigen::Vector2d along = (to - from).normalized();
@@ -93,7 +100,7 @@ TEST(HoughPairs, EndsWhereOneBorderEnds) {
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 300}, kRight);
   draw(edges, {286, 301}, {380, 380}, kRight);
-  const ShaftLines lines = hough_pairs(edges, empty_view(), Options{});
+  const ShaftLines lines = hough_pairs(edges, dark_between(200, 285), Options{});
   EXPECT_NEAR(lines.left.from_px.y(), 20, 2);
   EXPECT_NEAR(lines.left.to_px.y(), 300, 6);
   EXPECT_NEAR(lines.left.from_px.x(), 285, 0.01);
@@ -106,7 +113,7 @@ TEST(HoughPairs, AllowsATaperAndPrefersTheLikelierWidth) {
   draw(edges, {200, 20}, {195, 400}, kLeft);
   draw(edges, {283, 20}, {290, 400}, kRight);
   draw(edges, {300, 20}, {307, 400}, kRight);  // 36 mm: allowed, but less likely
-  const ShaftLines lines = hough_pairs(edges, empty_view(), Options{});
+  const ShaftLines lines = hough_pairs(edges, dark_between(200, 285), Options{});
   EXPECT_NEAR(lines.width_mm, 89 * 0.6 * 300 / 512, 0.2);
   ASSERT_FALSE(lines.rejected.empty());
   EXPECT_NE(lines.rejected[0].reason.find("its log-likelihood of "), std::string::npos);
@@ -119,7 +126,7 @@ TEST(HoughPairs, ToleratesGapsUpToTheLimit) {
     draw(edges, {200, v}, {200, v + 40}, kLeft);
     draw(edges, {285, v}, {285, v + 40}, kRight);
   }
-  EXPECT_NEAR(hough_pairs(edges, empty_view(), Options{}).left.to_px.y(), 420, 3);
+  EXPECT_NEAR(hough_pairs(edges, dark_between(200, 285), Options{}).left.to_px.y(), 420, 3);
 }
 
 TEST(HoughPairs, SaysWhyThereIsNoPair) {
@@ -135,6 +142,12 @@ TEST(HoughPairs, SaysWhyThereIsNoPair) {
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its width of 140.6 mm is not that of a shaft "
             "(28.5 +- 3.3, 30.3 +- 3.1 mm, at most 3 deviations)");
+  edges = no_edges();
+  draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
+  draw(edges, {285, 20}, {285, 400}, kRight);
+  EXPECT_EQ(error_of([&] { hough_pairs(edges, dark_between(270, 330), Options{}); }),
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what lies beside it (mean grey "
+            "value 917 inside, 500 and 1000 outside)");
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);
