@@ -88,8 +88,8 @@ Mesh read_stl_text(const std::string& bytes, const std::string& what) {
       builder.triangle(corner[0], corner[1], corner[2]);
       corners = 0;
     } else if (word == "endsolid") {
-      ended = true;
       std::getline(stream, line);
+      ended = true;
     }
   }
   if (!ended) throw Error(what + ": 'endsolid' is missing; the file is cut off, or no STL");

@@ -5,7 +5,6 @@
 #include <itkMultiThreaderBase.h>
 #include <itkNiftiImageIO.h>
 #include <itkNrrdImageIO.h>
-#include <itkPNGImageIO.h>
 #include <itkTIFFImageIO.h>
 
 #include <cstring>
@@ -73,13 +72,12 @@ itk::ImageIOBase::Pointer reader_of(Format format) {
     case Format::nrrd: return itk::NrrdImageIO::New().GetPointer();
     case Format::nifti: return itk::NiftiImageIO::New().GetPointer();
     case Format::tiff: return itk::TIFFImageIO::New().GetPointer();
-    case Format::png: return itk::PNGImageIO::New().GetPointer();
   }
   return {};
 }
 
 const char* name_of(Format format) {
-  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF", "PNG"};
+  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF"};
   return kNames[int(format)];
 }
 
@@ -112,11 +110,8 @@ Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, co
     io.ReadImageInformation();
     Samples samples = describe(io, what);
     const double claimed = double(samples.count()) * samples.components * io.GetComponentSize();
-    const double stored = stored_bytes(path);
-    if (claimed > kBestCompression * stored + kSmallFile)
-      throw Error(what + ": its header claims " + std::to_string(samples.size[0]) + " x " + std::to_string(samples.size[1]) +
-                  " x " + std::to_string(samples.size[2]) + " samples, but the file has only " +
-                  std::to_string(std::size_t(stored)) + " bytes; it is damaged or cut off");
+    check_claim(what, samples, claimed, stored_bytes(path));
+    if (dynamic_cast<itk::MetaImageIO*>(&io)) check_meta_data(path, claimed);
     itk::ImageIORegion region(io.GetNumberOfDimensions());
     for (unsigned k = 0; k < io.GetNumberOfDimensions(); ++k) region.SetSize(k, io.GetDimensions(k));
     io.SetIORegion(region);
@@ -128,11 +123,24 @@ Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, co
   }
 }
 
-Samples read_samples(const std::filesystem::path& path, Format format) {
+void check_file(const std::filesystem::path& path) {
   std::error_code failure;
   if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
   if (!std::filesystem::is_regular_file(path, failure)) throw Error(path.string() + ": expected a file, this is none");
   if (std::filesystem::file_size(path, failure) == 0) throw Error(path.string() + ": the file is empty");
+}
+
+void check_claim(const std::string& what, const Samples& samples, double claimed_bytes, double stored_bytes) {
+  if (claimed_bytes > kBestCompression * stored_bytes + kSmallFile)
+    throw Error(what + ": its header claims " + std::to_string(samples.size[0]) + " x " + std::to_string(samples.size[1]) +
+                " x " + std::to_string(samples.size[2]) + " samples, but the file has only " +
+                std::to_string(std::size_t(stored_bytes)) + " bytes; it is damaged or cut off");
+}
+
+Samples read_samples(const std::filesystem::path& path, Format format) {
+  check_file(path);
+  if (format == Format::nifti) check_nifti_data(path);
+  if (format == Format::tiff) check_tiff_pages(path);
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
   const itk::ImageIOBase::Pointer io = reader_of(format);
   return read_through(*io, path, name_of(format));

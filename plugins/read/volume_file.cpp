@@ -143,7 +143,8 @@ Image read_image_file(const fs::path& path) {
   const std::string extension = lower_extension(path);
   const bool is_tiff = extension == ".tif" || extension == ".tiff";
   if (!is_tiff && extension != ".png") throw Error(path.string() + ": not an image that can be read; known are .png and .tif");
-  const Samples samples = read_samples(path, is_tiff ? Format::tiff : Format::png);
+  check_file(path);
+  const Samples samples = is_tiff ? read_samples(path, Format::tiff) : read_png(path);
   if (samples.size[2] != 1)
     throw Error(path.string() + ": has " + std::to_string(samples.size[2]) + " pages; an image has one (read.volume reads stacks)");
   if (samples.components != 1)

@@ -1,0 +1,152 @@
+// SPDX-License-Identifier: Apache-2.0
+// DICOM series through read.volume.
+#include <gtest/gtest.h>
+
+#include "plugins/read/volume.cpp"
+#include "read/files.hpp"
+#include "read/itk_files.hpp"
+
+namespace {
+
+using marrow::test::DicomSlice;
+using marrow::test::TemporaryFolder;
+using marrow::test::write_dicom;
+
+marrow::Volume read(const std::filesystem::path& path, const std::string& series_uid = "") {
+  Options options;
+  options.path = path;
+  options.series_uid = series_uid;
+  return volume(options);
+}
+
+DicomSlice slice_at(double z, int base) {
+  DicomSlice slice;
+  slice.position = {-1, -2, z};
+  for (int i = 0; i < 12; ++i) slice.values.push_back(std::int16_t(base + i));
+  return slice;
+}
+
+/// Four slices at z = 10, 12, 14, 16 whose file names run against their order.
+void write_series(const TemporaryFolder& folder, const std::string& series = "1.2.3.4", const std::string& prefix = "") {
+  for (int k = 0; k < 4; ++k) {
+    DicomSlice slice = slice_at(10 + 2 * k, 100 * k - 500);
+    slice.series = series;
+    write_dicom(folder / (prefix + "slice" + std::to_string(9 - k) + ".dcm"), slice);
+  }
+}
+
+TEST(ReadDicom, SortsSlicesByPositionAndGivesHounsfieldUnits) {
+  const TemporaryFolder folder;
+  write_series(folder);
+  marrow::test::put(folder / "README.txt", "not a slice");
+  const marrow::Volume volume = read(folder.path());
+  EXPECT_EQ(volume.grid.size, (std::array<int, 3>{4, 3, 4}));
+  EXPECT_LT((volume.grid.origin_mm - Eigen::Vector3d(-1, -2, 10)).norm(), 1e-9);
+  EXPECT_LT((volume.grid.spacing_mm - Eigen::Vector3d(0.5, 0.75, 2)).norm(), 1e-9);
+  EXPECT_TRUE(volume.grid.direction.isIdentity(1e-12));
+  for (int k = 0; k < 4; ++k) EXPECT_EQ(volume.at(2, 1, k), 100 * k - 500 + 6);
+}
+
+TEST(ReadDicom, CoronalSlicesKeepTheirDirections) {
+  const TemporaryFolder folder;
+  for (int k = 0; k < 3; ++k) {
+    DicomSlice slice = slice_at(0, 10 * k);
+    slice.position = {5, 1.5 * k, 7};
+    slice.orientation = "1\\0\\0\\0\\0\\-1";
+    write_dicom(folder / ("s" + std::to_string(k) + ".dcm"), slice);
+  }
+  const marrow::Volume volume = read(folder.path());
+  EXPECT_LT((volume.grid.direction.col(1) - Eigen::Vector3d(0, 0, -1)).norm(), 1e-9);
+  EXPECT_LT((volume.grid.direction.col(2) - Eigen::Vector3d(0, 1, 0)).norm(), 1e-9);
+  EXPECT_NEAR(volume.grid.spacing_mm[2], 1.5, 1e-9);
+  EXPECT_EQ(volume.at(0, 0, 2), 20);
+}
+
+TEST(ReadDicom, TwoSeriesAreListedAndOneCanBeNamed) {
+  const TemporaryFolder folder;
+  write_series(folder, "1.2.3.4", "a");
+  write_series(folder, "1.2.3.5", "b");
+  EXPECT_SAYS(read(folder.path()), "holds 2 series; name one with series_uid:\n    1.2.3.4 (CT, 4 slices)\n    1.2.3.5 (CT, 4 slices)");
+  EXPECT_EQ(read(folder.path(), "1.2.3.5").grid.size[2], 4);
+  EXPECT_SAYS(read(folder.path(), "9.9"), "holds no series 9.9; it holds:\n    1.2.3.4");
+}
+
+TEST(ReadDicom, MissingAndRepeatedSlicesAreDiagnosed) {
+  const TemporaryFolder folder;
+  for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0}) write_dicom(folder / ("z" + std::to_string(int(z)) + ".dcm"), slice_at(z, 0));
+  EXPECT_SAYS(read(folder.path()), "2 mm between z2.dcm and z4.dcm, 1 mm between most slices; a slice is missing");
+  write_dicom(folder / "z3.dcm", slice_at(3, 0));
+  EXPECT_EQ(read(folder.path()).grid.size[2], 6);
+  std::filesystem::copy(folder / "z3.dcm", folder / "z3again.dcm");
+  EXPECT_SAYS(read(folder.path()), "z3.dcm and z3again.dcm lie at the same place");
+}
+
+TEST(ReadDicom, RefusesOtherModalitiesSizesAndTilts) {
+  {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 2; ++k) {
+      DicomSlice slice = slice_at(k, 0);
+      slice.modality = "MR";
+      write_dicom(folder / ("s" + std::to_string(k) + ".dcm"), slice);
+    }
+    EXPECT_SAYS(read(folder.path()), "s0.dcm: is of modality 'MR'; expected CT");
+  }
+  {
+    const TemporaryFolder folder;
+    write_series(folder);
+    DicomSlice other = slice_at(18, 0);
+    other.width = 3;
+    other.height = 4;
+    write_dicom(folder / "other.dcm", other);
+    EXPECT_SAYS(read(folder.path()), "other.dcm: has another size, spacing or direction");
+  }
+  {
+    const TemporaryFolder folder;
+    for (int k = 0; k < 3; ++k) {
+      DicomSlice slice = slice_at(k, 0);
+      slice.position[1] = 0.3 * k;
+      write_dicom(folder / ("s" + std::to_string(k) + ".dcm"), slice);
+    }
+    EXPECT_SAYS(read(folder.path()), "a tilted gantry");
+  }
+  const TemporaryFolder folder;
+  EXPECT_SAYS(read(folder.path()), "holds no DICOM file");
+  write_dicom(folder / "only.dcm", slice_at(0, 0));
+  EXPECT_SAYS(read(folder.path()), "the series has 1 slice; a volume needs at least 2");
+  EXPECT_SAYS(read(folder / "only.dcm"), "a folder of DICOM slices (name the folder)");
+}
+
+TEST(ReadDicom, VisibleHumanPelvis) {
+  MARROW_NEED_DATA(path, "pelvis_dicom");
+  const marrow::Volume volume = read(path);
+  EXPECT_EQ(volume.grid.size, (std::array<int, 3>{512, 512, 4}));
+  EXPECT_NEAR(volume.grid.spacing_mm[2], 1, 1e-6);
+  EXPECT_GT(volume.grid.direction(2, 2), 0.99) << "the third axis runs to the head";
+  const auto [least, greatest] = std::minmax_element(volume.values.begin(), volume.values.end());
+  EXPECT_GE(*least, -2048);
+  EXPECT_LE(*least, -900) << "air is near -1000 HU";
+  EXPECT_GT(*greatest, 500) << "bone";
+}
+
+TEST(ReadDicom, DamagedSlicesAreDiagnosed) {
+  const TemporaryFolder good, folder;
+  DicomSlice slice = slice_at(0, 0);
+  slice.width = slice.height = 64;
+  slice.values.assign(4096, 7);
+  write_dicom(good / "good.dcm", slice);
+  for (int k = 1; k < 4; ++k) {
+    slice.position[2] = k;
+    write_dicom(folder / ("s" + std::to_string(k) + ".dcm"), slice);
+  }
+  marrow::test::expect_damage_is_diagnosed(good / "good.dcm", folder / "s0.dcm", [&](const auto&) { read(folder.path()); });
+}
+
+TEST(ReadDicom, TruncatedRealSliceIsDiagnosed) {
+  MARROW_NEED_DATA(path, "pelvis_dicom/vhf.1001.dcm");
+  const TemporaryFolder folder;
+  for (const char* name : {"vhf.1000.dcm", "vhf.1002.dcm", "vhf.1003.dcm"})
+    std::filesystem::copy(path.parent_path() / name, folder / name);
+  marrow::test::expect_damage_is_diagnosed(path, folder / "vhf.1001.dcm", [&](const auto&) { read(folder.path()); });
+}
+
+}  // namespace

@@ -1,0 +1,106 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/read/image.cpp"
+
+#include <gtest/gtest.h>
+
+#include "read/files.hpp"
+#include "read/itk_files.hpp"
+
+namespace {
+
+using marrow::test::ItkGrid;
+using marrow::test::TemporaryFolder;
+using marrow::test::write_itk;
+
+marrow::Image read(const std::filesystem::path& path) { return image({path}); }
+
+template <class T>
+ItkGrid<T> ramp(unsigned width, unsigned height, double step) {
+  ItkGrid<T> grid{.size = {width, height}};
+  for (unsigned i = 0; i < width * height; ++i) grid.samples.push_back(T(i * step));
+  return grid;
+}
+
+TEST(ReadImage, KeepsBitsAndOrientation) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a.png", "a.tif"}) {
+    write_itk(folder / name, ramp<std::uint8_t>(7, 5, 3));
+    const cv::Mat pixels = read(folder / name).pixels;
+    ASSERT_EQ(pixels.type(), CV_8U);
+    ASSERT_EQ(pixels.size(), cv::Size(7, 5));
+    EXPECT_EQ(pixels.at<std::uint8_t>(1, 2), (7 + 2) * 3) << name << ": row 1, column 2 from the top left";
+  }
+  for (const char* name : {"b.png", "b.tif"}) {
+    write_itk(folder / name, ramp<std::uint16_t>(7, 5, 1801));
+    const cv::Mat pixels = read(folder / name).pixels;
+    ASSERT_EQ(pixels.type(), CV_16U);
+    EXPECT_EQ(pixels.at<std::uint16_t>(4, 6), 34 * 1801) << name;
+  }
+  write_itk(folder / "c.tif", ramp<float>(7, 5, 0.125));
+  EXPECT_EQ(read(folder / "c.tif").pixels.at<float>(4, 6), 34 * 0.125f);
+}
+
+TEST(ReadImage, RealFluoroscopy) {
+  for (const char* name : {"wrist/images/xr_rad_uln_cam01_UND.0002.tif", "wrist/images/xr_rad_uln_cam02_UND.0158.tif"}) {
+    MARROW_NEED_DATA(path, name);
+    const cv::Mat pixels = read(path).pixels;
+    EXPECT_EQ(pixels.type(), CV_8U);
+    EXPECT_EQ(pixels.size(), cv::Size(1760, 1760));
+    EXPECT_GT(cv::mean(pixels)[0], 20);
+  }
+  MARROW_NEED_DATA(knee, "knee/images/L_Hop_Cam1_001_UND.0138.tif");
+  EXPECT_EQ(read(knee).pixels.type(), CV_8U);
+}
+
+TEST(ReadImage, RefusesOtherThanOneGreyImage) {
+  const TemporaryFolder folder;
+  ItkGrid<std::uint8_t> colours{.size = {2, 2}, .samples = std::vector<std::uint8_t>(12), .components = 3};
+  write_itk(folder / "colours.png", colours);
+  EXPECT_SAYS(read(folder / "colours.png"), "has 3 channels; an X-ray image has one");
+  ItkGrid<std::uint16_t> pages{.size = {4, 4, 3}, .samples = std::vector<std::uint16_t>(48)};
+  write_itk(folder / "pages.tif", pages);
+  EXPECT_SAYS(read(folder / "pages.tif"), "has 3 pages; an image has one");
+  marrow::test::put(folder / "a.bmp", "BM");
+  EXPECT_SAYS(read(folder / "a.bmp"), "not an image that can be read; known are .png and .tif");
+  EXPECT_SAYS(read(folder / "absent.png"), "there is no such file");
+  EXPECT_SAYS(read(folder.path()), "not an image");
+  std::filesystem::create_directory(folder / "folder.png");
+  EXPECT_SAYS(read(folder / "folder.png"), "expected a file, this is none");
+}
+
+TEST(ReadImage, DamagedFilesAreDiagnosed) {
+  const TemporaryFolder folder;
+  ItkGrid<std::uint16_t> noise{.size = {60, 40}};
+  for (unsigned i = 0; i < 2400; ++i) noise.samples.push_back(std::uint16_t(i * 40503u));
+  for (const char* extension : {".png", ".tif"}) {
+    SCOPED_TRACE(extension);
+    write_itk(folder / ("good" + std::string(extension)), noise);
+    marrow::test::expect_damage_is_diagnosed(folder / ("good" + std::string(extension)), folder / ("damaged" + std::string(extension)),
+                                             [](const auto& path) { read(path); });
+  }
+}
+
+TEST(ReadImage, DamagedRealTiffIsDiagnosed) {
+  MARROW_NEED_DATA(path, "wrist/images/xr_rad_uln_cam01_UND.0158.tif");
+  const TemporaryFolder folder;
+  marrow::test::expect_damage_is_diagnosed(path, folder / "damaged.tif", [](const auto& damaged) { read(damaged); });
+}
+
+TEST(ReadImage, PngThatClaimsAHugeSizeIsRefused) {
+  const TemporaryFolder folder;
+  write_itk(folder / "a.png", ramp<std::uint8_t>(7, 5, 3));
+  std::string bytes = marrow::test::bytes_of(folder / "a.png");
+  // IHDR: width and height at 16, then the checksum over type and data at 29, made right for the new size.
+  bytes.replace(16, 8, std::string("\0\0\xEA\x60\0\0\xEA\x60", 8));  // 60000 x 60000
+  std::uint32_t checksum = 0xFFFFFFFFu;
+  for (std::size_t i = 12; i < 29; ++i) {
+    checksum ^= std::uint8_t(bytes[i]);
+    for (int k = 0; k < 8; ++k) checksum = checksum >> 1 ^ (checksum & 1 ? 0xEDB88320u : 0);
+  }
+  checksum = ~checksum;
+  for (int k = 0; k < 4; ++k) bytes[29 + k] = char(checksum >> (24 - 8 * k));
+  marrow::test::put(folder / "huge.png", bytes);
+  EXPECT_SAYS(read(folder / "huge.png"), "its header claims 60000 x 60000 x 1 samples, but the file has only");
+}
+
+}  // namespace

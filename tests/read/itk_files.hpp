@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Files written by ITK itself, so that the readers are tested on what another program made.
+#include <array>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace marrow::test {
+
+/// A grid of samples for write_itk(). axes[k]: direction of grid axis k.
+template <class T>
+struct ItkGrid {
+  std::vector<unsigned> size{};
+  std::vector<T> samples{};
+  unsigned components = 1;
+  std::vector<double> spacing{1, 1, 1}, origin{0, 0, 0};
+  std::vector<std::vector<double>> axes{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+};
+
+/// Writes by the extension: .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif, .png.
+template <class T>
+void write_itk(const std::filesystem::path& path, const ItkGrid<T>& grid, bool compressed = false);
+
+struct DicomSlice {
+  std::string series = "1.2.3.4", modality = "CT";
+  std::array<double, 3> position{0, 0, 0};
+  std::string orientation = "1\\0\\0\\0\\1\\0";
+  int width = 4, height = 3;
+  std::vector<std::int16_t> values;  ///< HU
+};
+void write_dicom(const std::filesystem::path& path, const DicomSlice& slice);
+
+}  // namespace marrow::test

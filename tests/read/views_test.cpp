@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/read/views.cpp"
+
+#include <gtest/gtest.h>
+
+#include "read/files.hpp"
+#include "read/itk_files.hpp"
+
+namespace {
+
+using marrow::test::ItkGrid;
+using marrow::test::put;
+using marrow::test::TemporaryFolder;
+using marrow::test::write_itk;
+
+class ReadViews : public testing::Test {
+ protected:
+  ReadViews() {
+    for (const char* name : {"a.png", "b.png"})
+      write_itk(folder / name, ItkGrid<std::uint8_t>{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)});
+    for (const char* name : {"a.txt", "b.txt"})
+      put(folder / name, "image size\n4,6\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
+    options = {{"one", "two"}, {folder / "a.png", folder / "b.png"}, {folder / "a.txt", folder / "b.txt"}};
+  }
+  TemporaryFolder folder;
+  Options options;
+};
+
+TEST_F(ReadViews, ImagesWithTheirCameras) {
+  const auto value = views(nullptr, options);
+  EXPECT_EQ(value.names(), (std::vector<std::string>{"one", "two"}));
+  EXPECT_EQ(value[1].name, "two");
+  EXPECT_EQ(value[1].camera.camera_from_world.translation_mm.z(), 600);
+}
+
+TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
+  marrow::List<marrow::Camera> cameras;
+  marrow::Camera camera{6, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}};
+  camera.camera_from_world.translation_mm.z() = 2;
+  cameras.add("two", camera);
+  camera.camera_from_world.translation_mm.z() = 1;
+  cameras.add("one", camera);
+  EXPECT_SAYS(views(&cameras, options), "give the cameras either as the option (files) or as the input (values)");
+  options.cameras.clear();
+  EXPECT_EQ(views(&cameras, options)[0].camera.camera_from_world.translation_mm.z(), 1);
+  options.names[1] = "three";
+  EXPECT_SAYS(views(&cameras, options), "view 'three' has no camera of that name; there are 'two', 'one'");
+}
+
+TEST_F(ReadViews, DiagnosesFaults) {
+  write_itk(folder / "b.png", ItkGrid<std::uint8_t>{.size = {6, 5}, .samples = std::vector<std::uint8_t>(30, 9)});
+  EXPECT_SAYS(views(nullptr, options), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
+  options.cameras.pop_back();
+  EXPECT_SAYS(views(nullptr, options), "names has 2 views, cameras 1 files; give one camera per view");
+  options.images.pop_back();
+  EXPECT_SAYS(views(nullptr, options), "names has 2 views, images 1 files; give one image per view");
+  options.names = {"one", "one"};
+  options.images = {folder / "a.png", folder / "b.png"};
+  EXPECT_SAYS(views(nullptr, options), "names: two views are named 'one'");
+  options = {};
+  EXPECT_SAYS(views(nullptr, options), "names: no view is named");
+}
+
+TEST_F(ReadViews, RealWristPairs) {
+  MARROW_NEED_DATA(data, "wrist");
+  options.images = {data / "images/xr_rad_uln_cam01_UND.0002.tif", data / "images/xr_rad_uln_cam02_UND.0002.tif"};
+  options.cameras = {data / "cameras/xr_calib_wrist_cam01.txt", data / "cameras/xr_calib_wrist_cam02.txt"};
+  const auto value = views(nullptr, options);
+  EXPECT_EQ(value[0].image.width(), 1760);
+  const double angle = std::acos(value[0].camera.camera_from_world.rotation.row(2).dot(value[1].camera.camera_from_world.rotation.row(2)));
+  EXPECT_NEAR(marrow::degrees(angle), 110, 3) << "the cameras stand 110 degrees apart";
+}
+
+}  // namespace
