@@ -82,12 +82,13 @@ FragmentFrame fragment_frame(const Mesh& mesh) {
   double area = 0;
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
-  for (const auto& t : mesh.triangles) {  // moments of the triangles' centroids, weighted by area
+  for (const auto& t : mesh.triangles) {  // exact moments of a triangle of uniform weight
     const double weight = 0.5 * area_vector(mesh, t).norm();
-    const Eigen::Vector3d centre = (mesh.vertices_mm[t[0]] + mesh.vertices_mm[t[1]] + mesh.vertices_mm[t[2]]) / 3;
+    const Eigen::Vector3d &a = mesh.vertices_mm[t[0]], &b = mesh.vertices_mm[t[1]], &c = mesh.vertices_mm[t[2]];
+    const Eigen::Vector3d centre = (a + b + c) / 3;
     area += weight;
     first += weight * centre;
-    second += weight * centre * centre.transpose();
+    second += weight / 12 * (9 * centre * centre.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   FragmentFrame frame;
   frame.origin_mm = first / area;

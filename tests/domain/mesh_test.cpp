@@ -67,6 +67,12 @@ TEST(FragmentFrame, LongAxisAndCentroidOfACylinderOffTheOrigin) {
   EXPECT_NEAR(frame.axes.determinant(), 1, 1e-9);
 }
 
+TEST(FragmentFrame, CoarseTrianglesGiveTheExactAxis) {
+  const marrow::FragmentFrame frame = fragment_frame(marrow::test::box({5, 6, 7}, {20, 30, 100}));
+  EXPECT_NEAR((frame.axes - Eigen::Matrix3d::Identity()).norm(), 0, 1e-9);
+  EXPECT_NEAR((frame.origin_mm - Vector3d(5, 6, 7)).norm(), 0, 1e-9);
+}
+
 TEST(FragmentFrame, LongAxisAgreesWithPlusZ) {
   const marrow::FragmentFrame frame = fragment_frame(cylinder({1, 2, 3}, Vector3d(0.6, 0, -0.8), 10, 100, 32));
   EXPECT_LT((frame.axes.col(2) - Vector3d(-0.6, 0, 0.8)).norm(), 1e-6);
