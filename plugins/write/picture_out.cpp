@@ -8,19 +8,19 @@ namespace marrow::write {
 
 void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels) {
   if (pixels.empty()) throw Error(path.string() + ": the image is empty, there is nothing to write");
-  if (pixels.channels() != 1 && pixels.channels() != 3)
-    throw Error(path.string() + ": the image has " + std::to_string(pixels.channels()) + " channels; expected 1 or 3");
   const cv::Mat whole = pixels.isContinuous() ? pixels : pixels.clone();
-  switch (whole.depth()) {
-    case CV_8U: return write_pixels(path, whole.cols, whole.rows, whole.channels(), Sample::u8, whole.data);
-    case CV_16U: return write_pixels(path, whole.cols, whole.rows, whole.channels(), Sample::u16, whole.data);
-    case CV_32F: return write_pixels(path, whole.cols, whole.rows, whole.channels(), Sample::f32, whole.data);
-    default: throw Error(path.string() + ": expected pixels of 8 or 16 bits or float");
-  }
+  const int channels = whole.channels();
+  if (whole.depth() == CV_8U && (channels == 1 || channels == 3))
+    return write_png(path, whole.cols, whole.rows, channels, Sample::u8, whole.data);
+  if (whole.depth() == CV_16U && (channels == 1 || channels == 3))
+    return write_png(path, whole.cols, whole.rows, channels, Sample::u16, whole.data);
+  if (whole.type() == CV_32FC1) return write_float_tiff(path, whole.cols, whole.rows, whole.ptr<float>());
+  throw Error(path.string() + ": expected pixels of one or three channels of 8 or 16 bits, or one of float");
 }
 
 void write_grid(const std::filesystem::path& path, const Grid& grid, const std::vector<float>& values) {
-  if (grid.count() == 0 || values.size() != grid.count())
+  if (grid.size[0] <= 0 || grid.size[1] <= 0 || grid.size[2] <= 0) throw Error(path.string() + ": the volume is empty");
+  if (values.size() != grid.count())
     throw Error(path.string() + ": " + std::to_string(grid.count()) + " samples expected from the grid's size, got " +
                 std::to_string(values.size()));
   GridOut out;

@@ -3,10 +3,8 @@
 
 #include <itkMetaImageIO.h>
 #include <itkMultiThreaderBase.h>
-#include <itkPNGImageIO.h>
 #include <itkTIFFImageIO.h>
 
-#include <algorithm>
 #include <fstream>
 
 #include "marrow/domain/error.hpp"
@@ -31,16 +29,6 @@ bool mha_is_whole(const std::filesystem::path& path) {
   return false;
 }
 
-/// PNG: the last chunk is IEND, which always is these 12 bytes.
-bool png_is_whole(const std::filesystem::path& path) {
-  static constexpr unsigned char kEnd[12] = {0, 0, 0, 0, 'I', 'E', 'N', 'D', 0xAE, 0x42, 0x60, 0x82};
-  std::ifstream stream(path, std::ios::binary);
-  unsigned char last[12] = {};
-  stream.seekg(-12, std::ios::end);
-  stream.read(reinterpret_cast<char*>(last), sizeof last);
-  return stream && std::equal(last, last + 12, kEnd);
-}
-
 template <class Io>
 void write(Io& io, const std::filesystem::path& path, const void* samples) {
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
@@ -54,15 +42,6 @@ void write(Io& io, const std::filesystem::path& path, const void* samples) {
   } catch (const itk::ExceptionObject&) {
     fail(path);
   }
-}
-
-void describe(itk::ImageIOBase& io, int width, int height, int channels, itk::IOComponentEnum type) {
-  io.SetNumberOfDimensions(2);
-  io.SetDimensions(0, unsigned(width));
-  io.SetDimensions(1, unsigned(height));
-  io.SetComponentType(type);
-  io.SetNumberOfComponents(unsigned(channels));
-  io.SetPixelType(channels == 3 ? itk::IOPixelEnum::RGB : itk::IOPixelEnum::SCALAR);
 }
 
 }  // namespace
@@ -84,21 +63,19 @@ void write_mha(const std::filesystem::path& path, const GridOut& grid, const flo
   if (!mha_is_whole(path)) fail(path);
 }
 
-void write_pixels(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels) {
-  if (sample == Sample::f32) {
-    const auto io = itk::TIFFImageIO::New();
-    describe(*io, width, height, channels, itk::IOComponentEnum::FLOAT);
-    write(*io, path, pixels);
-    std::error_code failure;
-    const std::uintmax_t least = std::uintmax_t(width) * std::uintmax_t(height) * channels * sizeof(float);
-    if (std::filesystem::file_size(path, failure) < least || failure) fail(path);
-    return;
-  }
-  const auto io = itk::PNGImageIO::New();
-  describe(*io, width, height, channels, sample == Sample::u8 ? itk::IOComponentEnum::UCHAR : itk::IOComponentEnum::USHORT);
-  io->SetUseCompression(true);
+void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels) {
+  const auto io = itk::TIFFImageIO::New();
+  io->SetNumberOfDimensions(2);
+  io->SetDimensions(0, unsigned(width));
+  io->SetDimensions(1, unsigned(height));
+  io->SetComponentType(itk::IOComponentEnum::FLOAT);
+  io->SetNumberOfComponents(1);
+  io->SetPixelType(itk::IOPixelEnum::SCALAR);
+  io->SetUseCompression(false);
   write(*io, path, pixels);
-  if (!png_is_whole(path)) fail(path);
+  std::error_code failure;
+  const std::uintmax_t least = std::uintmax_t(width) * std::uintmax_t(height) * sizeof(float);
+  if (std::filesystem::file_size(path, failure) < least || failure) fail(path);
 }
 
 }  // namespace marrow::write

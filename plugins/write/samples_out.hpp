@@ -6,7 +6,7 @@
 
 namespace marrow::write {
 
-enum class Sample { u8, u16, f32 };
+enum class Sample { u8, u16 };
 
 /// A grid of float samples, x fastest, as compressed MHA. Throws Error when the file did not become whole.
 struct GridOut {
@@ -16,8 +16,10 @@ struct GridOut {
 };
 void write_mha(const std::filesystem::path& path, const GridOut& grid, const float* values);
 
-/// An image, rows from the top, pixels without gaps: PNG for u8 and u16, TIFF for f32. Throws Error when the file did not
-/// become whole.
-void write_pixels(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels);
+/// An image as PNG, rows from the top, pixels without gaps, one or three channels of 8 or 16 bits. Throws Error.
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels);
+
+/// The same as TIFF of float. Throws Error when the file did not become whole.
+void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels);
 
 }  // namespace marrow::write

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// PNG through libpng itself, made in memory: ITK's writer ends the whole program when the disk is full.
+#include <png.h>
+
+#include <bit>
+#include <csetjmp>
+#include <string>
+#include <vector>
+
+#include "atomic_write.hpp"
+#include "marrow/domain/error.hpp"
+#include "samples_out.hpp"
+
+namespace marrow::write {
+namespace {
+
+void put(png_structp png, png_bytep bytes, std::size_t count) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), count);
+}
+
+void flush(png_structp) {}
+
+void on_warning(png_structp, png_const_charp) {}
+
+struct Writer {
+  explicit Writer(std::string& bytes) {
+    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, on_warning);
+    info = png_create_info_struct(png);
+    png_set_write_fn(png, &bytes, put, flush);
+  }
+  ~Writer() { png_destroy_write_struct(&png, &info); }
+  png_structp png = nullptr;
+  png_infop info = nullptr;
+};
+
+/// Nothing with a destructor lives between setjmp and the calls that may jump back to it.
+bool write_rows(Writer& writer, int width, int height, int channels, int bits, png_bytepp rows) {
+  if (setjmp(png_jmpbuf(writer.png))) return false;
+  png_set_IHDR(writer.png, writer.info, png_uint_32(width), png_uint_32(height), bits,
+               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
+               PNG_FILTER_TYPE_DEFAULT);
+  png_set_compression_level(writer.png, 4);
+  png_write_info(writer.png, writer.info);
+  if (bits == 16 && std::endian::native == std::endian::little) png_set_swap(writer.png);
+  png_write_image(writer.png, rows);
+  png_write_end(writer.png, nullptr);
+  return true;
+}
+
+}  // namespace
+
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels) {
+  const int bits = sample == Sample::u16 ? 16 : 8;
+  const std::size_t row_bytes = std::size_t(width) * std::size_t(channels) * std::size_t(bits / 8);
+  std::vector<png_bytep> rows;
+  // libpng takes rows that it may write to, but does not.
+  auto* first = static_cast<png_bytep>(const_cast<void*>(pixels));
+  for (int v = 0; v < height; ++v) rows.push_back(first + std::size_t(v) * row_bytes);
+  std::string bytes;
+  Writer writer(bytes);
+  if (!write_rows(writer, width, height, channels, bits, rows.data()))
+    throw Error(path.string() + ": cannot be written: libpng takes no image of " + std::to_string(width) + " x " +
+                std::to_string(height) + " pixels");
+  write_text_plainly(path, bytes);
+}
+
+}  // namespace marrow::write

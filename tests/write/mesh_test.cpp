@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/write/mesh.cpp"
+
+#include <gtest/gtest.h>
+
+#include "mesh_file.hpp"
+#include "write/full_disk.hpp"
+
+namespace {
+
+marrow::Mesh example() {
+  return {{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, "ct"};
+}
+
+TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
+  const marrow::test::TemporaryFolder folder;
+  mesh(example(), (folder / "m.ply").string());
+  EXPECT_EQ(marrow::hash_of(marrow::read::read_mesh_file(folder / "m.ply", 1)), marrow::hash_of(example()));
+}
+
+TEST(WriteMesh, FullDisk) {
+  const marrow::test::TemporaryFolder folder;
+  for (const rlim_t bytes : {0, 100, 300})
+    marrow::test::expect_full_disk_is_diagnosed(folder, "m.ply", bytes, [](const std::string& path) { mesh(example(), path); });
+}
+
+}  // namespace

@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/write/text.cpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "camera_file.hpp"
+#include "write/full_disk.hpp"
+#include "yaml_values.hpp"
+
+namespace {
+
+using marrow::test::bytes_of;
+using marrow::test::TemporaryFolder;
+
+marrow::Pose example_pose() {
+  marrow::Pose value;
+  value.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.7, 1.3});
+  value.world_from_model.translation_mm = {1.0 / 3, -2e-7, 812.25};
+  value.frame.origin_mm = {0.1, 0.2, 0.3};
+  value.frame.axes = marrow::rotation_from_vector({0, 0.2, 0});
+  value.covariance = marrow::Matrix6d::Identity() * 1e-6;
+  (*value.covariance)(2, 2) = std::pow(marrow::radians(0.35), 2);
+  (*value.covariance)(3, 3) = 0.04;
+  value.warnings = {"axial rotation is not seen: \"bare\" shaft", "line\nbreak: # no comment"};
+  value.cost = 1.0 / 7;
+  value.evaluations = 321;
+  return value;
+}
+
+TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
+  const TemporaryFolder folder;
+  pose(example_pose(), (folder / "pose.yaml").string());
+  EXPECT_EQ(marrow::hash_of(marrow::read::read_pose_file(folder / "pose.yaml")), marrow::hash_of(example_pose()));
+  const std::string text = bytes_of(folder / "pose.yaml");
+  EXPECT_NE(text.find("target: world\nsource: ct\nmatrix:  # world_from_ct, mm\n"), std::string::npos) << text;
+  EXPECT_NE(text.find("predicted_deviation:"), std::string::npos);
+  EXPECT_NE(text.find(", 0.35"), std::string::npos) << "degrees about the long axis\n" << text;
+}
+
+TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
+  const TemporaryFolder folder;
+  marrow::Pose value = example_pose();
+  value.covariance.reset();
+  value.warnings.clear();
+  pose(value, (folder / "pose.yaml").string());
+  EXPECT_EQ(marrow::hash_of(marrow::read::read_pose_file(folder / "pose.yaml")), marrow::hash_of(value));
+  value.covariance = marrow::Matrix6d::Constant(std::numeric_limits<double>::infinity());
+  pose(value, (folder / "pose.yaml").string());
+  EXPECT_FALSE(marrow::read::read_pose_file(folder / "pose.yaml").covariance);
+  EXPECT_NE(bytes_of(folder / "pose.yaml").find("rotation_deg: [.inf, .inf, .inf]"), std::string::npos);
+}
+
+TEST(WriteText, CameraAndSeedsReadBackTheSame) {
+  const TemporaryFolder folder;
+  marrow::Camera written{512, 384, Eigen::Matrix3d::Identity(), {"camera", "world", marrow::rotation_from_vector({1, 2, 3}), {1.0 / 3, 2, 600}}};
+  written.intrinsics(0, 0) = 1706.484641638225;
+  camera(written, (folder / "c.yaml").string());
+  EXPECT_EQ(marrow::hash_of(marrow::read::read_camera_file(folder / "c.yaml")), marrow::hash_of(written));
+  const marrow::Seeds points{"distal: \"2\"", {{0.1, 0.2, 1.0 / 3}}, false};
+  seeds(points, (folder / "s.yaml").string());
+  EXPECT_EQ(marrow::hash_of(marrow::read::read_seeds_file(folder / "s.yaml")[0]), marrow::hash_of(points));
+}
+
+TEST(WriteText, MetricsAreJson) {
+  const TemporaryFolder folder;
+  metrics({{{"rotation error", 0.1, "deg"}, {"impossible", std::nan(""), "mm"}}}, (folder / "m.json").string());
+  const auto json = nlohmann::json::parse(bytes_of(folder / "m.json"));
+  EXPECT_EQ(json["metrics"][0]["name"], "rotation error");
+  EXPECT_EQ(json["metrics"][0]["value"], 0.1);
+  EXPECT_TRUE(json["metrics"][1]["value"].is_null());
+}
+
+TEST(WriteText, ShaftLinesAndTruthAreYaml) {
+  const TemporaryFolder folder;
+  marrow::ShaftLines lines;
+  lines.left = {{1, 2}, {3, 4.5}};
+  lines.rejected.push_back({{{5, 6}, {7, 8}}, {{9, 10}, {11, 12}}, "canal: too narrow"});
+  shaft_lines(lines, (folder / "l.yaml").string());
+  const YAML::Node yaml = YAML::LoadFile(folder / "l.yaml");
+  EXPECT_EQ(yaml["left"]["to_px"][1].as<double>(), 4.5);
+  EXPECT_EQ(yaml["rejected"][0]["reason"].as<std::string>(), "canal: too narrow");
+  truth({example_pose().world_from_model}, (folder / "t.yaml").string());
+  EXPECT_EQ(YAML::LoadFile(folder / "t.yaml")["matrix"][2][3].as<double>(), 812.25);
+}
+
+TEST(WriteText, FullDisk) {
+  const TemporaryFolder folder;
+  for (const rlim_t bytes : {0, 200})
+    marrow::test::expect_full_disk_is_diagnosed(folder, "p.yaml", bytes, [](const std::string& path) { pose(example_pose(), path); });
+}
+
+TEST(WriteText, AFolderOfThatNameIsNotReplaced) {
+  const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "p.yaml");
+  EXPECT_SAYS((pose(example_pose(), (folder / "p.yaml").string()), 0), "p.yaml: cannot be written");
+  EXPECT_TRUE(std::filesystem::is_directory(folder / "p.yaml"));
+}
+
+}  // namespace
