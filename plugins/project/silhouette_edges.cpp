@@ -66,13 +66,12 @@ class ContourFinder {
   }
 
  private:
-  /// Whether a normal of the patch can be perpendicular to a line of sight.
+  /// Whether a normal of the patch can be perpendicular to a line of sight: whether the sine of the angle between the cone's
+  /// axis and the plane across the sight is at most sin(cone + angle under which the patch is seen), of which
+  /// sin(cone) + radius / distance is an upper bound.
   bool may_cross(const SurfacePatches::Patch& patch) const {
     const Eigen::Vector3f sight = geometry_.source - patch.centre;
-    const float distance = sight.norm();
-    if (distance <= patch.radius) return true;
-    const float tilt_rad = std::asin(std::min(1.0f, std::abs(patch.axis.dot(sight)) / distance));
-    return tilt_rad <= patch.cone_rad + std::asin(patch.radius / distance) + 1e-3f;
+    return std::abs(patch.axis.dot(sight)) <= 1.001f * (patch.cone_sine * sight.norm() + patch.radius);
   }
 
   void evaluate(const SurfacePatches::Patch& patch) {

@@ -17,7 +17,7 @@ struct SurfacePatches {
     Eigen::Vector3f centre;   ///< of the sphere around its vertices
     float radius;
     Eigen::Vector3f axis;     ///< of the cone around its vertex normals
-    float cone_rad;           ///< half opening angle
+    float cone_sine;          ///< of its half opening angle; 1 from a right angle on
     std::uint32_t first_vertex, vertex_count, first_triangle, triangle_count, first_rim, rim_count;
   };
   std::vector<Patch> patches;
@@ -120,11 +120,13 @@ inline void bound(SurfacePatches& s, SurfacePatches::Patch& patch) {
     patch.axis += normal(i);
   }
   patch.axis = patch.axis.norm() > 1e-3f ? Eigen::Vector3f(patch.axis.normalized()) : Eigen::Vector3f::UnitZ();
-  patch.radius = patch.cone_rad = 0;
+  patch.radius = 0;
+  float least_cosine = 1;
   for (std::size_t i = first; i < last; ++i) {
     patch.radius = std::max(patch.radius, (point(i) - patch.centre).norm());
-    patch.cone_rad = std::max(patch.cone_rad, std::acos(std::clamp(normal(i).dot(patch.axis), -1.0f, 1.0f)));
+    least_cosine = std::min(least_cosine, normal(i).dot(patch.axis));
   }
+  patch.cone_sine = least_cosine <= 0 ? 1 : std::sqrt(std::max(0.0f, 1 - least_cosine * least_cosine));
 }
 
 }  // namespace surface_patches

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numeric>
 
 #include "predicted_covariance.hpp"
 
@@ -12,9 +15,11 @@ struct Options {
   double scan_rotation_step_deg = 3;
   double scan_translation_mm = 15;
   double scan_translation_step_mm = 3;
+  int candidates = 3;
   std::vector<double> contour_spacing_px{8, 4, 2};
   std::vector<double> reach_px{24, 12, 6};
   std::vector<double> step_deg{3, 1, 0.3};
+  std::vector<double> step_axial_deg{6, 3, 1};
   std::vector<double> step_mm{3, 1, 0.3};
   int max_evaluations = 400;
   double step_tolerance = 0.02;
@@ -28,6 +33,7 @@ struct Result {
 };
 
 constexpr int kAxialRotation = 2, kAxialTranslation = 5;
+const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
 
 /// The search: the pose found so far, moved about the fragment's own axes.
 class Search {
@@ -37,29 +43,45 @@ class Search {
       : optimizer_(optimizer), frame_(initial.frame), pose_(initial.world_from_model), options_(options), context_(context) {}
 
   const marrow::RigidTransform& pose() const { return pose_; }
+  void go_to(const marrow::RigidTransform& pose) { pose_ = pose; }
   int evaluations() const { return evaluations_; }
 
-  /// Tries a grid of axial rotations and translations and goes to the best: the stage before leaves these two open, and the
-  /// cost has other minima within their range.
-  void scan(const marrow::Cost& cost) {
-    const auto steps = [](double range, double step) { return range > 0 ? int(std::floor(range / step + 1e-9)) : 0; };
+  /// Tries a grid of axial rotations and translations, which the stage before leaves open, and returns the best poses that
+  /// are no neighbours of a better one: the cost has other minima within their range.
+  std::vector<marrow::RigidTransform> scan(const marrow::Cost& cost) {
+    const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
     const int turns = steps(options_.scan_rotation_deg, options_.scan_rotation_step_deg);
     const int shifts = steps(options_.scan_translation_mm, options_.scan_translation_step_mm);
+    const int columns = 2 * shifts + 1, count = (2 * turns + 1) * columns;
     std::vector<marrow::RigidTransform> poses;
-    for (int turn = -turns; turn <= turns; ++turn)
-      for (int shift = -shifts; shift <= shifts; ++shift) {
-        marrow::Vector6d motion = marrow::Vector6d::Zero();
-        motion[kAxialRotation] = turn * options_.scan_rotation_step_deg;
-        motion[kAxialTranslation] = shift * options_.scan_translation_step_mm;
-        poses.push_back(moved_by_units(pose_, frame_, motion));
-      }
+    for (int i = 0; i < count; ++i) {
+      marrow::Vector6d motion = marrow::Vector6d::Zero();
+      motion[kAxialRotation] = (i / columns - turns) * options_.scan_rotation_step_deg;
+      motion[kAxialTranslation] = (i % columns - shifts) * options_.scan_translation_step_mm;
+      poses.push_back(moved_by_units(pose_, frame_, motion));
+    }
     const std::vector<double> values = cost.values(poses);
-    evaluations_ += int(values.size());
-    pose_ = poses[std::size_t(std::min_element(values.begin(), values.end()) - values.begin())];
+    evaluations_ += count;
+    std::vector<int> order(poses.size()), chosen;
+    std::iota(order.begin(), order.end(), 0);
+    std::sort(order.begin(), order.end(), [&](int a, int b) {
+      return values[std::size_t(a)] != values[std::size_t(b)] ? values[std::size_t(a)] < values[std::size_t(b)] : a < b;
+    });
+    const auto near = [&](int a, int b) {
+      return std::abs(a / columns - b / columns) <= 2 && std::abs(a % columns - b % columns) <= 2;
+    };
+    std::vector<marrow::RigidTransform> candidates;
+    for (const int i : order) {
+      if (int(candidates.size()) == options_.candidates) break;
+      if (std::any_of(chosen.begin(), chosen.end(), [&](int other) { return near(i, other); })) continue;
+      chosen.push_back(i);
+      candidates.push_back(poses[std::size_t(i)]);
+    }
+    return candidates;
   }
 
-  /// Minimises over the given axes from the pose found so far, and goes there.
-  void refine(const marrow::Cost& cost, const std::vector<int>& axes, std::size_t level, double done, double share) {
+  /// Minimises over the given axes from the pose found so far, goes there and returns the cost.
+  double refine(const marrow::Cost& cost, const std::vector<int>& axes, std::size_t level, double done, double share) {
     const auto n = Eigen::Index(axes.size());
     const auto pose_at = [&](const Eigen::VectorXd& x) {
       marrow::Vector6d motion = marrow::Vector6d::Zero();
@@ -69,8 +91,12 @@ class Search {
     marrow::MinimisationProblem problem;
     problem.start = Eigen::VectorXd::Zero(n);
     problem.initial_step.resize(n);
-    for (Eigen::Index i = 0; i < n; ++i)
-      problem.initial_step[i] = axes[std::size_t(i)] < 3 ? options_.step_deg[level] : options_.step_mm[level];
+    for (Eigen::Index i = 0; i < n; ++i) {
+      const int axis = axes[std::size_t(i)];
+      problem.initial_step[i] = axis == kAxialRotation ? options_.step_axial_deg[level]
+                                : axis < 3             ? options_.step_deg[level]
+                                                       : options_.step_mm[level];
+    }
     problem.max_evaluations = options_.max_evaluations;
     problem.step_tolerance = options_.step_tolerance;
     problem.function = [&](const Eigen::VectorXd& x) {
@@ -84,6 +110,7 @@ class Search {
     const marrow::MinimisationResult result = optimizer_.minimise(problem);
     evaluations_ += result.evaluations;
     pose_ = pose_at(result.x);
+    return result.value;
   }
 
  private:
@@ -101,13 +128,15 @@ void check_options(const Options& options) {
     if (values.empty() || values.size() != levels)
       throw marrow::Error(std::string(name) + " has " + std::to_string(values.size()) +
                           " numbers, but contour_spacing_px has " + std::to_string(levels) +
-                          "; give each of contour_spacing_px, reach_px, step_deg and step_mm one number per level");
+                          "; give each of contour_spacing_px, reach_px, step_deg, step_axial_deg and step_mm one number per "
+                          "level");
     for (const double value : values)
       if (!(value > 0)) throw marrow::Error(std::string(name) + ": each number must be positive");
   };
   check(options.contour_spacing_px, "contour_spacing_px");
   check(options.reach_px, "reach_px");
   check(options.step_deg, "step_deg");
+  check(options.step_axial_deg, "step_axial_deg");
   check(options.step_mm, "step_mm");
 }
 
@@ -131,12 +160,28 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
     result.pose = std::move(pose);
   };
   add_stage("start");
-  const double share = 1.0 / double(levels.size() + 1);
-  search.scan(*levels.front());
-  search.refine(*levels.front(), {kAxialRotation, kAxialTranslation}, 0, 0, share);
+  // Each candidate is judged after all six axes had their turn, because the start's errors in the other four hide which of
+  // them is right.
+  const std::vector<marrow::RigidTransform> candidates = search.scan(*levels.front());
+  const double share = 1.0 / double(candidates.size() + levels.size());
+  marrow::RigidTransform best_axial, best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < candidates.size(); ++i) {
+    search.go_to(candidates[i]);
+    search.refine(*levels.front(), {kAxialRotation, kAxialTranslation}, 0, share * double(i), share / 2);
+    const marrow::RigidTransform axial = search.pose();
+    const double value = search.refine(*levels.front(), kAllAxes, 0, share * (double(i) + 0.5), share / 2);
+    if (value < least) {
+      least = value;
+      best_axial = axial;
+      best = search.pose();
+    }
+  }
+  search.go_to(best_axial);
   add_stage("axial");
-  for (std::size_t i = 0; i < levels.size(); ++i)
-    search.refine(*levels[i], {0, 1, 2, 3, 4, 5}, i, share * double(i + 1), share);
+  search.go_to(best);
+  for (std::size_t i = 1; i < levels.size(); ++i)
+    search.refine(*levels[i], kAllAxes, i, share * double(candidates.size() + i), share);
   add_stage("final");
 
   if (const auto factor = levels.back()->likelihood_factor(search.pose())) {
@@ -167,9 +212,12 @@ MARROW_PLUGIN(plugin) {
       .option("scan_translation_mm", &Options::scan_translation_mm, "axial translations tried, to either side",
               marrow::at_least(0))
       .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these", marrow::at_least(0.01))
+      .option("candidates", &Options::candidates, "best places of this scan that are followed up", marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
-      .option("step_deg", &Options::step_deg, "per level: first step of the rotations")
+      .option("step_deg", &Options::step_deg, "per level: first step of the rotations about the frontal and lateral axes")
+      .option("step_axial_deg", &Options::step_axial_deg,
+              "per level: first step of the axial rotation, which moves the outline less")
       .option("step_mm", &Options::step_mm, "per level: first step of the translations")
       .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost per level", marrow::at_least(1))
       .option("step_tolerance", &Options::step_tolerance, "a level ends when steps fall below this part of its first step",

@@ -144,8 +144,8 @@ TEST(Multiresolution, RefusesLevelsThatDoNotAgree) {
     FAIL();
   } catch (const marrow::Error& error) {
     EXPECT_STREQ(error.what(),
-                 "reach_px has 2 numbers, but contour_spacing_px has 3; give each of contour_spacing_px, reach_px, step_deg "
-                 "and step_mm one number per level");
+                 "reach_px has 2 numbers, but contour_spacing_px has 3; give each of contour_spacing_px, reach_px, step_deg, "
+                 "step_axial_deg and step_mm one number per level");
   }
 }
 
