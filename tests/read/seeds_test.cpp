@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "read/files.hpp"
+#include "volume_file.hpp"
 
 namespace {
 
@@ -19,6 +20,16 @@ TEST(ReadSeeds, FragmentsInTheirOrder) {
   EXPECT_FALSE(value[0].wanted);
   EXPECT_TRUE(value[1].wanted);
   EXPECT_EQ(value[1].points_mm[1], Eigen::Vector3d(7, 8, 9));
+}
+
+TEST(ReadSeeds, SeedsOfTheWristLieInBone) {
+  const auto file = std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist/radius.seeds.yaml";
+  const marrow::List<marrow::Seeds> radius = seeds({file});
+  EXPECT_EQ(radius.names(), std::vector<std::string>{"radius"});
+  MARROW_NEED_DATA(data, "wrist/volumes/rad_dcm_cropped.tif");
+  const marrow::Volume ct = marrow::read::read_volume_file(data, {{0.39625, 0.39625, 0.625}, {}, -1024, ""});
+  for (const Eigen::Vector3d& point : radius[0].points_mm)
+    EXPECT_GT(sample_trilinear(ct.grid, ct.values, ct.grid.index_from_point(point)), 800);
 }
 
 TEST(ReadSeeds, DiagnosesFaults) {
