@@ -14,8 +14,7 @@ namespace {
 using Eigen::Vector3d;
 using Node = std::pair<double, double>;
 
-/// Smooth curve through nodes (monotone: a smoothstep between neighbours would wave, so straight pieces with rounded blends are
-/// approximated by averaging the piecewise linear curve over +-w).
+/// Piecewise linear curve through nodes, constant beyond them.
 double along(std::span<const Node> nodes, double x) {
   if (x <= nodes.front().first) return nodes.front().second;
   for (std::size_t i = 1; i < nodes.size(); ++i)
@@ -26,6 +25,7 @@ double along(std::span<const Node> nodes, double x) {
   return nodes.back().second;
 }
 
+/// The same with its corners rounded, by averaging over +-0.025.
 double smooth_along(std::span<const Node> nodes, double x) {
   constexpr double kHalfWidth = 0.025;
   double sum = 0;
@@ -110,14 +110,14 @@ double FemurField::distal(const Vector3d& p) const {
   const double axis = bow(0.06 * shape_.length_mm) - 4;
   const Vector3d q(p.x(), p.y() - axis, p.z());
   // Each condyle is two discs, a small one behind and a large one before it: the radius of curvature grows to the front.
-  const double medial_x = half - 14 * s, lateral_x = -half + 15 * s;
+  const double medial_x = half - 16 * s, lateral_x = -half + 17 * s;
   const double medial = join(disc(q - Vector3d(medial_x, 17 * s, 21 * s), 20.5 * s, 14 * s, 9 * s),
                              disc(q - Vector3d(medial_x - 2 * s, -2 * s, 26 * s), 26 * s, 14 * s, 10 * s), 8 * s);
   const double lateral = join(disc(q - Vector3d(lateral_x, 14 * s, 23.5 * s), 19.5 * s, 14.5 * s, 9 * s),
                               disc(q - Vector3d(lateral_x + 1 * s, -6 * s, 30 * s), 28 * s, 15 * s, 9 * s), 8 * s);
   const double trochlea = ellipsoid(q - Vector3d(-2 * s, -9 * s, 33 * s), Vector3d(30, 22, 21) * s);
-  const double epicondyles = std::min(ellipsoid(q - Vector3d(half - 5 * s, 4 * s, 33 * s), Vector3d(7, 11, 12) * s),
-                                      ellipsoid(q - Vector3d(-half + 5 * s, 5 * s, 30 * s), Vector3d(7, 10, 10) * s));
+  const double epicondyles = std::min(ellipsoid(q - Vector3d(half - 9 * s, 4 * s, 33 * s), Vector3d(7, 11, 12) * s),
+                                      ellipsoid(q - Vector3d(-half + 9 * s, 5 * s, 30 * s), Vector3d(7, 10, 10) * s));
   double all = join(join(medial, lateral, 4 * s), join(trochlea, epicondyles, 4 * s), 9 * s);
   const double notch = ellipsoid(q - Vector3d(0, 20 * s, 8 * s), Vector3d(11, 26, 25) * s);
   all = cut(all, -notch, 5 * s);

@@ -67,7 +67,7 @@ class XRay {
     for (const auto& fragment : phantom.fragments) bone_from_world_.push_back(inverse(fragment.world_from_bone()));
   }
 
-  const simulate::RayBundle& bundle() const { return rays_.bundle(); }
+  const simulate::SolidRays& rays() const { return rays_; }
 
   Ray ray(int column, int row) const {
     const Eigen::Vector2d pixel((column + 0.5) / kSubsamples - 0.5, (row + 0.5) / kSubsamples - 0.5);
@@ -107,11 +107,11 @@ class XRay {
 
   /// Mean transmission of each pixel's rays, for rows first to last - 1.
   void render(int first, int last, cv::Mat1d& primary) const {
-    const auto crossings = bundle().crossings(first * kSubsamples, last * kSubsamples);
+    const auto crossings = rays_.bundle().crossings(first * kSubsamples, last * kSubsamples);
     std::size_t next = 0;
     std::vector<Interval> intervals;
     for (int row = first * kSubsamples; row < last * kSubsamples; ++row)
-      for (int column = 0; column < bundle().columns(); ++column) {
+      for (int column = 0; column < rays_.bundle().columns(); ++column) {
         const Ray line = ray(column, row);
         Lengths lengths = soft_tissue(line);
         const std::size_t begin = next;

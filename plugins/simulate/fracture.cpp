@@ -200,6 +200,8 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
   simulate::check_bone(bone, "simulate.fracture");
+  if (!(options.level >= 0.1 && options.level <= 0.9))
+    throw Error("simulate.fracture: the level " + std::to_string(options.level) + " must lie in 0.1 to 0.9 of the bone's length");
   const Box box = bounds(bone.outer);
   const double z = box.low.z() + options.level * (box.high.z() - box.low.z());
   const Eigen::Vector2d at = centre_at(bone.outer, z);

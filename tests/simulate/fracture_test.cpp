@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/simulate/fracture.cpp"
+
+#include <gtest/gtest.h>
+
+#include "shapes.hpp"
+
+namespace {
+
+namespace test = simulate::test;
+
+Bone shaft() {
+  Bone bone;
+  // Rings of corners along the cylinder, so that its triangles are small against the fracture.
+  bone.outer = simulate::polygonise(
+      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 14, std::abs(p.z()) - 100); }, {-20, -20, -104},
+      {26, 20, 104}, 1.1, 1.5);
+  bone.inner = simulate::polygonise(
+      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 6, std::abs(p.z()) - 94); }, {-20, -20, -104},
+      {26, 20, 104}, 1.1, 1.5);
+  return bone;
+}
+
+TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
+  const Eigen::Vector2d centre = centre_at(shaft().outer, 12.34);
+  EXPECT_NEAR(centre.x(), 3, 0.02);
+  EXPECT_NEAR(centre.y(), 0, 0.02);
+}
+
+TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
+  FractureOptions options;
+  options.level = 0.4;
+  options.obliquity_deg = 30;
+  options.direction_deg = 0;
+  options.roughness_mm = 0;
+  const Phantom phantom = fracture(shaft(), options);
+  EXPECT_TRUE(is_closed(phantom.fracture));
+  EXPECT_GT(enclosed_volume_mm3(phantom.fracture), 0);
+  double below = -1e9, above = 1e9;  // the surface's height at the axis and 10 mm to the left
+  for (const auto& vertex : phantom.fracture.vertices_mm) {
+    if (std::hypot(vertex.x() - 3, vertex.y()) < 0.6) below = std::max(below, vertex.z());
+    if (std::hypot(vertex.x() - 13, vertex.y()) < 0.6) above = std::min(above, vertex.z() > -100 ? vertex.z() : 1e9);
+  }
+  EXPECT_NEAR(below, -100 + 0.4 * 200, 0.6);
+  EXPECT_NEAR(above, -20 + 10 * std::tan(kPi / 6), 0.6);
+}
+
+TEST(SimulateFracture, RoughnessIsItsRootMeanSquareAndItsSeedChangesIt) {
+  FractureOptions options;
+  options.obliquity_deg = 0;
+  options.roughness_mm = 1.5;
+  options.level = 0.5;
+  const auto relief = [&](int seed) {
+    options.fracture_seed = seed;
+    return Relief(options, {0, 0, 0});
+  };
+  double squares = 0;
+  int count = 0;
+  for (int seed = 1; seed <= 40; ++seed) {
+    const Relief surface = relief(seed);
+    for (double x = -200; x <= 200; x += 7.7)
+      for (double y = -200; y <= 200; y += 7.3, ++count) squares += std::pow(surface({x, y}), 2);
+  }
+  EXPECT_NEAR(std::sqrt(squares / count), 1.5, 0.1);
+  EXPECT_NE(relief(1)({3, 4}), relief(2)({3, 4}));
+}
+
+TEST(SimulateFracture, MotionIsAboutTheFragmentsOwnAxes) {
+  FractureOptions options;
+  options.rotation_deg = {2, -3, 40};
+  options.translation_mm = {4, 5, -6};
+  options.ct_gap_mm = {0.5, 0, -2};
+  const Phantom phantom = fracture(shaft(), options);
+  ASSERT_EQ(phantom.fragments.size(), 2u);
+  EXPECT_EQ(phantom.fragments[0].name, "proximal");
+  EXPECT_EQ(phantom.fragments[1].name, "distal");
+  const Fragment& distal = phantom.fragments[1];
+  const Vector6d motion = motion_between(RigidTransform{"world", "ct"}, distal.world_from_ct, distal.frame);
+  const Vector6d expected = (Vector6d() << radians(2), radians(-3), radians(40), 4, 5, -6).finished();
+  EXPECT_LT((motion - expected).norm(), 1e-9);
+  // The distal shaft reaches from -100 to -10 (level 0.45): its wall of 7917 mm2 around -55 and its cap of 616 mm2 at -100 have
+  // their centre at -58.2, and the gap is 2. The cut rises by tan 30 cos 30 = 0.5 along x, which moves the centre of the wall
+  // by 0.5 14^2 / (2 90) = 0.54; its share is 0.93.
+  EXPECT_NEAR(distal.frame.origin_mm.z(), -58.2 - 2, 0.3);
+  EXPECT_NEAR(distal.frame.origin_mm.x(), 3.5 + 0.5, 0.05);
+  EXPECT_NEAR(distal.frame.axes(2, 2), 1, 2e-3);
+  EXPECT_EQ(distal.ct_from_bone.translation_mm, Eigen::Vector3d(0.5, 0, -2));
+  EXPECT_EQ(phantom.fragments[0].world_from_ct.translation_mm, Eigen::Vector3d::Zero());
+  EXPECT_EQ(phantom.fragments[0].world_from_ct.rotation, Eigen::Matrix3d::Identity());
+}
+
+TEST(SimulateFracture, SeedsLieInTheirOwnFragmentsCortex) {
+  FractureOptions options;
+  options.ct_gap_mm = {0, 0, -2};
+  const Phantom phantom = fracture(shaft(), options);
+  for (const Fragment& fragment : phantom.fragments) {
+    EXPECT_GE(fragment.seeds_mm.size(), 8u) << fragment.name;
+    for (const auto& seed : fragment.seeds_mm) {
+      const Eigen::Vector3d in_bone = inverse(fragment.ct_from_bone) * seed;
+      const double radius = std::hypot(in_bone.x() - 3, in_bone.y());
+      EXPECT_GT(radius, 8);
+      EXPECT_LT(radius, 12);
+      const double height = in_bone.z() + 10;  // over the fracture's centre; at radius 12 it rises by 7 mm
+      if (fragment.side < 0) EXPECT_LT(height, 11);
+      else EXPECT_GT(height, -11);
+    }
+  }
+}
+
+TEST(SimulateFracture, BadInputIsExplained) {
+  FractureOptions options;
+  Bone open = shaft();
+  open.outer.triangles.pop_back();
+  EXPECT_EQ(test::message_of([&] { fracture(open, options); }),
+            "simulate.fracture, outer surface: the surface is open or not consistently oriented, so it has no inside; close its "
+            "holes (each edge must be shared by exactly two triangles)");
+  Bone inward = shaft();
+  for (auto& triangle : inward.outer.triangles) std::swap(triangle[0], triangle[1]);
+  EXPECT_NE(test::message_of([&] { fracture(inward, options); }).find("the triangles face inward"), std::string::npos);
+  Bone few = shaft();
+  few.fill_fraction = {0.1, 0.2};
+  EXPECT_EQ(test::message_of([&] { fracture(few, options); }),
+            "simulate.fracture: the bone share needs as many positions as values, got 1 and 2");
+  options.level = 1.2;
+  EXPECT_EQ(test::message_of([&] { fracture(shaft(), options); }),
+            "simulate.fracture: the level 1.200000 must lie in 0.1 to 0.9 of the bone's length");
+}
+
+}  // namespace

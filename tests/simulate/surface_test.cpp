@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/simulate/surface.cpp"
+
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <fstream>
+
+#include "shapes.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+namespace test = simulate::test;
+
+fs::path write_stl(const std::string& name, const Mesh& mesh, bool ascii) {
+  const fs::path path = fs::path(testing::TempDir()) / name;
+  std::ofstream file(path, std::ios::binary);
+  if (ascii) file << "solid bone\n";
+  else file << std::string(80, ' ');
+  const std::uint32_t count = std::uint32_t(mesh.triangles.size());
+  if (!ascii) file.write(reinterpret_cast<const char*>(&count), 4);
+  for (const auto& t : mesh.triangles) {
+    if (ascii) file << "facet normal 0 0 0\nouter loop\n";
+    else file.write(std::string(12, '\0').data(), 12);
+    for (std::uint32_t corner : t) {
+      const Eigen::Vector3f p = mesh.vertices_mm[corner].cast<float>();
+      if (ascii) file << "vertex " << p.x() << " " << p.y() << " " << p.z() << "\n";
+      else file.write(reinterpret_cast<const char*>(p.data()), 12);
+    }
+    if (ascii) file << "endloop\nendfacet\n";
+    else file.write("\0\0", 2);
+  }
+  if (ascii) file << "endsolid bone\n";
+  return path;
+}
+
+SurfaceOptions reading(const fs::path& path) {
+  SurfaceOptions options;
+  options.outer = path;
+  return options;
+}
+
+TEST(SimulateSurface, ReadsBinaryAndAsciiStlScalesAndTurns) {
+  const Mesh box = test::box({0, 0, 0}, {0.4, 0.05, 0.03});  // metres, long axis along x
+  for (bool ascii : {false, true}) {
+    SurfaceOptions options = reading(write_stl(ascii ? "ascii.stl" : "binary.stl", box, ascii));
+    options.scale = 1000;
+    options.rotation_deg = {0, -90, 0};
+    options.isocentre_from_distal_end_mm = 100;
+    const Bone bone = surface(options);
+    EXPECT_EQ(bone.outer.vertices_mm.size(), 8u);
+    EXPECT_NEAR(enclosed_volume_mm3(bone.outer), 400.0 * 50 * 30, 1);
+    double low = 1e9, high = -1e9;
+    for (const auto& p : bone.outer.vertices_mm) low = std::min(low, p.z()), high = std::max(high, p.z());
+    EXPECT_NEAR(low, -100, 1e-3);
+    EXPECT_NEAR(high, 300, 1e-3);
+    EXPECT_NEAR(bone.fill_z_mm.front(), -100, 1e-3);
+    EXPECT_NEAR(bone.fill_z_mm.back(), 300, 1e-3);
+  }
+}
+
+TEST(SimulateSurface, BadFilesAreExplained) {
+  const auto message = [](const SurfaceOptions& options) { return test::message_of([&] { surface(options); }); };
+  const fs::path folder = testing::TempDir();
+  EXPECT_EQ(message(reading(folder / "missing.stl")),
+            "surface file " + (folder / "missing.stl").string() + ": cannot be read; give the path of an STL file");
+  const Mesh box = test::box({0, 0, 0}, {10, 10, 100});
+  const fs::path truncated = write_stl("truncated.stl", box, false);
+  fs::resize_file(truncated, 300);
+  EXPECT_EQ(message(reading(truncated)),
+            "surface file " + truncated.string() + ": neither a binary STL (300 bytes, but its header promises 12 triangles, which take "
+            "684) nor an ASCII one; the file may be truncated");
+  std::ofstream(folder / "empty.stl");
+  EXPECT_NE(message(reading(folder / "empty.stl")).find("neither a binary STL (0 bytes"), std::string::npos);
+  std::ofstream(folder / "words.stl") << "solid x\nvertex 1 2 three\n";
+  EXPECT_EQ(message(reading(folder / "words.stl")),
+            "surface file " + (folder / "words.stl").string() + ": a 'vertex' is not followed by three numbers");
+  Mesh open = box;
+  open.triangles.pop_back();
+  EXPECT_NE(message(reading(write_stl("open.stl", open, false))).find("the surface is open"), std::string::npos);
+  EXPECT_EQ(message(reading(write_stl("lying.stl", test::box({0, 0, 0}, {100, 10, 10}), false))),
+            "simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends 100.000000 x 10.000000 x "
+            "10.000000 mm; turn it with rotation_deg");
+  SurfaceOptions options = reading(write_stl("good.stl", box, false));
+  options.fill_at = {0, 1};
+  options.fill_fraction = {0.1};
+  EXPECT_EQ(message(options), "simulate.surface: fill_at has 2 positions, but fill_fraction has 1 values; give as many of each");
+}
+
+TEST(SimulateSurface, RealFemurIsAHollowBone) {
+  const fs::path folder = fs::path(MARROW_SOURCE_DIR) / "../shared/data/femur";
+  if (!fs::exists(folder / "femur.stl")) GTEST_SKIP() << "the real femur is not at " << folder;
+  SurfaceOptions options = reading(folder / "femur.stl");
+  options.inner = folder / "femur_cortex.stl";
+  const Bone bone = surface(options);
+  EXPECT_EQ(bone.outer.triangles.size(), 20308u);
+  EXPECT_LT(enclosed_volume_mm3(bone.inner), enclosed_volume_mm3(bone.outer));
+  EXPECT_GT(enclosed_volume_mm3(bone.inner), 0.3 * enclosed_volume_mm3(bone.outer));
+}
+
+}  // namespace
