@@ -40,16 +40,16 @@ class EdgeProfile {
  public:
   /// `sigma_mm` of the Gaussian derivative; `blur_mm`: width (standard deviation) of an ideal edge in the CT itself.
   EdgeProfile(double sigma_mm, double blur_mm)
-      : step_mm_(sigma_mm / 2), variance_mm2_(sigma_mm * sigma_mm + blur_mm * blur_mm) {
+      : step_mm_(kStep * sigma_mm), variance_mm2_(sigma_mm * sigma_mm + blur_mm * blur_mm) {
     double sum = 0, second_sum = 0, half = 0;
     for (int k = -kReach; k <= kReach; ++k) {
-      const double t = k / 2.0;  // in sigmas
+      const double t = k * kStep;  // in sigmas
       weights_[k + kReach][0] = std::exp(-0.5 * t * t);
       sum += weights_[k + kReach][0];
     }
     for (auto& w : weights_) w[0] /= sum;
     for (int k = -kReach; k <= kReach; ++k) {
-      const double t = k / 2.0;
+      const double t = k * kStep;
       auto& w = weights_[k + kReach];
       w[1] = -t / sigma_mm * w[0];
       w[2] = (t * t - 1) / (sigma_mm * sigma_mm) * w[0];
@@ -77,7 +77,8 @@ class EdgeProfile {
   }
 
  private:
-  static constexpr int kReach = 6;  // samples on either side, half a sigma apart
+  static constexpr int kReach = 4;       // samples on either side
+  static constexpr double kStep = 0.75;  // in sigmas
   double step_mm_, variance_mm2_, drop_per_slope_mm_ = 1;
   std::array<std::array<double, 3>, 2 * kReach + 1> weights_{};
 };

@@ -25,8 +25,9 @@ float curvature(const float* v, const Eigen::Vector3f& per_mm, const Eigen::Vect
   const float xx = second(kX, 0), yy = second(kY, 1), zz = second(kZ, 2);
   const float squared = g.squaredNorm();
   const float numerator = xx * (g.y() * g.y() + g.z() * g.z()) + yy * (g.x() * g.x() + g.z() * g.z()) +
-                          zz * (g.x() * g.x() + g.y() * g.y()) - 2 * (g.x() * g.y() * mixed(kX, kY, 0, 1) +
-                          g.x() * g.z() * mixed(kX, kZ, 0, 2) + g.y() * g.z() * mixed(kY, kZ, 1, 2));
+                          zz * (g.x() * g.x() + g.y() * g.y()) -
+                          2 * (g.x() * g.y() * mixed(kX, kY, 0, 1) + g.x() * g.z() * mixed(kX, kZ, 0, 2) +
+                               g.y() * g.z() * mixed(kY, kZ, 1, 2));
   return numerator / (squared * std::sqrt(squared));
 }
 
@@ -65,6 +66,10 @@ bool beside_surface(const float* v) {
   for (int step : {kX, -kX, kY, -kY, kZ, -kZ})
     if ((v[step] < 0) != (v[0] < 0)) return true;
   return false;
+}
+
+bool beyond_band(const float* v, float band) {
+  return v[kX] == band && v[-kX] == band && v[kY] == band && v[-kY] == band && v[kZ] == band && v[-kZ] == band;
 }
 
 }  // namespace
@@ -113,8 +118,10 @@ void Front::load(const Extent& extent, Halo& halo) const {
     for (int y = 0; y < extent.size[1] + 2; ++y) {
       const float* row = values_mm_.data() + grid_.offset(0, std::clamp(extent.first[1] + y - 1, 0, grid_.size[1] - 1),
                                                           std::clamp(extent.first[2] + z - 1, 0, grid_.size[2] - 1));
-      for (int x = 0; x < extent.size[0] + 2; ++x)
-        halo[std::size_t(z) * kZ + y * kY + x] = row[std::clamp(extent.first[0] + x - 1, 0, grid_.size[0] - 1)];
+      float* out = halo.data() + z * kZ + y * kY;
+      std::copy_n(row + extent.first[0], extent.size[0], out + 1);
+      out[0] = row[std::max(extent.first[0] - 1, 0)];
+      out[extent.size[0] + 1] = row[std::min(extent.first[0] + extent.size[0], grid_.size[0] - 1)];
     }
 }
 
@@ -136,19 +143,21 @@ void Front::write_back() {
     const Extent e = extent(active_[position]);
     for (int z = 0; z < e.size[2]; ++z)
       for (int y = 0; y < e.size[1]; ++y)
-        std::copy_n(next_values_.data() + position * kTile * kTile * kTile + std::size_t(z * kTile + y) * kTile, e.size[0],
-                    values_mm_.data() + grid_.offset(e.first[0], e.first[1] + y, e.first[2] + z));
+        std::copy_n(next_values_.data() + position * kTile * kTile * kTile + std::size_t(z * kTile + y) * kTile,
+                    e.size[0], values_mm_.data() + grid_.offset(e.first[0], e.first[1] + y, e.first[2] + z));
   });
 }
 
 void Front::wake_all() {
   tbb::parallel_for(std::size_t(0), tile_count(), [&](std::size_t tile) {
     const Extent e = extent(tile);
+    const bool inside = values_mm_[grid_.offset(e.first[0], e.first[1], e.first[2])] < 0;
     is_awake_[tile] = 0;
-    for (int z = 0; z < e.size[2]; ++z)
-      for (int y = 0; y < e.size[1]; ++y)
-        for (int x = 0; x < e.size[0]; ++x)
-          is_awake_[tile] |= std::abs(values_mm_[grid_.offset(e.first[0] + x, e.first[1] + y, e.first[2] + z)]) < near_mm_;
+    // One voxel beyond the tile, so that a surface between two tiles wakes both.
+    for (int z = e.first[2]; z < std::min(e.first[2] + kTile + 1, grid_.size[2]); ++z)
+      for (int y = e.first[1]; y < std::min(e.first[1] + kTile + 1, grid_.size[1]); ++y)
+        for (int x = e.first[0]; x < std::min(e.first[0] + kTile + 1, grid_.size[0]); ++x)
+          is_awake_[tile] |= (values_mm_[grid_.offset(x, y, z)] < 0) != inside;
   });
   choose_active();
 }
@@ -159,10 +168,16 @@ void Front::choose_active() {
     for (int y = 0; y < tiles_[1]; ++y)
       for (int x = 0; x < tiles_[0]; ++x) {
         if (!is_awake_[(std::size_t(z) * tiles_[1] + y) * tiles_[0] + x]) continue;
-        for (int k = std::max(0, z - 1); k <= std::min(tiles_[2] - 1, z + 1); ++k)
-          for (int j = std::max(0, y - 1); j <= std::min(tiles_[1] - 1, y + 1); ++j)
-            for (int i = std::max(0, x - 1); i <= std::min(tiles_[0] - 1, x + 1); ++i)
-              is_active_[(std::size_t(k) * tiles_[1] + j) * tiles_[0] + i] = 1;
+        const auto choose = [&](int i, int j, int k) {
+          if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
+            is_active_[(std::size_t(k) * tiles_[1] + j) * tiles_[0] + i] = 1;
+        };
+        choose(x, y, z);
+        for (int side : {-1, 1}) {
+          choose(x + side, y, z);
+          choose(x, y + side, z);
+          choose(x, y, z + side);
+        }
       }
   active_.clear();
   for (std::size_t tile = 0; tile < tile_count(); ++tile)
@@ -201,7 +216,7 @@ void Front::advance(double step_mm) {
       // The speed of the band is that of the closest point of the surface.
       const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
       int nearest[3];
-      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(std::lround(closest[k])), 0, grid_.size[k] - 1);
+      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
       const float speed = speed_[grid_.offset(nearest[0], nearest[1], nearest[2])];
       const float moved = *v - float(step_mm) * speed * upwind_gradient(v, voxels_per_mm_, speed);
       next_values_[place] = std::clamp(moved, -band_mm_, band_mm_);
@@ -219,6 +234,8 @@ void Front::redistance() {
           const float length = gradient(v, voxels_per_mm_).norm();
           const float rescaled = pass == 0 && length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
           next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // no voxel beside it is farther
+        } else if (beyond_band(v, sign * band_mm_)) {
+          next_values_[place] = sign * band_mm_;
         } else {
           next_values_[place] = sign * std::min(eikonal(v, sign, voxels_per_mm_), band_mm_);
         }
@@ -229,7 +246,10 @@ void Front::redistance() {
 }
 
 bool Front::rest(double least_motion_mm) {
-  struct Tally { double motion_mm = 0; std::size_t surface = 0, band = 0; };
+  struct Tally {
+    double motion_mm = 0;
+    std::size_t surface = 0, band = 0;
+  };
   std::vector<Tally> tallies(active_.size());
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     Tally& tally = tallies[position];
@@ -264,8 +284,7 @@ void Front::keep_apart(Front& a, Front& b) {
       for (int y = 0; y < e.size[1]; ++y)
         for (int x = 0; x < e.size[0]; ++x) {
           const std::size_t at = a.grid_.offset(e.first[0] + x, e.first[1] + y, e.first[2] + z);
-          const float overlap = 0.5f * (a.values_mm_[at] + b.values_mm_[at]);
-          if (overlap >= 0) continue;
+          const float overlap = std::min(0.f, 0.5f * (a.values_mm_[at] + b.values_mm_[at]));
           a.values_mm_[at] -= overlap;
           b.values_mm_[at] -= overlap;
         }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A moving surface: a signed distance, kept in a narrow band around its zero level only (Adalsteinsson and Sethian, A fast
-// level set method for propagating interfaces, J. Comput. Phys. 1995). The grid is divided in tiles of 8 x 8 x 8 voxels; only
-// tiles near a part of the surface that still moves are visited, so a step costs what moves, not what the volume holds.
+// A moving surface: a signed distance, kept in a narrow band around its zero level only (Adalsteinsson and Sethian, A
+// fast level set method for propagating interfaces, J. Comput. Phys. 1995). The grid is divided in tiles of 8 x 8 x 8
+// voxels; only tiles near a part of the surface that still moves are visited, so a step costs what moves, not what the
+// volume holds.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -48,7 +49,9 @@ class Front {
  private:
   static constexpr int kTile = 8, kHalo = kTile + 2;
   using Halo = std::array<float, kHalo * kHalo * kHalo>;
-  struct Extent { int first[3], size[3]; };
+  struct Extent {
+    int first[3], size[3];
+  };
 
   std::size_t tile_count() const { return std::size_t(tiles_[0]) * tiles_[1] * tiles_[2]; }
   Extent extent(std::size_t tile) const;
@@ -63,9 +66,9 @@ class Front {
   Eigen::Vector3f voxels_per_mm_;
   std::array<int, 3> tiles_;
   std::vector<float> values_mm_, values_before_, speed_;
-  std::vector<std::uint32_t> active_;   // tiles visited in this step, in order
+  std::vector<std::uint32_t> active_;  // tiles visited in this step, in order
   std::vector<std::uint8_t> is_active_, is_awake_;
-  std::vector<float> next_values_;      // of the active tiles
+  std::vector<float> next_values_;  // of the active tiles
   double mean_motion_mm_ = 0;
   std::size_t band_voxels_ = 0;
 };

@@ -54,18 +54,24 @@ struct Planes {
   double slope_u, slope_v;
 
   int shift(int i, int j) const {
-    return int(std::lround(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) + slope_v * (j - (box.first[v] + box.last[v]) / 2.0)));
+    return int(std::lround(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) +
+                           slope_v * (j - (box.first[v] + box.last[v]) / 2.0)));
   }
   int reach() const {
-    return int(std::ceil(std::abs(slope_u) * (box.last[u] - box.first[u]) + std::abs(slope_v) * (box.last[v] - box.first[v]))) / 2 + 1;
+    return int(std::ceil(std::abs(slope_u) * (box.last[u] - box.first[u]) +
+                         std::abs(slope_v) * (box.last[v] - box.first[v]))) /
+               2 +
+           1;
   }
 };
 
 /// Marks in `is_filled` what bone encloses in one plane: all that cannot be reached from the plane's border.
-void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>& is_bone, std::vector<std::uint8_t>& is_filled) {
+void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>& is_bone,
+                std::vector<std::uint8_t>& is_filled) {
   const Box& box = planes.box;
   const int width = box.last[planes.u] - box.first[planes.u] + 3, height = box.last[planes.v] - box.first[planes.v] + 3;
-  const std::size_t steps[3] = {1, std::size_t(planes.grid.size[0]), std::size_t(planes.grid.size[0]) * planes.grid.size[1]};
+  const std::size_t steps[3] = {1, std::size_t(planes.grid.size[0]),
+                                std::size_t(planes.grid.size[0]) * planes.grid.size[1]};
   thread_local std::vector<std::uint8_t> closed;
   thread_local std::vector<std::size_t> source;
   thread_local std::vector<int> stack;
@@ -120,7 +126,8 @@ float distance_from(const Grid& grid, const std::vector<float>& distance, const 
   for (int k = 0; k < 3; ++k) {
     double nearest = 1e9;
     if (p[k] > 0 && state[at - steps[k]] == State::known) nearest = std::min(nearest, double(distance[at - steps[k]]));
-    if (p[k] + 1 < grid.size[k] && state[at + steps[k]] == State::known) nearest = std::min(nearest, double(distance[at + steps[k]]));
+    if (p[k] + 1 < grid.size[k] && state[at + steps[k]] == State::known)
+      nearest = std::min(nearest, double(distance[at + steps[k]]));
     terms[k] = {nearest, 1 / (grid.spacing_mm[k] * grid.spacing_mm[k])};
   }
   std::sort(terms.begin(), terms.end());

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <tbb/parallel_for.h>
+
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
@@ -31,7 +33,7 @@ struct Options {
   int refine_steps = 20;
 };
 
-constexpr double kStepVoxels = 0.45;  // stable below 1 / sqrt(3) (Courant, Friedrichs and Lewy)
+constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant, Friedrichs and Lewy)
 constexpr int kStepsPerCycle = 3, kCyclesPerRest = 3;
 
 void keep_all_apart(std::vector<Front>& fronts) {
@@ -39,11 +41,13 @@ void keep_all_apart(std::vector<Front>& fronts) {
     for (std::size_t b = a + 1; b < fronts.size(); ++b) Front::keep_apart(fronts[a], fronts[b]);
 }
 
-void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, const char* phase, int step, Context& context) {
+void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, const char* phase, int step,
+                Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     char line[200];
-    std::snprintf(line, sizeof line, "%s, step %d, %s: moved %.4f mm a step, %zu voxels in the moving band", phase, step,
-                  seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * kCyclesPerRest), fronts[f].band_voxels());
+    std::snprintf(line, sizeof line, "%s, step %d, %s: moved %.4f mm a step, %zu voxels in the moving band", phase,
+                  step, seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * kCyclesPerRest),
+                  fronts[f].band_voxels());
     context.info(line);
   }
 }
@@ -62,7 +66,8 @@ void cycle(const Volume& volume, const EdgeProfile& profile, const Force& force,
 }
 
 /// Expands all fronts together until each of them rests on the walls of its bone.
-void expand(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts, Context& context) {
+void expand(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
+            Context& context) {
   const EdgeProfile profile(options.expand_sigma_mm, options.blur_mm);
   const Force force{1, options.curvature_mm, options.edge_hu, options.floor_hu};
   constexpr int kSteps = kStepsPerCycle * kCyclesPerRest;
@@ -81,7 +86,7 @@ void expand(const Volume& volume, const List<Seeds>& seeds, const Options& optio
 }
 
 /// Leaves only the outer surface of each front, with nothing inside.
-void fill(const marrow::Grid& grid, std::vector<Front>& fronts, double band_mm) {
+void fill(const marrow::Grid& grid, std::vector<Front>& fronts) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     std::vector<float>& values = fronts[f].values_mm();
     std::vector<std::uint8_t> is_bone(grid.count()), is_other(grid.count(), 0);
@@ -94,16 +99,16 @@ void fill(const marrow::Grid& grid, std::vector<Front>& fronts, double band_mm) 
     const float half_voxel = float(grid.spacing_mm[0] / 2);
     for (std::size_t at = 0; at < is_bone.size(); ++at)
       if (is_bone[at] && values[at] >= 0) values[at] = -half_voxel;
-    segment::march_distances(grid, values, band_mm);
+    fronts[f].wake_all();
+    for (int k = 0; k < 3; ++k) fronts[f].redistance();
   }
 }
 
-/// Draws the surfaces to the steepest descent of the CT along their normals; where there is none (the mouth of a canal),
-/// they stay.
+/// Draws the surfaces to the steepest descent of the CT along their normals; where there is none (the mouth of a
+/// canal), they stay.
 void refine(const Volume& volume, const Options& options, std::vector<Front>& fronts, Context& context) {
   const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm);
   const Force force{0, options.refine_curvature_mm, options.edge_hu, options.floor_hu};
-  for (Front& front : fronts) front.wake_all();
   for (int step = 0; step < options.refine_steps; step += kStepsPerCycle) {
     context.check_cancelled();
     context.progress(0.7 + 0.3 * step / options.refine_steps, "refining");
@@ -115,11 +120,13 @@ void check(const Volume& volume) {
   marrow::check_volume(volume, "volume");
   for (int size : volume.grid.size)
     if (size < 4)
-      throw marrow::Error("volume: at least 4 voxels along each axis expected, got " + std::to_string(volume.grid.size[0]) +
-                          " x " + std::to_string(volume.grid.size[1]) + " x " + std::to_string(volume.grid.size[2]));
+      throw marrow::Error("volume: at least 4 voxels along each axis expected, got " +
+                          std::to_string(volume.grid.size[0]) + " x " + std::to_string(volume.grid.size[1]) + " x " +
+                          std::to_string(volume.grid.size[2]));
 }
 
-List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
+List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds, const Options& options,
+                                   Context& context) {
   check(volume);
   const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
   const double in_plane_mm = volume.grid.spacing_mm[0], band_mm = options.band_voxels * in_plane_mm;
@@ -134,15 +141,18 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     const auto& values = fronts[f].values_mm();
     if (std::none_of(values.begin(), values.end(), [](float v) { return v < 0; }))
-      throw marrow::Error("fragment '" + seeds.name(f) + "': the front vanished, as its seeds lie too close to the edge of "
+      throw marrow::Error("fragment '" + seeds.name(f) +
+                          "': the front vanished, as its seeds lie too close to the edge of "
                           "the bone; move them towards the middle of the cortical or spongy bone");
   }
-  fill(volume.grid, fronts, band_mm);
+  fill(volume.grid, fronts);
   refine(volume, options, fronts, context);
+  tbb::parallel_for(std::size_t(0), fronts.size(), [&](std::size_t f) {
+    if (seeds[f].wanted) segment::march_distances(volume.grid, fronts[f].values_mm(), band_mm);
+  });
   List<SignedField> fields;
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     if (!seeds[f].wanted) continue;
-    segment::march_distances(volume.grid, fronts[f].values_mm(), band_mm);
     fields.add(seeds.name(f), SignedField{volume.grid, std::move(fronts[f].values_mm())});
   }
   if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
@@ -157,17 +167,20 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("band_voxels", &Options::band_voxels, "half width of the narrow band, in in-plane voxels", marrow::at_least(3),
-              marrow::at_most(20), marrow::unit("voxels"))
-      .option("curvature_mm", &Options::curvature_mm, "weight of the curvature while the fronts expand", marrow::at_least(0),
-              marrow::at_most(0.5))
-      .option("edge_hu", &Options::edge_hu, "drop of the CT that halves the speed", marrow::at_least(1), marrow::unit("HU"))
-      .option("floor_hu", &Options::floor_hu, "no front advances into what is darker; nor may a seed be", marrow::unit("HU"))
+      .option("band_voxels", &Options::band_voxels, "half width of the narrow band, in in-plane voxels",
+              marrow::at_least(3), marrow::at_most(20), marrow::unit("voxels"))
+      .option("curvature_mm", &Options::curvature_mm, "weight of the curvature while the fronts expand",
+              marrow::at_least(0), marrow::at_most(0.5))
+      .option("edge_hu", &Options::edge_hu, "drop of the CT that halves the speed", marrow::at_least(1),
+              marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu, "no front advances into what is darker; nor may a seed be",
+              marrow::unit("HU"))
       .option("expand_sigma_mm", &Options::expand_sigma_mm, "Gaussian derivative while the fronts expand",
               marrow::at_least(0.1), marrow::at_most(5))
       .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative that the final surface rests on",
               marrow::at_least(0.1), marrow::at_most(5))
-      .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0), marrow::at_most(5))
+      .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
+              marrow::at_most(5))
       .option("refine_curvature_mm", &Options::refine_curvature_mm, "weight of the curvature in the final surface",
               marrow::at_least(0), marrow::at_most(0.5))
       .option("stop_speed", &Options::stop_speed, "a part of a front that is slower (F0 is 1) comes to rest",

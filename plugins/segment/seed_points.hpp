@@ -10,13 +10,15 @@
 
 namespace segment {
 
-/// The seeds of each fragment as fractional indices. Throws Error for no seeds, a fragment without any, or a seed that lies
-/// outside the volume or where the CT, averaged over 3 x 3 x 3 voxels, is below `least_hu`.
+/// The seeds of each fragment as fractional indices. Throws Error for no seeds, a fragment without any, or a seed that
+/// lies outside the volume or where the CT, averaged over 3 x 3 x 3 voxels, is below `least_hu`.
 inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volume& volume,
-                                                              const marrow::List<marrow::Seeds>& seeds, double least_hu) {
+                                                              const marrow::List<marrow::Seeds>& seeds,
+                                                              double least_hu) {
   using marrow::Error;
   if (seeds.empty())
-    throw Error("seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
+    throw Error(
+        "seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
   std::vector<std::vector<Eigen::Vector3d>> indices(seeds.size());
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     const std::string fragment = "seeds of fragment '" + seeds.name(f) + "'";
@@ -24,7 +26,8 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
     for (std::size_t i = 0; i < seeds[f].points_mm.size(); ++i) {
       const Eigen::Vector3d& point = seeds[f].points_mm[i];
       char where[120];
-      std::snprintf(where, sizeof where, ": point %zu at (%.1f, %.1f, %.1f) mm", i + 1, point.x(), point.y(), point.z());
+      std::snprintf(where, sizeof where, ": point %zu at (%.1f, %.1f, %.1f) mm", i + 1, point.x(), point.y(),
+                    point.z());
       const Eigen::Vector3d index = volume.grid.index_from_point(point);
       int voxel[3];
       for (int k = 0; k < 3; ++k) {
@@ -40,8 +43,10 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
             if (volume.grid.contains(x, y, z)) sum += volume.at(x, y, z), ++count;
       if (sum / count < least_hu) {
         char value[160];
-        std::snprintf(value, sizeof value, " is not in bone: the CT shows %.0f HU there, at least %.0f HU expected; move it "
-                                           "into cortical or spongy bone", sum / count, least_hu);
+        std::snprintf(value, sizeof value,
+                      " is not in bone: the CT shows %.0f HU there, at least %.0f HU expected; move it "
+                      "into cortical or spongy bone",
+                      sum / count, least_hu);
         throw Error(fragment + where + value);
       }
       indices[f].push_back(index);

@@ -32,13 +32,16 @@ inline double round_cone(const Vector3d& p, const Vector3d& a, const Vector3d& b
 using Scene = std::function<double(const Vector3d&)>;
 
 /// Volume of a body with a soft rim as wide as the sub-voxels, which stands for their partial filling.
-inline double filled(double distance_mm) { return std::clamp(0.5 - distance_mm / 0.4, 0.0, 1.0); }
+inline double filled(double distance_mm) {
+  return std::clamp(0.5 - distance_mm / 0.4, 0.0, 1.0);
+}
 
 inline void blur_axis(std::vector<float>& values, const std::array<int, 3>& size, int axis, double sigma) {
   std::vector<float> kernel;
   const int reach = int(std::ceil(4 * sigma));
   float sum = 0;
-  for (int k = -reach; k <= reach; ++k) kernel.push_back(float(std::exp(-0.5 * k * k / sigma / sigma))), sum += kernel.back();
+  for (int k = -reach; k <= reach; ++k)
+    kernel.push_back(float(std::exp(-0.5 * k * k / sigma / sigma))), sum += kernel.back();
   const std::array<std::size_t, 3> steps{1, std::size_t(size[0]), std::size_t(size[0]) * size[1]};
   const int u = (axis + 1) % 3, v = (axis + 2) % 3;
   tbb::parallel_for(0, size[v], [&](int j) {
@@ -57,7 +60,8 @@ inline void blur_axis(std::vector<float>& values, const std::array<int, 3>& size
 }
 
 /// The CT of a scene: 2 x 2 x 2 sub-voxels, a Gaussian point-spread function, the mean over each voxel, Gaussian noise.
-inline marrow::Volume scan(const marrow::Grid& grid, const Scene& scene, double psf_mm, double noise_hu, unsigned seed) {
+inline marrow::Volume scan(const marrow::Grid& grid, const Scene& scene, double psf_mm, double noise_hu,
+                           unsigned seed) {
   const std::array<int, 3> fine{grid.size[0] * 2, grid.size[1] * 2, grid.size[2] * 2};
   std::vector<float> values(std::size_t(fine[0]) * fine[1] * fine[2]);
   const auto at = [&](int x, int y, int z) { return (std::size_t(z) * fine[1] + y) * fine[0] + x; };
@@ -85,10 +89,11 @@ struct Accuracy {
   std::size_t points = 0;
 };
 
-/// Compares a field with the true signed distance: Dice over voxels, and the true distance of each point where the field's
-/// zero level crosses a grid edge, as far as `counts` says that the point counts.
-inline Accuracy compare(const marrow::SignedField& field, const Distance& truth_mm,
-                        const std::function<bool(const Vector3d&)>& counts = [](const Vector3d&) { return true; }) {
+/// Compares a field with the true signed distance: Dice over voxels, and the true distance of each point where the
+/// field's zero level crosses a grid edge, as far as `counts` says that the point counts.
+inline Accuracy compare(
+    const marrow::SignedField& field, const Distance& truth_mm,
+    const std::function<bool(const Vector3d&)>& counts = [](const Vector3d&) { return true; }) {
   const marrow::Grid& grid = field.grid;
   Accuracy accuracy;
   double both = 0, either = 0;
@@ -122,8 +127,8 @@ inline Accuracy compare(const marrow::SignedField& field, const Distance& truth_
 }
 
 inline void print(const std::string& what, const Accuracy& a) {
-  std::printf("%-34s Dice %.4f  bias %+.3f mm  mean %.3f mm  rms %.3f mm  largest %.2f mm  (%zu points)\n", what.c_str(), a.dice,
-              a.bias_mm, a.mean_mm, a.rms_mm, a.largest_mm, a.points);
+  std::printf("%-34s Dice %.4f  bias %+.3f mm  mean %.3f mm  rms %.3f mm  largest %.2f mm  (%zu points)\n",
+              what.c_str(), a.dice, a.bias_mm, a.mean_mm, a.rms_mm, a.largest_mm, a.points);
 }
 
 /// A grid with the CT's spacing, centred on the origin.

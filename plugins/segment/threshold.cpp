@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+#include <queue>
+
+#include "interior.hpp"
+#include "seed_points.hpp"
+
+namespace {
+
+using marrow::Context;
+using marrow::Grid;
+using marrow::List;
+using marrow::Seeds;
+using marrow::SignedField;
+using marrow::Volume;
+
+struct Options {
+  double threshold_hu = 250;
+  double band_mm = 4;
+};
+
+constexpr std::uint8_t kNobody = 255, kUnclaimed = 254;
+
+template <class Visit>
+void for_neighbours(const Grid& grid, std::size_t at, const Visit& visit) {
+  const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
+  const int x = int(at % row), y = int(at % slice / row), z = int(at / slice);
+  if (x > 0) visit(at - 1);
+  if (x + 1 < grid.size[0]) visit(at + 1);
+  if (y > 0) visit(at - row);
+  if (y + 1 < grid.size[1]) visit(at + row);
+  if (z > 0) visit(at - slice);
+  if (z + 1 < grid.size[2]) visit(at + slice);
+}
+
+/// Gives each bright voxel that a seed reaches through bright voxels to the fragment whose seed is the fewest steps
+/// away.
+void claim_from_seeds(const Grid& grid, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
+                      std::vector<std::uint8_t>& owner) {
+  std::queue<std::size_t> reached;
+  for (std::size_t f = 0; f < seeds.size(); ++f)
+    for (const auto& index : seeds[f]) {
+      int low[3], high[3];
+      for (int k = 0; k < 3; ++k) {
+        const int nearest = int(std::lround(index[k]));
+        low[k] = std::max(0, nearest - 1);
+        high[k] = std::min(grid.size[k] - 1, nearest + 1);
+      }
+      for (int z = low[2]; z <= high[2]; ++z)
+        for (int y = low[1]; y <= high[1]; ++y)
+          for (int x = low[0]; x <= high[0]; ++x) {
+            const std::size_t at = grid.offset(x, y, z);
+            if (owner[at] != kUnclaimed) continue;
+            owner[at] = std::uint8_t(f);
+            reached.push(at);
+          }
+    }
+  while (!reached.empty()) {
+    const std::size_t at = reached.front();
+    reached.pop();
+    for_neighbours(grid, at, [&](std::size_t next) {
+      if (owner[next] != kUnclaimed) return;
+      owner[next] = owner[at];
+      reached.push(next);
+    });
+  }
+}
+
+/// Gives the largest connected set of bright voxels to fragment 0.
+void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
+  std::vector<std::size_t> component, largest;
+  for (std::size_t start = 0; start < owner.size(); ++start) {
+    if (owner[start] != kUnclaimed) continue;
+    component.assign(1, start);
+    owner[start] = kNobody;
+    for (std::size_t i = 0; i < component.size(); ++i)
+      for_neighbours(grid, component[i], [&](std::size_t next) {
+        if (owner[next] != kUnclaimed) return;
+        owner[next] = kNobody;
+        component.push_back(next);
+      });
+    if (component.size() > largest.size()) largest.swap(component);
+  }
+  for (std::size_t at : largest) owner[at] = 0;
+}
+
+/// Signed distance to the outer surface of one fragment: where its bone meets dark voxels, the surface is where the CT,
+/// interpolated, crosses the threshold; where it meets another fragment, halfway.
+SignedField field_of(const Volume& volume, const Options& options, const std::vector<std::uint8_t>& owner,
+                     std::uint8_t fragment) {
+  const Grid& grid = volume.grid;
+  std::vector<std::uint8_t> is_bone(owner.size()), is_other(owner.size());
+  for (std::size_t at = 0; at < owner.size(); ++at) {
+    is_bone[at] = owner[at] == fragment;
+    is_other[at] = owner[at] < kUnclaimed && owner[at] != fragment;
+  }
+  segment::fill_interior(grid, is_bone, is_other);
+  SignedField field{grid, std::vector<float>(owner.size())};
+  const double half_voxel_mm = grid.spacing_mm.minCoeff() / 2;
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y)
+      for (int x = 0; x < grid.size[0]; ++x) {
+        const std::size_t at = grid.offset(x, y, z);
+        const auto slope = [&](int dx, int dy, int dz, int axis) {
+          const auto value = [&](int sign) {
+            const int i = std::clamp(x + sign * dx, 0, grid.size[0] - 1),
+                      j = std::clamp(y + sign * dy, 0, grid.size[1] - 1),
+                      k = std::clamp(z + sign * dz, 0, grid.size[2] - 1);
+            return double(volume.at(i, j, k));
+          };
+          return (value(1) - value(-1)) / (2 * grid.spacing_mm[axis]);
+        };
+        bool at_surface = false;
+        for_neighbours(grid, at, [&](std::size_t next) { at_surface |= is_bone[next] != is_bone[at]; });
+        const bool agrees = (volume.values[at] >= options.threshold_hu) == bool(is_bone[at]);
+        double distance = half_voxel_mm;
+        if (at_surface && agrees) {
+          const double steepness = Eigen::Vector3d(slope(1, 0, 0, 0), slope(0, 1, 0, 1), slope(0, 0, 1, 2)).norm();
+          distance = std::abs(volume.values[at] - options.threshold_hu) / std::max(steepness, 1.0);
+        }
+        distance = std::clamp(distance, 1e-4, grid.spacing_mm.maxCoeff());
+        field.values_mm[at] = float(is_bone[at] ? -distance : distance);
+      }
+  segment::march_distances(grid, field.values_mm, options.band_mm);
+  return field;
+}
+
+List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, const Options& options, Context& context) {
+  marrow::check_volume(volume, "volume");
+  std::vector<std::uint8_t> owner(volume.values.size(), kNobody);
+  bool any = false;
+  for (std::size_t at = 0; at < owner.size(); ++at)
+    if (volume.values[at] >= options.threshold_hu) owner[at] = kUnclaimed, any = true;
+  if (!any)
+    throw marrow::Error("volume: no voxel reaches the threshold of " + std::to_string(int(options.threshold_hu)) +
+                        " HU, so there is no bone; lower threshold_hu, and check that the CT is in Hounsfield units");
+  List<SignedField> fields;
+  if (!seeds) {
+    claim_largest(volume.grid, owner);
+    fields.add("bone", field_of(volume, options, owner, 0));
+    return fields;
+  }
+  if (seeds->size() >= kUnclaimed)
+    throw marrow::Error("seeds: at most 253 fragments expected, got " + std::to_string(seeds->size()));
+  claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, options.threshold_hu), owner);
+  for (std::size_t f = 0; f < seeds->size(); ++f) {
+    context.check_cancelled();
+    context.progress(double(f) / double(seeds->size()), seeds->name(f));
+    if ((*seeds)[f].wanted) fields.add(seeds->name(f), field_of(volume, options, owner, std::uint8_t(f)));
+  }
+  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
+  return fields;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("segment.threshold", threshold)
+      .summary("Bone brighter than a threshold, shared out between the fragments by the nearest seed")
+      .in("volume", "CT in Hounsfield units")
+      .in("seeds", "points inside each fragment; without any, the largest connected bone", marrow::over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .option("threshold_hu", &Options::threshold_hu, "CT number at the surface", marrow::unit("HU"))
+      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+}

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/segment/threshold.cpp"
+
+#include <gtest/gtest.h>
+
+#include "segment/phantom.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+
+/// Two capsules with a wall of 3 mm over marrow.
+struct Pair {
+  double first(const Vector3d& p) const { return phantom::round_cone(p, {0, 0, -20}, {0, 0, -18}, 11, 11); }
+  double second(const Vector3d& p) const { return phantom::round_cone(p, {0, 0, 12}, {0, 0, 20}, 12, 12); }
+  double hu(const Vector3d& p) const {
+    const double outer = std::min(first(p), second(p));
+    return 50 + 1000 * phantom::filled(outer) - 1050 * phantom::filled(outer + 3);
+  }
+  Volume volume() const {
+    return phantom::scan(
+        phantom::ct_grid({44, 44, 80}), [&](const Vector3d& p) { return hu(p); }, 0.5, 20, 7);
+  }
+};
+
+TEST(Threshold, OneFieldForEachFragmentWithItsCanalFilled) {
+  const Pair pair;
+  List<Seeds> seeds;
+  seeds.add("proximal", Seeds{"proximal", {{10.5, 0, 16}}});
+  seeds.add("distal", Seeds{"distal", {{9.5, 0, -19}}});
+  Context context;
+  const auto fields = threshold(pair.volume(), &seeds, {.threshold_hu = 550}, context);
+  ASSERT_EQ(fields.size(), 2u);
+  const auto proximal = phantom::compare(fields[0], [&](const Vector3d& p) { return pair.second(p); });
+  const auto distal = phantom::compare(fields[1], [&](const Vector3d& p) { return pair.first(p); });
+  phantom::print("proximal, half threshold", proximal);
+  phantom::print("distal, half threshold", distal);
+  for (const auto& accuracy : {proximal, distal}) {
+    EXPECT_GT(accuracy.dice, 0.98);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.1);
+    EXPECT_LT(accuracy.mean_mm, 0.15);
+  }
+}
+
+TEST(Threshold, TheLargestBoneWithoutSeeds) {
+  const Pair pair;
+  Context context;
+  const auto fields = threshold(pair.volume(), nullptr, {.threshold_hu = 550}, context);
+  ASSERT_EQ(fields.size(), 1u);
+  EXPECT_EQ(fields.name(0), "bone");
+  EXPECT_GT(phantom::compare(fields[0], [&](const Vector3d& p) { return pair.second(p); }).dice, 0.98);
+}
+
+TEST(Threshold, TouchingFragmentsAreSharedOutHalfway) {
+  marrow::Grid grid = phantom::ct_grid({24, 24, 41});
+  const auto rod = [](const Vector3d& p) { return std::hypot(p.x(), p.y()) - 6; };
+  const Volume volume = phantom::scan(
+      grid, [&](const Vector3d& p) { return 1000 * phantom::filled(rod(p)); }, 0.5, 0, 1);
+  List<Seeds> seeds;
+  seeds.add("low", Seeds{"low", {{0, 0, -15}}, false});
+  seeds.add("high", Seeds{"high", {{0, 0, 15}}});
+  Context context;
+  const auto fields = threshold(volume, &seeds, {.threshold_hu = 500}, context);
+  ASSERT_EQ(fields.size(), 1u);
+  EXPECT_EQ(fields.name(0), "high");
+  EXPECT_LT(sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, 2})), 0);
+  EXPECT_GT(sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, -2})), 0);
+}
+
+TEST(Threshold, SaysWhenThereIsNoBone) {
+  const Volume volume{phantom::ct_grid({8, 8, 8}), std::vector<float>(512, 30.f)};
+  Context context;
+  try {
+    threshold(volume, nullptr, {}, context);
+    FAIL() << "no error";
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "volume: no voxel reaches the threshold of 250 HU, so there is no bone; lower threshold_hu, and "
+                 "check that the CT is in Hounsfield units");
+  }
+}
+
+}  // namespace
