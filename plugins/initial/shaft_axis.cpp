@@ -4,6 +4,8 @@
 // of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from the silhouette that the
 // model would show in the same stretches of the same views, so that a bow, a taper or a ridge moves both axes alike.
 #include <Eigen/Geometry>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -20,6 +22,7 @@ using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, m
 struct Options {
   int rounds = 10;
   double tolerance_mm = 1.0;
+  double border_inset_mm = 0.5;
 };
 
 std::string number(double value) {
@@ -52,24 +55,27 @@ std::vector<Sight> sights_of(const List<ShaftLines>& lines, const List<View>& vi
   return sights;
 }
 
-/// Distance of a pair's borders in the middle of their stretch, across it.
-double width_px(const ShaftLines& lines) {
+/// Distance of a pair's borders in the middle of their stretch, across it, with the inset added on both sides.
+double width_px(const ShaftLines& lines, double inset_px) {
   const Eigen::Vector2d along = (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
   const Eigen::Vector2d between = 0.5 * (lines.right.from_px + lines.right.to_px - lines.left.from_px - lines.left.to_px);
-  return std::abs(along.x() * between.y() - along.y() * between.x());
+  return std::abs(along.x() * between.y() - along.y() * between.x()) + 2 * inset_px;
 }
 
 /// The model's borders in every view at a pose.
 std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model, const std::vector<Sight>& sights,
                                      double tolerance_mm) {
+  std::vector<std::optional<ModelBorders>> found(sights.size());
+  tbb::parallel_for(std::size_t(0), sights.size(), [&](std::size_t i) {
+    const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, Eigen::Vector3d::Zero());
+    found[i] = model_borders(model, world_from_model, *sights[i].camera, *sights[i].lines, tolerance_mm / std::abs(pixel_mm));
+  });
   std::vector<ModelBorders> borders;
-  for (const Sight& sight : sights) {
-    const double pixel_mm = marrow::pixel_size_at_mm(*sight.camera, Eigen::Vector3d::Zero());
-    auto found = model_borders(model, world_from_model, *sight.camera, *sight.lines, tolerance_mm / std::abs(pixel_mm));
-    if (!found)
-      throw marrow::Error("view '" + sight.name + "': where the image shows the shaft, the model at its start does not appear; "
+  for (std::size_t i = 0; i < sights.size(); ++i) {
+    if (!found[i])
+      throw marrow::Error("view '" + sights[i].name + "': where the image shows the shaft, the model at its start does not appear; "
                           "give a start nearer to the bone");
-    borders.push_back(std::move(*found));
+    borders.push_back(std::move(*found[i]));
   }
   return borders;
 }
@@ -87,9 +93,10 @@ RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vecto
 /// One view knows the plane of the axis. The depth follows from the angle under which the bone's own width is seen: for a
 /// cylinder r = D sin(half angle), so two depths are as the widths of the image inversely. How far the axis leans out of the
 /// image stays as it was.
-RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor) {
+RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor, double inset_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
-  const double nearer = borders.width_px / width_px(*sight.lines);
+  const double inset_px = inset_mm / marrow::pixel_size_at_mm(*sight.camera, anchor);
+  const double nearer = borders.width_px / width_px(*sight.lines, inset_px);
   // The model's own axis is laid into the plane that its borders span, so that a perfect start is left where it is.
   const Plane model_plane = bisecting_plane(*sight.camera, borders.left, borders.right);
   const auto into = [&](const Plane& plane, const Eigen::Vector3d& vector) {
@@ -104,11 +111,12 @@ RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, co
 }
 
 /// In words, where the lines of a view cannot be those of this model.
-std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor) {
+std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor,
+                                double inset_mm) {
   std::vector<std::string> warnings;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, anchor);
-    const double seen_mm = width_px(*sights[i].lines) * pixel_mm, model_mm = borders[i].width_px * pixel_mm;
+    const double seen_mm = width_px(*sights[i].lines, inset_mm / pixel_mm) * pixel_mm, model_mm = borders[i].width_px * pixel_mm;
     if (sights.size() > 1 && std::abs(seen_mm - model_mm) > 0.15 * model_mm)
       warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) + " mm apart, where the model is " +
                          number(model_mm) + " mm wide; they may belong to something else");
@@ -132,13 +140,15 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
   for (int round = 0; round < options.rounds; ++round) {
     const std::vector<ModelBorders> borders = borders_of(model, pose.world_from_model, sights, options.tolerance_mm);
     const Eigen::Vector3d anchor = pose.world_from_model * pose.frame.origin_mm;
-    const RigidTransform move = sights.size() == 1 ? move_by_width(sights[0], borders[0], anchor) : move_by_planes(sights, borders, anchor);
+    const RigidTransform move = sights.size() == 1 ? move_by_width(sights[0], borders[0], anchor, options.border_inset_mm)
+                                                     : move_by_planes(sights, borders, anchor);
     pose.world_from_model = move * pose.world_from_model;
     ++pose.evaluations;
     const double shift_mm = (pose.world_from_model * pose.frame.origin_mm - anchor).norm();
     if (shift_mm < 1e-3 && marrow::geodesic_angle_rad(move.rotation, Eigen::Matrix3d::Identity()) < 1e-5) break;
   }
-  pose.warnings = doubts(sights, borders_of(model, pose.world_from_model, sights, options.tolerance_mm), pose.world_from_model * pose.frame.origin_mm);
+  pose.warnings = doubts(sights, borders_of(model, pose.world_from_model, sights, options.tolerance_mm),
+                         pose.world_from_model * pose.frame.origin_mm, options.border_inset_mm);
   return pose;
 }
 
@@ -154,5 +164,8 @@ MARROW_PLUGIN(plugin) {
       .out("pose", "four degrees of freedom from the views, two from the start")
       .option("rounds", &Options::rounds, "most times that the model's axis is measured anew", marrow::at_least(1), marrow::at_most(100))
       .option("tolerance_mm", &Options::tolerance_mm,
-              "largest distance, at the isocentre, of a silhouette point from the model's border line", marrow::at_least(0.01));
+              "largest distance, at the isocentre, of a silhouette point from the model's border line", marrow::at_least(0.01))
+      .option("border_inset_mm", &Options::border_inset_mm,
+              "how far inside its outline a round bone's edge is seen, because attenuation begins gradually; it matters where a single view "
+              "gives the depth by the width");
 }

@@ -22,7 +22,7 @@ struct Options {
   std::vector<double> width_deviation_mm{3.3, 3.1};
   double magnification_tolerance = 0.05;
   double min_length_mm = 25;
-  double max_angle_deg = 8;
+  double max_angle_deg = 15;
   double tolerance_mm = 1.0;
   double gap_mm = 8;
   int lines = 60;
@@ -31,6 +31,7 @@ struct Options {
 constexpr int kAngles = 360;         // directed lines: the normal turns once around
 constexpr int kVoteSpread = 6;       // degrees by which noise turns a gradient
 constexpr double kRhoStep_px = 2;
+constexpr double kTaper_deg = 6;         // standard deviation of the angle between the borders: a distal femur flares
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
 
 struct Scale {
@@ -121,7 +122,7 @@ struct Pair {
   Border left, right;  // as seen along the stretch
   Stretch stretch;
   double width_mm = 0, supported_mm = 0;
-  double score = 0;         // log-likelihood of width and evidence
+  double score = 0;         // log-likelihood of width, taper and evidence
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
 
@@ -205,7 +206,8 @@ void judge(const EdgeMap& edges, const cv::Mat& image, const Scale& scale, const
     std::swap(pair.left, pair.right);
   pair.width_mm = width_of(pair, scale.pixel_mm);
   const double deviations = deviations_of(pair.width_mm, options);
-  pair.score = kEvidencePer_mm * pair.supported_mm - 0.5 * deviations * deviations;
+  const double taper = marrow::degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0))) / kTaper_deg;
+  pair.score = kEvidencePer_mm * pair.supported_mm - 0.5 * deviations * deviations - 0.5 * taper * taper;
   const double length_mm = pair.stretch.length() * scale.pixel_mm;
   if (length_mm < options.min_length_mm)
     pair.reason = text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm, options.min_length_mm);
