@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The triangles of each of the 256 sign patterns of a cell, derived rather than typed in (Lorensen and Cline, Marching cubes,
-// SIGGRAPH 1987, whose own table leaves holes where two neighbours treat an ambiguous face differently).
+// The triangles of each of the 256 sign patterns of a cell, derived rather than typed in (Lorensen and Cline, Marching
+// cubes, SIGGRAPH 1987, whose own table leaves holes where two neighbours treat an ambiguous face differently).
 //
-// On each face the surface runs as directed segments, from the edge where a walk around the face enters the inside to the
-// edge where it leaves it, so inside corners on a face's diagonal stay apart. That depends on the face's four signs only,
-// hence both cells that share the face agree, and the segments of all faces close to loops. A loop is cut into triangles
-// without a diagonal that lies in a face, as the neighbour could have the same one. The surface is therefore a closed
-// manifold for every field.
+// On each face the surface runs as directed segments, from the edge where a walk around the face enters the inside to
+// the edge where it leaves it, so inside corners on a face's diagonal stay apart. That depends on the face's four signs
+// only, hence both cells that share the face agree, and the segments of all faces close to loops. A loop is cut into
+// triangles without a diagonal that lies in a face, as the neighbour could have the same one. The surface is therefore
+// a closed manifold for every field.
 #include <array>
 #include <cstdint>
 #include <vector>
 
 namespace marching_cubes {
 
-// Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge 4 * axis + k runs along `axis` from kEdgeStart[edge].
+// Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge 4 * axis + k runs along `axis` from
+// kEdgeStart[edge].
 constexpr std::array<std::uint8_t, 12> kEdgeStart = {0, 2, 4, 6, 0, 1, 4, 5, 0, 1, 2, 3};
 
 constexpr int edge_between(int corner, int other) {

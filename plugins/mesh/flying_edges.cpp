@@ -20,8 +20,8 @@ struct Options {
   int smoothing = 0;
 };
 
-/// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes half
-/// a voxel outside the last samples.
+/// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes
+/// half a voxel outside the last samples.
 void fill(vtkImageData& image, const SignedField& field) {
   const auto& size = field.grid.size;
   image.SetExtent(-1, size[0], -1, size[1], -1, size[2]);
@@ -30,7 +30,8 @@ void fill(vtkImageData& image, const SignedField& field) {
   for (int z = -1; z <= size[2]; ++z)
     for (int y = -1; y <= size[1]; ++y)
       for (int x = -1; x <= size[0]; ++x) {
-        const float value = field.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1));
+        const float value =
+            field.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1));
         const float padded = field.grid.contains(x, y, z) ? value : std::abs(value);
         *out++ = padded;
       }

@@ -20,9 +20,9 @@ struct Options {
   int smoothing = 0;
 };
 
-/// The signs of a field, one bit a voxel, with one layer of outside around it so that the surface closes at the border. Each
-/// set bit of `edges` is a grid edge that the surface crosses; its vertex has the number of set bits before it. Points are
-/// counted in the padded grid, and own the edges that leave them in +x, +y and +z.
+/// The signs of a field, one bit a voxel, with one layer of outside around it so that the surface closes at the border.
+/// Each set bit of `edges` is a grid edge that the surface crosses; its vertex has the number of set bits before it.
+/// Points are counted in the padded grid, and own the edges that leave them in +x, +y and +z.
 class Crossings {
  public:
   explicit Crossings(const SignedField& field)
@@ -58,7 +58,8 @@ class Crossings {
     return first_vertex(axis, x >> 6, y, z) + std::uint32_t(std::popcount(edges(axis, x >> 6, y, z) & before));
   }
 
-  /// The field, mirrored to the outside beyond its border: the surface then closes half a voxel outside the last samples.
+  /// The field, mirrored to the outside beyond its border: the surface then closes half a voxel outside the last
+  /// samples.
   float value(int x, int y, int z) const {
     const auto& size = field_.grid.size;
     const int i = std::clamp(x - 1, 0, size[0] - 1), j = std::clamp(y - 1, 0, size[1] - 1),

@@ -29,11 +29,13 @@ void check_field(const marrow::SignedField& field) {
   }
   if (!finite) throw Error("field: some values are not finite numbers; a signed distance in mm was expected");
   if (!inside)
-    throw Error("field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
-                "seeds and thresholds");
+    throw Error(
+        "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
+        "seeds and thresholds");
   if (!outside)
-    throw Error("field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
-                "volume: raise its threshold");
+    throw Error(
+        "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
+        "volume: raise its threshold");
 }
 
 Mesh largest_component(const Mesh& mesh) {

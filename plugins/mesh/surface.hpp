@@ -9,11 +9,12 @@ namespace surface {
 /// Throws Error for an empty field, missing or non-finite values, or a field with no surface.
 void check_field(const marrow::SignedField& field);
 
-/// The component that encloses the largest volume (an inner wall encloses a negative one), its vertices in their old order.
+/// The component that encloses the largest volume (an inner wall encloses a negative one), its vertices in their old
+/// order.
 marrow::Mesh largest_component(const marrow::Mesh& mesh);
 
-/// Smooths without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing approach
-/// to fair surface design, SIGGRAPH 1995, with lambda 0.5 and pass band 0.1).
+/// Smooths without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing
+/// approach to fair surface design, SIGGRAPH 1995, with lambda 0.5 and pass band 0.1).
 void smooth(marrow::Mesh& mesh, int iterations);
 
 }  // namespace surface

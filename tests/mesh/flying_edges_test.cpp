@@ -46,8 +46,9 @@ TEST(FlyingEdges, SaysWhatIsWrongWithAField) {
     flying_edges(field, {});
     FAIL() << "no error";
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "field: there is no surface, as no value is negative (inside); the segmentation found "
-                               "nothing: check its seeds and thresholds");
+    EXPECT_STREQ(error.what(),
+                 "field: there is no surface, as no value is negative (inside); the segmentation found "
+                 "nothing: check its seeds and thresholds");
   }
 }
 

@@ -84,7 +84,8 @@ TEST(MarchingCubes, ClosesHalfAVoxelBeyondTheBorder) {
   Grid grid;
   grid.size = {40, 40, 11};
   grid.spacing_mm = {1, 1, 2};
-  const auto field = shapes::field_of(grid, [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; });
+  const auto field =
+      shapes::field_of(grid, [](const Vector3d& p) { return std::hypot(p.x() - 19.7, p.y() - 19.4) - 10; });
   const Mesh mesh = marching_cubes_mesh(field, {});
   EXPECT_TRUE(marrow::is_closed(mesh));
   double low = 1e9, high = -1e9;
@@ -96,7 +97,9 @@ TEST(MarchingCubes, ClosesHalfAVoxelBeyondTheBorder) {
 
 TEST(MarchingCubes, KeepsTheLargestPartAndDropsItsInnerWall) {
   const shapes::Distance shell = [](const Vector3d& p) { return std::abs(p.norm() - 12) - 2; };
-  const shapes::Distance both = [&](const Vector3d& p) { return std::min(shell(p), (p - Vector3d(0, 0, 19)).norm() - 3); };
+  const shapes::Distance both = [&](const Vector3d& p) {
+    return std::min(shell(p), (p - Vector3d(0, 0, 19)).norm() - 3);
+  };
   const auto field = shapes::field_of(shapes::turned_grid({64, 64, 52}), both);
   const Mesh all = marching_cubes_mesh(field, {.largest_only = false}), largest = marching_cubes_mesh(field, {});
   EXPECT_TRUE(marrow::is_closed(all));
@@ -150,9 +153,8 @@ TEST(MarchingCubes, SameBytesAtAnyNumberOfThreads) {
 TEST(MarchingCubes, TellsTimeOnAWholeBone) {
   Grid grid;
   grid.size = {256, 256, 384};
-  const auto field = shapes::field_of(grid, [](const Vector3d& p) {
-    return std::hypot(p.x() - 128, p.y() - 128) - 60 + 8 * std::sin(p.z() / 20);
-  });
+  const auto field = shapes::field_of(
+      grid, [](const Vector3d& p) { return std::hypot(p.x() - 128, p.y() - 128) - 60 + 8 * std::sin(p.z() / 20); });
   const auto start = std::chrono::steady_clock::now();
   const Mesh mesh = marching_cubes_mesh(field, {});
   const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
@@ -171,15 +173,18 @@ std::string message_of(const SignedField& field) {
 }
 
 TEST(MarchingCubes, SaysWhatIsWrongWithAField) {
-  EXPECT_EQ(message_of({}), "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
+  EXPECT_EQ(message_of({}),
+            "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
   SignedField field;
   field.grid.size = {3, 3, 3};
   field.values_mm.assign(27, 2.f);
-  EXPECT_EQ(message_of(field), "field: there is no surface, as no value is negative (inside); the segmentation found "
-                               "nothing: check its seeds and thresholds");
+  EXPECT_EQ(message_of(field),
+            "field: there is no surface, as no value is negative (inside); the segmentation found "
+            "nothing: check its seeds and thresholds");
   field.values_mm.assign(27, -2.f);
-  EXPECT_EQ(message_of(field), "field: there is no surface, as every value is negative (inside); the segmentation ran over "
-                               "the whole volume: raise its threshold");
+  EXPECT_EQ(message_of(field),
+            "field: there is no surface, as every value is negative (inside); the segmentation ran over "
+            "the whole volume: raise its threshold");
   field.values_mm[13] = std::nanf("");
   EXPECT_EQ(message_of(field), "field: some values are not finite numbers; a signed distance in mm was expected");
 }

@@ -15,7 +15,9 @@ namespace shapes {
 
 using Distance = std::function<double(const Eigen::Vector3d&)>;
 
-inline double sphere(const Eigen::Vector3d& p, double radius_mm) { return p.norm() - radius_mm; }
+inline double sphere(const Eigen::Vector3d& p, double radius_mm) {
+  return p.norm() - radius_mm;
+}
 inline double torus(const Eigen::Vector3d& p, double ring_mm, double tube_mm) {
   return std::hypot(std::hypot(p.x(), p.y()) - ring_mm, p.z()) - tube_mm;
 }
