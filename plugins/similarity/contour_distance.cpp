@@ -16,6 +16,7 @@ struct Options {
   double direction_tolerance_deg = 40;
   double edge_offset_px = 0;
   bool estimate_offset = true;
+  double model_error_px = 0.25;
 };
 
 /// One point of the outline against the edge nearest to it.
@@ -82,26 +83,32 @@ class ContourDistance : public marrow::Cost {
 
   /// Ratio between the curvature of the cost and the variance of its slope, both by the residuals at this pose (the sandwich of
   /// M-estimation: Huber 1981, 6.3). Errors along the outline are related to each other, so the slopes are first summed over
-  /// blocks of the image, and the sums taken as independent.
+  /// blocks of the image, and the sums taken as independent. To each block the error of model and edges is added that is the
+  /// same all over it: the fit takes up much of such errors, so the residuals do not tell them.
   std::optional<double> likelihood_factor(const marrow::RigidTransform& world_from_model) const override {
     constexpr float kBlock_px = 32;
-    constexpr double kLeastNoise_px = 0.05;  // no edge is known better than this
+    constexpr double kLeastNoise_px = 0.05;  // no edge pixel is known better than this
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
     double curvature = 0, variance = 0;
     for (const Matches& view : views) {
       const double points = std::max(double(view.points), least_points());
-      std::map<std::pair<int, int>, double> blocks;
-      double least = 0;
+      struct Block {
+        double slope = 0, weight = 0;
+      };
+      std::map<std::pair<int, int>, Block> blocks;
+      double squares = 0, least = 0;
       for (const Residual& r : view.residuals) {
         const double d2 = distance2(r, offset);
         if (!loss_.counts(d2)) continue;
         curvature += loss_.second_derivative(d2) / points;
-        blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}] += loss_.weight(d2) * (double(r.along_normal) - offset);
-        least += std::pow(kLeastNoise_px * loss_.weight(0), 2);
+        Block& block = blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}];
+        block.slope += loss_.weight(d2) * (double(r.along_normal) - offset);
+        block.weight += loss_.weight(d2);
+        least += std::pow(kLeastNoise_px * loss_.weight(d2), 2);
       }
-      double squares = 0;
-      for (const auto& [block, sum] : blocks) squares += sum * sum;
+      for (const auto& [place, block] : blocks)
+        squares += block.slope * block.slope + std::pow(scene_->options.model_error_px * block.weight, 2);
       variance += std::max(squares, least) / (points * points);
     }
     const double n = double(views.size());
@@ -229,5 +236,7 @@ MARROW_PLUGIN(plugin) {
       .option("edge_offset_px", &Options::edge_offset_px,
               "how far edges lie outside the model's outline; where it is estimated, the middle of the +-3 px that are tried")
       .option("estimate_offset", &Options::estimate_offset,
-              "find, at each pose, the edge offset common to all views that fits best");
+              "find, at each pose, the edge offset common to all views that fits best")
+      .option("model_error_px", &Options::model_error_px,
+              "for the predicted deviation: how far model and edges may differ all along 32 px of outline", marrow::at_least(0));
 }

@@ -5,5 +5,7 @@
 
 std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
                                               const marrow::List<marrow::EdgeMap>& edges) {
-  return contour_distance(projector, views, edges, Options{});
+  Options options;
+  options.model_error_px = 0;  // ideal edges have none
+  return contour_distance(projector, views, edges, options);
 }

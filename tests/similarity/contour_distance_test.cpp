@@ -52,6 +52,7 @@ Options fixed_offset(double offset_px = 0) {
   options.edge_offset_px = offset_px;
   options.contour_spacing_px = 1;
   options.reach_px = 10;
+  options.model_error_px = 0;
   return options;
 }
 
@@ -124,6 +125,12 @@ TEST(ContourDistance, LevelsAndLikelihood) {
   const double sd = 1 / std::sqrt(*factor * curvature);
   EXPECT_GT(sd, 0.12);
   EXPECT_LT(sd, 0.48);
+  // An error of 1 px that each block may have as a whole makes that about 1 / sqrt(4.5) = 0.5 px.
+  Options rough = fixed_offset();
+  rough.model_error_px = 1;
+  const auto rough_factor = contour_distance(kLine, one_view(), edge_maps(map), rough)->likelihood_factor(shifted(0));
+  EXPECT_GT(*factor / *rough_factor, 2);
+  EXPECT_LT(*factor / *rough_factor, 20);
   EXPECT_FALSE(cost->likelihood_factor(shifted(50)).has_value()) << "nothing is near";
 }
 
