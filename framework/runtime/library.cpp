@@ -133,10 +133,15 @@ void run_registration(Plugin& plugin, const PluginEntry& entry) {
 LibraryInfo describe_here(const fs::path& file) {
   LibraryInfo info;
   try {
-    // Lazy binding first, so that a library whose symbols do not fit can still say with what it was built.
-    void* handle = open_library(file, RTLD_LAZY);
+    void* handle = nullptr;
+    try {
+      handle = open_library(file, RTLD_NOW);
+    } catch (const Error&) {
+      // With lazy binding a library whose symbols do not fit can still say with what it was built, which is the better reason.
+      checked_entry(open_library(file, RTLD_LAZY));
+      throw;
+    }
     const PluginEntry& entry = checked_entry(handle);
-    open_library(file, RTLD_NOW);
     info.linked = linked_libraries(handle);
     Plugin plugin;
     run_registration(plugin, entry);
