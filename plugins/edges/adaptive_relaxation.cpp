@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's edge extraction (3.2): hysteresis thresholds at the 50th and 75th percentile of the gradient's magnitude in a
-// local window, recursive relaxation of the pixels between them, removal of small components. In every flat window a quarter
-// of all pixels lies above the 75th percentile, so both thresholds have a floor: the window's median plus a multiple of the
-// measured noise. (The median, because noise makes ridges on the smooth slope of a round thigh as well as on flat ground.)
+// The chapter's edge extraction (3.2): hysteresis thresholds at the 50th and 75th percentile of the gradient's
+// magnitude in a local window, recursive relaxation of the pixels between them, removal of small components. In every
+// flat window a quarter of all pixels lies above the 75th percentile, so both thresholds have a floor: the window's
+// median plus a multiple of the measured noise. (The median, because noise makes ridges on the smooth slope of a round
+// thigh as well as on flat ground.)
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -36,7 +37,8 @@ struct Thresholds {
 
 Thresholds local_thresholds(const Prepared& image, const Gradient& gradient, const Options& options) {
   const cv::Mat noise = block_noise(image, gradient, options.sigma_px);
-  const auto [median, low, high] = window_percentiles(gradient, image.usable, options.window_px, {50, options.low, options.high});
+  const auto [median, low, high] =
+      window_percentiles(gradient, image.usable, options.window_px, {50, options.low, options.high});
   return {cv::max(low, median + options.noise_low * noise), cv::max(high, median + options.noise_high * noise)};
 }
 
@@ -68,8 +70,8 @@ void for_neighbours(const cv::Point& pixel, Function function) {
       if (u != pixel.x || v != pixel.y) function(u, v);
 }
 
-/// Recursive relabelling of intermediate pixels beside an edge pixel of similar magnitude and direction. What is reached does
-/// not depend on the order.
+/// Recursive relabelling of intermediate pixels beside an edge pixel of similar magnitude and direction. What is
+/// reached does not depend on the order.
 void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
   const float cosine = float(std::cos(marrow::radians(options.direction_tolerance_deg)));
   std::vector<cv::Point> edge;
@@ -79,7 +81,8 @@ void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
   while (!edge.empty()) {
     const cv::Point pixel = edge.back();
     edge.pop_back();
-    const float du = gradient.du.at<float>(pixel), dv = gradient.dv.at<float>(pixel), magnitude = gradient.magnitude.at<float>(pixel);
+    const float du = gradient.du.at<float>(pixel), dv = gradient.dv.at<float>(pixel),
+                magnitude = gradient.magnitude.at<float>(pixel);
     for_neighbours(pixel, [&](int u, int v) {
       if (labels.at<uchar>(v, u) != kIntermediate) return;
       const float other = gradient.magnitude.at<float>(v, u);
@@ -134,21 +137,26 @@ MARROW_PLUGIN(plugin) {
       .summary("Edges by local percentile thresholds, relaxation and removal of small components (the chapter's 3.2)")
       .in("view", "X-ray view")
       .out("edges", "edge pixels at sub-pixel positions")
-      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7), marrow::at_most(10))
+      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7),
+              marrow::at_most(10))
       .option("logarithm", &Options::logarithm, "seek edges of the attenuation (logarithm of the grey value)")
-      .option("low", &Options::low, "lower threshold: percentile of the gradient's magnitude in the window", marrow::unit("%"),
-              marrow::at_least(0), marrow::at_most(100))
-      .option("high", &Options::high, "upper threshold: percentile of the gradient's magnitude in the window", marrow::unit("%"),
-              marrow::at_least(0), marrow::at_most(100))
-      .option("window_px", &Options::window_px, "side of the local window, in effect an odd multiple of 16", marrow::at_least(16))
-      .option("noise_low", &Options::noise_low, "floor of the lower threshold above the window's median, in standard deviations of the noise",
+      .option("low", &Options::low, "lower threshold: percentile of the gradient's magnitude in the window",
+              marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
+      .option("high", &Options::high, "upper threshold: percentile of the gradient's magnitude in the window",
+              marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
+      .option("window_px", &Options::window_px, "side of the local window, in effect an odd multiple of 16",
+              marrow::at_least(16))
+      .option("noise_low", &Options::noise_low,
+              "floor of the lower threshold above the window's median, in standard deviations of the noise",
               marrow::at_least(0))
-      .option("noise_high", &Options::noise_high, "floor of the upper threshold above the window's median, in standard deviations of the noise",
+      .option("noise_high", &Options::noise_high,
+              "floor of the upper threshold above the window's median, in standard deviations of the noise",
               marrow::at_least(0))
       .option("thin", &Options::thin, "keep only the ridge of the gradient's magnitude")
       .option("magnitude_tolerance", &Options::magnitude_tolerance,
-              "relaxation: largest difference of magnitudes, as a fraction of the larger", marrow::at_least(0), marrow::at_most(1))
-      .option("direction_tolerance_deg", &Options::direction_tolerance_deg, "relaxation: largest difference of directions",
-              marrow::at_least(0), marrow::at_most(180))
+              "relaxation: largest difference of magnitudes, as a fraction of the larger", marrow::at_least(0),
+              marrow::at_most(1))
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
+              "relaxation: largest difference of directions", marrow::at_least(0), marrow::at_most(180))
       .option("min_pixels", &Options::min_pixels, "smaller connected components are removed", marrow::at_least(1));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Canny's detector (IEEE TPAMI 1986) as OpenCV has it, on a Gaussian gradient. Its magnitude is counted above the median of a
-// window and in multiples of the noise, so that the same thresholds serve an 8 bit and a 16 bit image, its bright and its dark
-// parts, and the smooth slope of a round thigh, on which noise makes ridges.
+// Canny's detector (IEEE TPAMI 1986) as OpenCV has it, on a Gaussian gradient. Its magnitude is counted above the
+// median of a window and in multiples of the noise, so that the same thresholds serve an 8 bit and a 16 bit image, its
+// bright and its dark parts, and the smooth slope of a round thigh, on which noise makes ridges.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -62,11 +62,15 @@ MARROW_PLUGIN(plugin) {
       .summary("Canny's edge detector (IEEE TPAMI 1986), thresholds in multiples of the image's noise")
       .in("view", "X-ray view")
       .out("edges", "edge pixels at sub-pixel positions")
-      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7), marrow::at_most(10))
+      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7),
+              marrow::at_most(10))
       .option("logarithm", &Options::logarithm, "seek edges of the attenuation (logarithm of the grey value)")
-      .option("window_px", &Options::window_px, "side of the window of the median, in effect an odd multiple of 16", marrow::at_least(16))
-      .option("low", &Options::low, "lower hysteresis threshold above the window's median, in standard deviations of the noise",
+      .option("window_px", &Options::window_px, "side of the window of the median, in effect an odd multiple of 16",
+              marrow::at_least(16))
+      .option("low", &Options::low,
+              "lower hysteresis threshold above the window's median, in standard deviations of the noise",
               marrow::at_least(0))
-      .option("high", &Options::high, "upper hysteresis threshold above the window's median, in standard deviations of the noise",
+      .option("high", &Options::high,
+              "upper hysteresis threshold above the window's median, in standard deviations of the noise",
               marrow::at_least(0));
 }

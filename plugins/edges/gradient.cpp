@@ -19,9 +19,8 @@ constexpr int kBlock = 16;
 /// Calls function(first row, end row) for bands of rows, in parallel.
 template <class Function>
 void for_bands(int rows, Function function) {
-  tbb::parallel_for(0, (rows + kBandRows - 1) / kBandRows, [&](int band) {
-    function(band * kBandRows, std::min(rows, (band + 1) * kBandRows));
-  });
+  tbb::parallel_for(0, (rows + kBandRows - 1) / kBandRows,
+                    [&](int band) { function(band * kBandRows, std::min(rows, (band + 1) * kBandRows)); });
 }
 
 /// Black areas that reach the corners, where a round collimator left the detector dark; empty when there are none.
@@ -154,8 +153,8 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient, double s
   std::erase_if(blocks, [](const auto& block) { return block.second < 0; });
   std::sort(blocks.begin(), blocks.end());
 
-  // Rounding to whole grey values has the deviation 1 / sqrt(12); a Gaussian derivative leaves 1 / (sqrt(8 pi) sigma^2) of
-  // white noise. Images of floats get a hundred thousandth of their range instead.
+  // Rounding to whole grey values has the deviation 1 / sqrt(12); a Gaussian derivative leaves 1 / (sqrt(8 pi) sigma^2)
+  // of white noise. Images of floats get a hundred thousandth of their range instead.
   const double rounding = (image.whole_numbers ? 0.29 : 1e-5 * image.range) * 0.2 / (sigma_px * sigma_px);
   const std::size_t groups = std::clamp<std::size_t>(blocks.size() / 32, 1, 8);
   for (std::size_t group = 0; group < groups && !blocks.empty(); ++group) {
@@ -168,7 +167,8 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient, double s
     const float least = float(rounding * image.slope(value));
     noise_of_value_.emplace_back(value, std::max(least, median(noises, 0.3)));  // texture only adds to the noise
   }
-  if (noise_of_value_.empty()) noise_of_value_.emplace_back(0.0f, float(rounding * image.slope(image.values.at<float>(0, 0))));
+  if (noise_of_value_.empty())
+    noise_of_value_.emplace_back(0.0f, float(rounding * image.slope(image.values.at<float>(0, 0))));
 }
 
 float NoiseLevel::at(float value) const {

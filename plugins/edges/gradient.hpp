@@ -22,9 +22,9 @@ struct Prepared {
   float slope(float value) const { return logarithm ? std::exp(-value) : 1.0f; }
 };
 
-/// Checks the view and prepares it. Not usable are what View::mask excludes, black corners left by a round collimator (found
-/// where at least three corners are black), each with a margin of 3 sigma, and the outermost 3 sigma of the image.
-/// Throws Error for an image that is constant, holds NaN or infinity, or has no usable pixel.
+/// Checks the view and prepares it. Not usable are what View::mask excludes, black corners left by a round collimator
+/// (found where at least three corners are black), each with a margin of 3 sigma, and the outermost 3 sigma of the
+/// image. Throws Error for an image that is constant, holds NaN or infinity, or has no usable pixel.
 Prepared prepare(const View& view, double sigma_px, bool logarithm);
 
 /// Derivatives of the image smoothed by a Gaussian, per pixel; CV_32F.
@@ -33,9 +33,9 @@ struct Gradient {
 };
 Gradient gaussian_gradient(const cv::Mat& values, double sigma_px);
 
-/// The standard deviation that noise alone gives to a component of the gradient, as a function of the value: X-ray noise
-/// depends on brightness. Measured as the median absolute deviation in blocks of 16 x 16 pixels, of which those of equal
-/// brightness that vary least are believed.
+/// The standard deviation that noise alone gives to a component of the gradient, as a function of the value: X-ray
+/// noise depends on brightness. Measured as the median absolute deviation in blocks of 16 x 16 pixels, of which those
+/// of equal brightness that vary least are believed.
 class NoiseLevel {
  public:
   NoiseLevel(const Prepared& image, const Gradient& gradient, double sigma_px);

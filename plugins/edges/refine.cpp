@@ -11,7 +11,8 @@ namespace marrow::edges {
 namespace {
 
 float bilinear(const cv::Mat& values, float u, float v) {
-  const int left = std::clamp(int(std::floor(u)), 0, values.cols - 2), top = std::clamp(int(std::floor(v)), 0, values.rows - 2);
+  const int left = std::clamp(int(std::floor(u)), 0, values.cols - 2),
+            top = std::clamp(int(std::floor(v)), 0, values.rows - 2);
   const float right_part = u - float(left), lower_part = v - float(top);
   const float* upper = values.ptr<float>(top) + left;
   const float* lower = values.ptr<float>(top + 1) + left;

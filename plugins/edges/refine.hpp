@@ -9,17 +9,17 @@
 
 namespace marrow::edges {
 
-/// The way along the gradient, in pixels, from the centre of a pixel to the ridge of the gradient's magnitude; nothing where
-/// the magnitude has no maximum across the edge. The pixel must not lie on the image's border. A parabola is fitted to the
-/// logarithm of the magnitude over 3 x 3 pixels (the facet model of Steger, IEEE TPAMI 1998): a straight step smoothed by a
-/// Gaussian has exactly this shape, at any orientation, so its position comes out unbiased.
+/// The way along the gradient, in pixels, from the centre of a pixel to the ridge of the gradient's magnitude; nothing
+/// where the magnitude has no maximum across the edge. The pixel must not lie on the image's border. A parabola is
+/// fitted to the logarithm of the magnitude over 3 x 3 pixels (the facet model of Steger, IEEE TPAMI 1998): a straight
+/// step smoothed by a Gaussian has exactly this shape, at any orientation, so its position comes out unbiased.
 std::optional<float> way_to_ridge(const Gradient& gradient, int u, int v);
 
 /// True where the ridge passes through this pixel or just beside it: a thin edge without gaps.
 bool on_ridge(const Gradient& gradient, int u, int v);
 
-/// Edge pixels at their sub-pixel positions with the gradient there, its magnitude in grey values per pixel; one for each
-/// pixel, in row-major order. `marked` is CV_8U, non-zero at edge pixels.
+/// Edge pixels at their sub-pixel positions with the gradient there, its magnitude in grey values per pixel; one for
+/// each pixel, in row-major order. `marked` is CV_8U, non-zero at edge pixels.
 EdgeMap refined(const Prepared& image, const Gradient& gradient, const cv::Mat& marked);
 
 }  // namespace marrow::edges

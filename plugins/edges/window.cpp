@@ -13,8 +13,8 @@ namespace {
 constexpr int kBlock = 16;
 constexpr int kBins = 256;  // of a histogram with 16 bins an octave
 
-/// Histograms of the magnitude in blocks. A bin is made from exponent and leading mantissa bits of the float, so it is about
-/// 5 % wide whatever the size of the values; the range ends at the image's largest magnitude.
+/// Histograms of the magnitude in blocks. A bin is made from exponent and leading mantissa bits of the float, so it is
+/// about 5 % wide whatever the size of the values; the range ends at the image's largest magnitude.
 class BlockHistograms {
  public:
   BlockHistograms(const Gradient& gradient, const cv::Mat& usable)
@@ -49,8 +49,7 @@ class BlockHistograms {
     for (std::uint32_t count : window) total += count;
     double left = percent / 100 * total;
     for (int i = 0; i < kBins && total > 0; ++i) {
-      if (left <= window[i] && window[i] > 0)
-        return edge(i) + float(left / window[i]) * (edge(i + 1) - edge(i));
+      if (left <= window[i] && window[i] > 0) return edge(i) + float(left / window[i]) * (edge(i + 1) - edge(i));
       left -= window[i];
     }
     return 0;

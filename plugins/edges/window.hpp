@@ -8,8 +8,8 @@
 
 namespace marrow::edges {
 
-/// The magnitudes below which so many percent of the usable pixels of a window lie, one CV_32F value a block of 16 x 16 pixels
-/// for each percentage; 0 where the window has no usable pixel. The window is an odd number of blocks wide.
+/// The magnitudes below which so many percent of the usable pixels of a window lie, one CV_32F value a block of 16 x 16
+/// pixels for each percentage; 0 where the window has no usable pixel. The window is an odd number of blocks wide.
 std::array<cv::Mat, 3> window_percentiles(const Gradient& gradient, const cv::Mat& usable, int window_px,
                                           const std::array<double, 3>& percents);
 

@@ -18,7 +18,8 @@ Eigen::Vector3d line_through(const LineSegment& segment) {
 }  // namespace
 
 Plane bisecting_plane(const Camera& camera, const LineSegment& left, const LineSegment& right) {
-  const Plane one = back_project_line(camera, line_through(left)), other = back_project_line(camera, line_through(right));
+  const Plane one = back_project_line(camera, line_through(left)),
+              other = back_project_line(camera, line_through(right));
   Plane plane;
   plane.normal = (one.normal + other.normal).normalized();  // both borders run the same way, so these normals agree
   plane.offset_mm = plane.normal.dot(source_position_mm(camera));
@@ -39,8 +40,9 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   if (angle_deg < 10) {
     char text[20];
     std::snprintf(text, sizeof text, "%.1f", angle_deg);
-    throw Error("the " + std::to_string(planes.size()) + " views see the shaft from nearly the same side: the planes of its " +
-                "axis meet at " + text + " degrees, where 10 are needed; use views farther apart, or a single one");
+    throw Error("the " + std::to_string(planes.size()) +
+                " views see the shaft from nearly the same side: the planes of its " + "axis meet at " + text +
+                " degrees, where 10 are needed; use views farther apart, or a single one");
   }
   Axis axis;
   axis.direction = svd.matrixV().col(2);
@@ -50,7 +52,8 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
 }
 
 RigidTransform world_from_world_move(const Axis& model, const Axis& target, const Eigen::Vector3d& anchor) {
-  const Eigen::Vector3d target_z = target.direction.dot(model.direction) < 0 ? Eigen::Vector3d(-target.direction) : target.direction;
+  const Eigen::Vector3d target_z =
+      target.direction.dot(model.direction) < 0 ? Eigen::Vector3d(-target.direction) : target.direction;
   const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(model.direction, target_z).toRotationMatrix();
   const Eigen::Vector3d model_x = model.direction.unitOrthogonal();
 

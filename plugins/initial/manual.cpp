@@ -12,8 +12,10 @@ struct Options {
 marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const Options& options) {
   marrow::check_mesh(model, "model");
   marrow::Pose pose;
-  if (start) pose.world_from_model = start->world_from_model;
-  else pose.world_from_model.source = model.frame;
+  if (start)
+    pose.world_from_model = start->world_from_model;
+  else
+    pose.world_from_model.source = model.frame;
   marrow::check_rigid(pose.world_from_model, "start");
   pose.frame = marrow::fragment_frame(model);
   marrow::Vector6d motion;

@@ -39,8 +39,8 @@ struct PairFrame {
 };
 
 /// For each side the extremes at positions 0, 2, 4, ... along the pair, where triangle edges cross them.
-std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTransform& world_from_model, const Camera& camera,
-                                                const PairFrame& pair) {
+std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTransform& world_from_model,
+                                                const Camera& camera, const PairFrame& pair) {
   const std::size_t count = std::size_t(pair.length / kStep_px) + 1;
   std::array<std::vector<Extreme>, 2> sides{std::vector<Extreme>(count), std::vector<Extreme>(count)};
   std::vector<Eigen::Vector2d> flat(model.vertices_mm.size());
@@ -67,8 +67,8 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   };
   for (const auto& triangle : model.triangles)
     for (int k = 0; k < 3; ++k)
-      // Each edge belongs to two triangles; the one that runs upwards crosses for both. An open border is crossed anyway by
-      // the other edges of its triangle.
+      // Each edge belongs to two triangles; the one that runs upwards crosses for both. An open border is crossed
+      // anyway by the other edges of its triangle.
       if (triangle[k] < triangle[(k + 1) % 3]) cross(triangle[k], triangle[(k + 1) % 3]);
   for (auto& side : sides)
     for (Extreme& extreme : side)
@@ -76,7 +76,8 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   return sides;
 }
 
-/// across = at_start + slope * s through the extremes, leaving out those farther than the tolerance from the line before.
+/// across = at_start + slope * s through the extremes, leaving out those farther than the tolerance from the line
+/// before.
 struct Line {
   double at_start = 0, slope = 0;
   double at(double s) const { return at_start + slope * s; }
@@ -112,18 +113,21 @@ Axis axis_of_middles(const std::array<std::vector<Extreme>, 2>& sides) {
   }
   Axis axis;
   axis.point_mm = first / n;
-  axis.direction = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / n - axis.point_mm * axis.point_mm.transpose())
-                       .eigenvectors().col(2);
+  axis.direction =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / n - axis.point_mm * axis.point_mm.transpose())
+          .eigenvectors()
+          .col(2);
   return axis;
 }
 
 }  // namespace
 
-std::optional<ModelBorders> model_borders(const Mesh& model, const RigidTransform& world_from_model, const Camera& camera,
-                                          const ShaftLines& lines, double tolerance_px) {
+std::optional<ModelBorders> model_borders(const Mesh& model, const RigidTransform& world_from_model,
+                                          const Camera& camera, const ShaftLines& lines, double tolerance_px) {
   const PairFrame pair(lines);
   const auto sides = extremes_of(model, world_from_model, camera, pair);
-  const auto seen = std::count_if(sides[0].begin(), sides[0].end(), [](const Extreme& extreme) { return extreme.seen; });
+  const auto seen =
+      std::count_if(sides[0].begin(), sides[0].end(), [](const Extreme& extreme) { return extreme.seen; });
   if (seen < 5 || std::size_t(3 * seen) < sides[0].size()) return std::nullopt;
   const Line left = fitted(sides[0], tolerance_px), right = fitted(sides[1], tolerance_px);
   ModelBorders borders;

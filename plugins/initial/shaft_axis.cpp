@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's first stage (3.4): the bone's axis from the shaft lines of the views, and the model's axis laid onto it. The
-// chapter back-projects at right angles to the image; here the planes go through the X-ray source, which takes away an error
-// of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from the silhouette that the
-// model would show in the same stretches of the same views, so that a bow, a taper or a ridge moves both axes alike.
-#include <Eigen/Geometry>
+// The chapter's first stage (3.4): the bone's axis from the shaft lines of the views, and the model's axis laid onto
+// it. The chapter back-projects at right angles to the image; here the planes go through the X-ray source, which takes
+// away an error of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from
+// the silhouette that the model would show in the same stretches of the same views, so that a bow, a taper or a ridge
+// moves both axes alike.
 #include <tbb/parallel_for.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -17,7 +18,8 @@
 namespace {
 
 using namespace marrow::initial;
-using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, marrow::RigidTransform, marrow::ShaftLines, marrow::View;
+using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, marrow::RigidTransform,
+    marrow::ShaftLines, marrow::View;
 
 struct Options {
   int rounds = 10;
@@ -57,23 +59,27 @@ std::vector<Sight> sights_of(const List<ShaftLines>& lines, const List<View>& vi
 
 /// Distance of a pair's borders in the middle of their stretch, across it, with the inset added on both sides.
 double width_px(const ShaftLines& lines, double inset_px) {
-  const Eigen::Vector2d along = (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
-  const Eigen::Vector2d between = 0.5 * (lines.right.from_px + lines.right.to_px - lines.left.from_px - lines.left.to_px);
+  const Eigen::Vector2d along =
+      (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
+  const Eigen::Vector2d between =
+      0.5 * (lines.right.from_px + lines.right.to_px - lines.left.from_px - lines.left.to_px);
   return std::abs(along.x() * between.y() - along.y() * between.x()) + 2 * inset_px;
 }
 
 /// The model's borders in every view at a pose.
-std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model, const std::vector<Sight>& sights,
-                                     double tolerance_mm) {
+std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model,
+                                     const std::vector<Sight>& sights, double tolerance_mm) {
   std::vector<std::optional<ModelBorders>> found(sights.size());
   tbb::parallel_for(std::size_t(0), sights.size(), [&](std::size_t i) {
     const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, Eigen::Vector3d::Zero());
-    found[i] = model_borders(model, world_from_model, *sights[i].camera, *sights[i].lines, tolerance_mm / std::abs(pixel_mm));
+    found[i] =
+        model_borders(model, world_from_model, *sights[i].camera, *sights[i].lines, tolerance_mm / std::abs(pixel_mm));
   });
   std::vector<ModelBorders> borders;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     if (!found[i])
-      throw marrow::Error("view '" + sights[i].name + "': where the image shows the shaft, the model at its start does not appear; "
+      throw marrow::Error("view '" + sights[i].name +
+                          "': where the image shows the shaft, the model at its start does not appear; "
                           "give a start nearer to the bone");
     borders.push_back(std::move(*found[i]));
   }
@@ -81,7 +87,8 @@ std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& wo
 }
 
 /// With two or more views the planes meet in the axis (Eq 7), of the image and of the model alike.
-RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor) {
+RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders,
+                              const Eigen::Vector3d& anchor) {
   std::vector<Plane> target, model;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     target.push_back(sights[i].plane);
@@ -90,10 +97,11 @@ RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vecto
   return world_from_world_move(axis_of_planes(model), axis_of_planes(target), anchor);
 }
 
-/// One view knows the plane of the axis. The depth follows from the angle under which the bone's own width is seen: for a
-/// cylinder r = D sin(half angle), so two depths are as the widths of the image inversely. How far the axis leans out of the
-/// image stays as it was.
-RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor, double inset_mm) {
+/// One view knows the plane of the axis. The depth follows from the angle under which the bone's own width is seen: for
+/// a cylinder r = D sin(half angle), so two depths are as the widths of the image inversely. How far the axis leans out
+/// of the image stays as it was.
+RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor,
+                             double inset_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
   const double inset_px = inset_mm / marrow::pixel_size_at_mm(*sight.camera, anchor);
   const double nearer = borders.width_px / width_px(*sight.lines, inset_px);
@@ -111,37 +119,44 @@ RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, co
 }
 
 /// In words, where the lines of a view cannot be those of this model.
-std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders, const Eigen::Vector3d& anchor,
-                                double inset_mm) {
+std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders,
+                                const Eigen::Vector3d& anchor, double inset_mm) {
   std::vector<std::string> warnings;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, anchor);
-    const double seen_mm = width_px(*sights[i].lines, inset_mm / pixel_mm) * pixel_mm, model_mm = borders[i].width_px * pixel_mm;
+    const double seen_mm = width_px(*sights[i].lines, inset_mm / pixel_mm) * pixel_mm,
+                 model_mm = borders[i].width_px * pixel_mm;
     if (sights.size() > 1 && std::abs(seen_mm - model_mm) > 0.15 * model_mm)
-      warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) + " mm apart, where the model is " +
-                         number(model_mm) + " mm wide; they may belong to something else");
+      warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) +
+                         " mm apart, where the model is " + number(model_mm) +
+                         " mm wide; they may belong to something else");
     const Plane model = bisecting_plane(*sights[i].camera, borders[i].left, borders[i].right);
-    const double turned_deg = marrow::degrees(std::acos(std::clamp(std::abs(model.normal.dot(sights[i].plane.normal)), 0.0, 1.0)));
+    const double turned_deg =
+        marrow::degrees(std::acos(std::clamp(std::abs(model.normal.dot(sights[i].plane.normal)), 0.0, 1.0)));
     if (turned_deg > 1)
-      warnings.push_back("view '" + sights[i].name + "': its shaft lines disagree with those of the other views by " + number(turned_deg) +
-                         " degrees");
+      warnings.push_back("view '" + sights[i].name + "': its shaft lines disagree with those of the other views by " +
+                         number(turned_deg) + " degrees");
   }
   return warnings;
 }
 
-Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start, const Options& options) {
+Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start,
+                const Options& options) {
   marrow::check_mesh(model, "model");
   const std::vector<Sight> sights = sights_of(lines, views);
   Pose pose;
-  if (start) pose.world_from_model = start->world_from_model;
-  else pose.world_from_model.source = model.frame;
+  if (start)
+    pose.world_from_model = start->world_from_model;
+  else
+    pose.world_from_model.source = model.frame;
   marrow::check_rigid(pose.world_from_model, "start");
   pose.frame = marrow::fragment_frame(model);
   for (int round = 0; round < options.rounds; ++round) {
     const std::vector<ModelBorders> borders = borders_of(model, pose.world_from_model, sights, options.tolerance_mm);
     const Eigen::Vector3d anchor = pose.world_from_model * pose.frame.origin_mm;
-    const RigidTransform move = sights.size() == 1 ? move_by_width(sights[0], borders[0], anchor, options.border_inset_mm)
-                                                     : move_by_planes(sights, borders, anchor);
+    const RigidTransform move = sights.size() == 1
+                                    ? move_by_width(sights[0], borders[0], anchor, options.border_inset_mm)
+                                    : move_by_planes(sights, borders, anchor);
     pose.world_from_model = move * pose.world_from_model;
     ++pose.evaluations;
     const double shift_mm = (pose.world_from_model * pose.frame.origin_mm - anchor).norm();
@@ -162,10 +177,13 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray views, for their cameras", marrow::over("view"))
       .in("start", "nominal placement, which keeps its rotation about the axis and its place along it")
       .out("pose", "four degrees of freedom from the views, two from the start")
-      .option("rounds", &Options::rounds, "most times that the model's axis is measured anew", marrow::at_least(1), marrow::at_most(100))
+      .option("rounds", &Options::rounds, "most times that the model's axis is measured anew", marrow::at_least(1),
+              marrow::at_most(100))
       .option("tolerance_mm", &Options::tolerance_mm,
-              "largest distance, at the isocentre, of a silhouette point from the model's border line", marrow::at_least(0.01))
+              "largest distance, at the isocentre, of a silhouette point from the model's border line",
+              marrow::at_least(0.01))
       .option("border_inset_mm", &Options::border_inset_mm,
-              "how far inside its outline a round bone's edge is seen, because attenuation begins gradually; it matters where a single view "
+              "how far inside its outline a round bone's edge is seen, because attenuation begins gradually; it "
+              "matters where a single view "
               "gives the depth by the width");
 }

@@ -86,7 +86,8 @@ Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& ot
   Stretch stretch;
   stretch.along = along;
   std::tie(stretch.from, stretch.to) = longest_run(both, gap_px);
-  supported = int(std::count_if(both.begin(), both.end(), [&](double s) { return s >= stretch.from && s <= stretch.to; }));
+  supported =
+      int(std::count_if(both.begin(), both.end(), [&](double s) { return s >= stretch.from && s <= stretch.to; }));
   return stretch;
 }
 

@@ -8,7 +8,8 @@
 
 namespace marrow::shaft {
 
-/// The line {p : normal . p = rho}; the unit normal points to the brighter side, as the gradient of its edge pixels does.
+/// The line {p : normal . p = rho}; the unit normal points to the brighter side, as the gradient of its edge pixels
+/// does.
 struct Border {
   Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
   double rho = 0;
@@ -17,8 +18,8 @@ struct Border {
 
 /// Which edge pixels support a border.
 struct Support {
-  double tolerance_px = 3;        ///< largest distance from the line
-  double direction_cosine = 0.97; ///< least cosine between gradient and normal
+  double tolerance_px = 3;         ///< largest distance from the line
+  double direction_cosine = 0.97;  ///< least cosine between gradient and normal
 };
 
 /// A stretch of a direction: positions s = along . p between `from` and `to`.
@@ -29,7 +30,9 @@ struct Stretch {
 };
 
 /// The direction of a border, as its own `along`.
-inline Eigen::Vector2d along(const Border& border) { return {-border.normal.y(), border.normal.x()}; }
+inline Eigen::Vector2d along(const Border& border) {
+  return {-border.normal.y(), border.normal.x()};
+}
 
 /// Where the line stands at position s along a direction that is not across it.
 Eigen::Vector2d point_at(const Border& border, const Eigen::Vector2d& along, double s);
@@ -41,12 +44,13 @@ std::vector<double> supported_positions(const EdgeMap& edges, const Border& bord
 /// The stretch of most positions without a gap wider than gap_px; the positions must ascend.
 std::pair<double, double> longest_run(const std::vector<double>& positions, double gap_px);
 
-/// Least squares line through the supporting edge pixels of a stretch. Rounds of `weighted` refits with Tukey's weights come
-/// first, so that stray pixels lose their pull. The border given back has no pixels when fewer than ten are left.
+/// Least squares line through the supporting edge pixels of a stretch. Rounds of `weighted` refits with Tukey's weights
+/// come first, so that stray pixels lose their pull. The border given back has no pixels when fewer than ten are left.
 Border refit(const EdgeMap& edges, Border border, const Support& support, const Stretch& stretch, int weighted);
 
-/// The longest stretch, in the direction `along`, in which both borders have edge pixels side by side without a gap wider than
-/// gap_px; of zero length when there is none. `supported` receives the number of whole pixels of it at which both have one.
+/// The longest stretch, in the direction `along`, in which both borders have edge pixels side by side without a gap
+/// wider than gap_px; of zero length when there is none. `supported` receives the number of whole pixels of it at which
+/// both have one.
 Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
                        const Eigen::Vector2d& along, double gap_px, int& supported);
 

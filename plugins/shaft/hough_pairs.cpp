@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's extraction of the shaft (3.2): lines by the classical Hough transform (rho = u cos t + v sin t), paired and
-// accepted by the outer diameter of femora (Noble et al., CORR 1988). The chapter accepts widths within one standard deviation,
-// which turns away a third of all femora in each view; here widths have a likelihood and a limit of three. The canal's borders
-// lie inside and are turned away by which of their sides is brighter.
+// The chapter's extraction of the shaft (3.2): lines by the classical Hough transform (rho = u cos t + v sin t), paired
+// and accepted by the outer diameter of femora (Noble et al., CORR 1988). The chapter accepts widths within one
+// standard deviation, which turns away a third of all femora in each view; here widths have a likelihood and a limit of
+// three. The canal's borders lie inside and are turned away by which of their sides is brighter.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -18,7 +18,8 @@ using namespace marrow::shaft;
 using marrow::EdgeMap, marrow::EdgePixel, marrow::ShaftLines, marrow::View;
 
 struct Options {
-  std::vector<double> width_mm{28.5, 30.3};  // outer diameter of the middle third of femora, side to side and front to back
+  std::vector<double> width_mm{28.5,
+                               30.3};  // outer diameter of the middle third of femora, side to side and front to back
   std::vector<double> width_deviation_mm{3.3, 3.1};
   double magnification_tolerance = 0.05;
   double min_length_mm = 25;
@@ -28,8 +29,8 @@ struct Options {
   int lines = 60;
 };
 
-constexpr int kAngles = 360;         // directed lines: the normal turns once around
-constexpr int kVoteSpread = 6;       // degrees by which noise turns a gradient
+constexpr int kAngles = 360;    // directed lines: the normal turns once around
+constexpr int kVoteSpread = 6;  // degrees by which noise turns a gradient
 constexpr double kRhoStep_px = 2;
 constexpr double kTaper_deg = 6;         // standard deviation of the angle between the borders: a distal femur flares
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
@@ -44,7 +45,8 @@ Scale scale_of(const View& view, const Options& options) {
   Scale scale;
   scale.pixel_mm = marrow::pixel_size_at_mm(view.camera, Eigen::Vector3d::Zero());
   if (!(scale.pixel_mm > 0))
-    throw marrow::Error("view '" + view.name + "': the world's origin, the isocentre, does not lie in front of the X-ray source");
+    throw marrow::Error("view '" + view.name +
+                        "': the world's origin, the isocentre, does not lie in front of the X-ray source");
   scale.min_length_px = options.min_length_mm / scale.pixel_mm;
   scale.gap_px = options.gap_mm / scale.pixel_mm;
   scale.support = {options.tolerance_mm / scale.pixel_mm, std::cos(marrow::radians(15))};
@@ -69,7 +71,9 @@ struct Accumulator {
       }
     }
   }
-  static Eigen::Vector2d normal(int angle) { return {std::cos(marrow::radians(angle)), std::sin(marrow::radians(angle))}; }
+  static Eigen::Vector2d normal(int angle) {
+    return {std::cos(marrow::radians(angle)), std::sin(marrow::radians(angle))};
+  }
 
   /// True where no cell of the neighbourhood has more votes; of equals, the first.
   bool is_peak(int angle, int rho) {
@@ -86,7 +90,9 @@ struct Accumulator {
 /// The lines of most votes, refined on their edge pixels and cut to the longest run of these.
 std::vector<Border> hough_lines(const EdgeMap& edges, const Scale& scale, int most) {
   Accumulator accumulator(edges);
-  struct Peak { int votes, angle, rho; };
+  struct Peak {
+    int votes, angle, rho;
+  };
   std::vector<Peak> peaks;
   const int least = std::max(10, int(0.3 * scale.min_length_px));
   for (int angle = 0; angle < kAngles; ++angle)
@@ -104,13 +110,15 @@ std::vector<Border> hough_lines(const EdgeMap& edges, const Scale& scale, int mo
     for (int round = 0; round < 2 && (round == 0 || border.pixels > 0); ++round) {
       Stretch run;
       run.along = along(border);
-      std::tie(run.from, run.to) = longest_run(supported_positions(edges, border, scale.support, run.along), scale.gap_px);
+      std::tie(run.from, run.to) =
+          longest_run(supported_positions(edges, border, scale.support, run.along), scale.gap_px);
       border = run.length() < 0.5 * scale.min_length_px ? Border{} : refit(edges, border, scale.support, run, 2);
     }
     const auto same = [&](const Border& other) {
       return other.normal.dot(border.normal) > std::cos(marrow::radians(1)) &&
              (point_at(other, along(border), along(border).dot(accumulator.centre)) -
-              point_at(border, along(border), along(border).dot(accumulator.centre))).norm() < 0.3 * scale.support.tolerance_px;
+              point_at(border, along(border), along(border).dot(accumulator.centre)))
+                     .norm() < 0.3 * scale.support.tolerance_px;
     };
     if (border.pixels > 0 && std::none_of(borders.begin(), borders.end(), same)) borders.push_back(border);
   }
@@ -122,7 +130,7 @@ struct Pair {
   Border left, right;  // as seen along the stretch
   Stretch stretch;
   double width_mm = 0, supported_mm = 0;
-  double score = 0;         // log-likelihood of width, taper and evidence
+  double score = 0;    // log-likelihood of width, taper and evidence
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
 
@@ -146,13 +154,14 @@ double width_of(const Pair& pair, double pixel_mm) {
   return (point_at(pair.left, pair.stretch.along, s) - point_at(pair.right, pair.stretch.along, s)).norm() * pixel_mm;
 }
 
-/// How many standard deviations an outer diameter is from the mean, for the nearer of the directions from which a femur may
-/// be seen. That the depth may differ from the isocentre's widens the deviation.
+/// How many standard deviations an outer diameter is from the mean, for the nearer of the directions from which a femur
+/// may be seen. That the depth may differ from the isocentre's widens the deviation.
 double deviations_of(double width_mm, const Options& options) {
   double least = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < options.width_mm.size(); ++i)
-    least = std::min(least, std::abs(width_mm - options.width_mm[i]) /
-                                std::hypot(options.width_deviation_mm[i], options.magnification_tolerance * options.width_mm[i]));
+    least = std::min(
+        least, std::abs(width_mm - options.width_mm[i]) /
+                   std::hypot(options.width_deviation_mm[i], options.magnification_tolerance * options.width_mm[i]));
   return least;
 }
 
@@ -179,7 +188,9 @@ Brightness brightness_of(const cv::Mat& image, const Pair& pair, double pixel_mm
         const Eigen::Vector2d at = from + (k + 0.5) / kAcross * (to - from);
         const cv::Point pixel(int(std::lround(at.x())), int(std::lround(at.y())));
         if (pixel.x < 0 || pixel.y < 0 || pixel.x >= image.cols || pixel.y >= image.rows) continue;
-        sum += image.depth() == CV_8U ? image.at<uchar>(pixel) : image.depth() == CV_16U ? image.at<std::uint16_t>(pixel) : image.at<float>(pixel);
+        sum += image.depth() == CV_8U    ? image.at<uchar>(pixel)
+               : image.depth() == CV_16U ? image.at<std::uint16_t>(pixel)
+                                         : image.at<float>(pixel);
         ++count;
       }
     }
@@ -190,7 +201,8 @@ Brightness brightness_of(const cv::Mat& image, const Pair& pair, double pixel_mm
       return point_at(border, pair.stretch.along, s) + shift * border.normal;
     };
   };
-  return {mean_between(beside(pair.left, 0), beside(pair.right, 0)), mean_between(beside(pair.left, 1), beside(pair.left, 4)),
+  return {mean_between(beside(pair.left, 0), beside(pair.right, 0)),
+          mean_between(beside(pair.left, 1), beside(pair.left, 4)),
           mean_between(beside(pair.right, 1), beside(pair.right, 4))};
 }
 
@@ -206,26 +218,29 @@ void judge(const EdgeMap& edges, const cv::Mat& image, const Scale& scale, const
     std::swap(pair.left, pair.right);
   pair.width_mm = width_of(pair, scale.pixel_mm);
   const double deviations = deviations_of(pair.width_mm, options);
-  const double taper = marrow::degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0))) / kTaper_deg;
+  const double taper =
+      marrow::degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0))) / kTaper_deg;
   pair.score = kEvidencePer_mm * pair.supported_mm - 0.5 * deviations * deviations - 0.5 * taper * taper;
   const double length_mm = pair.stretch.length() * scale.pixel_mm;
   if (length_mm < options.min_length_mm)
-    pair.reason = text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm, options.min_length_mm);
+    pair.reason =
+        text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm, options.min_length_mm);
   else if (pair.left.normal.dot(to_left) < 0)
-    pair.reason = text("it is darker outside than inside, as a canal or a gap between bones is (%.1f mm wide)", pair.width_mm);
+    pair.reason =
+        text("it is darker outside than inside, as a canal or a gap between bones is (%.1f mm wide)", pair.width_mm);
   else if (deviations > 3)
     pair.reason = text("its width of %.1f mm is not that of a shaft (", pair.width_mm) + allowed_widths(options) +
                   " mm, at most 3 deviations)";
   if (!pair.reason.empty()) return;
   const Brightness mean = brightness_of(image, pair, scale.pixel_mm);
   if (mean.inside >= std::min(mean.outside_left, mean.outside_right))
-    pair.reason = text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)", mean.inside,
-                       mean.outside_left, mean.outside_right);
+    pair.reason = text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
+                       mean.inside, mean.outside_left, mean.outside_right);
 }
 
 /// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first.
-std::vector<Pair> pairs_of(const EdgeMap& edges, const cv::Mat& image, const std::vector<Border>& borders, const Scale& scale,
-                           const Options& options) {
+std::vector<Pair> pairs_of(const EdgeMap& edges, const cv::Mat& image, const std::vector<Border>& borders,
+                           const Scale& scale, const Options& options) {
   std::vector<Pair> pairs;
   const double cosine = std::cos(marrow::radians(options.max_angle_deg));
   for (std::size_t i = 0; i < borders.size(); ++i)
@@ -243,14 +258,16 @@ std::vector<Pair> pairs_of(const EdgeMap& edges, const cv::Mat& image, const std
   return pairs;
 }
 
-/// Both borders fitted again over the stretch that they share, until that stretch settles, so that both tell of the same piece
-/// of the bone.
+/// Both borders fitted again over the stretch that they share, until that stretch settles, so that both tell of the
+/// same piece of the bone.
 Pair settled(const EdgeMap& edges, const cv::Mat& image, Pair pair, const Scale& scale, const Options& options) {
   for (int round = 0; round < 3 && pair.reason.empty(); ++round) {
     pair.left = refit(edges, pair.left, scale.support, pair.stretch, 0);
     pair.right = refit(edges, pair.right, scale.support, pair.stretch, 0);
-    if (pair.left.pixels == 0 || pair.right.pixels == 0) pair.reason = "a border loses its edge pixels when it is fitted again";
-    else judge(edges, image, scale, options, pair);
+    if (pair.left.pixels == 0 || pair.right.pixels == 0)
+      pair.reason = "a border loses its edge pixels when it is fitted again";
+    else
+      judge(edges, image, scale, options, pair);
   }
   return pair;
 }
@@ -266,11 +283,14 @@ void check_inputs(const EdgeMap& edges, const View& view, const Options& options
   if (type != CV_8UC1 && type != CV_16UC1 && type != CV_32FC1)
     throw marrow::Error(what + "the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   if (edges.width_px != view.camera.width_px || edges.height_px != view.camera.height_px)
-    throw marrow::Error(what + "the edge map is for " + std::to_string(edges.width_px) + " x " + std::to_string(edges.height_px) +
-                        " pixels, the view has " + std::to_string(view.camera.width_px) + " x " +
-                        std::to_string(view.camera.height_px) + "; wire the edges of this view");
+    throw marrow::Error(what + "the edge map is for " + std::to_string(edges.width_px) + " x " +
+                        std::to_string(edges.height_px) + " pixels, the view has " +
+                        std::to_string(view.camera.width_px) + " x " + std::to_string(view.camera.height_px) +
+                        "; wire the edges of this view");
   if (edges.pixels.empty())
-    throw marrow::Error(what + "the edge map is empty, so there is no shaft in it; look at the image, and lower the thresholds of the edge detector");
+    throw marrow::Error(what +
+                        "the edge map is empty, so there is no shaft in it; look at the image, and lower the "
+                        "thresholds of the edge detector");
   if (options.width_mm.empty() || options.width_mm.size() != options.width_deviation_mm.size())
     throw marrow::Error("width_mm has " + std::to_string(options.width_mm.size()) + " numbers and width_deviation_mm " +
                         std::to_string(options.width_deviation_mm.size()) + "; give one deviation for each width");
@@ -306,7 +326,8 @@ ShaftLines hough_pairs(const EdgeMap& edges, const View& view, const Options& op
     if (pairs[i].reason.empty())
       pairs[i].reason = text("its log-likelihood of %.1f is below the best one's %.1f (%.1f mm wide)", pairs[i].score,
                              pairs[0].score, pairs[i].width_mm);
-    lines.rejected.push_back({segment_of(pairs[i].left, pairs[i].stretch), segment_of(pairs[i].right, pairs[i].stretch), pairs[i].reason});
+    lines.rejected.push_back(
+        {segment_of(pairs[i].left, pairs[i].stretch), segment_of(pairs[i].right, pairs[i].stretch), pairs[i].reason});
   }
   return lines;
 }
@@ -319,17 +340,19 @@ MARROW_PLUGIN(plugin) {
       .in("edges", "edge pixels of the view")
       .in("view", "X-ray view, for its camera and brightness")
       .out("lines", "the two outer borders of the shaft, and what was turned away")
-      .option("width_mm", &Options::width_mm, "mean outer diameters, one for each direction from which the bone may be seen")
+      .option("width_mm", &Options::width_mm,
+              "mean outer diameters, one for each direction from which the bone may be seen")
       .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations")
       .option("magnification_tolerance", &Options::magnification_tolerance,
               "standard deviation of the magnification, as a fraction: the shaft need not lie at the isocentre",
               marrow::at_least(0), marrow::at_most(1))
       .option("min_length_mm", &Options::min_length_mm, "shortest stretch, at the isocentre, that both borders share",
               marrow::at_least(1))
-      .option("max_angle_deg", &Options::max_angle_deg, "largest angle between the borders: shafts taper", marrow::at_least(0),
-              marrow::at_most(45))
-      .option("tolerance_mm", &Options::tolerance_mm, "largest distance, at the isocentre, of an edge pixel from its line",
-              marrow::at_least(0.01))
+      .option("max_angle_deg", &Options::max_angle_deg, "largest angle between the borders: shafts taper",
+              marrow::at_least(0), marrow::at_most(45))
+      .option("tolerance_mm", &Options::tolerance_mm,
+              "largest distance, at the isocentre, of an edge pixel from its line", marrow::at_least(0.01))
       .option("gap_mm", &Options::gap_mm, "widest gap, at the isocentre, that a border may have", marrow::at_least(0))
-      .option("lines", &Options::lines, "largest number of lines that are tried", marrow::at_least(2), marrow::at_most(1000));
+      .option("lines", &Options::lines, "largest number of lines that are tried", marrow::at_least(2),
+              marrow::at_most(1000));
 }

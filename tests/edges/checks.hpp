@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every edge detector must do, on images whose edges are known exactly. A test program defines `find_edges(view)` before
-// it includes this header.
+// What every edge detector must do, on images whose edges are known exactly. A test program defines `find_edges(view)`
+// before it includes this header.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
@@ -30,7 +30,8 @@ marrow::View drawn(int size, Function function, double noise = 0, unsigned seed 
     for (int u = 0; u < size; ++u) {
       double sum = 0;
       for (int k = 0; k < 64; ++k) sum += function(u + (k % 8 - 3.5) / 8, v + (k / 8 - 3.5) / 8);
-      view.image.pixels.at<std::uint16_t>(v, u) = cv::saturate_cast<std::uint16_t>(sum / 64 + (noise > 0 ? normal(random) : 0));
+      view.image.pixels.at<std::uint16_t>(v, u) =
+          cv::saturate_cast<std::uint16_t>(sum / 64 + (noise > 0 ? normal(random) : 0));
     }
   return view;
 }
@@ -49,7 +50,8 @@ TEST(Edges, LieOnAStraightStepAtAnyOrientation) {
   double largest = 0, sum = 0, largest_turn_deg = 0;
   int count = 0;
   for (double angle_deg = 0; angle_deg < 360; angle_deg += 15) {
-    const double nu = std::cos(marrow::radians(angle_deg)), nv = std::sin(marrow::radians(angle_deg)), at = 0.013 * angle_deg;
+    const double nu = std::cos(marrow::radians(angle_deg)), nv = std::sin(marrow::radians(angle_deg)),
+                 at = 0.013 * angle_deg;
     const auto side = [&](double u, double v) { return (u - 63.5) * nu + (v - 63.5) * nv - at; };
     const auto view = drawn(128, [&](double u, double v) { return side(u, v) > 0 ? 11000.0 : 10000.0; });
     const marrow::EdgeMap edges = find_edges(view);
@@ -59,17 +61,20 @@ TEST(Edges, LieOnAStraightStepAtAnyOrientation) {
       const double error = side(edge.u_px, edge.v_px);
       largest = std::max(largest, std::abs(error));
       sum += error, ++count;
-      largest_turn_deg = std::max(largest_turn_deg, marrow::degrees(std::acos(std::min(1.0, edge.direction_u * nu + edge.direction_v * nv))));
+      largest_turn_deg = std::max(
+          largest_turn_deg, marrow::degrees(std::acos(std::min(1.0, edge.direction_u * nu + edge.direction_v * nv))));
     }
   }
-  std::printf("straight step: mean %.4f px, largest %.4f px, direction within %.2f deg\n", sum / count, largest, largest_turn_deg);
+  std::printf("straight step: mean %.4f px, largest %.4f px, direction within %.2f deg\n", sum / count, largest,
+              largest_turn_deg);
   EXPECT_LT(largest, 0.1);
   EXPECT_LT(std::abs(sum / count), 0.02);
   EXPECT_LT(largest_turn_deg, 1.0);
 }
 
 TEST(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
-  const auto view = drawn(200, [](double u, double v) { return std::hypot(u - 101.3, v - 98.6) < 60.4 ? 28500.0 : 30000.0; });
+  const auto view =
+      drawn(200, [](double u, double v) { return std::hypot(u - 101.3, v - 98.6) < 60.4 ? 28500.0 : 30000.0; });
   const marrow::EdgeMap edges = find_edges(view);
   EXPECT_GT(edges.pixels.size(), 300u);
   double sum = 0, largest = 0;
@@ -78,29 +83,33 @@ TEST(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
     const double du = edge.u_px - 101.3, dv = edge.v_px - 98.6, radius = std::hypot(du, dv);
     EXPECT_GT((du * edge.direction_u + dv * edge.direction_v) / radius, 0.999);
     EXPECT_NEAR(std::hypot(edge.direction_u, edge.direction_v), 1, 1e-5);
-    EXPECT_NEAR(edge.magnitude, 1500 / (std::sqrt(2 * marrow::kPi) * 1.5), 40);  // grey values per pixel, before the square pixel
+    EXPECT_NEAR(edge.magnitude, 1500 / (std::sqrt(2 * marrow::kPi) * 1.5),
+                40);  // grey values per pixel, before the square pixel
     sum += radius - 60.4;
     largest = std::max(largest, std::abs(radius - 60.4));
     const int pixel = int(std::lround(edge.v_px)) * 200 + int(std::lround(edge.u_px));
     EXPECT_GT(pixel, last);
     last = pixel;
   }
-  std::printf("disc: mean %.4f px, largest %.4f px, %zu edges\n", sum / double(edges.pixels.size()), largest, edges.pixels.size());
+  std::printf("disc: mean %.4f px, largest %.4f px, %zu edges\n", sum / double(edges.pixels.size()), largest,
+              edges.pixels.size());
   EXPECT_LT(std::abs(sum / double(edges.pixels.size())), 0.05);
   EXPECT_LT(largest, 0.15);
 }
 
 TEST(Edges, AreScarceInPureNoise) {
-  const auto view = drawn(256, [](double, double) { return 20000.0; }, 300);
+  const auto view = drawn(
+      256, [](double, double) { return 20000.0; }, 300);
   const double fraction = double(find_edges(view).pixels.size()) / (256 * 256);
   std::printf("pure noise: %.4f %% of the pixels\n", 100 * fraction);
   EXPECT_LT(fraction, 0.001);
 }
 
-TEST(Edges, AreFoundInTheDarkAsInTheLight) {  // the exposure falls tenfold from left to right, the bar takes 10 % everywhere
-  const auto view = drawn(256, [](double u, double v) {
-    return 50000 * std::pow(0.1, u / 255) * (std::abs(v - 128) < 20 ? 0.9 : 1.0);
-  }, 30);
+TEST(Edges,
+     AreFoundInTheDarkAsInTheLight) {  // the exposure falls tenfold from left to right, the bar takes 10 % everywhere
+  const auto view = drawn(
+      256, [](double u, double v) { return 50000 * std::pow(0.1, u / 255) * (std::abs(v - 128) < 20 ? 0.9 : 1.0); },
+      30);
   std::vector<int> upper(256, 0), lower(256, 0);
   for (const marrow::EdgePixel& edge : find_edges(view).pixels) {
     if (std::abs(edge.v_px - 108) < 1) upper[std::size_t(edge.u_px)] = 1;
@@ -142,7 +151,10 @@ TEST(Edges, OfANoisyHollowBoneInAThighAreContinuous) {
 
 TEST(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
   const auto disc = [](double u, double v) { return std::hypot(u - 127.5, v - 127.5); };
-  auto view = drawn(256, [&](double u, double v) { return disc(u, v) > 120 ? 100.0 : disc(u, v) < 40 ? 10000.0 : 30000.0; }, 20);
+  auto view = drawn(
+      256, [&](double u, double v) { return disc(u, v) > 120  ? 100.0
+                                            : disc(u, v) < 40 ? 10000.0
+                                                              : 30000.0; }, 20);
   for (const marrow::EdgePixel& edge : find_edges(view).pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 100);
   view.mask = cv::Mat(256, 256, CV_8U, cv::Scalar(0));
   view.mask.colRange(0, 128) = 255;
@@ -152,7 +164,8 @@ TEST(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
 }
 
 TEST(Edges, AreTheSameBytesWithOneAndTwoThreads) {
-  const auto view = radiograph::image("frontal", radiograph::camera(0), radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
+  const auto view =
+      radiograph::image("frontal", radiograph::camera(0), radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
   const auto with_threads = [&](int threads) {
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
     return find_edges(view);
@@ -170,33 +183,38 @@ TEST(Edges, SayWhatIsWrongWithAnImage) {
             "view 'frontal': all pixels have the same value 1234, so there is no edge; check the image file");
   good.image.pixels.convertTo(view.image.pixels, CV_32F);
   view.image.pixels.at<float>(3, 3) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(error_of([&] { find_edges(view); }), "view 'frontal': the image holds pixels that are not finite (NaN or infinity)");
+  EXPECT_EQ(error_of([&] { find_edges(view); }),
+            "view 'frontal': the image holds pixels that are not finite (NaN or infinity)");
   good.image.pixels.convertTo(view.image.pixels, CV_32F, -1);
   EXPECT_EQ(error_of([&] { find_edges(view); }),
             "view 'frontal': the image has no positive grey value, so its logarithm cannot be taken");
   view = good;
   view.mask = cv::Mat(64, 64, CV_8U, cv::Scalar(0));
-  EXPECT_EQ(error_of([&] { find_edges(view); }),
-            "view 'frontal': no pixel is left to search for edges (mask, image border and smoothing take all of 64 x 64)");
+  EXPECT_EQ(
+      error_of([&] { find_edges(view); }),
+      "view 'frontal': no pixel is left to search for edges (mask, image border and smoothing take all of 64 x 64)");
   view = good;
   view.image.pixels = cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3));
   EXPECT_EQ(error_of([&] { find_edges(view); }),
             "view 'frontal': the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   view = good;
   view.camera.width_px = 65;
-  EXPECT_NE(error_of([&] { find_edges(view); }).find("64 x 64 pixels, but its camera is for 65 x 64"), std::string::npos);
+  EXPECT_NE(error_of([&] { find_edges(view); }).find("64 x 64 pixels, but its camera is for 65 x 64"),
+            std::string::npos);
   view.image.pixels = cv::Mat();
   EXPECT_EQ(error_of([&] { find_edges(view); }), "view 'frontal': the image is empty");
 }
 
 TEST(Edges, AreFoundInReasonableTime) {
   for (const int size : {512, 1024}) {
-    const auto view = radiograph::image("frontal", radiograph::camera(0, size), radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
+    const auto view = radiograph::image("frontal", radiograph::camera(0, size),
+                                        radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
     double best_ms = 1e9;
     for (int run = 0; run < 5; ++run) {
       const auto start = std::chrono::steady_clock::now();
       find_edges(view);
-      best_ms = std::min(best_ms, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+      best_ms = std::min(best_ms,
+                         std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
     }
     std::printf("%d x %d: %.1f ms\n", size, size, best_ms);
     EXPECT_LT(best_ms, 1000);  // a wide margin, for a busy machine

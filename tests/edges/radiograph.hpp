@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// X-ray images of cylinders and balls by the exact length of each ray inside them: a shaft with its canal in a thigh, with
-// condyles, seen by a pinhole camera.
+// X-ray images of cylinders and balls by the exact length of each ray inside them: a shaft with its canal in a thigh,
+// with condyles, seen by a pinhole camera.
 #include <Eigen/Dense>
 #include <cmath>
 #include <marrow/domain/camera.hpp>
@@ -12,8 +12,8 @@
 
 namespace radiograph {
 
-/// A C-arm view: source 600 mm before the isocentre, detector of size_px^2 pixels over 300 mm at 1000 mm. At 0 degrees the
-/// rays run along +y with the patient's left on the right and the head up; the angle turns about z.
+/// A C-arm view: source 600 mm before the isocentre, detector of size_px^2 pixels over 300 mm at 1000 mm. At 0 degrees
+/// the rays run along +y with the patient's left on the right and the head up; the angle turns about z.
 inline marrow::Camera camera(double angle_deg, int size_px = 512) {
   marrow::Camera camera;
   camera.width_px = camera.height_px = size_px;
@@ -45,7 +45,8 @@ struct Scene {
 inline double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray, const Cylinder& body) {
   const Eigen::Vector3d across = ray - body.direction * ray.dot(body.direction);
   const Eigen::Vector3d from = source - body.point, start = from - body.direction * from.dot(body.direction);
-  const double a = across.squaredNorm(), b = across.dot(start), c = start.squaredNorm() - body.radius_mm * body.radius_mm;
+  const double a = across.squaredNorm(), b = across.dot(start),
+               c = start.squaredNorm() - body.radius_mm * body.radius_mm;
   return 2 * std::sqrt(std::max(0.0, b * b - a * c)) / a;
 }
 inline double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray, const Ball& body) {
@@ -55,7 +56,8 @@ inline double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray
 }
 
 /// A shaft of 28 mm with a canal of 12 mm along `direction` through `point`, in a thigh of 150 mm.
-inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double outer_mm = 28, double canal_mm = 12) {
+inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, double outer_mm = 28,
+                   double canal_mm = 12) {
   Scene scene;
   scene.cylinders = {{Eigen::Vector3d(0, 0, 0), Eigen::Vector3d::UnitZ(), 75, 0.024},
                      {point, direction.normalized(), outer_mm / 2, 0.08 - 0.024},
@@ -63,9 +65,10 @@ inline Scene shaft(const Eigen::Vector3d& point, const Eigen::Vector3d& directio
   return scene;
 }
 
-/// 16 bit image: `photons` per pixel where nothing is in the way (0: no noise), 60000 grey values there; each pixel is the
-/// mean over 3 x 3 rays.
-inline marrow::View image(const std::string& name, const marrow::Camera& camera, const Scene& scene, double photons, unsigned seed) {
+/// 16 bit image: `photons` per pixel where nothing is in the way (0: no noise), 60000 grey values there; each pixel is
+/// the mean over 3 x 3 rays.
+inline marrow::View image(const std::string& name, const marrow::Camera& camera, const Scene& scene, double photons,
+                          unsigned seed) {
   marrow::View view;
   view.name = name;
   view.camera = camera;
@@ -78,7 +81,8 @@ inline marrow::View image(const std::string& name, const marrow::Camera& camera,
     for (int u = 0; u < camera.width_px; ++u) {
       double mean = 0;
       for (int k = 0; k < 9; ++k) {
-        const Eigen::Vector3d ray = (world_from_pixel * Eigen::Vector3d(u + (k % 3 - 1) / 3.0, v + (k / 3 - 1) / 3.0, 1)).normalized();
+        const Eigen::Vector3d ray =
+            (world_from_pixel * Eigen::Vector3d(u + (k % 3 - 1) / 3.0, v + (k / 3 - 1) / 3.0, 1)).normalized();
         double path = 0;
         for (const Cylinder& body : scene.cylinders) path += body.added_per_mm * chord_mm(source, ray, body);
         for (const Ball& body : scene.balls) path += body.added_per_mm * chord_mm(source, ray, body);

@@ -45,10 +45,12 @@ TEST(Axis, OfACylinderIsExactFromItsBordersInTwoAndThreeViews) {
     }
 }
 
-// The chapter's planes stand at right angles to the image, through the mid line drawn in the plane of the detector (or scaled
-// down by source-to-isocentre over source-to-detector). This is what that costs, and why it is not done.
+// The chapter's planes stand at right angles to the image, through the mid line drawn in the plane of the detector (or
+// scaled down by source-to-isocentre over source-to-detector). This is what that costs, and why it is not done.
 TEST(Axis, ByOrthogonalPlanesErrsByDegreesAndMillimetres) {
-  struct Row { double off_mm, tilt_deg, turned_deg, off_by_mm, demagnified_mm; };
+  struct Row {
+    double off_mm, tilt_deg, turned_deg, off_by_mm, demagnified_mm;
+  };
   for (const Row& row : {Row{20, 5, 0.07, 10.3, 0.24}, Row{40, 5, 0.14, 20.3, 0.94}, Row{40, 15, 0.39, 20.5, 0.97}}) {
     std::mt19937 random(4);
     double turned_deg = 0, off_by_mm = 0, demagnified_mm = 0;
@@ -58,7 +60,8 @@ TEST(Axis, ByOrthogonalPlanesErrsByDegreesAndMillimetres) {
         std::vector<marrow::Plane> planes;
         for (double angle : {0.0, 90.0}) {
           const marrow::Camera camera = radiograph::camera(angle);
-          const auto in_plane = [&](double s) -> Eigen::Vector3d {  // image point in mm about the principal point, in world axes
+          const auto in_plane =
+              [&](double s) -> Eigen::Vector3d {  // image point in mm about the principal point, in world axes
             const Eigen::Vector2d pixel = marrow::project(camera, truth.point + s * truth.direction);
             const Eigen::Vector2d mm = (pixel - camera.intrinsics.topRightCorner<2, 1>()) * (300.0 / 512) * scale;
             return camera.camera_from_world.rotation.transpose() * Eigen::Vector3d(mm.x(), mm.y(), 0);
@@ -76,8 +79,8 @@ TEST(Axis, ByOrthogonalPlanesErrsByDegreesAndMillimetres) {
       off_by_mm = std::max(off_by_mm, (plain.nearest_to(truth.point) - truth.point).norm());
       demagnified_mm = std::max(demagnified_mm, (scaled.nearest_to(truth.point) - truth.point).norm());
     }
-    std::printf("orthogonal planes, %g mm off, %g deg: %.2f deg, %.1f mm, demagnified %.2f mm\n", row.off_mm, row.tilt_deg, turned_deg,
-                off_by_mm, demagnified_mm);
+    std::printf("orthogonal planes, %g mm off, %g deg: %.2f deg, %.1f mm, demagnified %.2f mm\n", row.off_mm,
+                row.tilt_deg, turned_deg, off_by_mm, demagnified_mm);
     EXPECT_GT(turned_deg, 0.5 * row.turned_deg);
     EXPECT_GT(off_by_mm, 0.5 * row.off_by_mm);
     EXPECT_GT(demagnified_mm, 0.4 * row.demagnified_mm);
@@ -88,8 +91,10 @@ TEST(Axis, MoveMapsModelOriginAndZOntoTheTargets) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
   for (int i = 0; i < 100; ++i) {
-    Axis model{{20 * unit(random), 20 * unit(random), 9}, Eigen::Vector3d(0.3 * unit(random), 0.3 * unit(random), 1).normalized()};
-    Axis target{{20 * unit(random), 20 * unit(random), 3}, Eigen::Vector3d(0.3 * unit(random), 0.3 * unit(random), 1).normalized()};
+    Axis model{{20 * unit(random), 20 * unit(random), 9},
+               Eigen::Vector3d(0.3 * unit(random), 0.3 * unit(random), 1).normalized()};
+    Axis target{{20 * unit(random), 20 * unit(random), 3},
+                Eigen::Vector3d(0.3 * unit(random), 0.3 * unit(random), 1).normalized()};
     if (i % 2) target.direction = -target.direction;  // an axis has no sense of its own
     const Eigen::Vector3d anchor(5, -7, 60);
     const marrow::RigidTransform move = world_from_world_move(model, target, anchor);
@@ -115,9 +120,10 @@ TEST(Axis, IsRefusedFromViewsOfTheSameSide) {
     axis_of_planes(planes);
     FAIL();
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, where 10 are "
-                 "needed; use views farther apart, or a single one");
+    EXPECT_STREQ(
+        error.what(),
+        "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 4.0 degrees, where 10 are "
+        "needed; use views farther apart, or a single one");
   }
 }
 

@@ -8,7 +8,8 @@
 namespace {
 
 TEST(Manual, MovesAboutTheFragmentsOwnAxes) {
-  const marrow::Mesh model = tube::mesh(90, [](double, double) { return 14.0; }, [](double) { return Eigen::Vector3d(30, 0, 0); });
+  const marrow::Mesh model = tube::mesh(
+      90, [](double, double) { return 14.0; }, [](double) { return Eigen::Vector3d(30, 0, 0); });
   Options options;
   options.rotation_deg = {0, 0, 90};
   options.translation_mm = {1, 2, 3};

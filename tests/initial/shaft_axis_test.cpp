@@ -51,7 +51,8 @@ struct TrueViews {
 
 /// Errors of the axis at the fragment's origin: angle between long axes, and distance across the axis.
 std::pair<double, double> axis_errors(const Pose& pose, const RigidTransform& truth) {
-  const Eigen::Vector3d z = truth.rotation * pose.frame.axes.col(2), found = pose.world_from_model.rotation * pose.frame.axes.col(2);
+  const Eigen::Vector3d z = truth.rotation * pose.frame.axes.col(2),
+                        found = pose.world_from_model.rotation * pose.frame.axes.col(2);
   const Eigen::Vector3d off = pose.world_from_model * pose.frame.origin_mm - truth * pose.frame.origin_mm;
   return {marrow::degrees(std::atan2(z.cross(found).norm(), z.dot(found))), (off - z * z.dot(off)).norm()};
 }
@@ -71,7 +72,8 @@ TEST(ShaftAxis, FindsTheAxisOfACylinderFromTwoAndThreeViews) {
     }
     const Pose pose = shaft_axis(model, lines, views, nullptr, Options{});
     const auto [turned_deg, off_mm] = axis_errors(pose, truth);
-    std::printf("cylinder, %zu views: %.4f deg, %.4f mm, %d rounds\n", angles.size(), turned_deg, off_mm, pose.evaluations);
+    std::printf("cylinder, %zu views: %.4f deg, %.4f mm, %d rounds\n", angles.size(), turned_deg, off_mm,
+                pose.evaluations);
     EXPECT_LT(turned_deg, 0.02);
     EXPECT_LT(off_mm, 0.02);
     EXPECT_TRUE(pose.warnings.empty());
@@ -80,11 +82,15 @@ TEST(ShaftAxis, FindsTheAxisOfACylinderFromTwoAndThreeViews) {
   }
 }
 
-// A bow of 900 mm radius to the front, a taper of 2 degrees a side and a ridge of 4 mm at the back: none of them moves the
-// axis, because the model is measured as the image was.
+// A bow of 900 mm radius to the front, a taper of 2 degrees a side and a ridge of 4 mm at the back: none of them moves
+// the axis, because the model is measured as the image was.
 TEST(ShaftAxis, IsNotMisledByBowTaperAndRidge) {
   const Mesh model = tube::mesh(
-      90, [](double z, double angle) { return 14 - 0.035 * z + 4 * std::exp(-std::pow(std::remainder(angle - marrow::kPi / 2, 2 * marrow::kPi) / 0.3, 2)); },
+      90,
+      [](double z, double angle) {
+        return 14 - 0.035 * z +
+               4 * std::exp(-std::pow(std::remainder(angle - marrow::kPi / 2, 2 * marrow::kPi) / 0.3, 2));
+      },
       [](double z) { return Eigen::Vector3d(0, z * z / 1800, 0); });
   for (const Eigen::Vector3d& tilt : {Eigen::Vector3d(5, -4, 0), Eigen::Vector3d(-8, 3, 0)}) {
     const RigidTransform truth = posed(tilt, {6, -9, 0});
@@ -93,8 +99,8 @@ TEST(ShaftAxis, IsNotMisledByBowTaperAndRidge) {
     const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr, Options{});
     const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
     const auto [turned_deg, off_mm] = axis_errors(pose, truth);
-    std::printf("bowed, tapered, ridged: %.4f deg, %.4f mm, %d rounds, %.1f ms, %zu triangles\n", turned_deg, off_mm, pose.evaluations, ms,
-                model.triangles.size());
+    std::printf("bowed, tapered, ridged: %.4f deg, %.4f mm, %d rounds, %.1f ms, %zu triangles\n", turned_deg, off_mm,
+                pose.evaluations, ms, model.triangles.size());
     EXPECT_LT(turned_deg, 0.3);
     EXPECT_LT(off_mm, 0.5);
   }
@@ -152,14 +158,20 @@ TEST(ShaftAxis, WarnsOfBordersThatAreNotThoseOfTheModel) {
   setup.lines.add("lateral", tube::borders(side.camera, {0, 0, 0}, {0, 0, 1}, 19, 60, 350));
   const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr, Options{});
   ASSERT_EQ(pose.warnings.size(), 1u);
-  EXPECT_EQ(pose.warnings[0], "view 'lateral': the shaft's borders are 39.0 mm apart, where the model is 28.0 mm wide; they may belong to "
-                              "something else");
+  EXPECT_EQ(
+      pose.warnings[0],
+      "view 'lateral': the shaft's borders are 39.0 mm apart, where the model is 28.0 mm wide; they may belong to "
+      "something else");
 }
 
 TEST(ShaftAxis, SaysWhatIsMissing) {
   const Mesh model = tube::cylinder(14, 90);
   TrueViews setup(model, posed({0, 0, 0}, {0, 0, 0}), {0, 90});
-  const List<View> one_view = [&] { List<View> list; list.add("at 0", setup.views[0]); return list; }();
+  const List<View> one_view = [&] {
+    List<View> list;
+    list.add("at 0", setup.views[0]);
+    return list;
+  }();
   EXPECT_EQ(error_of([&] { shaft_axis(model, setup.lines, one_view, nullptr, Options{}); }),
             "there are shaft lines of a view 'at 90', but no view of that name");
   EXPECT_EQ(error_of([&] { shaft_axis(model, {}, setup.views, nullptr, Options{}); }),
@@ -167,12 +179,14 @@ TEST(ShaftAxis, SaysWhatIsMissing) {
   Pose far;
   far.world_from_model.translation_mm = {0, 0, 400};
   EXPECT_EQ(error_of([&] { shaft_axis(model, setup.lines, setup.views, &far, Options{}); }),
-            "view 'at 0': where the image shows the shaft, the model at its start does not appear; give a start nearer to the bone");
+            "view 'at 0': where the image shows the shaft, the model at its start does not appear; give a start nearer "
+            "to the bone");
   List<ShaftLines> empty_lines;
   empty_lines.add("at 0", ShaftLines{});
   EXPECT_EQ(error_of([&] { shaft_axis(model, empty_lines, setup.views, nullptr, Options{}); }),
             "view 'at 0': a border of the shaft has no length");
-  EXPECT_EQ(error_of([&] { shaft_axis(Mesh{}, setup.lines, setup.views, nullptr, Options{}); }), "model: the surface has no triangles");
+  EXPECT_EQ(error_of([&] { shaft_axis(Mesh{}, setup.lines, setup.views, nullptr, Options{}); }),
+            "model: the surface has no triangles");
 }
 
 }  // namespace

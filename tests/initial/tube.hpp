@@ -12,7 +12,10 @@ namespace tube {
 template <class Radius, class Centre>
 marrow::Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180, int rings = 120) {
   marrow::Mesh mesh;
-  const auto add = [&](const Eigen::Vector3d& point) { mesh.vertices_mm.push_back(point); return std::uint32_t(mesh.vertices_mm.size() - 1); };
+  const auto add = [&](const Eigen::Vector3d& point) {
+    mesh.vertices_mm.push_back(point);
+    return std::uint32_t(mesh.vertices_mm.size() - 1);
+  };
   for (int ring = 0; ring <= rings; ++ring) {
     const double z = half_mm * (2.0 * ring / rings - 1);
     for (int side = 0; side < sides; ++side) {
@@ -21,7 +24,8 @@ marrow::Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180,
     }
   }
   const auto at = [&](int ring, int side) { return std::uint32_t(ring * sides + side % sides); };
-  const std::uint32_t bottom = add(centre(-half_mm) + Eigen::Vector3d(0, 0, -half_mm)), top = add(centre(half_mm) + Eigen::Vector3d(0, 0, half_mm));
+  const std::uint32_t bottom = add(centre(-half_mm) + Eigen::Vector3d(0, 0, -half_mm)),
+                      top = add(centre(half_mm) + Eigen::Vector3d(0, 0, half_mm));
   for (int side = 0; side < sides; ++side) {
     for (int ring = 0; ring < rings; ++ring) {
       mesh.triangles.push_back({at(ring, side), at(ring, side + 1), at(ring + 1, side + 1)});
@@ -34,12 +38,14 @@ marrow::Mesh mesh(double half_mm, Radius radius, Centre centre, int sides = 180,
 }
 
 inline marrow::Mesh cylinder(double radius_mm, double half_mm) {
-  return mesh(half_mm, [=](double, double) { return radius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); });
+  return mesh(
+      half_mm, [=](double, double) { return radius_mm; }, [](double) { return Eigen::Vector3d(0, 0, 0); });
 }
 
-/// The two image lines in which planes through the source touch a circular cylinder, between the images of two of its points.
-inline std::array<Eigen::Vector3d, 2> tangents(const marrow::Camera& camera, const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
-                                               double radius_mm) {
+/// The two image lines in which planes through the source touch a circular cylinder, between the images of two of its
+/// points.
+inline std::array<Eigen::Vector3d, 2> tangents(const marrow::Camera& camera, const Eigen::Vector3d& point,
+                                               const Eigen::Vector3d& direction, double radius_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(camera), d = direction.normalized();
   Eigen::Vector3d to_axis = point - source;
   to_axis -= d * d.dot(to_axis);
@@ -54,16 +60,19 @@ inline std::array<Eigen::Vector3d, 2> tangents(const marrow::Camera& camera, con
 }
 
 /// Point of an image line at height v.
-inline Eigen::Vector2d at_height(const Eigen::Vector3d& line, double v) { return {-(line.y() * v + line.z()) / line.x(), v}; }
+inline Eigen::Vector2d at_height(const Eigen::Vector3d& line, double v) {
+  return {-(line.y() * v + line.z()) / line.x(), v};
+}
 
 /// Exact borders between two heights of the image, as shaft lines.
-inline marrow::ShaftLines borders(const marrow::Camera& camera, const Eigen::Vector3d& point, const Eigen::Vector3d& direction,
-                                  double radius_mm, double from_v, double to_v) {
+inline marrow::ShaftLines borders(const marrow::Camera& camera, const Eigen::Vector3d& point,
+                                  const Eigen::Vector3d& direction, double radius_mm, double from_v, double to_v) {
   const auto lines = tangents(camera, point, direction, radius_mm);
   marrow::ShaftLines shaft;
   shaft.left = {at_height(lines[0], from_v), at_height(lines[0], to_v)};
   shaft.right = {at_height(lines[1], from_v), at_height(lines[1], to_v)};
-  if (shaft.left.from_px.x() < shaft.right.from_px.x()) std::swap(shaft.left, shaft.right);  // they run down, so left is at larger u
+  if (shaft.left.from_px.x() < shaft.right.from_px.x())
+    std::swap(shaft.left, shaft.right);  // they run down, so left is at larger u
   return shaft;
 }
 

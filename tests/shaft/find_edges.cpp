@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program can hold the entry of one plugin only: this one's gets another name.
 #define marrow_plugin_entry edges_plugin_entry
-#include "plugins/edges/adaptive_relaxation.cpp"
-
 #include "shaft/find_edges.hpp"
 
-marrow::EdgeMap find_edges(const marrow::View& view) { return adaptive_relaxation(view, Options{}); }
+#include "plugins/edges/adaptive_relaxation.cpp"
+
+marrow::EdgeMap find_edges(const marrow::View& view) {
+  return adaptive_relaxation(view, Options{});
+}

@@ -49,7 +49,9 @@ void draw(EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to
   }
 }
 
-EdgeMap no_edges() { return {512, 512, {}}; }
+EdgeMap no_edges() {
+  return {512, 512, {}};
+}
 const Eigen::Vector2d kLeft(-1, 0), kRight(1, 0);
 
 /// Angle and offset of the plane that two borders span against the exact one.
@@ -62,7 +64,8 @@ void check_against_truth(const ShaftLines& lines, const View& view, const radiog
   const auto middle = [](const ShaftLines& s, double v) {
     double sum = 0;
     for (const marrow::LineSegment* border : {&s.left, &s.right})
-      sum += border->from_px.x() + (v - border->from_px.y()) / (border->to_px.y() - border->from_px.y()) * (border->to_px.x() - border->from_px.x());
+      sum += border->from_px.x() + (v - border->from_px.y()) / (border->to_px.y() - border->from_px.y()) *
+                                       (border->to_px.x() - border->from_px.x());
     return sum / 2;
   };
   std::printf("  middle off by %.3f and %.3f px, width %.2f of %.2f mm\n", middle(lines, 100) - middle(exact, 100),
@@ -75,18 +78,21 @@ TEST(HoughPairs, FindsTheShaftOfARadiographAndRejectsCanalAndThigh) {
   for (double photons : {1000.0, 5000.0, 0.0})
     for (double angle : {0.0, 90.0}) {
       const auto scene = radiograph::shaft({5, 3, 0}, {0.08, -0.05, 1});
-      const View view = radiograph::image(angle == 0 ? "frontal" : "lateral", radiograph::camera(angle), scene, photons, 11);
+      const View view =
+          radiograph::image(angle == 0 ? "frontal" : "lateral", radiograph::camera(angle), scene, photons, 11);
       const EdgeMap edges = find_edges(view);
       const auto before = std::chrono::steady_clock::now();
       const ShaftLines lines = hough_pairs(edges, view, Options{});
-      std::printf("%.0f photons: %.1f ms\n", photons, std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count());
+      std::printf("%.0f photons: %.1f ms\n", photons,
+                  std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count());
       EXPECT_NEAR(lines.width_mm, 28, 1.5);
       EXPECT_GT((lines.left.to_px - lines.left.from_px).norm(), 400);
       EXPECT_GT(lines.left.to_px.y(), lines.left.from_px.y());
       EXPECT_GT(lines.left.from_px.x(), lines.right.from_px.x());  // on the left when looking down the image
       check_against_truth(lines, view, scene.cylinders[1]);
       const auto said = [&](const std::string& words) {
-        return std::any_of(lines.rejected.begin(), lines.rejected.end(), [&](const auto& r) { return r.reason.find(words) != std::string::npos; });
+        return std::any_of(lines.rejected.begin(), lines.rejected.end(),
+                           [&](const auto& r) { return r.reason.find(words) != std::string::npos; });
       };
       if (photons != 1000) {
         EXPECT_TRUE(said("it is darker outside than inside, as a canal"));
@@ -134,25 +140,29 @@ TEST(HoughPairs, SaysWhyThereIsNoPair) {
   draw(edges, {240, 20}, {240, 400}, kRight);  // the canal's polarity
   draw(edges, {275, 20}, {275, 400}, kLeft);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is darker outside than inside, as a canal or "
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is darker outside than "
+            "inside, as a canal or "
             "a gap between bones is (12.3 mm wide)");
   edges = no_edges();
   draw(edges, {40, 20}, {40, 400}, kLeft);  // the thigh's outline
   draw(edges, {440, 20}, {440, 400}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its width of 140.6 mm is not that of a shaft "
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its width of 140.6 mm is "
+            "not that of a shaft "
             "(28.5 +- 3.3, 30.3 +- 3.1 mm, at most 3 deviations)");
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, dark_between(270, 330), Options{}); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what lies beside it (mean grey "
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what "
+            "lies beside it (mean grey "
             "value 917 inside, 500 and 1000 outside)");
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its borders run side by side for 7 mm only, of 25 mm "
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its borders run side by "
+            "side for 7 mm only, of 25 mm "
             "wanted");
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
@@ -162,12 +172,14 @@ TEST(HoughPairs, SaysWhyThereIsNoPair) {
 
 TEST(HoughPairs, SaysWhatIsWrongWithItsInputs) {
   EXPECT_EQ(error_of([&] { hough_pairs(no_edges(), empty_view(), Options{}); }),
-            "view 'frontal': the edge map is empty, so there is no shaft in it; look at the image, and lower the thresholds of the edge "
+            "view 'frontal': the edge map is empty, so there is no shaft in it; look at the image, and lower the "
+            "thresholds of the edge "
             "detector");
   EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
-  EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(256), Options{}); }),
-            "view 'frontal': the edge map is for 512 x 512 pixels, the view has 256 x 256; wire the edges of this view");
+  EXPECT_EQ(
+      error_of([&] { hough_pairs(edges, empty_view(256), Options{}); }),
+      "view 'frontal': the edge map is for 512 x 512 pixels, the view has 256 x 256; wire the edges of this view");
   Options options;
   options.width_deviation_mm = {3};
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), options); }),
@@ -178,7 +190,8 @@ TEST(HoughPairs, SaysWhatIsWrongWithItsInputs) {
             "view 'frontal': the world's origin, the isocentre, does not lie in front of the X-ray source");
 }
 
-// A real knee (data of Brown University, see the data folder's README): the distal femur runs from the middle to the upper left.
+// A real knee (data of Brown University, see the data folder's README): the distal femur runs from the middle to the
+// upper left.
 TEST(HoughPairs, FindsTheFemurOfARealKnee) {
   const std::string path = MARROW_SOURCE_DIR "/../shared/data/knee/images/L_Hop_Cam2_001_UND.0138.tif";
   if (!std::filesystem::exists(path)) GTEST_SKIP() << "the real knee is not here: " << path;
@@ -187,13 +200,15 @@ TEST(HoughPairs, FindsTheFemurOfARealKnee) {
   view.image.pixels = cv::imread(path, cv::IMREAD_GRAYSCALE);
   view.camera.width_px = view.image.width();
   view.camera.height_px = view.image.height();
-  view.camera.intrinsics << 8700, 0, 880, 0, 8700, 880, 0, 0, 1;  // about 0.158 mm a pixel where the world's origin lies
+  view.camera.intrinsics << 8700, 0, 880, 0, 8700, 880, 0, 0,
+      1;  // about 0.158 mm a pixel where the world's origin lies
   view.camera.camera_from_world.translation_mm = {0, 0, 1370};
   const ShaftLines lines = hough_pairs(find_edges(view), view, Options{});
   const auto angle_deg = [](const marrow::LineSegment& s) {
     return marrow::degrees(std::atan2(s.to_px.y() - s.from_px.y(), s.to_px.x() - s.from_px.x()));
   };
-  std::printf("knee: width %.1f mm, borders at %.1f and %.1f deg\n", lines.width_mm, angle_deg(lines.left), angle_deg(lines.right));
+  std::printf("knee: width %.1f mm, borders at %.1f and %.1f deg\n", lines.width_mm, angle_deg(lines.left),
+              angle_deg(lines.right));
   EXPECT_NEAR(angle_deg(lines.left), 41.5, 4);
   EXPECT_NEAR(angle_deg(lines.right), 42, 4);
   EXPECT_NEAR(lines.left.from_px.x(), 330, 60);  // read off the picture
