@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <marrow/plugin.hpp>
 
 #include "nearest_edges.hpp"
 
@@ -16,7 +15,7 @@ struct Options {
   double direction_tolerance_deg = 40;
   double edge_offset_px = 0;
   bool estimate_offset = true;
-  double model_error_px = 0.25;
+  double model_error_px = 0.4;
 };
 
 /// One point of the outline against the edge nearest to it.
@@ -34,7 +33,8 @@ struct Matches {
 /// sqrt(s^2 + d^2) - s: quadratic near zero, then the distance itself as in the chapter, and no more than at the reach.
 class Loss {
  public:
-  Loss(double scale, double reach) : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
+  Loss(double scale, double reach)
+      : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
   double worst() const { return worst_; }
   double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
   bool counts(double distance2) const { return distance2 < reach2_; }
@@ -81,10 +81,11 @@ class ContourDistance : public marrow::Cost {
     return std::make_shared<ContourDistance>(scene_, level);
   }
 
-  /// Ratio between the curvature of the cost and the variance of its slope, both by the residuals at this pose (the sandwich of
-  /// M-estimation: Huber 1981, 6.3). Errors along the outline are related to each other, so the slopes are first summed over
-  /// blocks of the image, and the sums taken as independent. To each block the error of model and edges is added that is the
-  /// same all over it: the fit takes up much of such errors, so the residuals do not tell them.
+  /// Ratio between the curvature of the cost and the variance of its slope, both by the residuals at this pose (the
+  /// sandwich of M-estimation: Huber 1981, 6.3). Errors along the outline are related to each other, so the slopes are
+  /// first summed over blocks of the image, and the sums taken as independent. To each block the error of model and
+  /// edges is added that is the same all over it: the fit takes up much of such errors, so the residuals do not tell
+  /// them.
   std::optional<double> likelihood_factor(const marrow::RigidTransform& world_from_model) const override {
     constexpr float kBlock_px = 32;
     constexpr double kLeastNoise_px = 0.05;  // no edge pixel is known better than this
@@ -132,10 +133,11 @@ class ContourDistance : public marrow::Cost {
   }
 
   Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;   // edge detectors see nothing at the very border of an image
+    constexpr float kMargin_px = 3;        // edge detectors see nothing at the very border of an image
     constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
     const marrow::View& view = scene_->views[index];
-    const float right = float(view.camera.width_px - 1) - kMargin_px, bottom = float(view.camera.height_px - 1) - kMargin_px;
+    const float right = float(view.camera.width_px - 1) - kMargin_px,
+                bottom = float(view.camera.height_px - 1) - kMargin_px;
     Matches matches;
     const auto outline = scene_->projector->outline(view.camera, world_from_model, level_.contour_spacing_px);
     matches.residuals.reserve(outline.size());
@@ -154,8 +156,8 @@ class ContourDistance : public marrow::Cost {
   }
 
   /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie
-  /// inside its silhouette, and a segmented model may be too fat or too thin. The value that costs least at this pose, by
-  /// iteratively reweighted means.
+  /// inside its silhouette, and a segmented model may be too fat or too thin. The value that costs least at this pose,
+  /// by iteratively reweighted means.
   double offset_of(const std::vector<Matches>& views) const {
     constexpr double kMost_px = 3;
     constexpr int kRounds = 5;
@@ -191,19 +193,22 @@ void check_inputs(const marrow::List<marrow::View>& views, const marrow::List<ma
     const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
     marrow::check_camera(views[i].camera, "view '" + views.name(i) + "'");
     if (edges[i].pixels.empty())
-      throw marrow::Error("view '" + views.name(i) +
-                          "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, "
-                          "or check that the image shows the bone");
+      throw marrow::Error(
+          "view '" + views.name(i) +
+          "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, "
+          "or check that the image shows the bone");
     if (edges[i].width_px != views[i].camera.width_px || edges[i].height_px != views[i].camera.height_px)
-      throw marrow::Error("view '" + views.name(i) + "': the edge map has " + size(edges[i].width_px, edges[i].height_px) +
-                          " pixels, but the camera " + size(views[i].camera.width_px, views[i].camera.height_px) +
+      throw marrow::Error("view '" + views.name(i) + "': the edge map has " +
+                          size(edges[i].width_px, edges[i].height_px) + " pixels, but the camera " +
+                          size(views[i].camera.width_px, views[i].camera.height_px) +
                           "; give the edges of this view's own image");
   }
 }
 
 std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
                                                      const marrow::List<marrow::View>& views,
-                                                     const marrow::List<marrow::EdgeMap>& edges, const Options& options) {
+                                                     const marrow::List<marrow::EdgeMap>& edges,
+                                                     const Options& options) {
   check_inputs(views, edges);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
@@ -222,21 +227,26 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& pr
 
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.contour_distance", contour_distance)
-      .summary("Mean distance from the points of the projected outline to the nearest edges of like direction, over all views")
+      .summary(
+          "Mean distance from the points of the projected outline to the nearest edges of like direction, over all "
+          "views")
       .in("projector", "draws the outline of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
       .out("cost", "mean distance [px]")
       .option("contour_spacing_px", &Options::contour_spacing_px, "distance between points of the outline",
               marrow::at_least(0.25))
-      .option("reach_px", &Options::reach_px, "distance from which on a point counts as unmatched", marrow::at_least(0.5))
+      .option("reach_px", &Options::reach_px, "distance from which on a point counts as unmatched",
+              marrow::at_least(0.5))
       .option("scale_px", &Options::scale_px, "distances below this count by their squares", marrow::at_least(0.01))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
               "by how much the directions of edge and outline may differ", marrow::at_least(10), marrow::at_most(180))
       .option("edge_offset_px", &Options::edge_offset_px,
-              "how far edges lie outside the model's outline; where it is estimated, the middle of the +-3 px that are tried")
+              "how far edges lie outside the model's outline; where it is estimated, the middle of the +-3 px that are "
+              "tried")
       .option("estimate_offset", &Options::estimate_offset,
               "find, at each pose, the edge offset common to all views that fits best")
       .option("model_error_px", &Options::model_error_px,
-              "for the predicted deviation: how far model and edges may differ all along 32 px of outline", marrow::at_least(0));
+              "for the predicted deviation: how far model and edges may differ all along 32 px of outline",
+              marrow::at_least(0));
 }

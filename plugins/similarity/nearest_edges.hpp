@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/features.hpp>
-#include <marrow/domain/transform.hpp>
 #include <oneapi/tbb/parallel_for.h>
 
 #include <algorithm>
@@ -9,15 +7,18 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <marrow/domain/features.hpp>
+#include <marrow/domain/transform.hpp>
 #include <opencv2/core.hpp>
 #include <vector>
 
-/// For any pixel and direction the nearest edge whose gradient points about that way. Directions fall into 16 sectors, and for
-/// each a label image (an exact distance transform: Felzenszwalb and Huttenlocher, Theory of Computing 2012) names the
-/// nearest edge of each cell of 2 x 2 pixels.
+/// For any pixel and direction the nearest edge whose gradient points about that way. Directions fall into 16 sectors,
+/// and for each a label image (an exact distance transform: Felzenszwalb and Huttenlocher, Theory of Computing 2012)
+/// names the nearest edge of each cell of 2 x 2 pixels.
 class NearestEdges {
  public:
-  /// Edges are used inside the mask (empty: everywhere), for directions that differ by at most `tolerance_rad` from theirs.
+  /// Edges are used inside the mask (empty: everywhere), for directions that differ by at most `tolerance_rad` from
+  /// theirs.
   NearestEdges(const marrow::EdgeMap& edges, const cv::Mat& mask, double tolerance_rad)
       : columns_((edges.width_px + kCell_px - 1) / kCell_px), rows_((edges.height_px + kCell_px - 1) / kCell_px) {
     for (const marrow::EdgePixel& edge : edges.pixels) {
@@ -35,8 +36,10 @@ class NearestEdges {
   /// The nearest edge, or nullptr when there is none in that direction. The pixel must lie inside the image.
   const marrow::EdgePixel* find(float u, float v, float direction_u, float direction_v) const {
     const int column = int(u + 0.5f) / kCell_px, row = int(v + 0.5f) / kCell_px;
-    const std::int32_t label = labels_[(std::size_t(sector_of(direction_u, direction_v)) * std::size_t(rows_) +
-                                        std::size_t(row)) * std::size_t(columns_) + std::size_t(column)];
+    const std::int32_t label =
+        labels_[(std::size_t(sector_of(direction_u, direction_v)) * std::size_t(rows_) + std::size_t(row)) *
+                    std::size_t(columns_) +
+                std::size_t(column)];
     return label < 0 ? nullptr : &edges_[std::size_t(label)];
   }
 
@@ -56,8 +59,8 @@ class NearestEdges {
     return std::atan2((1 - std::abs(along)) * (around < 2 ? 1 : -1), along);
   }
 
-  /// Moves each edge along its direction to the mean of its neighbours on the same border, because one cell keeps one edge
-  /// only, and one edge pixel is noisier than a few.
+  /// Moves each edge along its direction to the mean of its neighbours on the same border, because one cell keeps one
+  /// edge only, and one edge pixel is noisier than a few.
   void smooth(int width, int height) {
     constexpr int kReach_px = 3;
     constexpr float kSameBorder_px = 1.2f, kSameDirection = 0.8f;
@@ -74,7 +77,8 @@ class NearestEdges {
           const int j = at.at<int>(y, x);
           if (j < 0) continue;
           const marrow::EdgePixel& other = edges_[std::size_t(j)];
-          const float offset = (other.u_px - edge.u_px) * edge.direction_u + (other.v_px - edge.v_px) * edge.direction_v;
+          const float offset =
+              (other.u_px - edge.u_px) * edge.direction_u + (other.v_px - edge.v_px) * edge.direction_v;
           const float cosine = other.direction_u * edge.direction_u + other.direction_v * edge.direction_v;
           if (std::abs(offset) > kSameBorder_px || cosine < kSameDirection) continue;
           sum += offset;
@@ -120,9 +124,12 @@ class NearestEdges {
       for (int column = 0; column < columns_; ++column) {
         const std::size_t cell = std::size_t(row) * std::size_t(columns_) + std::size_t(column);
         std::int32_t& last = above[std::size_t(column)];
-        if (labels[cell] >= 0) last = labels[cell];
-        else if (last < 0 || (below[cell] >= 0 && row_of(below[cell]) - row < row - row_of(last))) labels[cell] = below[cell];
-        else labels[cell] = last;
+        if (labels[cell] >= 0)
+          last = labels[cell];
+        else if (last < 0 || (below[cell] >= 0 && row_of(below[cell]) - row < row - row_of(last)))
+          labels[cell] = below[cell];
+        else
+          labels[cell] = last;
       }
   }
 
