@@ -73,10 +73,17 @@ class Reader {
       declared_.push_back(input.key);
       OptionInfo info;
       info.type = OptionType::text;
-      std::optional<WrittenValue> value;
+      WrittenValue value;
+      bool given = false;
+      const auto give = [&](const Place& place, const YAML::Node& node, const fs::path& folder) {
+        given = true;
+        value.place = place;
+        value.value.reset(node);
+        value.folder = folder;
+      };
       for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input '" + input.key + "'", &kKeys)) {
         if (entry.key == "help") yaml_.text(entry.value, entry.place, "help");
-        if (entry.key == "default") value = WrittenValue{entry.place, entry.value, folder_};
+        if (entry.key == "default") give(entry.place, entry.value, folder_);
         if (entry.key != "type") continue;
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
@@ -88,12 +95,12 @@ class Reader {
         if (*type == "boolean") info.type = OptionType::boolean;
       }
       for (const auto& [name, text] : arguments_.inputs)
-        if (name == input.key) value = WrittenValue{{name + "=" + text}, YAML::Node(text), fs::current_path()};
-      set_input(input, info, value);
+        if (name == input.key) give({name + "=" + text, 0, 0}, YAML::Node(text), fs::current_path());
+      set_input(input, info, given ? &value : nullptr);
     }
   }
 
-  void set_input(const YamlEntry& input, const OptionInfo& info, const std::optional<WrittenValue>& value) {
+  void set_input(const YamlEntry& input, const OptionInfo& info, const WrittenValue* value) {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
