@@ -16,13 +16,16 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+double dot(const Vector& a, const Vector& b) {
+  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+}
 
 struct Slice {
   std::filesystem::path path;
   std::string series, description, modality;
   Samples samples;
   double position_mm = 0;  ///< along the normal of the slices
+  bool is_placed = false;  ///< says where it lies
 };
 
 bool looks_like_dicom(const std::filesystem::path& path) {
@@ -32,8 +35,8 @@ bool looks_like_dicom(const std::filesystem::path& path) {
   return stream.gcount() == sizeof head && std::equal(head + 128, head + 132, "DICM");
 }
 
-/// GDCM takes a file whose pixels are cut off, so the length that the pixel data element (7FE0,0010) claims is held against
-/// the file's size. Compressed pixels have no length here; they fail when they are unpacked.
+/// GDCM takes a file whose pixels are cut off, so the length that the pixel data element (7FE0,0010) claims is held
+/// against the file's size. Compressed pixels have no length here; they fail when they are unpacked.
 void check_pixels_are_whole(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
@@ -47,7 +50,8 @@ void check_pixels_are_whole(const std::filesystem::path& path) {
   // counts; only where there is none, the last with an implicit one.
   std::size_t begin = 0, length = 0;
   for (const char* type : {"OW", "OB"})
-    if (const std::size_t at = bytes.rfind(kTag + type + std::string(2, '\0')); at != std::string::npos && at + 12 > begin) {
+    if (const std::size_t at = bytes.rfind(kTag + type + std::string(2, '\0'));
+        at != std::string::npos && at + 12 > begin) {
       begin = at + 12;
       length = length_at(at + 8);
     }
@@ -86,8 +90,7 @@ Slice read_slice(const std::filesystem::path& path) {
   if (slice.samples.size[2] != 1)
     throw Error(what + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
   if (slice.samples.components != 1) throw Error(what + ": has colours; a CT slice has one value per pixel");
-  if (tag(*io, "0020|0032").empty() || tag(*io, "0020|0037").empty())
-    throw Error(what + ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
+  slice.is_placed = !tag(*io, "0020|0032").empty() && !tag(*io, "0020|0037").empty();
   slice.position_mm = dot({slice.samples.origin_mm[0], slice.samples.origin_mm[1], slice.samples.origin_mm[2]},
                           column(slice.samples, 2));
   return slice;
@@ -120,7 +123,8 @@ std::vector<Slice> choose_series(const std::filesystem::path& folder, const std:
     all += "\n    " + uid + " (" + slices[0].modality + ", " + std::to_string(slices.size()) + " slices" +
            (slices[0].description.empty() ? "" : ", " + slices[0].description) + ")";
   if (series_uid.empty() && series.size() > 1)
-    throw Error(folder.string() + ": holds " + std::to_string(series.size()) + " series; name one with series_uid:" + all);
+    throw Error(folder.string() + ": holds " + std::to_string(series.size()) +
+                " series; name one with series_uid:" + all);
   const auto chosen = series_uid.empty() ? series.begin() : series.find(series_uid);
   if (chosen == series.end()) throw Error(folder.string() + ": holds no series " + series_uid + "; it holds:" + all);
   return std::move(chosen->second);
@@ -138,11 +142,17 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
   if (slices.size() < 2) throw Error(folder.string() + ": the series has 1 slice; a volume needs at least 2");
   for (const Slice& slice : slices) {
     if (slice.modality != "CT")
-      throw Error(slice.path.string() + ": is of modality '" + slice.modality + "'; expected CT, whose values are Hounsfield units");
+      throw Error(slice.path.string() + ": is of modality '" + slice.modality +
+                  "'; expected CT, whose values are Hounsfield units");
+    if (!slice.is_placed)
+      throw Error(slice.path.string() +
+                  ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
     bool same = slice.samples.size == first.samples.size;
     for (int i = 0; i < 9; ++i) same = same && std::abs(slice.samples.direction[i] - first.samples.direction[i]) < 1e-4;
-    for (int i = 0; i < 2; ++i) same = same && std::abs(slice.samples.spacing_mm[i] - first.samples.spacing_mm[i]) < 1e-5;
-    if (!same) throw Error(slice.path.string() + ": has another size, spacing or direction than " + first.path.string());
+    for (int i = 0; i < 2; ++i)
+      same = same && std::abs(slice.samples.spacing_mm[i] - first.samples.spacing_mm[i]) < 1e-5;
+    if (!same)
+      throw Error(slice.path.string() + ": has another size, spacing or direction than " + first.path.string());
   }
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
@@ -151,7 +161,8 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
   const double usual = sorted[sorted.size() / 2];
   for (std::size_t i = 0; i < gaps.size(); ++i) {
     const std::string between = slices[i].path.filename().string() + " and " + slices[i + 1].path.filename().string();
-    if (gaps[i] < 1e-3) throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
+    if (gaps[i] < 1e-3)
+      throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
     if (std::abs(gaps[i] - usual) > 0.01 * usual + 1e-3)
       throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(usual) +
                   " between most slices; a slice is missing or the series is unevenly spaced");
@@ -169,15 +180,15 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
 DicomSeries read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
   std::vector<Slice> slices = choose_series(folder, series_uid);
-  std::stable_sort(slices.begin(), slices.end(), [](const Slice& a, const Slice& b) { return a.position_mm < b.position_mm; });
+  std::stable_sort(slices.begin(), slices.end(),
+                   [](const Slice& a, const Slice& b) { return a.position_mm < b.position_mm; });
   check_slices(folder, slices);
   DicomSeries series;
   series.geometry = slices[0].samples;
   series.geometry.bytes.clear();
   series.geometry.dimensions = 3;
   series.geometry.size[2] = int(slices.size());
-  series.geometry.spacing_mm[2] =
-      (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
+  series.geometry.spacing_mm[2] = (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
   for (const Slice& slice : slices) {
     const std::vector<float> values = to_float(slice.samples);
     series.values.insert(series.values.end(), values.begin(), values.end());
