@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/error.hpp>
-#include <marrow/domain/functions.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <exception>
 #include <limits>
+#include <marrow/domain/error.hpp>
+#include <marrow/domain/functions.hpp>
 #include <nlopt.hpp>
 #include <string>
 #include <vector>
 
-/// Runs one of NLopt's algorithms without derivatives on a problem. The algorithm works in units of the initial step, so
-/// that coordinates of different scale are alike to it.
+/// Runs one of NLopt's algorithms without derivatives on a problem. The algorithm works in units of the initial step,
+/// so that coordinates of different scale are alike to it.
 class NloptRun {
  public:
   NloptRun(nlopt::algorithm algorithm, const marrow::MinimisationProblem& problem)

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "volume_border.hpp"
@@ -37,7 +36,8 @@ class Silhouette {
           right = std::max(right, u);
         }
       }
-      const int from = int(std::ceil(std::max(left, 0.0))), to = int(std::floor(std::min(right, double(triangle_of.cols - 1))));
+      const int from = int(std::ceil(std::max(left, 0.0))),
+                to = int(std::floor(std::min(right, double(triangle_of.cols - 1))));
       int* pixels = triangle_of.ptr<int>(row);
       for (int u = from; u <= to; ++u) pixels[u] = triangle;
     }
@@ -62,7 +62,8 @@ class SilhouetteProjector : public marrow::Projector {
   SilhouetteProjector(const marrow::Mesh& mesh, std::vector<char> at_border)
       : mesh_(mesh), at_border_(std::move(at_border)) {}
 
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
+                                            const marrow::RigidTransform& world_from_model,
                                             double spacing_px) const override {
     if (!(spacing_px > 0)) throw marrow::Error("the outline's spacing must be positive");
     const Silhouette silhouette = draw(camera, world_from_model);

@@ -1,11 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
 #include <algorithm>
 #include <cmath>
+#include <marrow/plugin.hpp>
 
 #include "surface_patches.hpp"
 #include "volume_border.hpp"
+
+// The hot loop is compiled for newer processors as well, and the fitting version taken at run time.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define MARROW_DISPATCH __attribute__((target_clones("avx2", "default")))
+#else
+#define MARROW_DISPATCH
+#endif
 
 namespace {
 
@@ -15,10 +21,10 @@ struct Options {
 
 /// A camera and a pose as this projector uses them: everything relative to the model's own origin.
 struct Geometry {
-  Eigen::Vector3f source;          ///< in the model's axes
-  Eigen::Matrix3f pixel_matrix;    ///< homogeneous pixel = pixel_matrix * model point + pixel_offset
+  Eigen::Vector3f source;        ///< in the model's axes
+  Eigen::Matrix3f pixel_matrix;  ///< homogeneous pixel = pixel_matrix * model point + pixel_offset
   Eigen::Vector3f pixel_offset;
-  Eigen::Matrix3f line_matrix;     ///< image line of the plane through the source with a model normal
+  Eigen::Matrix3f line_matrix;  ///< image line of the plane through the source with a model normal
 };
 
 Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
@@ -34,11 +40,12 @@ Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform&
   return g;
 }
 
-/// A point of the border between the surface's parts that face the source and those that do not.
+/// A point of the border between the surface's parts that face the source and those that do not: on the edge between
+/// two vertices of the surface.
 struct ContourPoint {
   float u, v;
-  Eigen::Vector3f normal;
-  Eigen::Vector3f model;
+  float fraction;  ///< of the way from `from` to `to`
+  std::uint32_t from, to;
   bool usable;  ///< in front of the source, and made by the bone
 };
 
@@ -47,6 +54,20 @@ struct ContourPiece {
   ContourPoint from, to;
 };
 
+/// Marks the patches of which a normal can be perpendicular to a line of sight: the sine of the angle between the
+/// cone's axis and the plane across the sight is at most sin(cone + angle under which the patch is seen), of which
+/// sin(cone) + radius / distance is an upper bound.
+MARROW_DISPATCH void mark_patches(const SurfacePatches::Bounds& b, const float* source, char* may_cross) {
+  const std::size_t count = b.radius.size();
+  const float sx = source[0], sy = source[1], sz = source[2];
+  for (std::size_t i = 0; i < count; ++i) {
+    const float dx = sx - b.x[i], dy = sy - b.y[i], dz = sz - b.z[i];
+    const float tilt = std::abs(b.axis_x[i] * dx + b.axis_y[i] * dy + b.axis_z[i] * dz);
+    const float most = b.cone_sine[i] * std::sqrt(dx * dx + dy * dy + dz * dz) + b.radius[i];
+    may_cross[i] = tilt <= 1.001f * most;
+  }
+}
+
 /// Finds the border on the surface as the zero line of g = n . (source - x), linear within each triangle. With the
 /// interpolated normals of the vertices it is a smooth curve, where the mesh's own edges zigzag.
 class ContourFinder {
@@ -54,49 +75,45 @@ class ContourFinder {
   ContourFinder(const SurfacePatches& surface, const Geometry& geometry) : s_(surface), geometry_(geometry) {}
 
   std::vector<ContourPiece> find() {
-    for (const auto& patch : s_.patches) {
-      const bool crossed = may_cross(patch);
+    std::vector<char> may_cross(s_.patches.size());
+    mark_patches(s_.bounds, geometry_.source.data(), may_cross.data());
+    pieces_.reserve(4096);
+    for (std::size_t i = 0; i < s_.patches.size(); ++i) {
+      const auto& patch = s_.patches[i];
+      const bool crossed = may_cross[i];
       if (!crossed && !patch.rim_count) continue;
       evaluate(patch);
       if (crossed)
-        for (std::uint32_t i = 0; i < patch.triangle_count; ++i) add_triangle(s_.triangles[patch.first_triangle + i]);
-      for (std::uint32_t i = 0; i < patch.rim_count; ++i) add_rim(s_.rims[patch.first_rim + i]);
+        for (std::uint32_t k = 0; k < patch.triangle_count; ++k) add_triangle(s_.triangles[patch.first_triangle + k]);
+      for (std::uint32_t k = 0; k < patch.rim_count; ++k) add_rim(s_.rims[patch.first_rim + k]);
     }
     return std::move(pieces_);
   }
 
  private:
-  /// Whether a normal of the patch can be perpendicular to a line of sight: whether the sine of the angle between the cone's
-  /// axis and the plane across the sight is at most sin(cone + angle under which the patch is seen), of which
-  /// sin(cone) + radius / distance is an upper bound.
-  bool may_cross(const SurfacePatches::Patch& patch) const {
-    const Eigen::Vector3f sight = geometry_.source - patch.centre;
-    return std::abs(patch.axis.dot(sight)) <= 1.001f * (patch.cone_sine * sight.norm() + patch.radius);
-  }
-
   void evaluate(const SurfacePatches::Patch& patch) {
     first_ = patch.first_vertex;
     const float sx = geometry_.source.x(), sy = geometry_.source.y(), sz = geometry_.source.z();
     for (std::uint32_t i = 0; i < patch.vertex_count; ++i) {
       const std::size_t k = first_ + i;
       facing_[i] = s_.nx[k] * (sx - s_.x[k]) + s_.ny[k] * (sy - s_.y[k]) + s_.nz[k] * (sz - s_.z[k]);
+      front_[i] = facing_[i] > 0;
     }
   }
 
   void add_triangle(const std::array<std::uint8_t, 3>& t) {
-    const bool front[3] = {facing_[t[0]] > 0, facing_[t[1]] > 0, facing_[t[2]] > 0};
-    const int count = front[0] + front[1] + front[2];
+    const int front[3] = {front_[t[0]], front_[t[1]], front_[t[2]]}, count = front[0] + front[1] + front[2];
     if (count == 0 || count == 3) return;
     // The corner that differs from the two others.
     int lone = 0;
-    while (front[lone] != (count == 1)) ++lone;
+    while (front[lone] != int(count == 1)) ++lone;
     const ContourPoint p = between(t[lone], t[(lone + 1) % 3]), q = between(t[lone], t[(lone + 2) % 3]);
     pieces_.push_back(count == 1 ? ContourPiece{p, q} : ContourPiece{q, p});
   }
 
   /// The rim of an open surface bounds the facing part as well, but is no outline of a bone.
   void add_rim(const std::array<std::uint8_t, 2>& rim) {
-    const bool from_front = facing_[rim[0]] > 0, to_front = facing_[rim[1]] > 0;
+    const bool from_front = front_[rim[0]], to_front = front_[rim[1]];
     if (!from_front && !to_front) return;
     ContourPiece piece{from_front ? point(rim[0], rim[0], 0) : between(rim[0], rim[1]),
                        to_front ? point(rim[1], rim[1], 0) : between(rim[0], rim[1])};
@@ -109,42 +126,50 @@ class ContourFinder {
   }
 
   ContourPoint point(std::uint8_t a, std::uint8_t b, float t) const {
-    const std::size_t i = first_ + a, j = first_ + b;
-    const auto mix = [t](float p, float q) { return p + t * (q - p); };
-    ContourPoint point;
-    point.model = {mix(s_.x[i], s_.x[j]), mix(s_.y[i], s_.y[j]), mix(s_.z[i], s_.z[j])};
-    point.normal = {mix(s_.nx[i], s_.nx[j]), mix(s_.ny[i], s_.ny[j]), mix(s_.nz[i], s_.nz[j])};
-    const Eigen::Vector3f pixel = geometry_.pixel_matrix * point.model + geometry_.pixel_offset;
-    point.u = pixel.x() / pixel.z();
-    point.v = pixel.y() / pixel.z();
-    point.usable = pixel.z() > 0 && !s_.at_border[i] && !s_.at_border[j];
-    return point;
+    const auto i = std::uint32_t(first_ + a), j = std::uint32_t(first_ + b);
+    const float x = s_.x[i] + t * (s_.x[j] - s_.x[i]), y = s_.y[i] + t * (s_.y[j] - s_.y[i]),
+                z = s_.z[i] + t * (s_.z[j] - s_.z[i]);
+    const Eigen::Matrix3f& m = geometry_.pixel_matrix;
+    const Eigen::Vector3f& o = geometry_.pixel_offset;
+    const float depth = m(2, 0) * x + m(2, 1) * y + m(2, 2) * z + o[2], inverse = 1 / depth;
+    return {(m(0, 0) * x + m(0, 1) * y + m(0, 2) * z + o[0]) * inverse,
+            (m(1, 0) * x + m(1, 1) * y + m(1, 2) * z + o[1]) * inverse,
+            t,
+            i,
+            j,
+            depth > 0 && !s_.at_border[i] && !s_.at_border[j]};
   }
 
   const SurfacePatches& s_;
   const Geometry& geometry_;
   std::size_t first_ = 0;
   std::array<float, 256> facing_;
+  std::array<std::uint8_t, 256> front_;
   std::vector<ContourPiece> pieces_;
 };
 
 /// Where a piece of contour crosses a line of a square grid laid over the image.
 struct Crossing {
-  float at_px;           ///< position along the line
+  float at_px;  ///< position along the line
+  std::int32_t line;
   std::int32_t piece;
-  float fraction;        ///< along the piece
-  int layers;            ///< change of the number of facing layers when passing it upwards
+  float fraction;  ///< along the piece
+  int layers;      ///< change of the number of facing layers when passing it upwards
 };
 
 /// Keeps, of all contour pieces, the points on the outer outline: those where the number of facing layers that cover a
-/// line of the image changes between none and some. The lines are the rows and columns of a grid, so that the points move
-/// smoothly with the pose; a row gives the points of an upright outline, a column those of a level one.
+/// line of the image changes between none and some. The lines are the rows and columns of a grid, so that the points
+/// move smoothly with the pose; a row gives the points of an upright outline, a column those of a level one.
 class OuterOutline {
  public:
-  OuterOutline(const std::vector<ContourPiece>& pieces, const marrow::Camera& camera, const Geometry& geometry,
-               double spacing_px, const Eigen::Vector3d& origin_mm)
-      : pieces_(pieces), geometry_(geometry), spacing_px_(float(spacing_px)), origin_(origin_mm.cast<float>()),
-        width_px_(camera.width_px), height_px_(camera.height_px) {}
+  OuterOutline(const SurfacePatches& surface, const std::vector<ContourPiece>& pieces, const marrow::Camera& camera,
+               const Geometry& geometry, double spacing_px)
+      : surface_(surface),
+        pieces_(pieces),
+        geometry_(geometry),
+        spacing_px_(float(spacing_px)),
+        width_px_(camera.width_px),
+        height_px_(camera.height_px) {}
 
   std::vector<marrow::OutlinePoint> find() {
     scan(true);
@@ -160,31 +185,40 @@ class OuterOutline {
   void scan(bool rows) {
     const int lines = int((rows ? height_px_ - 1 : width_px_ - 1) / spacing_px_) + 1;
     // Counting sort of the crossings by line.
+    crossings_.clear();
+    find_crossings(rows, lines);
     std::vector<std::uint32_t> first(std::size_t(lines) + 1, 0);
-    each_crossing(rows, lines, [&](int line, const Crossing&) { ++first[std::size_t(line) + 1]; });
+    for (const Crossing& c : crossings_) ++first[std::size_t(c.line) + 1];
     for (std::size_t i = 1; i < first.size(); ++i) first[i] += first[i - 1];
     std::vector<Crossing> sorted(first.back());
     std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
-    each_crossing(rows, lines, [&](int line, const Crossing& c) { sorted[next[std::size_t(line)]++] = c; });
+    for (const Crossing& c : crossings_) sorted[next[std::size_t(c.line)]++] = c;
     for (int line = 0; line < lines; ++line)
       walk(rows, sorted.begin() + first[std::size_t(line)], sorted.begin() + first[std::size_t(line) + 1]);
   }
 
-  template <class Use>
-  void each_crossing(bool rows, int lines, Use&& use) const {
+  void find_crossings(bool rows, int lines) {
+    const float lines_per_px = 1 / spacing_px_, top = float(lines);
     for (std::size_t i = 0; i < pieces_.size(); ++i) {
       const ContourPiece& piece = pieces_[i];
-      const float a = across(piece.from, rows) / spacing_px_, b = across(piece.to, rows) / spacing_px_;
+      const float a = across(piece.from, rows) * lines_per_px, b = across(piece.to, rows) * lines_per_px;
       const float low = std::min(a, b), high = std::max(a, b);
-      if (!(low < float(lines) - 0.5f && high > 0)) continue;  // also refuses NaN
-      const int begin = std::max(0, int(std::ceil(low))), end = std::min(lines, int(std::ceil(std::min(high, float(lines)))));
-      for (int line = begin; line < end; ++line) {  // half open, so that a joint of two pieces is crossed once
+      if (!(low < top && high > 0)) continue;  // also refuses NaN
+      // Half open, so that a joint of two pieces is crossed once.
+      const int begin = ceil_of(std::max(low, 0.0f)), end = ceil_of(std::min(high, top));
+      for (int line = begin; line < end; ++line) {
         const float t = (float(line) - a) / (b - a);
         const float at = along(piece.from, rows) + t * (along(piece.to, rows) - along(piece.from, rows));
         // The facing part lies on the left of the piece: passing rightwards one enters it where the piece runs down.
-        use(line, Crossing{at, std::int32_t(i), t, (b > a) == rows ? 1 : -1});
+        crossings_.push_back({at, line, std::int32_t(i), t, (b > a) == rows ? 1 : -1});
       }
     }
+  }
+
+  /// Of a number that is not negative; std::ceil is a call of a function without SSE 4.1.
+  static int ceil_of(float x) {
+    const int whole = int(x);
+    return whole + (float(whole) < x);
   }
 
   template <class Iterator>
@@ -207,7 +241,7 @@ class OuterOutline {
     const ContourPiece& piece = pieces_[std::size_t(crossing.piece)];
     if (!piece.from.usable || !piece.to.usable) return;
     const float t = crossing.fraction;
-    const Eigen::Vector3f normal = piece.from.normal + t * (piece.to.normal - piece.from.normal);
+    const Eigen::Vector3f normal = (1 - t) * normal_at(piece.from) + t * normal_at(piece.to);
     // The tangent plane contains the ray, so its image is the tangent of the outline.
     const Eigen::Vector2f image_normal = (geometry_.line_matrix * normal).head<2>().normalized();
     const float cosine = image_normal[rows ? 0 : 1], sine = image_normal[rows ? 1 : 0];
@@ -216,19 +250,29 @@ class OuterOutline {
     marrow::OutlinePoint point;
     point.u_px = piece.from.u + t * (piece.to.u - piece.from.u);
     point.v_px = piece.from.v + t * (piece.to.v - piece.from.v);
-    if (!(point.u_px >= 0 && point.v_px >= 0 && point.u_px <= float(width_px_ - 1) && point.v_px <= float(height_px_ - 1)))
+    if (!(point.u_px >= 0 && point.v_px >= 0 && point.u_px <= float(width_px_ - 1) &&
+          point.v_px <= float(height_px_ - 1)))
       return;
     point.normal_u = image_normal[0];
     point.normal_v = image_normal[1];
-    point.model_mm = origin_ + piece.from.model + t * (piece.to.model - piece.from.model);
+    point.model_mm = surface_.origin_mm.cast<float>() + (1 - t) * model_at(piece.from) + t * model_at(piece.to);
     points_.push_back(point);
   }
 
+  Eigen::Vector3f normal_at(const ContourPoint& p) const { return between(surface_.nx, surface_.ny, surface_.nz, p); }
+  Eigen::Vector3f model_at(const ContourPoint& p) const { return between(surface_.x, surface_.y, surface_.z, p); }
+  static Eigen::Vector3f between(const std::vector<float>& x, const std::vector<float>& y, const std::vector<float>& z,
+                                 const ContourPoint& p) {
+    const Eigen::Vector3f from(x[p.from], y[p.from], z[p.from]), to(x[p.to], y[p.to], z[p.to]);
+    return from + p.fraction * (to - from);
+  }
+
+  const SurfacePatches& surface_;
   const std::vector<ContourPiece>& pieces_;
   const Geometry& geometry_;
   const float spacing_px_;
-  const Eigen::Vector3f origin_;
   const int width_px_, height_px_;
+  std::vector<Crossing> crossings_;
   std::vector<marrow::OutlinePoint> points_;
 };
 
@@ -236,12 +280,13 @@ class SilhouetteEdges : public marrow::Projector {
  public:
   explicit SilhouetteEdges(SurfacePatches surface) : surface_(std::move(surface)) {}
 
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
+                                            const marrow::RigidTransform& world_from_model,
                                             double spacing_px) const override {
     if (!(spacing_px > 0)) throw marrow::Error("the outline's spacing must be positive");
     const Geometry geometry = geometry_of(camera, world_from_model, surface_.origin_mm);
     const std::vector<ContourPiece> pieces = ContourFinder(surface_, geometry).find();
-    return OuterOutline(pieces, camera, geometry, spacing_px, surface_.origin_mm).find();
+    return OuterOutline(surface_, pieces, camera, geometry, spacing_px).find();
   }
 
  private:

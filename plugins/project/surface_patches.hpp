@@ -1,27 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/mesh.hpp>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <map>
+#include <marrow/domain/mesh.hpp>
 #include <numeric>
 #include <vector>
 
-/// A surface cut into patches of some 32 neighbouring triangles of like normal, so that a whole patch can be passed over when
-/// none of its normals can be perpendicular to the line of sight. Vertices are stored once per patch, one array a coordinate.
+/// A surface cut into patches of some 32 neighbouring triangles of like normal, so that a whole patch can be passed
+/// over when none of its normals can be perpendicular to the line of sight. Vertices are stored once per patch, one
+/// array a coordinate.
 struct SurfacePatches {
   struct Patch {
-    Eigen::Vector3f centre;   ///< of the sphere around its vertices
-    float radius;
-    Eigen::Vector3f axis;     ///< of the cone around its vertex normals
-    float cone_sine;          ///< of its half opening angle; 1 from a right angle on
     std::uint32_t first_vertex, vertex_count, first_triangle, triangle_count, first_rim, rim_count;
   };
+  /// Of each patch: the sphere around its vertices and the cone around their normals.
+  struct Bounds {
+    std::vector<float> x, y, z, radius, axis_x, axis_y, axis_z;
+    std::vector<float> cone_sine;  ///< of the cone's half opening angle; 1 from a right angle on
+  };
   std::vector<Patch> patches;
-  std::vector<float> x, y, z, nx, ny, nz;              ///< relative to origin_mm; unit normals
+  Bounds bounds;
+  std::vector<float> x, y, z, nx, ny, nz;  ///< relative to origin_mm; unit normals
   std::vector<char> at_border;
   std::vector<std::array<std::uint8_t, 3>> triangles;  ///< indices within the patch
   std::vector<std::array<std::uint8_t, 2>> rims;       ///< edges of one triangle only, in its sense: an open surface
@@ -109,24 +111,25 @@ inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangle
   return rims;
 }
 
-inline void bound(SurfacePatches& s, SurfacePatches::Patch& patch) {
+inline void bound(SurfacePatches& s, const SurfacePatches::Patch& patch) {
   const auto point = [&](std::size_t i) { return Eigen::Vector3f(s.x[i], s.y[i], s.z[i]); };
   const auto normal = [&](std::size_t i) { return Eigen::Vector3f(s.nx[i], s.ny[i], s.nz[i]); };
   const std::size_t first = patch.first_vertex, last = first + patch.vertex_count;
-  patch.centre.setZero();
-  patch.axis.setZero();
+  Eigen::Vector3f centre = Eigen::Vector3f::Zero(), axis = Eigen::Vector3f::Zero();
   for (std::size_t i = first; i < last; ++i) {
-    patch.centre += point(i) / float(patch.vertex_count);
-    patch.axis += normal(i);
+    centre += point(i) / float(patch.vertex_count);
+    axis += normal(i);
   }
-  patch.axis = patch.axis.norm() > 1e-3f ? Eigen::Vector3f(patch.axis.normalized()) : Eigen::Vector3f::UnitZ();
-  patch.radius = 0;
-  float least_cosine = 1;
+  axis = axis.norm() > 1e-3f ? Eigen::Vector3f(axis.normalized()) : Eigen::Vector3f::UnitZ();
+  float radius = 0, least_cosine = 1;
   for (std::size_t i = first; i < last; ++i) {
-    patch.radius = std::max(patch.radius, (point(i) - patch.centre).norm());
-    least_cosine = std::min(least_cosine, normal(i).dot(patch.axis));
+    radius = std::max(radius, (point(i) - centre).norm());
+    least_cosine = std::min(least_cosine, normal(i).dot(axis));
   }
-  patch.cone_sine = least_cosine <= 0 ? 1 : std::sqrt(std::max(0.0f, 1 - least_cosine * least_cosine));
+  SurfacePatches::Bounds& b = s.bounds;
+  b.x.push_back(centre.x()), b.y.push_back(centre.y()), b.z.push_back(centre.z()), b.radius.push_back(radius);
+  b.axis_x.push_back(axis.x()), b.axis_y.push_back(axis.y()), b.axis_z.push_back(axis.z());
+  b.cone_sine.push_back(least_cosine <= 0 ? 1 : std::sqrt(std::max(0.0f, 1 - least_cosine * least_cosine)));
 }
 
 }  // namespace surface_patches

@@ -3,11 +3,10 @@
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/mesh.hpp>
 #include <marrow/domain/volume.hpp>
-
 #include <vector>
 
-/// For each vertex of a mesh whether it lies within `voxels` of the faces of the CT volume: there the surface ends because
-/// the scan does, and not because the bone does. All false without a volume.
+/// For each vertex of a mesh whether it lies within `voxels` of the faces of the CT volume: there the surface ends
+/// because the scan does, and not because the bone does. All false without a volume.
 inline std::vector<char> vertices_at_volume_border(const marrow::Mesh& mesh, const marrow::Volume* volume,
                                                    double voxels) {
   std::vector<char> at_border(mesh.vertices_mm.size(), 0);

@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <marrow/plugin.hpp>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <marrow/plugin.hpp>
 #include <numeric>
 
 #include "predicted_covariance.hpp"
@@ -22,7 +21,7 @@ struct Options {
   std::vector<double> step_axial_deg{6, 3, 1};
   std::vector<double> step_mm{3, 1, 0.3};
   int max_evaluations = 400;
-  double step_tolerance = 0.02;
+  std::vector<double> step_tolerance{0.1, 0.1, 0.03};
   double warn_above_deg = 3;
   double warn_above_mm = 5;
 };
@@ -40,14 +39,18 @@ class Search {
  public:
   Search(const marrow::Optimizer& optimizer, const marrow::Pose& initial, const Options& options,
          marrow::Context& context)
-      : optimizer_(optimizer), frame_(initial.frame), pose_(initial.world_from_model), options_(options), context_(context) {}
+      : optimizer_(optimizer),
+        frame_(initial.frame),
+        pose_(initial.world_from_model),
+        options_(options),
+        context_(context) {}
 
   const marrow::RigidTransform& pose() const { return pose_; }
   void go_to(const marrow::RigidTransform& pose) { pose_ = pose; }
   int evaluations() const { return evaluations_; }
 
-  /// Tries a grid of axial rotations and translations, which the stage before leaves open, and returns the best poses that
-  /// are no neighbours of a better one: the cost has other minima within their range.
+  /// Tries a grid of axial rotations and translations, which the stage before leaves open, and returns the best poses
+  /// that are no neighbours of a better one: the cost has other minima within their range.
   std::vector<marrow::RigidTransform> scan(const marrow::Cost& cost) {
     const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
     const int turns = steps(options_.scan_rotation_deg, options_.scan_rotation_step_deg);
@@ -98,7 +101,7 @@ class Search {
                                                        : options_.step_mm[level];
     }
     problem.max_evaluations = options_.max_evaluations;
-    problem.step_tolerance = options_.step_tolerance;
+    problem.step_tolerance = options_.step_tolerance[level];
     problem.function = [&](const Eigen::VectorXd& x) {
       context_.check_cancelled();
       return cost.value(pose_at(x));
@@ -128,8 +131,7 @@ void check_options(const Options& options) {
     if (values.empty() || values.size() != levels)
       throw marrow::Error(std::string(name) + " has " + std::to_string(values.size()) +
                           " numbers, but contour_spacing_px has " + std::to_string(levels) +
-                          "; give each of contour_spacing_px, reach_px, step_deg, step_axial_deg and step_mm one number per "
-                          "level");
+                          "; give reach_px and the four options of steps as many, one for each level");
     for (const double value : values)
       if (!(value > 0)) throw marrow::Error(std::string(name) + ": each number must be positive");
   };
@@ -138,6 +140,7 @@ void check_options(const Options& options) {
   check(options.step_deg, "step_deg");
   check(options.step_axial_deg, "step_axial_deg");
   check(options.step_mm, "step_mm");
+  check(options.step_tolerance, "step_tolerance");
 }
 
 Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose& initial,
@@ -160,8 +163,8 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
     result.pose = std::move(pose);
   };
   add_stage("start");
-  // Each candidate is judged after all six axes had their turn, because the start's errors in the other four hide which of
-  // them is right.
+  // Each candidate is judged after all six axes had their turn, because the start's errors in the other four hide which
+  // of them is right.
   const std::vector<marrow::RigidTransform> candidates = search.scan(*levels.front());
   const double share = 1.0 / double(candidates.size() + levels.size());
   marrow::RigidTransform best_axial, best;
@@ -206,24 +209,28 @@ MARROW_PLUGIN(plugin) {
       .in("initial", "pose to start from, and the fragment's axes")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses on the way: start, axial, final", marrow::over("stage"))
-      .option("scan_rotation_deg", &Options::scan_rotation_deg, "axial rotations tried, to either side", marrow::at_least(0),
-              marrow::at_most(180))
-      .option("scan_rotation_step_deg", &Options::scan_rotation_step_deg, "distance between these", marrow::at_least(0.01))
+      .option("scan_rotation_deg", &Options::scan_rotation_deg, "axial rotations tried, to either side",
+              marrow::at_least(0), marrow::at_most(180))
+      .option("scan_rotation_step_deg", &Options::scan_rotation_step_deg, "distance between these",
+              marrow::at_least(0.01))
       .option("scan_translation_mm", &Options::scan_translation_mm, "axial translations tried, to either side",
               marrow::at_least(0))
-      .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these", marrow::at_least(0.01))
+      .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these",
+              marrow::at_least(0.01))
       .option("candidates", &Options::candidates, "best places of this scan that are followed up", marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
-      .option("step_deg", &Options::step_deg, "per level: first step of the rotations about the frontal and lateral axes")
+      .option("step_deg", &Options::step_deg,
+              "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg,
               "per level: first step of the axial rotation, which moves the outline less")
       .option("step_mm", &Options::step_mm, "per level: first step of the translations")
-      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost per level", marrow::at_least(1))
-      .option("step_tolerance", &Options::step_tolerance, "a level ends when steps fall below this part of its first step",
-              marrow::at_least(1e-9), marrow::at_most(1), marrow::unit(""))
-      .option("warn_above_deg", &Options::warn_above_deg, "predicted standard deviation of a rotation that gives a warning",
-              marrow::at_least(0))
-      .option("warn_above_mm", &Options::warn_above_mm, "predicted standard deviation of a translation that gives a warning",
-              marrow::at_least(0));
+      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost per level",
+              marrow::at_least(1))
+      .option("step_tolerance", &Options::step_tolerance,
+              "per level: it ends when steps fall below this part of its first step")
+      .option("warn_above_deg", &Options::warn_above_deg,
+              "predicted standard deviation of a rotation that gives a warning", marrow::at_least(0))
+      .option("warn_above_mm", &Options::warn_above_mm,
+              "predicted standard deviation of a translation that gives a warning", marrow::at_least(0));
 }

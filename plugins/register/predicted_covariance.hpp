@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <marrow/domain/functions.hpp>
-
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <marrow/domain/functions.hpp>
 #include <string>
 #include <vector>
 
@@ -17,9 +16,9 @@ inline marrow::RigidTransform moved_by_units(const marrow::RigidTransform& pose,
   return marrow::moved(pose, frame, motion);
 }
 
-/// The covariance of a minimum, predicted from the curvature of the cost there: the inverse of likelihood_factor * Hessian.
-/// The Hessian is made of central differences, whose step is for each axis the one that raises the cost by a good part of a
-/// pixel, so that the roughness of the cost does not matter and the fits are still near the minimum.
+/// The covariance of a minimum, predicted from the curvature of the cost there: the inverse of likelihood_factor *
+/// Hessian. The Hessian is made of central differences, whose step is for each axis the one that raises the cost by a
+/// good part of a pixel, so that the roughness of the cost does not matter and the fits are still near the minimum.
 class PredictedCovariance {
  public:
   PredictedCovariance(const marrow::Cost& cost, const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame,
@@ -36,7 +35,7 @@ class PredictedCovariance {
   /// A sentence for each axis that the images hardly determine.
   std::vector<std::string> warnings(double most_deg, double most_mm) const {
     static const std::array<const char*, 6> kAxes = {
-        "rotation about the frontal axis",   "rotation about the lateral axis",   "axial rotation",
+        "rotation about the frontal axis",    "rotation about the lateral axis",    "axial rotation",
         "translation along the frontal axis", "translation along the lateral axis", "axial translation"};
     std::vector<std::string> warnings;
     for (int axis = 0; axis < 6; ++axis) {
@@ -44,10 +43,12 @@ class PredictedCovariance {
       const double sd = std::sqrt(covariance_(axis, axis)), shown = turn ? marrow::degrees(sd) : sd;
       if (shown <= (turn ? most_deg : most_mm)) continue;
       if (undetermined_[std::size_t(axis)])
-        warnings.push_back(std::string(kAxes[std::size_t(axis)]) + " is not determined by these images: the cost hardly changes within " +
-                           number(kMostStep) + (turn ? " degrees" : " mm"));
+        warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
+                           " is not determined by these images: the cost hardly changes within " + number(kMostStep) +
+                           (turn ? " degrees" : " mm"));
       else
-        warnings.push_back(std::string(kAxes[std::size_t(axis)]) + " is poorly determined by these images: its predicted standard deviation is " +
+        warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
+                           " is poorly determined by these images: its predicted standard deviation is " +
                            number(shown) + (turn ? " degrees" : " mm"));
     }
     return warnings;
@@ -89,7 +90,8 @@ class PredictedCovariance {
       h(i, i) = 2 * rises_[i];
       for (int j = 0; j < i; ++j)
         h(i, j) = h(j, i) = (at(i, steps_[i], j, steps_[j]) - at(i, steps_[i], j, -steps_[j]) -
-                             at(i, -steps_[i], j, steps_[j]) + at(i, -steps_[i], j, -steps_[j])) / 4;
+                             at(i, -steps_[i], j, steps_[j]) + at(i, -steps_[i], j, -steps_[j])) /
+                            4;
     }
     return h;
   }

@@ -2,11 +2,11 @@
 #pragma once
 // What every optimizer must do, as functions that the test of each calls.
 #include <gtest/gtest.h>
-#include <marrow/domain/error.hpp>
-#include <marrow/domain/functions.hpp>
 
 #include <cmath>
 #include <limits>
+#include <marrow/domain/error.hpp>
+#include <marrow/domain/functions.hpp>
 #include <stdexcept>
 
 namespace optimizer_behaviour {

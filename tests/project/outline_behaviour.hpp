@@ -2,11 +2,11 @@
 #pragma once
 // What every outline must be, as functions that the test of each projector calls with its own tolerance in pixels.
 #include <gtest/gtest.h>
+
+#include <functional>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/functions.hpp>
 #include <marrow/domain/volume.hpp>
-
-#include <functional>
 #include <memory>
 
 #include "project/shapes.hpp"
@@ -15,7 +15,8 @@ namespace outline_behaviour {
 
 using Make = std::function<std::shared_ptr<const marrow::Projector>(const marrow::Mesh&, const marrow::Volume*)>;
 
-/// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector: half angle asin(r / d).
+/// The outline of a sphere is the circle (ellipse) where the cone of tangent rays meets the detector: half angle asin(r
+/// / d).
 inline void sphere_is_its_tangent_cone(const Make& make, double tolerance_px, double model_tolerance_px) {
   const marrow::Mesh mesh = shapes::sphere(30);
   const auto projector = make(mesh, nullptr);
@@ -35,7 +36,8 @@ inline void sphere_is_its_tangent_cone(const Make& make, double tolerance_px, do
     const Eigen::Vector2d outward = Eigen::Vector2d(p.u_px, p.v_px) - marrow::project(camera, centre);
     EXPECT_GT(outward.normalized().dot(Eigen::Vector2d(p.normal_u, p.normal_v)), 0.95);
     EXPECT_NEAR(std::hypot(p.normal_u, p.normal_v), 1, 1e-5);
-    EXPECT_LT((marrow::project(camera, world_from_model * p.model_mm.cast<double>()) - Eigen::Vector2d(p.u_px, p.v_px)).norm(),
+    EXPECT_LT((marrow::project(camera, world_from_model * p.model_mm.cast<double>()) - Eigen::Vector2d(p.u_px, p.v_px))
+                  .norm(),
               model_tolerance_px);
   }
   const double circumference_px = 2 * marrow::kPi * camera.intrinsics(0, 0) * std::tan(half_angle);
@@ -87,7 +89,9 @@ inline void ends_of_the_volume_are_left_out(const Make& make) {
     make(mesh, &volume);
     FAIL();
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "the mesh is in frame 'ct', but the volume in frame 'mr'; give the volume that the mesh was made from");
+    EXPECT_STREQ(
+        error.what(),
+        "the mesh is in frame 'ct', but the volume in frame 'mr'; give the volume that the mesh was made from");
   }
 }
 

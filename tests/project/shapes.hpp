@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Surfaces and cameras for the tests of projectors, costs and registration.
-#include <marrow/domain/camera.hpp>
-#include <marrow/domain/mesh.hpp>
-
 #include <Eigen/Geometry>
 #include <cmath>
 #include <functional>
+#include <marrow/domain/camera.hpp>
+#include <marrow/domain/mesh.hpp>
 
 namespace shapes {
 
-/// A closed surface around an axis parallel to z: rings of points centre(z) + r(theta, z) in planes from z = 0 to `length`.
+/// A closed surface around an axis parallel to z: rings of points centre(z) + r(theta, z) in planes from z = 0 to
+/// `length`.
 inline marrow::Mesh around_axis(double length_mm, int rings, int around,
                                 const std::function<Eigen::Vector2d(double)>& centre,
                                 const std::function<double(double, double)>& radius) {
@@ -33,15 +33,17 @@ inline marrow::Mesh around_axis(double length_mm, int rings, int around,
     const auto middle = std::uint32_t(mesh.vertices_mm.size());
     mesh.vertices_mm.emplace_back(centre(z).x(), centre(z).y(), z);
     for (int k = 0; k < around; ++k) {
-      if (ring == 0) mesh.triangles.push_back({middle, at(0, k + 1), at(0, k)});
-      else mesh.triangles.push_back({middle, at(ring, k), at(ring, k + 1)});
+      if (ring == 0)
+        mesh.triangles.push_back({middle, at(0, k + 1), at(0, k)});
+      else
+        mesh.triangles.push_back({middle, at(ring, k), at(ring, k + 1)});
     }
   }
   return mesh;
 }
 
-/// The distal 200 mm of a femur-like bone: bowed, tapered, thicker from front to back, with a ridge behind and two unequal
-/// condyles below. +x to the left, +y to the back, +z to the head; about 70,000 triangles.
+/// The distal 200 mm of a femur-like bone: bowed, tapered, thicker from front to back, with a ridge behind and two
+/// unequal condyles below. +x to the left, +y to the back, +z to the head; about 70,000 triangles.
 inline marrow::Mesh distal_femur() {
   const auto bump = [](double angle, double at, double width) {
     return std::exp(-std::pow(std::remainder(angle - at, 2 * marrow::kPi) / width, 2));
@@ -55,27 +57,27 @@ inline marrow::Mesh distal_femur() {
     const double rounding = std::clamp((25 - z) / 25, 0.0, 0.999);
     return r * std::sqrt(1 - rounding * rounding);
   };
-  return around_axis(200, 251, 140, [](double z) { return Eigen::Vector2d(0, (z - 100) * (z - 100) / 1800); }, radius);
+  return around_axis(
+      200, 251, 140, [](double z) { return Eigen::Vector2d(0, (z - 100) * (z - 100) / 1800); }, radius);
 }
 
 inline marrow::Mesh cylinder(double radius_mm, double length_mm, int around = 200) {
-  return around_axis(length_mm, 101, around, [](double) { return Eigen::Vector2d(0, 0); },
-                     [&](double, double) { return radius_mm; });
+  return around_axis(
+      length_mm, 101, around, [](double) { return Eigen::Vector2d(0, 0); }, [&](double, double) { return radius_mm; });
 }
 
 /// Its lowest point at the origin.
 inline marrow::Mesh sphere(double radius_mm) {
   constexpr int kRings = 161;
-  marrow::Mesh mesh = around_axis(kRings - 1, kRings, 300, [](double) { return Eigen::Vector2d(0, 0); },
-                                  [&](double, double ring) {
-                                    return radius_mm * std::max(1e-4, std::sin(marrow::kPi * ring / (kRings - 1)));
-                                  });
+  marrow::Mesh mesh = around_axis(
+      kRings - 1, kRings, 300, [](double) { return Eigen::Vector2d(0, 0); },
+      [&](double, double ring) { return radius_mm * std::max(1e-4, std::sin(marrow::kPi * ring / (kRings - 1))); });
   for (auto& v : mesh.vertices_mm) v.z() = radius_mm * (1 - std::cos(marrow::kPi * v.z() / (kRings - 1)));
   return mesh;
 }
 
-/// The standard simulated C-arm: 1000 mm from source to detector, 600 to the isocentre, 512 x 512 pixels of 0.586 mm. At
-/// angle 0 the source is in front of the patient; at 90 degrees on the right side.
+/// The standard simulated C-arm: 1000 mm from source to detector, 600 to the isocentre, 512 x 512 pixels of 0.586 mm.
+/// At angle 0 the source is in front of the patient; at 90 degrees on the right side.
 inline marrow::Camera c_arm(double angle_deg, int size_px = 512) {
   marrow::Camera camera;
   camera.width_px = camera.height_px = size_px;

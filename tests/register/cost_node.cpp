@@ -3,7 +3,8 @@
 #include "nodes.hpp"
 #include "plugins/similarity/contour_distance.cpp"
 
-std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector,
+                                              const marrow::List<marrow::View>& views,
                                               const marrow::List<marrow::EdgeMap>& edges) {
   Options options;
   options.model_error_px = 0;  // ideal edges have none

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Edge maps as a perfect detector would give them: the outline of a model at the true pose, and the ways in which a real
-// detector falls short of that.
+// Edge maps as a perfect detector would give them: the outline of a model at the true pose, and the ways in which a
+// real detector falls short of that.
+#include <algorithm>
 #include <marrow/domain/case.hpp>
 #include <marrow/domain/features.hpp>
 #include <marrow/domain/functions.hpp>
-
-#include <algorithm>
 #include <random>
 
 #include "project/shapes.hpp"
@@ -14,11 +13,11 @@
 namespace ideal_edges {
 
 struct Faults {
-  double noise_px = 0;         ///< independent, along the gradient
-  double missing = 0;          ///< share of the outline that is missing, in gaps
-  int outliers = 0;            ///< edge pixels of anything else
-  double offset_px = 0;        ///< all edges lie this far outside the outline
-  bool canal = false;          ///< the inner border of the cortex, 20 px inside, where it gets brighter inwards
+  double noise_px = 0;   ///< independent, along the gradient
+  double missing = 0;    ///< share of the outline that is missing, in gaps
+  int outliers = 0;      ///< edge pixels of anything else
+  double offset_px = 0;  ///< all edges lie this far outside the outline
+  bool canal = false;    ///< the inner border of the cortex, 20 px inside, where it gets brighter inwards
   unsigned seed = 1;
 };
 

@@ -26,7 +26,8 @@ marrow::Vector6d motion(double rx, double ry, double rz, double tx, double ty, d
 struct Trial {
   Trial(marrow::Mesh surface, double height_mm) : mesh(std::move(surface)), projector(outline_node(mesh)) {
     truth.frame = marrow::fragment_frame(mesh);
-    truth.world_from_model = moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
+    truth.world_from_model =
+        moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
   }
   Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
              const Options& options = {}) const {
@@ -144,13 +145,14 @@ TEST(Multiresolution, RefusesLevelsThatDoNotAgree) {
     FAIL();
   } catch (const marrow::Error& error) {
     EXPECT_STREQ(error.what(),
-                 "reach_px has 2 numbers, but contour_spacing_px has 3; give each of contour_spacing_px, reach_px, step_deg, "
-                 "step_axial_deg and step_mm one number per level");
+                 "reach_px has 2 numbers, but contour_spacing_px has 3; give reach_px and the four options of steps "
+                 "as many, one for each level");
   }
 }
 
 TEST(Multiresolution, StopsWhenCancelled) {
-  const ideal_edges::Scene scene = ideal_edges::scene_of(*femur().projector, femur().truth.world_from_model, {0, 90}, {});
+  const ideal_edges::Scene scene =
+      ideal_edges::scene_of(*femur().projector, femur().truth.world_from_model, {0, 90}, {});
   const auto cost = cost_node(*femur().projector, scene.views, scene.edges);
   const std::atomic<bool> cancelled{true};
   marrow::Context::Hooks hooks;

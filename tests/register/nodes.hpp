@@ -6,6 +6,7 @@
 #include <marrow/domain/functions.hpp>
 
 std::shared_ptr<const marrow::Projector> outline_node(const marrow::Mesh& mesh, const marrow::Volume* volume = nullptr);
-std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector,
+                                              const marrow::List<marrow::View>& views,
                                               const marrow::List<marrow::EdgeMap>& edges);
 std::shared_ptr<const marrow::Optimizer> optimizer_node();

@@ -3,4 +3,6 @@
 #include "nodes.hpp"
 #include "plugins/optimizer/nelder_mead.cpp"
 
-std::shared_ptr<const marrow::Optimizer> optimizer_node() { return nelder_mead(); }
+std::shared_ptr<const marrow::Optimizer> optimizer_node() {
+  return nelder_mead();
+}

@@ -16,7 +16,8 @@ class LineProjector : public marrow::Projector {
                                             double spacing_px) const override {
     std::vector<marrow::OutlinePoint> points;
     for (double v = 50; v < 150; v += spacing_px)
-      points.push_back({float(100 + pose.translation_mm.x()), float(v + pose.translation_mm.z()), -1, 0, Eigen::Vector3f::Zero()});
+      points.push_back(
+          {float(100 + pose.translation_mm.x()), float(v + pose.translation_mm.z()), -1, 0, Eigen::Vector3f::Zero()});
     return points;
   }
 };
@@ -89,7 +90,8 @@ TEST(ContourDistance, OffsetIsGivenOrFound) {
   // The edges lie 2 px to the right of u = 100, which for an outline facing left is 2 px inside.
   const auto edges = edge_maps(line_at(102, -1));
   EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(-2))->value(shifted(0)), 0, 1e-5);
-  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1, 1e-5);
+  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1,
+              1e-5);
   Options found = fixed_offset();
   found.estimate_offset = true;
   EXPECT_NEAR(contour_distance(kLine, one_view(), edges, found)->value(shifted(0)), 0, 1e-5);
@@ -108,7 +110,8 @@ TEST(ContourDistance, PointsOutsideImageAndMaskDoNotPay) {
   Options options = fixed_offset();
   options.contour_spacing_px = 0.5;  // 69 points of the upper part remain
   EXPECT_NEAR(contour_distance(kLine, one_view(mask), edge_maps(map), options)->value(shifted(0)),
-              51.0 / 120 * all->value(shifted(100)), 1e-5) << "60 px of outline are the least that is evidence";
+              51.0 / 120 * all->value(shifted(100)), 1e-5)
+      << "60 px of outline are the least that is evidence";
   EXPECT_NEAR(all->value(shifted(0, 500)), std::sqrt(101.0) - 1, 1e-5) << "nothing to compare is the worst";
 }
 
@@ -121,7 +124,8 @@ TEST(ContourDistance, LevelsAndLikelihood) {
   const auto factor = cost->likelihood_factor(shifted(0));
   ASSERT_TRUE(factor.has_value());
   // 100 points in 4 to 5 blocks that err together by 0.5 px: the mean is known to about 0.5 / sqrt(4.5) = 0.24 px.
-  const double h = 0.1, curvature = (cost->value(shifted(h)) - 2 * cost->value(shifted(0)) + cost->value(shifted(-h))) / (h * h);
+  const double h = 0.1,
+               curvature = (cost->value(shifted(h)) - 2 * cost->value(shifted(0)) + cost->value(shifted(-h))) / (h * h);
   const double sd = 1 / std::sqrt(*factor * curvature);
   EXPECT_GT(sd, 0.12);
   EXPECT_LT(sd, 0.48);
@@ -136,12 +140,14 @@ TEST(ContourDistance, LevelsAndLikelihood) {
 
 TEST(ContourDistance, SaysWhatIsWrong) {
   EXPECT_EQ(message(one_view(), edge_maps(marrow::EdgeMap{200, 200, {}})),
-            "view 'lateral': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, or "
+            "view 'lateral': the edge map is empty, so nothing can be compared; lower the thresholds of the edge "
+            "detector, or "
             "check that the image shows the bone");
   marrow::EdgeMap small = line_at(50, 1);
   small.width_px = 100;
   EXPECT_EQ(message(one_view(), edge_maps(small)),
-            "view 'lateral': the edge map has 100 x 200 pixels, but the camera 200 x 200; give the edges of this view's own image");
+            "view 'lateral': the edge map has 100 x 200 pixels, but the camera 200 x 200; give the edges of this "
+            "view's own image");
   EXPECT_EQ(message(one_view(), {}), "there are 1 views, but edge maps of 0; give the edges of each view");
   EXPECT_EQ(message(one_view(cv::Mat(200, 200, CV_8U, cv::Scalar(0))), edge_maps(line_at(50, 1))),
             "view 'lateral': no edge lies inside the mask; widen the mask");
@@ -152,7 +158,8 @@ TEST(NearestEdges, AgreesWithASearchThroughAll) {
   marrow::EdgeMap map{120, 90, {}};
   for (int i = 0; i < 40; ++i) {
     const double angle = 0.7 * i;
-    map.pixels.push_back({float((i * 37) % 119), float((i * 53) % 89), float(std::cos(angle)), float(std::sin(angle)), 1});
+    map.pixels.push_back(
+        {float((i * 37) % 119), float((i * 53) % 89), float(std::cos(angle)), float(std::sin(angle)), 1});
   }
   const NearestEdges nearest(map, {}, marrow::kPi);  // any direction
   for (int v = 0; v < 90; v += 3)
@@ -161,6 +168,7 @@ TEST(NearestEdges, AgreesWithASearchThroughAll) {
       for (const auto& e : map.pixels) best = std::min(best, std::hypot(double(e.u_px) - u, double(e.v_px) - v));
       const marrow::EdgePixel* found = nearest.find(float(u), float(v), 0.6f, 0.8f);
       ASSERT_NE(found, nullptr);
-      EXPECT_LE(std::hypot(double(found->u_px) - u, double(found->v_px) - v), best + 3) << "cells of 2 px, half a cell at each end";
+      EXPECT_LE(std::hypot(double(found->u_px) - u, double(found->v_px) - v), best + 3)
+          << "cells of 2 px, half a cell at each end";
     }
 }
