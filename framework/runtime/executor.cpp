@@ -64,7 +64,10 @@ class Executor {
     arena_ = &arena;
     for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) {
       const auto given = settings_.given.find(pipeline_.nodes[i].id);
-      if (given != settings_.given.end()) result_.nodes[i].outputs = given->second;
+      if (given != settings_.given.end()) {
+        result_.nodes[i].outputs = given->second;
+        for (Value& value : result_.nodes[i].outputs) complete_key(value);
+      }
       if (!needed_[i]) continue;
       ++unfinished_;
       states_[i].waiting_for = count_sources(i);
@@ -93,6 +96,12 @@ class Executor {
     CallResult result;
     std::vector<std::pair<std::size_t, std::size_t>> waiting;  ///< (node, call)
   };
+
+  /// Data made outside a run has no key yet; without one, all of it would pass for the same.
+  static void complete_key(Value& value) {
+    for (Value& item : value.items) complete_key(item);
+    if (value.data && value.hash && value.key == Digest{}) value.key = value.hash(value.data.get());
+  }
 
   int count_sources(std::size_t index) const {
     std::vector<int> sources;

@@ -153,16 +153,15 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   Search search(optimizer, initial, options, context);
 
   Result result;
-  const auto add_stage = [&](const char* name) {
+  const auto pose_now = [&] {
     marrow::Pose pose = initial;
     pose.world_from_model = search.pose();
     pose.covariance.reset();
     pose.cost = levels.back()->value(search.pose());
     pose.evaluations = search.evaluations();
-    result.stages.add(name, pose);
-    result.pose = std::move(pose);
+    return pose;
   };
-  add_stage("start");
+  result.stages.add("start", pose_now());
   // Each candidate is judged after all six axes had their turn, because the start's errors in the other four hide which
   // of them is right.
   const std::vector<marrow::RigidTransform> candidates = search.scan(*levels.front());
@@ -181,11 +180,11 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
     }
   }
   search.go_to(best_axial);
-  add_stage("axial");
+  result.stages.add("axial", pose_now());
   search.go_to(best);
   for (std::size_t i = 1; i < levels.size(); ++i)
     search.refine(*levels[i], kAllAxes, i, share * double(candidates.size() + i), share);
-  add_stage("final");
+  result.pose = pose_now();
 
   if (const auto factor = levels.back()->likelihood_factor(search.pose())) {
     const PredictedCovariance predicted(*levels.back(), search.pose(), initial.frame, *factor);
@@ -196,6 +195,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
       result.pose.warnings.push_back(warning);
     }
   }
+  result.stages.add("final", result.pose);
   return result;
 }
 

@@ -114,6 +114,17 @@ TEST_F(ExecutorTest, GivenValuesAreNotComputedAgain) {
   EXPECT_EQ(second.nodes[1].status, Status::not_needed);
 }
 
+TEST_F(ExecutorTest, GivenValuesWithoutKeysAreToldApartByContent) {
+  const auto made = [](double value) {
+    return marrow::Value::of<marrow::Metrics>(std::make_shared<const marrow::Metrics>(marrow::Metrics{{{"value", value, ""}}}));
+  };
+  settings.given["c"] = {made(1)};
+  settings.given["d"] = {made(2)};
+  const RunResult result = run("  c: {uses: test.constant}\n  d: {uses: test.constant}\n  e: {uses: test.add, in: {a: c}}\n  f: {uses: test.add, in: {a: d}}\n", "e: e, f: f");
+  EXPECT_EQ(number(result, 0), 1);
+  EXPECT_EQ(number(result, 1), 2);
+}
+
 TEST_F(ExecutorTest, SameRecipeIsComputedOnce) {
   const RunResult result = run("  a: {uses: test.constant, with: {value: 3}}\n  b: {uses: test.constant, with: {value: 3}}\n  c: {uses: test.constant, with: {value: 4}}\n",
                                "a: a, b: b, c: c");
