@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Views of an isocentric C-arm from its two angles: the chapter's Eq 4 in corrected form. As printed, equal poses of the
-// gantry do not give the identity; what is meant is the absolute pose W_i = R_beta R_alpha R_0 of each view, from which the
-// relative motion follows as R_21 = W_2^T W_1.
+// Views of an isocentric C-arm from its two angles: the chapter's Eq 4 in corrected form. As printed, equal poses of
+// the gantry do not give the identity; what is meant is the absolute pose W_i = R_beta R_alpha R_0 of each view, from
+// which the relative motion follows as R_21 = W_2^T W_1.
 #include <Eigen/Geometry>
 #include <marrow/plugin.hpp>
 #include <set>
@@ -20,12 +20,12 @@ struct Options {
   Eigen::Vector3d isocentre_mm = Eigen::Vector3d::Zero();
 };
 
-/// Axes of the camera (columns u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs are those
-/// of DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector towards the
-/// patient's left, +alpha (secondary, cranial) towards the head.
+/// Axes of the camera (columns u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs are
+/// those of DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector
+/// towards the patient's left, +alpha (secondary, cranial) towards the head.
 Eigen::Matrix3d world_from_camera_rotation(double alpha_rad, double beta_rad) {
-  // At (0, 0) the detector is in front of the chest: the rays run to -y, the head is up (v to -z), and as the image is seen
-  // from the source, u runs to the patient's right.
+  // At (0, 0) the detector is in front of the chest: the rays run to -y, the head is up (v to -z), and as the image is
+  // seen from the source, u runs to the patient's right.
   Eigen::Matrix3d r_0;
   r_0.col(0) = -Eigen::Vector3d::UnitX();
   r_0.col(1) = -Eigen::Vector3d::UnitZ();
@@ -83,8 +83,9 @@ MARROW_PLUGIN(plugin) {
       .summary("Views of an isocentric C-arm from its angles (Eq 4, corrected; signs of DICOM's positioner angles)")
       .out("camera", "geometry of each view", marrow::over("view"))
       .option("names", &Options::names, "one name per view")
-      .option("alpha_deg", &Options::alpha_deg, "cranio-caudal angle per view, positive with the detector towards the head",
-              marrow::at_least(-90), marrow::at_most(90))
+      .option("alpha_deg", &Options::alpha_deg,
+              "cranio-caudal angle per view, positive with the detector towards the head", marrow::at_least(-90),
+              marrow::at_most(90))
       .option("beta_deg", &Options::beta_deg,
               "right/left anterior angle per view, positive with the detector towards the patient's left",
               marrow::at_least(-180), marrow::at_most(180))

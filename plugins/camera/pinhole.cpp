@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera given by its matrices: Eq 1-3 of the chapter with v = (f / z) y, K 3x3 and [R|t] 3x4 (as printed, Eq 1 repeats x
-// for v, and K's size does not fit [R|t]).
+// A camera given by its matrices: Eq 1-3 of the chapter with v = (f / z) y, K 3x3 and [R|t] 3x4 (as printed, Eq 1
+// repeats x for v, and K's size does not fit [R|t]).
 #include <marrow/plugin.hpp>
 
 namespace {
@@ -21,8 +21,9 @@ marrow::Camera pinhole(const Options& options) {
   camera.height_px = options.height_px;
   camera.intrinsics = Eigen::Map<const RowMajor>(options.intrinsics.data());
   if (camera.intrinsics(1, 0) != 0 || camera.intrinsics.row(2) != Eigen::RowVector3d(0, 0, 1))
-    throw marrow::Error("intrinsics: expected [f_u s u_0  0 f_v v_0  0 0 1] row by row; entry (2, 1) must be 0 and the "
-                        "last row 0 0 1");
+    throw marrow::Error(
+        "intrinsics: expected [f_u s u_0  0 f_v v_0  0 0 1] row by row; entry (2, 1) must be 0 and the "
+        "last row 0 0 1");
   camera.camera_from_world.rotation = Eigen::Map<const RowMajor>(options.rotation.data());
   camera.camera_from_world.translation_mm = Eigen::Map<const Eigen::Vector3d>(options.translation_mm.data());
   marrow::check_camera(camera, "camera.pinhole");
@@ -33,7 +34,8 @@ marrow::Camera pinhole(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.pinhole", pinhole)
-      .summary("Pinhole camera from its matrices (Eq 1-3): pixel = K (R x_world + t), +z to the detector, u right, v down")
+      .summary(
+          "Pinhole camera from its matrices (Eq 1-3): pixel = K (R x_world + t), +z to the detector, u right, v down")
       .out("camera", "geometry of the view")
       .option("width_px", &Options::width_px, "image width", marrow::at_least(1), marrow::at_most(16384))
       .option("height_px", &Options::height_px, "image height", marrow::at_least(1), marrow::at_most(16384))

@@ -9,7 +9,9 @@ struct Options {
   std::filesystem::path path;
 };
 
-marrow::Camera camera(const Options& options) { return marrow::read::read_camera_file(options.path); }
+marrow::Camera camera(const Options& options) {
+  return marrow::read::read_camera_file(options.path);
+}
 
 }  // namespace
 
@@ -17,5 +19,6 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.camera", camera)
       .summary("Camera from XMALab's text or marrow's YAML")
       .out("camera", "geometry of the view")
-      .option("path", &Options::path, "camera file; .yaml is marrow's own, anything else XMALab's text", marrow::required());
+      .option("path", &Options::path, "camera file; .yaml is marrow's own, anything else XMALab's text",
+              marrow::required());
 }

@@ -19,8 +19,9 @@ class XmalabText {
     std::error_code failure;
     if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
     if (!std::filesystem::is_regular_file(path, failure) || std::filesystem::file_size(path, failure) > 65536)
-      throw Error(path.string() + ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "
-                                  "matrix, rotation, translation)");
+      throw Error(path.string() +
+                  ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "
+                  "matrix, rotation, translation)");
     stream_.open(path);
     if (!stream_) throw Error(path.string() + ": cannot be read");
   }

@@ -16,8 +16,8 @@ struct Options {
   fs::path path;
 };
 
-/// The file that a key names. A path option counts by the content of the folder it names, so no file outside that folder may
-/// be opened.
+/// The file that a key names. A path option counts by the content of the folder it names, so no file outside that
+/// folder may be opened.
 std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, const std::string& key) {
   const auto text = map.text(key);
   if (!text) return std::nullopt;
@@ -96,7 +96,8 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result)
     const auto mask = read_image(folder, map, "mask");
     if (!mask) return;
     view.mask = mask->pixels;
-    if (view.mask.type() != CV_8U) map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
+    if (view.mask.type() != CV_8U)
+      map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
   }
   if (!name || !image || !camera) return;
   if (result.views.find(*name)) return map.fault("name", "name: two views are named '" + *name + "'");
@@ -154,18 +155,22 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
     if (fragment.has("start") && wanted) with_start.push_back(name);
     if (fragment.has("truth") && wanted) with_truth.push_back(name);
   }
-  if (registered.empty()) map.fault("fragments", "fragments: every fragment has register: false; register at least one");
+  if (registered.empty())
+    map.fault("fragments", "fragments: every fragment has register: false; register at least one");
   if (!with_start.empty() && with_start != registered)
-    map.fault("fragments", "fragments: some of the fragments to register have a start; give it for all of them or for none");
+    map.fault("fragments",
+              "fragments: some of the fragments to register have a start; give it for all of them or for none");
   if (!with_truth.empty() && with_truth != registered)
-    map.fault("fragments", "fragments: some of the fragments to register have a truth; give it for all of them or for none");
+    map.fault("fragments",
+              "fragments: some of the fragments to register have a truth; give it for all of them or for none");
 }
 
 marrow::Case read_case(const Options& options) {
   std::error_code failure;
   if (!fs::is_directory(options.path, failure))
-    throw marrow::Error(options.path.string() + ": expected the folder of a case, which holds case.yaml" +
-                        (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
+    throw marrow::Error(
+        options.path.string() + ": expected the folder of a case, which holds case.yaml" +
+        (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
   YamlFile file(options.path / "case.yaml");
   const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "views", "fragments"});
   marrow::read::check_version(map, "marrow-case");

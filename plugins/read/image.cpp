@@ -9,7 +9,9 @@ struct Options {
   std::filesystem::path path;
 };
 
-marrow::Image image(const Options& options) { return marrow::read::read_image_file(options.path); }
+marrow::Image image(const Options& options) {
+  return marrow::read::read_image_file(options.path);
+}
 
 }  // namespace
 

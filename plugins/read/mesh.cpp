@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "mesh_file.hpp"
-
 #include <marrow/plugin.hpp>
+
+#include "mesh_file.hpp"
 
 namespace {
 

@@ -44,7 +44,8 @@ class MeshBuilder {
   using Key = std::array<std::uint64_t, 3>;
   struct Hash {
     std::size_t operator()(const Key& key) const {
-      return key[0] * 0x9E3779B97F4A7C15ull ^ std::rotl(key[1] * 0xC2B2AE3D27D4EB4Full, 21) ^ std::rotl(key[2] * 0x165667B19E3779F9ull, 42);
+      return key[0] * 0x9E3779B97F4A7C15ull ^ std::rotl(key[1] * 0xC2B2AE3D27D4EB4Full, 21) ^
+             std::rotl(key[2] * 0x165667B19E3779F9ull, 42);
     }
   };
   static std::uint64_t bits(double value) { return std::bit_cast<std::uint64_t>(value + 0.0); }  // -0 counts as 0
@@ -137,7 +138,9 @@ class PlyBody {
   }
 
  private:
-  [[noreturn]] void cut_off() const { throw Error(what_ + ": has fewer numbers than its header claims; it is cut off or damaged"); }
+  [[noreturn]] void cut_off() const {
+    throw Error(what_ + ": has fewer numbers than its header claims; it is cut off or damaged");
+  }
   double next_text() {
     while (at_ < bytes_.size() && std::isspace(static_cast<unsigned char>(bytes_[at_]))) ++at_;
     std::size_t end = at_;
@@ -177,7 +180,8 @@ PlyHeader read_ply_header(const std::string& bytes, const std::string& what) {
   std::size_t at = 0;
   for (int line_number = 1;; ++line_number) {
     const std::size_t end = bytes.find('\n', at);
-    if (end == std::string::npos || end - at > 4096) throw Error(what + ": its header has no 'end_header'; it is cut off, or no PLY");
+    if (end == std::string::npos || end - at > 4096)
+      throw Error(what + ": its header has no 'end_header'; it is cut off, or no PLY");
     std::istringstream line(bytes.substr(at, end - at));
     at = end + 1;
     std::string word;
@@ -186,10 +190,12 @@ PlyHeader read_ply_header(const std::string& bytes, const std::string& what) {
     if (word == "format") line >> header.format;
     if (word == "element") {
       PlyElement element;
-      if (!(line >> element.name >> element.count)) throw Error(what + ": line " + std::to_string(line_number) + ": expected 'element NAME COUNT'");
+      if (!(line >> element.name >> element.count))
+        throw Error(what + ": line " + std::to_string(line_number) + ": expected 'element NAME COUNT'");
       // Every item takes at least one byte, which bounds what a damaged count can ask for.
-      if (element.count > bytes.size()) throw Error(what + ": its header claims " + std::to_string(element.count) + " of '" + element.name +
-                                                    "', but the file has only " + std::to_string(bytes.size()) + " bytes");
+      if (element.count > bytes.size())
+        throw Error(what + ": its header claims " + std::to_string(element.count) + " of '" + element.name +
+                    "', but the file has only " + std::to_string(bytes.size()) + " bytes");
       header.elements.push_back(element);
     }
     if (word == "property") {
@@ -208,7 +214,8 @@ PlyHeader read_ply_header(const std::string& bytes, const std::string& what) {
   return header;
 }
 
-void read_ply_vertex(const PlyElement& element, PlyBody& body, MeshBuilder& builder, std::vector<std::uint32_t>& index) {
+void read_ply_vertex(const PlyElement& element, PlyBody& body, MeshBuilder& builder,
+                     std::vector<std::uint32_t>& index) {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   for (const PlyProperty& property : element.properties) {
     if (!property.count_type.empty()) {
@@ -223,8 +230,8 @@ void read_ply_vertex(const PlyElement& element, PlyBody& body, MeshBuilder& buil
   index.push_back(builder.vertex(point));
 }
 
-void read_ply_face(const PlyElement& element, PlyBody& body, MeshBuilder& builder, const std::vector<std::uint32_t>& index,
-                   const std::string& what) {
+void read_ply_face(const PlyElement& element, PlyBody& body, MeshBuilder& builder,
+                   const std::vector<std::uint32_t>& index, const std::string& what) {
   for (const PlyProperty& property : element.properties) {
     if (property.count_type.empty()) {
       body.next(property.type);
@@ -235,7 +242,8 @@ void read_ply_face(const PlyElement& element, PlyBody& body, MeshBuilder& builde
       const double corner = body.next(property.type);
       if (property.name != "vertex_indices" && property.name != "vertex_index") continue;
       if (!(corner >= 0) || corner >= double(index.size()))
-        throw Error(what + ": a face names vertex " + std::to_string(std::int64_t(corner)) + "; there are " + std::to_string(index.size()));
+        throw Error(what + ": a face names vertex " + std::to_string(std::int64_t(corner)) + "; there are " +
+                    std::to_string(index.size()));
       corners.push_back(index[std::size_t(corner)]);
     }
     for (std::size_t i = 2; i < corners.size(); ++i) builder.triangle(corners[0], corners[i - 1], corners[i]);
@@ -249,8 +257,10 @@ Mesh read_ply(const std::string& bytes, const std::string& what) {
   std::vector<std::uint32_t> index;
   for (const PlyElement& element : header.elements)
     for (std::size_t i = 0; i < element.count; ++i) {
-      if (element.name == "vertex") read_ply_vertex(element, body, builder, index);
-      else read_ply_face(element, body, builder, element.name == "face" ? index : std::vector<std::uint32_t>(), what);
+      if (element.name == "vertex")
+        read_ply_vertex(element, body, builder, index);
+      else
+        read_ply_face(element, body, builder, element.name == "face" ? index : std::vector<std::uint32_t>(), what);
     }
   return std::move(builder.mesh);
 }
@@ -261,7 +271,8 @@ Mesh read_mesh_file(const std::filesystem::path& path, double scale) {
   const std::string what = path.string();
   std::string extension = path.extension().string();
   for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
-  if (extension != ".stl" && extension != ".ply") throw Error(what + ": not a surface that can be read; known are .stl and .ply");
+  if (extension != ".stl" && extension != ".ply")
+    throw Error(what + ": not a surface that can be read; known are .stl and .ply");
   const std::string bytes = read_bytes(path);
   Mesh mesh = extension == ".stl" ? read_stl(bytes, what) : read_ply(bytes, what);
   for (Eigen::Vector3d& vertex : mesh.vertices_mm) vertex *= scale;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// MetaIO only prints a line when samples are missing or do not unpack, and ITK hands on what the memory held. So it is made
-// sure here that all of them are there.
+// MetaIO only prints a line when samples are missing or do not unpack, and ITK hands on what the memory held. So it is
+// made sure here that all of them are there.
 #include <zlib.h>
 
 #include <algorithm>
@@ -40,7 +40,8 @@ MetaHeader read_header(std::istream& stream) {
   return header;
 }
 
-/// The number of bytes that a zlib or gzip stream unpacks to, up to just over `expected`; 0 when it is damaged or cut off.
+/// The number of bytes that a zlib or gzip stream unpacks to, up to just over `expected`; 0 when it is damaged or cut
+/// off.
 double unpacked_bytes(std::istream& stream, double expected) {
   z_stream unpacker = {};
   if (inflateInit2(&unpacker, 15 + 32) != Z_OK) throw Error("zlib does not start");  // 32: zlib or gzip
@@ -71,7 +72,9 @@ void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
     const auto found = header.values.find(key);
     return found == header.values.end() ? std::string() : found->second;
   };
-  const auto is_true = [](const std::string& text) { return !text.empty() && (text[0] == 'T' || text[0] == 't' || text[0] == '1'); };
+  const auto is_true = [](const std::string& text) {
+    return !text.empty() && (text[0] == 'T' || text[0] == 't' || text[0] == '1');
+  };
   std::filesystem::path data = path;
   std::uintmax_t begin = header.end;
   if (const std::string name = value("ElementDataFile"); name != "LOCAL" && name != "Local" && name != "local") {
@@ -80,7 +83,8 @@ void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
   }
   std::error_code failure;
   const std::uintmax_t size = std::filesystem::file_size(data, failure);
-  if (failure) throw Error(path.string() + ": names '" + data.filename().string() + "' for its samples, which is not there");
+  if (failure)
+    throw Error(path.string() + ": names '" + data.filename().string() + "' for its samples, which is not there");
   std::ifstream samples(data, std::ios::binary);
   samples.seekg(std::streamoff(begin));
   const bool is_packed = is_true(value("CompressedData"));
@@ -88,7 +92,8 @@ void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
   const double got = is_packed ? unpacked_bytes(samples, sample_bytes) : double(size - std::min(size, begin));
   if (is_packed ? got != sample_bytes : got < sample_bytes)
     throw Error(data.string() + ": is cut off or damaged: " + std::to_string(std::uintmax_t(sample_bytes)) +
-                " bytes of samples expected, got " + (got > 0 ? std::to_string(std::uintmax_t(got)) : "a stream that does not unpack"));
+                " bytes of samples expected, got " +
+                (got > 0 ? std::to_string(std::uintmax_t(got)) : "a stream that does not unpack"));
 }
 
 }  // namespace marrow::read

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The NIfTI library hands on zeros for samples that a file does not hold. So it is made sure here that all of them are there.
+// The NIfTI library hands on zeros for samples that a file does not hold. So it is made sure here that all of them are
+// there.
 #include <zlib.h>
 
 #include <algorithm>
@@ -24,7 +25,8 @@ T number_at(const std::array<char, kHeaderBytes>& header, int at, bool swapped) 
   return std::bit_cast<T>(raw);
 }
 
-/// Where the samples end, by the header: dim[8] at byte 40, bitpix at 72, vox_offset at 108. 0 where the header is none.
+/// Where the samples end, by the header: dim[8] at byte 40, bitpix at 72, vox_offset at 108. 0 where the header is
+/// none.
 double claimed_end(const std::array<char, kHeaderBytes>& header) {
   const bool swapped = number_at<std::int32_t>(header, 0, false) != kHeaderBytes;
   if (swapped && number_at<std::int32_t>(header, 0, true) != kHeaderBytes) return 0;
@@ -49,8 +51,8 @@ void check_nifti_data(const std::filesystem::path& path) {
   for (int count = 1; count > 0 && got < expected; got += std::max(count, 0))
     count = gzread(file.get(), part.data(), unsigned(part.size()));
   if (!(got >= expected))
-    throw Error(path.string() + ": is cut off or damaged: " + std::to_string(std::uintmax_t(expected)) + " bytes expected, got " +
-                std::to_string(std::uintmax_t(got)));
+    throw Error(path.string() + ": is cut off or damaged: " + std::to_string(std::uintmax_t(expected)) +
+                " bytes expected, got " + std::to_string(std::uintmax_t(got)));
 }
 
 }  // namespace marrow::read

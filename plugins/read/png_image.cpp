@@ -71,12 +71,15 @@ Samples read_png(const std::filesystem::path& path) {
   source.bytes.assign(std::istreambuf_iterator<char>(stream), {});
   if (source.bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(source.bytes.data()), 0, 8))
     throw Error(what + ": is not a PNG file, or is damaged at its start");
-  const auto fail = [&] { throw Error(what + ": cannot be read as PNG, it may be cut off or damaged (" + source.fault + ")"); };
+  const auto fail = [&] {
+    throw Error(what + ": cannot be read as PNG, it may be cut off or damaged (" + source.fault + ")");
+  };
   Reader reader(source);
   if (!read_header(reader)) fail();
   Samples samples;
   samples.dimensions = 2;
-  samples.size = {int(png_get_image_width(reader.png, reader.info)), int(png_get_image_height(reader.png, reader.info)), 1};
+  samples.size = {int(png_get_image_width(reader.png, reader.info)), int(png_get_image_height(reader.png, reader.info)),
+                  1};
   samples.components = png_get_channels(reader.png, reader.info);
   samples.type = png_get_bit_depth(reader.png, reader.info) == 16 ? Samples::Type::u16 : Samples::Type::u8;
   const std::size_t row_bytes = png_get_rowbytes(reader.png, reader.info);

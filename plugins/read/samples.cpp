@@ -22,17 +22,30 @@ constexpr double kSmallFile = 65536;
 Samples::Type sample_type(itk::IOComponentEnum type, const std::string& what) {
   using Type = Samples::Type;
   switch (type) {
-    case itk::IOComponentEnum::UCHAR: return Type::u8;
-    case itk::IOComponentEnum::CHAR: return Type::i8;
-    case itk::IOComponentEnum::USHORT: return Type::u16;
-    case itk::IOComponentEnum::SHORT: return Type::i16;
-    case itk::IOComponentEnum::UINT: return Type::u32;
-    case itk::IOComponentEnum::INT: return Type::i32;
-    case itk::IOComponentEnum::ULONG: case itk::IOComponentEnum::ULONGLONG: return Type::u64;
-    case itk::IOComponentEnum::LONG: case itk::IOComponentEnum::LONGLONG: return Type::i64;
-    case itk::IOComponentEnum::FLOAT: return Type::f32;
-    case itk::IOComponentEnum::DOUBLE: return Type::f64;
-    default: throw Error(what + ": its samples are of a type that is not read; save it as 16 bit integers or float");
+    case itk::IOComponentEnum::UCHAR:
+      return Type::u8;
+    case itk::IOComponentEnum::CHAR:
+      return Type::i8;
+    case itk::IOComponentEnum::USHORT:
+      return Type::u16;
+    case itk::IOComponentEnum::SHORT:
+      return Type::i16;
+    case itk::IOComponentEnum::UINT:
+      return Type::u32;
+    case itk::IOComponentEnum::INT:
+      return Type::i32;
+    case itk::IOComponentEnum::ULONG:
+    case itk::IOComponentEnum::ULONGLONG:
+      return Type::u64;
+    case itk::IOComponentEnum::LONG:
+    case itk::IOComponentEnum::LONGLONG:
+      return Type::i64;
+    case itk::IOComponentEnum::FLOAT:
+      return Type::f32;
+    case itk::IOComponentEnum::DOUBLE:
+      return Type::f64;
+    default:
+      throw Error(what + ": its samples are of a type that is not read; save it as 16 bit integers or float");
   }
 }
 
@@ -44,10 +57,12 @@ Samples describe(const itk::ImageIOBase& io, const std::string& what) {
   for (unsigned k = 0; k < io.GetNumberOfDimensions(); ++k) {
     const auto size = io.GetDimensions(k);
     if (k >= 3) {
-      if (size != 1) throw Error(what + ": has " + std::to_string(samples.dimensions) + " dimensions; expected one volume");
+      if (size != 1)
+        throw Error(what + ": has " + std::to_string(samples.dimensions) + " dimensions; expected one volume");
       continue;
     }
-    if (size < 1 || size > 100000) throw Error(what + ": its header gives a size of " + std::to_string(size) + "; it is damaged");
+    if (size < 1 || size > 100000)
+      throw Error(what + ": its header gives a size of " + std::to_string(size) + "; it is damaged");
     samples.size[k] = int(size);
     samples.spacing_mm[k] = io.GetSpacing(k);
     samples.origin_mm[k] = io.GetOrigin(k);
@@ -68,10 +83,14 @@ double stored_bytes(const std::filesystem::path& path) {
 
 itk::ImageIOBase::Pointer reader_of(Format format) {
   switch (format) {
-    case Format::meta: return itk::MetaImageIO::New().GetPointer();
-    case Format::nrrd: return itk::NrrdImageIO::New().GetPointer();
-    case Format::nifti: return itk::NiftiImageIO::New().GetPointer();
-    case Format::tiff: return itk::TIFFImageIO::New().GetPointer();
+    case Format::meta:
+      return itk::MetaImageIO::New().GetPointer();
+    case Format::nrrd:
+      return itk::NrrdImageIO::New().GetPointer();
+    case Format::nifti:
+      return itk::NiftiImageIO::New().GetPointer();
+    case Format::tiff:
+      return itk::TIFFImageIO::New().GetPointer();
   }
   return {};
 }
@@ -94,8 +113,10 @@ void convert(const Samples& samples, std::vector<float>& values) {
 
 std::string reason(const itk::ExceptionObject& error) {
   std::string text = error.GetDescription();
-  if (const std::size_t at = text.find("): "); text.rfind("ITK ERROR", 0) == 0 && at != std::string::npos) text = text.substr(at + 3);
-  if (const std::size_t at = text.find("): "); text.rfind("itk::ERROR", 0) == 0 && at != std::string::npos) text = text.substr(at + 3);
+  if (const std::size_t at = text.find("): "); text.rfind("ITK ERROR", 0) == 0 && at != std::string::npos)
+    text = text.substr(at + 3);
+  if (const std::size_t at = text.find("): "); text.rfind("itk::ERROR", 0) == 0 && at != std::string::npos)
+    text = text.substr(at + 3);
   for (char& c : text)
     if (c == '\n' || c == '\r') c = ' ';
   while (!text.empty() && text.back() == ' ') text.pop_back();
@@ -105,7 +126,8 @@ std::string reason(const itk::ExceptionObject& error) {
 Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, const std::string& format_name) {
   const std::string what = path.string();
   try {
-    if (!io.CanReadFile(what.c_str())) throw Error(what + ": is not a " + format_name + " file, or is damaged at its start");
+    if (!io.CanReadFile(what.c_str()))
+      throw Error(what + ": is not a " + format_name + " file, or is damaged at its start");
     io.SetFileName(what);
     io.ReadImageInformation();
     Samples samples = describe(io, what);
@@ -132,9 +154,10 @@ void check_file(const std::filesystem::path& path) {
 
 void check_claim(const std::string& what, const Samples& samples, double claimed_bytes, double stored_bytes) {
   if (claimed_bytes > kBestCompression * stored_bytes + kSmallFile)
-    throw Error(what + ": its header claims " + std::to_string(samples.size[0]) + " x " + std::to_string(samples.size[1]) +
-                " x " + std::to_string(samples.size[2]) + " samples, but the file has only " +
-                std::to_string(std::size_t(stored_bytes)) + " bytes; it is damaged or cut off");
+    throw Error(what + ": its header claims " + std::to_string(samples.size[0]) + " x " +
+                std::to_string(samples.size[1]) + " x " + std::to_string(samples.size[2]) +
+                " samples, but the file has only " + std::to_string(std::size_t(stored_bytes)) +
+                " bytes; it is damaged or cut off");
 }
 
 Samples read_samples(const std::filesystem::path& path, Format format) {
@@ -149,16 +172,36 @@ Samples read_samples(const std::filesystem::path& path, Format format) {
 std::vector<float> to_float(const Samples& samples) {
   std::vector<float> values(samples.count());
   switch (samples.type) {
-    case Samples::Type::u8: convert<std::uint8_t>(samples, values); break;
-    case Samples::Type::i8: convert<std::int8_t>(samples, values); break;
-    case Samples::Type::u16: convert<std::uint16_t>(samples, values); break;
-    case Samples::Type::i16: convert<std::int16_t>(samples, values); break;
-    case Samples::Type::u32: convert<std::uint32_t>(samples, values); break;
-    case Samples::Type::i32: convert<std::int32_t>(samples, values); break;
-    case Samples::Type::u64: convert<std::uint64_t>(samples, values); break;
-    case Samples::Type::i64: convert<std::int64_t>(samples, values); break;
-    case Samples::Type::f32: convert<float>(samples, values); break;
-    case Samples::Type::f64: convert<double>(samples, values); break;
+    case Samples::Type::u8:
+      convert<std::uint8_t>(samples, values);
+      break;
+    case Samples::Type::i8:
+      convert<std::int8_t>(samples, values);
+      break;
+    case Samples::Type::u16:
+      convert<std::uint16_t>(samples, values);
+      break;
+    case Samples::Type::i16:
+      convert<std::int16_t>(samples, values);
+      break;
+    case Samples::Type::u32:
+      convert<std::uint32_t>(samples, values);
+      break;
+    case Samples::Type::i32:
+      convert<std::int32_t>(samples, values);
+      break;
+    case Samples::Type::u64:
+      convert<std::uint64_t>(samples, values);
+      break;
+    case Samples::Type::i64:
+      convert<std::int64_t>(samples, values);
+      break;
+    case Samples::Type::f32:
+      convert<float>(samples, values);
+      break;
+    case Samples::Type::f64:
+      convert<double>(samples, values);
+      break;
   }
   return values;
 }

@@ -25,8 +25,8 @@ struct Samples {
 
 enum class Format { meta, nrrd, nifti, tiff };
 
-/// Reads a whole file. Throws Error when it is damaged, is not of this format, or its header claims more samples than the
-/// file can hold.
+/// Reads a whole file. Throws Error when it is damaged, is not of this format, or its header claims more samples than
+/// the file can hold.
 Samples read_samples(const std::filesystem::path& path, Format format);
 Samples read_png(const std::filesystem::path& path);
 
@@ -44,8 +44,8 @@ void check_claim(const std::string& what, const Samples& samples, double claimed
 /// The samples as float.
 std::vector<float> to_float(const Samples& samples);
 
-/// A CT series: all slices of one series in a folder, sorted by position and checked for gaps, as HU. `series_uid` picks one
-/// where the folder holds several; empty = there must be just one. Throws Error.
+/// A CT series: all slices of one series in a folder, sorted by position and checked for gaps, as HU. `series_uid`
+/// picks one where the folder holds several; empty = there must be just one. Throws Error.
 struct DicomSeries {
   Samples geometry;  ///< without bytes
   std::vector<float> values;

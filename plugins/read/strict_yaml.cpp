@@ -18,7 +18,8 @@ constexpr std::uintmax_t kLargestFile = 16 << 20;
 std::string read_text(const std::filesystem::path& path) {
   std::error_code failure;
   if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
-  if (!std::filesystem::is_regular_file(path, failure)) throw Error(path.string() + ": expected a YAML file, this is none");
+  if (!std::filesystem::is_regular_file(path, failure))
+    throw Error(path.string() + ": expected a YAML file, this is none");
   if (std::filesystem::file_size(path, failure) > kLargestFile)
     throw Error(path.string() + ": expected a YAML file of at most 16 MB; this is larger");
   std::ifstream stream(path, std::ios::binary);
@@ -30,8 +31,10 @@ std::string read_text(const std::filesystem::path& path) {
 std::vector<std::string> split_lines(const std::string& text) {
   std::vector<std::string> lines(1);
   for (char c : text) {
-    if (c == '\n') lines.emplace_back();
-    else if (c != '\r') lines.back() += c;
+    if (c == '\n')
+      lines.emplace_back();
+    else if (c != '\r')
+      lines.back() += c;
   }
   return lines;
 }
@@ -85,7 +88,8 @@ YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
   if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) throw Error(path_.string() + ": expected one YAML document, got " + std::to_string(documents.size()));
+    if (documents.size() > 1)
+      throw Error(path_.string() + ": expected one YAML document, got " + std::to_string(documents.size()));
     if (!documents.empty()) root_ = documents[0];
   } catch (const YAML::Exception& error) {
     throw Error(describe(error.mark, "not YAML: " + error.msg));
@@ -102,7 +106,9 @@ std::string YamlFile::describe(const YAML::Mark& mark, const std::string& text) 
   return message;
 }
 
-void YamlFile::fault(const YAML::Mark& mark, const std::string& text) { faults_.push_back(describe(mark, text)); }
+void YamlFile::fault(const YAML::Mark& mark, const std::string& text) {
+  faults_.push_back(describe(mark, text));
+}
 
 void YamlFile::finish() const {
   if (faults_.empty()) return;
@@ -121,7 +127,8 @@ YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const
   for (const auto& item : node_) {
     const std::string key = item.first.IsScalar() ? item.first.Scalar() : "";
     if (const auto before = line_of.find(key); before != line_of.end())
-      file_.fault(item.first.Mark(), what_ + ": key '" + key + "' is already given in line " + std::to_string(before->second));
+      file_.fault(item.first.Mark(),
+                  what_ + ": key '" + key + "' is already given in line " + std::to_string(before->second));
     line_of.emplace(key, item.first.Mark().line + 1);
     if (std::find(known_keys.begin(), known_keys.end(), key) != known_keys.end()) continue;
     std::string advice;
@@ -134,7 +141,9 @@ YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const
   }
 }
 
-bool YamlMap::has(const std::string& key) const { return node(key).IsDefined(); }
+bool YamlMap::has(const std::string& key) const {
+  return node(key).IsDefined();
+}
 
 YAML::Node YamlMap::node(const std::string& key) const {
   if (node_.IsMap())
@@ -222,7 +231,8 @@ std::optional<Eigen::MatrixXd> YamlMap::matrix(const std::string& key, int rows,
     }
   }
   if (good) return matrix;
-  fault(key, key + ": expected " + std::to_string(rows) + " rows of " + std::to_string(columns) + " numbers, got " + got(*value));
+  fault(key, key + ": expected " + std::to_string(rows) + " rows of " + std::to_string(columns) + " numbers, got " +
+                 got(*value));
   return std::nullopt;
 }
 
@@ -242,8 +252,10 @@ std::vector<Eigen::Vector3d> YamlMap::points(const std::string& key) const {
       good = number.has_value();
       if (good) point[i] = *number;
     }
-    if (good) points.push_back(point);
-    else file_.fault(item.Mark(), what_ + ": " + key + ": expected a point [x, y, z] in mm, got " + got(item));
+    if (good)
+      points.push_back(point);
+    else
+      file_.fault(item.Mark(), what_ + ": " + key + ": expected a point [x, y, z] in mm, got " + got(item));
   }
   return points;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Strict reading of YAML files. yaml-cpp 0.7 takes duplicate keys, reads 010 as 8 and yes as true, and counts lines from 0:
-// so every map is read through YamlMap. All faults of a file are collected and thrown together.
+// Strict reading of YAML files. yaml-cpp 0.7 takes duplicate keys, reads 010 as 8 and yes as true, and counts lines
+// from 0: so every map is read through YamlMap. All faults of a file are collected and thrown together.
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Core>
@@ -23,7 +23,8 @@ class YamlFile {
   /// Notes a fault at a place, or at the top of the file where the mark is null.
   void fault(const YAML::Mark& mark, const std::string& text);
   bool has_faults() const { return !faults_.empty(); }
-  /// Throws one Error that holds every fault, each as file:line:column with the source line; returns when there are none.
+  /// Throws one Error that holds every fault, each as file:line:column with the source line; returns when there are
+  /// none.
   void finish() const;
 
  private:
@@ -35,8 +36,9 @@ class YamlFile {
   std::vector<std::string> faults_;
 };
 
-/// One map of a file, whose keys are all known: unknown and repeated keys are faults. A getter whose key is missing or whose
-/// value is of the wrong form notes a fault and returns nothing (a `_or` getter takes a missing key as the default).
+/// One map of a file, whose keys are all known: unknown and repeated keys are faults. A getter whose key is missing or
+/// whose value is of the wrong form notes a fault and returns nothing (a `_or` getter takes a missing key as the
+/// default).
 class YamlMap {
  public:
   /// `what` names the map in messages, as in "a view".

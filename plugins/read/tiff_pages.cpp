@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// libtiff takes a stack whose end is cut off as one with fewer pages. So the chain of page directories is followed here: an
-// entry that points behind the end of the file means that pages are missing.
+// libtiff takes a stack whose end is cut off as one with fewer pages. So the chain of page directories is followed
+// here: an entry that points behind the end of the file means that pages are missing.
 #include <fstream>
 #include <stdexcept>
 
@@ -47,7 +47,8 @@ void check_tiff_pages(const std::filesystem::path& path) {
     const std::uint64_t entry_bytes = is_big ? 20 : 12;
     std::uint64_t at = bytes.number(is_big ? 8 : 4, width);
     for (; at != 0; ++pages) {
-      if (pages == kMostPages) throw Error(path.string() + ": has more than 100000 pages, or its pages run in a circle");
+      if (pages == kMostPages)
+        throw Error(path.string() + ": has more than 100000 pages, or its pages run in a circle");
       const std::uint64_t entries = bytes.number(at, count_width);
       if (entries > 65535) throw std::out_of_range("entries");
       at = bytes.number(at + std::uint64_t(count_width) + entries * entry_bytes, width);

@@ -14,7 +14,8 @@ struct Options {
 
 marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (bool(camera) == !options.camera.empty())
-    throw marrow::Error("view '" + options.name + "': give its camera either as the option (a file) or as the input (a value)");
+    throw marrow::Error("view '" + options.name +
+                        "': give its camera either as the option (a file) or as the input (a value)");
   marrow::View view;
   view.name = options.name;
   view.image = marrow::read::read_image_file(options.image);

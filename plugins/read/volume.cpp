@@ -25,8 +25,10 @@ MARROW_PLUGIN(plugin) {
       .summary("CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its data)")
       .out("volume", "CT in Hounsfield units; patient axes are LPS")
       .option("path", &Options::path, "file, or folder of one series", marrow::required())
-      .option("voxel_size_mm", &Options::voxel_size_mm, "size of a voxel [x, y, z]; needed for TIFF, replaces the file's own")
+      .option("voxel_size_mm", &Options::voxel_size_mm,
+              "size of a voxel [x, y, z]; needed for TIFF, replaces the file's own")
       .option("flip", &Options::flip, "axes of the grid (x, y, z) along which the samples are reversed")
-      .option("value_offset_hu", &Options::value_offset_hu, "added to every sample: -1024 where the file holds HU + 1024")
+      .option("value_offset_hu", &Options::value_offset_hu,
+              "added to every sample: -1024 where the file holds HU + 1024")
       .option("series_uid", &Options::series_uid, "SeriesInstanceUID, where a DICOM folder holds several series");
 }

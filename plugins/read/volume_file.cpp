@@ -16,7 +16,8 @@ namespace fs = std::filesystem;
 
 std::string lower_extension(const fs::path& path) {
   std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+  std::transform(extension.begin(), extension.end(), extension.begin(),
+                 [](unsigned char c) { return char(std::tolower(c)); });
   return extension;
 }
 
@@ -60,10 +61,12 @@ Samples read_single(const fs::path& path, const fs::path& named) {
     check_detached(path, named);
     return read_samples(path, Format::nrrd);
   }
-  if (extension == ".nii" || (extension == ".gz" && lower_extension(path.stem()) == ".nii")) return read_samples(path, Format::nifti);
+  if (extension == ".nii" || (extension == ".gz" && lower_extension(path.stem()) == ".nii"))
+    return read_samples(path, Format::nifti);
   if (extension == ".tif" || extension == ".tiff") return read_samples(path, Format::tiff);
-  throw Error(path.string() + ": not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
-                              "folder of DICOM slices (name the folder)");
+  throw Error(path.string() +
+              ": not a volume that can be read; known are .mha, .mhd, .nrrd, .nhdr, .nii, .nii.gz, .tif and a "
+              "folder of DICOM slices (name the folder)");
 }
 
 fs::path detached_header_in(const fs::path& folder) {
@@ -72,7 +75,9 @@ fs::path detached_header_in(const fs::path& folder) {
     const std::string extension = lower_extension(entry.path());
     if (extension == ".mhd" || extension == ".nhdr") headers.push_back(entry.path());
   }
-  if (headers.size() > 1) throw Error(folder.string() + ": holds " + std::to_string(headers.size()) + " .mhd or .nhdr files; keep one per folder");
+  if (headers.size() > 1)
+    throw Error(folder.string() + ": holds " + std::to_string(headers.size()) +
+                " .mhd or .nhdr files; keep one per folder");
   return headers.empty() ? fs::path() : headers[0];
 }
 
@@ -87,7 +92,8 @@ Grid grid_of(const Samples& samples) {
 
 int axis_of(const std::string& name) {
   static const std::string kAxes = "xyz";
-  if (name.size() != 1 || kAxes.find(name) == std::string::npos) throw Error("flip: expected axes x, y or z, got '" + name + "'");
+  if (name.size() != 1 || kAxes.find(name) == std::string::npos)
+    throw Error("flip: expected axes x, y or z, got '" + name + "'");
   return int(kAxes.find(name));
 }
 
@@ -106,7 +112,8 @@ void check_reading(const VolumeReading& reading) {
   if (!reading.voxel_size_mm.empty() && reading.voxel_size_mm.size() != 3)
     throw Error("voxel_size_mm: expected 3 lengths, got " + std::to_string(reading.voxel_size_mm.size()));
   for (double length : reading.voxel_size_mm)
-    if (!(length > 0) || !std::isfinite(length)) throw Error("voxel_size_mm: expected positive lengths, got " + std::to_string(length));
+    if (!(length > 0) || !std::isfinite(length))
+      throw Error("voxel_size_mm: expected positive lengths, got " + std::to_string(length));
 }
 
 }  // namespace
@@ -126,7 +133,8 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading) {
     if (samples.components != 1)
       throw Error(file.string() + ": has " + std::to_string(samples.components) + " values per voxel; a CT has one");
     if (samples.dimensions < 3)
-      throw Error(file.string() + ": is one image, not a volume; expected 3 dimensions, got " + std::to_string(samples.dimensions));
+      throw Error(file.string() + ": is one image, not a volume; expected 3 dimensions, got " +
+                  std::to_string(samples.dimensions));
     if ((extension == ".tif" || extension == ".tiff") && reading.voxel_size_mm.empty())
       throw Error(file.string() + ": a TIFF does not say how large its voxels are; give voxel_size_mm: [x, y, z]");
     volume = {grid_of(samples), to_float(samples)};
@@ -142,17 +150,21 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading) {
 Image read_image_file(const fs::path& path) {
   const std::string extension = lower_extension(path);
   const bool is_tiff = extension == ".tif" || extension == ".tiff";
-  if (!is_tiff && extension != ".png") throw Error(path.string() + ": not an image that can be read; known are .png and .tif");
+  if (!is_tiff && extension != ".png")
+    throw Error(path.string() + ": not an image that can be read; known are .png and .tif");
   check_file(path);
   const Samples samples = is_tiff ? read_samples(path, Format::tiff) : read_png(path);
   if (samples.size[2] != 1)
-    throw Error(path.string() + ": has " + std::to_string(samples.size[2]) + " pages; an image has one (read.volume reads stacks)");
+    throw Error(path.string() + ": has " + std::to_string(samples.size[2]) +
+                " pages; an image has one (read.volume reads stacks)");
   if (samples.components != 1)
     throw Error(path.string() + ": has " + std::to_string(samples.components) +
                 " channels; an X-ray image has one: save it as grey levels");
   int type = CV_8U;
-  if (samples.type == Samples::Type::u16) type = CV_16U;
-  else if (samples.type == Samples::Type::f32) type = CV_32F;
+  if (samples.type == Samples::Type::u16)
+    type = CV_16U;
+  else if (samples.type == Samples::Type::f32)
+    type = CV_32F;
   else if (samples.type != Samples::Type::u8)
     throw Error(path.string() + ": expected 8 or 16 bit grey levels without sign, or float");
   Image image{cv::Mat(samples.size[1], samples.size[0], type)};

@@ -17,8 +17,8 @@ struct VolumeReading {
   std::string series_uid;             ///< of DICOM; empty: the only one
 };
 
-/// A CT volume from MHA, NRRD, NIfTI, multi-page TIFF, or a folder: a DICOM series, or an MHD or NHDR header with the file
-/// that it names. Patient axes are LPS. Throws Error.
+/// A CT volume from MHA, NRRD, NIfTI, multi-page TIFF, or a folder: a DICOM series, or an MHD or NHDR header with the
+/// file that it names. Patient axes are LPS. Throws Error.
 Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& reading);
 
 /// One grey image from PNG or TIFF, with 8 or 16 bits or float. Throws Error.

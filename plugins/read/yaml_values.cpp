@@ -11,7 +11,8 @@ namespace {
 void check_frame(const YamlMap& map, const std::string& key, const std::string& expected) {
   const auto frame = map.text(key);
   if (frame && *frame != expected)
-    map.fault(key, key + ": expected the frame '" + expected + "', got '" + *frame + "'; this file holds another transform");
+    map.fault(key,
+              key + ": expected the frame '" + expected + "', got '" + *frame + "'; this file holds another transform");
 }
 
 std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) {
@@ -68,7 +69,8 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 }
 
 std::optional<Camera> camera_from(const YAML::Node& node, YamlFile& file) {
-  const YamlMap map(file, node, "camera", {"marrow-camera", "width_px", "height_px", "intrinsics", "camera_from_world"});
+  const YamlMap map(file, node, "camera",
+                    {"marrow-camera", "width_px", "height_px", "intrinsics", "camera_from_world"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
   const auto width = map.integer("width_px");
   const auto height = map.integer("height_px");
@@ -101,7 +103,8 @@ void check_version(const YamlMap& map, const std::string& key) {
 Pose read_pose_file(const std::filesystem::path& path) {
   YamlFile file(path);
   std::vector<std::string> keys = transform_keys();
-  for (const char* key : {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost", "evaluations"})
+  for (const char* key :
+       {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost", "evaluations"})
     keys.push_back(key);
   const YamlMap map(file, file.root(), "pose", keys);
   check_version(map, "marrow-pose");
@@ -125,7 +128,8 @@ List<Seeds> read_seeds_file(const std::filesystem::path& path) {
   check_version(map, "marrow-seeds");
   List<Seeds> seeds;
   if (const auto fragments = map.required("fragments")) {
-    if (!fragments->IsMap() || fragments->size() == 0) map.fault("fragments", "fragments: expected fragments by name");
+    if (!fragments->IsMap() || fragments->size() == 0)
+      map.fault("fragments", "fragments: expected fragments by name");
     else
       for (const auto& item : *fragments) {
         const std::string name = item.first.Scalar();

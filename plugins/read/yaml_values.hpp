@@ -9,8 +9,8 @@
 
 namespace marrow::read {
 
-/// A transform from `target`, `source` and either `rotation` with `translation_mm` or one 4x4 `matrix`. `expected` holds the
-/// frames that it must name. Faults are noted in the map's file.
+/// A transform from `target`, `source` and either `rotation` with `translation_mm` or one 4x4 `matrix`. `expected`
+/// holds the frames that it must name. Faults are noted in the map's file.
 std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected);
 /// The keys that transform_from reads.
 const std::vector<std::string>& transform_keys();

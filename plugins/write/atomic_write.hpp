@@ -6,8 +6,8 @@
 
 namespace marrow::write {
 
-/// Calls `fill` with a temporary name beside `path` that ends in the same extension, then renames what it made to `path`. On
-/// any failure the temporary file or folder is removed, `path` is as it was before, and Error names it.
+/// Calls `fill` with a temporary name beside `path` that ends in the same extension, then renames what it made to
+/// `path`. On any failure the temporary file or folder is removed, `path` is as it was before, and Error names it.
 void write_atomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& fill);
 
 /// Writes text in this way.

@@ -14,9 +14,12 @@ namespace fs = std::filesystem;
 using marrow::write::quoted;
 
 /// PNG for 8 and 16 bits, TIFF for float.
-std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
+std::string image_name(const marrow::Image& image) {
+  return image.pixels.depth() == CV_32F ? ".tif" : ".png";
+}
 
-/// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png, or with an empty stem image.png, camera.yaml and mask.png.
+/// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png, or with an empty stem image.png, camera.yaml and
+/// mask.png.
 struct ViewFiles {
   std::string image, camera, mask;
 };
@@ -51,7 +54,8 @@ std::string views_text(const marrow::Case& value, const fs::path& folder) {
   std::string text = "views:\n";
   for (std::size_t i = 0; i < value.views.size(); ++i) {
     const ViewFiles files = write_view_files(value.views[i], folder, file_stem(value.views.name(i), i));
-    text += "  - name: " + quoted(value.views.name(i)) + "\n    image: " + files.image + "\n    camera: " + files.camera + "\n";
+    text += "  - name: " + quoted(value.views.name(i)) + "\n    image: " + files.image +
+            "\n    camera: " + files.camera + "\n";
     if (!files.mask.empty()) text += "    mask: " + files.mask + "\n";
   }
   return text;
@@ -76,7 +80,8 @@ void check_case(const marrow::Case& value, const std::string& path) {
   if (value.seeds.empty()) throw marrow::Error(path + ": the case has no fragment with seeds");
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
-      if (!value.seeds.find(name)) throw marrow::Error(path + ": fragment '" + name + "' has a " + what + " but no seeds");
+      if (!value.seeds.find(name))
+        throw marrow::Error(path + ": fragment '" + name + "' has a " + what + " but no seeds");
   };
   check(value.start.names(), "start");
   check(value.truth.names(), "truth");
@@ -87,8 +92,8 @@ void write_case(const marrow::Case& value, const std::string& path) {
   marrow::write::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
     marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
-    marrow::write::write_text_plainly(folder / "case.yaml",
-                                      "marrow-case: 1\nct: ct.mha\n" + views_text(value, folder) + fragments_text(value));
+    marrow::write::write_text_plainly(
+        folder / "case.yaml", "marrow-case: 1\nct: ct.mha\n" + views_text(value, folder) + fragments_text(value));
   });
 }
 
@@ -96,5 +101,6 @@ void write_case(const marrow::Case& value, const std::string& path) {
 
 MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::View>("", view, "folder with image.png, camera.yaml and mask.png");
-  plugin.writer<marrow::Case>("", write_case, "folder with case.yaml, ct.mha, images and cameras, as read.case takes it");
+  plugin.writer<marrow::Case>("", write_case,
+                              "folder with case.yaml, ct.mha, images and cameras, as read.case takes it");
 }

@@ -17,8 +17,8 @@ void append(std::string& bytes, const T& value) {
 
 /// Binary PLY with double coordinates, so that what is read back is the same to the last bit.
 void mesh(const marrow::Mesh& mesh, const std::string& path) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + mesh.frame + "\nelement vertex " +
-                      std::to_string(mesh.vertices_mm.size()) +
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + mesh.frame +
+                      "\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
                       "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
                       std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";
   bytes.reserve(bytes.size() + mesh.vertices_mm.size() * 24 + mesh.triangles.size() * 13);
@@ -33,4 +33,6 @@ void mesh(const marrow::Mesh& mesh, const std::string& path) {
 
 }  // namespace
 
-MARROW_PLUGIN(plugin) { plugin.writer<marrow::Mesh>(".ply", mesh, "PLY surface in mm (MeshLab, Slicer, Blender open it)"); }
+MARROW_PLUGIN(plugin) {
+  plugin.writer<marrow::Mesh>(".ply", mesh, "PLY surface in mm (MeshLab, Slicer, Blender open it)");
+}

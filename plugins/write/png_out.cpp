@@ -37,8 +37,8 @@ struct Writer {
 bool write_rows(Writer& writer, int width, int height, int channels, int bits, png_bytepp rows) {
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_IHDR(writer.png, writer.info, png_uint_32(width), png_uint_32(height), bits,
-               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT,
-               PNG_FILTER_TYPE_DEFAULT);
+               channels == 3 ? PNG_COLOR_TYPE_RGB : PNG_COLOR_TYPE_GRAY, PNG_INTERLACE_NONE,
+               PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   png_set_compression_level(writer.png, 4);
   png_write_info(writer.png, writer.info);
   if (bits == 16 && std::endian::native == std::endian::little) png_set_swap(writer.png);
@@ -49,7 +49,8 @@ bool write_rows(Writer& writer, int width, int height, int channels, int bits, p
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels) {
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
+               const void* pixels) {
   const int bits = sample == Sample::u16 ? 16 : 8;
   const std::size_t row_bytes = std::size_t(width) * std::size_t(channels) * std::size_t(bits / 8);
   std::vector<png_bytep> rows;

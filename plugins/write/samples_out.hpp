@@ -17,7 +17,8 @@ struct GridOut {
 void write_mha(const std::filesystem::path& path, const GridOut& grid, const float* values);
 
 /// An image as PNG, rows from the top, pixels without gaps, one or three channels of 8 or 16 bits. Throws Error.
-void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample, const void* pixels);
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
+               const void* pixels);
 
 /// The same as TIFF of float. Throws Error when the file did not become whole.
 void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels);

@@ -19,7 +19,8 @@ std::string deviations(const Matrix6d& covariance) {
     rotation_deg[i] = degrees(std::sqrt(covariance(i, i)));
     translation_mm[i] = std::sqrt(covariance(3 + i, 3 + i));
   }
-  return "predicted_deviation:  # one standard deviation about and along the fragment's frontal, lateral and long axes\n  rotation_deg: " +
+  return "predicted_deviation:  # one standard deviation about and along the fragment's frontal, lateral and long "
+         "axes\n  rotation_deg: " +
          vector(rotation_deg) + "\n  translation_mm: " + vector(translation_mm) + "\n";
 }
 
@@ -36,9 +37,12 @@ std::string quoted(const std::string& text) {
   std::string result = "\"";
   for (const unsigned char c : text) {
     char escape[8];
-    if (c == '"' || c == '\\') result += std::string("\\") + char(c);
-    else if (c < 0x20) result += (std::snprintf(escape, sizeof escape, "\\x%02X", c), escape);
-    else result += char(c);
+    if (c == '"' || c == '\\')
+      result += std::string("\\") + char(c);
+    else if (c < 0x20)
+      result += (std::snprintf(escape, sizeof escape, "\\x%02X", c), escape);
+    else
+      result += char(c);
   }
   return result + "\"";
 }
@@ -59,12 +63,13 @@ std::string transform(const RigidTransform& t, const std::string& indent) {
   Eigen::Matrix4d whole = Eigen::Matrix4d::Identity();
   whole.topLeftCorner<3, 3>() = t.rotation;
   whole.topRightCorner<3, 1>() = t.translation_mm;
-  return indent + "target: " + t.target + "\n" + indent + "source: " + t.source + "\n" + indent +
-         "matrix:  # " + t.target + "_from_" + t.source + ", mm\n" + matrix(whole, indent + "  ");
+  return indent + "target: " + t.target + "\n" + indent + "source: " + t.source + "\n" + indent + "matrix:  # " +
+         t.target + "_from_" + t.source + ", mm\n" + matrix(whole, indent + "  ");
 }
 
 std::string camera(const Camera& camera) {
-  return "marrow-camera: 1\nwidth_px: " + std::to_string(camera.width_px) + "\nheight_px: " + std::to_string(camera.height_px) +
+  return "marrow-camera: 1\nwidth_px: " + std::to_string(camera.width_px) +
+         "\nheight_px: " + std::to_string(camera.height_px) +
          "\nintrinsics:  # pixel = intrinsics * camera point, divided by the third coordinate\n" +
          matrix(camera.intrinsics, "  ") + "camera_from_world:\n" + transform(camera.camera_from_world, "  ");
 }
@@ -82,21 +87,26 @@ std::string pose(const Pose& pose) {
   for (const std::string& warning : pose.warnings) text += "  - " + quoted(warning) + "\n";
   if (std::isfinite(pose.cost)) text += "cost: " + number(pose.cost) + "\n";
   text += "evaluations: " + std::to_string(pose.evaluations) + "\n";
-  text += "fragment_frame:  # the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long\n";
+  text +=
+      "fragment_frame:  # the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long\n";
   text += "  origin_mm: " + vector(pose.frame.origin_mm) + "\n  axes:\n" + matrix(pose.frame.axes, "    ");
   if (pose.covariance && pose.covariance->allFinite())
-    text += "covariance:  # of rotation [rad] and translation [mm] about and along these axes\n" + matrix(*pose.covariance, "  ");
+    text += "covariance:  # of rotation [rad] and translation [mm] about and along these axes\n" +
+            matrix(*pose.covariance, "  ");
   return text;
 }
 
-std::string truth(const Truth& truth) { return "marrow-truth: 1\n" + transform(truth.world_from_model, ""); }
+std::string truth(const Truth& truth) {
+  return "marrow-truth: 1\n" + transform(truth.world_from_model, "");
+}
 
 std::string shaft_lines(const ShaftLines& lines) {
   std::string text = "marrow-shaft-lines: 1\nleft: " + segment(lines.left) + "\nright: " + segment(lines.right) +
                      "\nwidth_mm: " + number(lines.width_mm) + "\nlog_likelihood: " + number(lines.log_likelihood) +
                      "\nrejected:" + (lines.rejected.empty() ? " []" : "") + "\n";
   for (const ShaftLines::Rejected& pair : lines.rejected)
-    text += "  - left: " + segment(pair.left) + "\n    right: " + segment(pair.right) + "\n    reason: " + quoted(pair.reason) + "\n";
+    text += "  - left: " + segment(pair.left) + "\n    right: " + segment(pair.right) +
+            "\n    reason: " + quoted(pair.reason) + "\n";
   return text;
 }
 

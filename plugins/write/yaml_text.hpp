@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// marrow's values as YAML text that plugins/read takes back to the last bit: numbers are written in the shortest form that
-// reads as the same double.
+// marrow's values as YAML text that plugins/read takes back to the last bit: numbers are written in the shortest form
+// that reads as the same double.
 #include <string>
 
 #include "marrow/domain/camera.hpp"

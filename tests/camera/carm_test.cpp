@@ -15,7 +15,9 @@ marrow::Camera view(double alpha_deg, double beta_deg, Options options = {}) {
   return carm(options)[0];
 }
 
-Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
+Vector3d towards_detector(const marrow::Camera& camera) {
+  return camera.camera_from_world.rotation.row(2);
+}
 
 TEST(CarmCamera, FrontalHasDetectorInFrontHeadUpAndLooksFromTheSource) {
   const marrow::Camera frontal = view(0, 0);
@@ -35,7 +37,8 @@ TEST(CarmCamera, PositiveBetaTurnsTheDetectorToThePatientsLeft) {
 
 TEST(CarmCamera, PositiveAlphaTiltsTheDetectorTowardsTheHead) {
   EXPECT_TRUE(towards_detector(view(90, 0)).isApprox(Vector3d::UnitZ()));
-  EXPECT_TRUE(towards_detector(view(20, 0)).isApprox(Vector3d(0, -std::cos(marrow::radians(20)), std::sin(marrow::radians(20)))));
+  EXPECT_TRUE(towards_detector(view(20, 0))
+                  .isApprox(Vector3d(0, -std::cos(marrow::radians(20)), std::sin(marrow::radians(20)))));
   // The source is then towards the feet, so a point in front of the isocentre lies below the central ray: v grows.
   EXPECT_GT(project(view(20, 0), {0, -50, 0}).y(), project(view(0, 0), {0, -50, 0}).y());
 }
@@ -84,7 +87,8 @@ TEST(CarmCamera, RelativeMotionBetweenTwoPoses) {
   const Vector3d c_1 = -600 * w_1.col(2), c_2 = -600 * w_2.col(2);
   EXPECT_TRUE(motion.translation_mm.isApprox(w_2.transpose() * (c_1 - c_2), 1e-12));
   EXPECT_NEAR(marrow::degrees(marrow::geodesic_angle_rad(view(0, 0).camera_from_world.rotation,
-                                                         view(0, 90).camera_from_world.rotation)), 90, 1e-9);
+                                                         view(0, 90).camera_from_world.rotation)),
+              90, 1e-9);
 }
 
 TEST(CarmCamera, DefaultsAreTwoNamedViews) {

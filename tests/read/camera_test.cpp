@@ -12,7 +12,9 @@ using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
-marrow::Camera read(const std::filesystem::path& path) { return camera({path}); }
+marrow::Camera read(const std::filesystem::path& path) {
+  return camera({path});
+}
 
 const std::string kXmalab =
     "image size\n480,640\n\ncamera matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\n"
@@ -22,7 +24,8 @@ TEST(ReadCamera, XmalabText) {
   const TemporaryFolder folder;
   for (const std::string& text : {kXmalab, [] {
                                     std::string windows;
-                                    for (char c : kXmalab) windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
+                                    for (char c : kXmalab)
+                                      windows += c == '\n' ? std::string("\r\n") : std::string(1, c);
                                     return windows;
                                   }()}) {
     put(folder / "cam.txt", text);
@@ -38,7 +41,8 @@ TEST(ReadCamera, XmalabText) {
 // Metal beads whose positions in both images and in space are known; their own reprojection error is 0.02-0.36 px.
 TEST(ReadCamera, RealBeadsReprojectWithinTheirMeasuredError) {
   MARROW_NEED_DATA(folder, "wrist");
-  const marrow::Camera cameras[] = {read(folder / "cameras/xr_calib_wrist_cam01.txt"), read(folder / "cameras/xr_calib_wrist_cam02.txt")};
+  const marrow::Camera cameras[] = {read(folder / "cameras/xr_calib_wrist_cam01.txt"),
+                                    read(folder / "cameras/xr_calib_wrist_cam02.txt")};
   const YAML::Node frames = YAML::LoadFile(folder / "beads.json")["beads"];
   int count = 0;
   double worst = 0;
@@ -51,7 +55,8 @@ TEST(ReadCamera, RealBeadsReprojectWithinTheirMeasuredError) {
         for (int k = 0; k < 2; ++k) {
           if (!bead[keys[k]].IsSequence()) continue;
           const auto uv = bead[keys[k]].as<std::vector<double>>();
-          worst = std::max(worst, (project(cameras[k], {xyz[0], xyz[1], xyz[2]}) - Eigen::Vector2d(uv[0], uv[1])).norm());
+          worst =
+              std::max(worst, (project(cameras[k], {xyz[0], xyz[1], xyz[2]}) - Eigen::Vector2d(uv[0], uv[1])).norm());
           ++count;
         }
       }
@@ -96,7 +101,8 @@ TEST(ReadCamera, OwnYaml) {
   EXPECT_EQ(camera.width_px, 640);
   EXPECT_EQ(camera.camera_from_world.translation_mm.z(), 900);
   put(folder / "cam.yaml", with(kYaml, "target: camera", "target: detector"));
-  EXPECT_SAYS(read(folder / "cam.yaml"), "cam.yaml:6:11: camera_from_world: target: expected the frame 'camera', got 'detector'");
+  EXPECT_SAYS(read(folder / "cam.yaml"),
+              "cam.yaml:6:11: camera_from_world: target: expected the frame 'camera', got 'detector'");
   put(folder / "cam.yaml", with(kYaml, "marrow-camera: 1\n", ""));
   EXPECT_SAYS(read(folder / "cam.yaml"), "key 'marrow-camera' is missing");
   put(folder / "cam.yaml", with(kYaml, "640", "640.5"));

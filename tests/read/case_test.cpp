@@ -103,7 +103,8 @@ TEST_F(ReadCase, WithoutStartAndTruthTheirListsAreEmpty) {
 }
 
 TEST_F(ReadCase, CtWithWhatItsFileDoesNotSay) {
-  put(folder / "case.yaml", with(kCase, "ct: ct.mha", "ct: {file: ct.mha, voxel_size_mm: [1, 2, 3], value_offset_hu: -1024, flip: [z]}"));
+  put(folder / "case.yaml",
+      with(kCase, "ct: ct.mha", "ct: {file: ct.mha, voxel_size_mm: [1, 2, 3], value_offset_hu: -1024, flip: [z]}"));
   EXPECT_EQ(read().ct.grid.spacing_mm, Eigen::Vector3d(1, 2, 3));
   EXPECT_EQ(read().ct.values[0], 40 - 1024);
 }
@@ -124,7 +125,8 @@ TEST_F(ReadCase, EveryFaultIsShownAtItsPlaceAndAllTogether) {
 }
 
 TEST_F(ReadCase, StrictYaml) {
-  expect_said("marrow-case: 1", "marrow-case: 2", "case.yaml:1:14: case: marrow-case: this program reads version 1, the file is of version 2");
+  expect_said("marrow-case: 1", "marrow-case: 2",
+              "case.yaml:1:14: case: marrow-case: this program reads version 1, the file is of version 2");
   expect_said("marrow-case: 1\n", "", "key 'marrow-case' is missing");
   expect_said("ct: ct.mha", "ct: ct.mha\nct: ct.mha", "case.yaml:3:1: case: key 'ct' is already given in line 2");
   expect_said("width_px: 6", "width_px: \"6\"", "width_px: expected a whole number, got the quoted text \"6\"");
@@ -141,11 +143,12 @@ TEST_F(ReadCase, StrictYaml) {
 TEST_F(ReadCase, TransformsSayTheirFramesAndAreRigid) {
   expect_said("start: {target: world", "start: {target: ct", "target: expected the frame 'world', got 'ct'");
   expect_said("start: {target: world, ", "start: {", "start: key 'target' is missing");
-  expect_said("rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [1", "rotation: [[1, 0, 0], [0, 1, 0], [0, 0, -1]], translation_mm: [1",
-              "rotation: not a rotation");
+  expect_said("rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [1",
+              "rotation: [[1, 0, 0], [0, 1, 0], [0, 0, -1]], translation_mm: [1", "rotation: not a rotation");
   expect_said("[0, 0, 0, 1]]}", "[0, 0, 0, 2]]}", "matrix: the last row of a rigid transform is [0, 0, 0, 1]");
   expect_said("[0, 0, 0, 1]]}", "[0, 0, 0, 1]], rotation: 1}", "'matrix' already gives it");
-  expect_said("translation_mm: [1, 2, 3]}", "translation_mm: [1, 2]}", "translation_mm: expected 3 numbers [x, y, z], got a list of 2");
+  expect_said("translation_mm: [1, 2, 3]}", "translation_mm: [1, 2]}",
+              "translation_mm: expected 3 numbers [x, y, z], got a list of 2");
 }
 
 TEST_F(ReadCase, NothingOutsideTheFolderIsOpened) {
@@ -175,13 +178,16 @@ TEST_F(ReadCase, FaultsOfOtherFilesAreShownAtTheKeyThatNamesThem) {
 }
 
 TEST_F(ReadCase, StartAndTruthForAllFragmentsOrNone) {
-  expect_said("    register: false\n", "", "some of the fragments to register have a start; give it for all of them or for none");
-  expect_said("[[1, 2, 3], [4, 5, 6.5]]", "[[1, 2, 3], [4, 5, 6.5]]\n    register: false", "every fragment has register: false");
+  expect_said("    register: false\n", "",
+              "some of the fragments to register have a start; give it for all of them or for none");
+  expect_said("[[1, 2, 3], [4, 5, 6.5]]", "[[1, 2, 3], [4, 5, 6.5]]\n    register: false",
+              "every fragment has register: false");
   expect_said("seeds: [[0, 0, 1]]", "seeds: []", "fragment 'proximal': seeds: expected a list of points");
 }
 
 TEST_F(ReadCase, WantsTheFolder) {
-  EXPECT_SAYS(read_case({folder / "case.yaml"}), "expected the folder of a case, which holds case.yaml (name the folder, not a file in it)");
+  EXPECT_SAYS(read_case({folder / "case.yaml"}),
+              "expected the folder of a case, which holds case.yaml (name the folder, not a file in it)");
   EXPECT_SAYS(read_case({folder / "absent"}), "there is no such folder");
   std::filesystem::remove(folder / "case.yaml");
   EXPECT_SAYS(read(), "case.yaml: there is no such file");
@@ -204,9 +210,12 @@ TEST_F(ReadCase, MutationsAreReadOrDiagnosed) {
   for (int i = 0; i < 300; ++i) {
     std::string text = kCase;
     const std::size_t at = random(text.size());
-    if (i % 3 == 0) text.erase(at, 1 + random(5));
-    else if (i % 3 == 1) text[at] = ":-[]{}#&*!|>'\"%@`\t\n0x~"[random(22)];
-    else text.insert(at, text.substr(random(text.size()), random(12)));
+    if (i % 3 == 0)
+      text.erase(at, 1 + random(5));
+    else if (i % 3 == 1)
+      text[at] = ":-[]{}#&*!|>'\"%@`\t\n0x~"[random(22)];
+    else
+      text.insert(at, text.substr(random(text.size()), random(12)));
     const std::string message = said(text);
     EXPECT_TRUE(message.empty() || message.find("case.yaml") != std::string::npos) << text << message;
   }

@@ -27,7 +27,8 @@ DicomSlice slice_at(double z, int base) {
 }
 
 /// Four slices at z = 10, 12, 14, 16 whose file names run against their order.
-void write_series(const TemporaryFolder& folder, const std::string& series = "1.2.3.4", const std::string& prefix = "") {
+void write_series(const TemporaryFolder& folder, const std::string& series = "1.2.3.4",
+                  const std::string& prefix = "") {
   for (int k = 0; k < 4; ++k) {
     DicomSlice slice = slice_at(10 + 2 * k, 100 * k - 500);
     slice.series = series;
@@ -66,14 +67,16 @@ TEST(ReadDicom, TwoSeriesAreListedAndOneCanBeNamed) {
   const TemporaryFolder folder;
   write_series(folder, "1.2.3.4", "a");
   write_series(folder, "1.2.3.5", "b");
-  EXPECT_SAYS(read(folder.path()), "holds 2 series; name one with series_uid:\n    1.2.3.4 (CT, 4 slices)\n    1.2.3.5 (CT, 4 slices)");
+  EXPECT_SAYS(read(folder.path()),
+              "holds 2 series; name one with series_uid:\n    1.2.3.4 (CT, 4 slices)\n    1.2.3.5 (CT, 4 slices)");
   EXPECT_EQ(read(folder.path(), "1.2.3.5").grid.size[2], 4);
   EXPECT_SAYS(read(folder.path(), "9.9"), "holds no series 9.9; it holds:\n    1.2.3.4");
 }
 
 TEST(ReadDicom, MissingAndRepeatedSlicesAreDiagnosed) {
   const TemporaryFolder folder;
-  for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0}) write_dicom(folder / ("z" + std::to_string(int(z)) + ".dcm"), slice_at(z, 0));
+  for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0})
+    write_dicom(folder / ("z" + std::to_string(int(z)) + ".dcm"), slice_at(z, 0));
   EXPECT_SAYS(read(folder.path()), "2 mm between z2.dcm and z4.dcm, 1 mm between most slices; a slice is missing");
   write_dicom(folder / "z3.dcm", slice_at(3, 0));
   EXPECT_EQ(read(folder.path()).grid.size[2], 6);
@@ -138,7 +141,8 @@ TEST(ReadDicom, DamagedSlicesAreDiagnosed) {
     slice.position[2] = k;
     write_dicom(folder / ("s" + std::to_string(k) + ".dcm"), slice);
   }
-  marrow::test::expect_damage_is_diagnosed(good / "good.dcm", folder / "s0.dcm", [&](const auto&) { read(folder.path()); });
+  marrow::test::expect_damage_is_diagnosed(good / "good.dcm", folder / "s0.dcm",
+                                           [&](const auto&) { read(folder.path()); });
 }
 
 TEST(ReadDicom, TruncatedRealSliceIsDiagnosed) {

@@ -59,11 +59,11 @@ std::string message_of(Call call) {
   return "";
 }
 
-#define EXPECT_SAYS(call, text)                                                                          \
-  do {                                                                                                   \
-    const std::string marrow_message = ::marrow::test::message_of([&] { (void)(call); });                \
-    EXPECT_NE(marrow_message.find(text), std::string::npos)                                              \
-        << "it said: " << (marrow_message.empty() ? "(nothing thrown)" : marrow_message);                \
+#define EXPECT_SAYS(call, text)                                                           \
+  do {                                                                                    \
+    const std::string marrow_message = ::marrow::test::message_of([&] { (void)(call); }); \
+    EXPECT_NE(marrow_message.find(text), std::string::npos)                               \
+        << "it said: " << (marrow_message.empty() ? "(nothing thrown)" : marrow_message); \
   } while (false)
 
 /// Real data beside the source tree; empty when it is not there.
@@ -72,11 +72,12 @@ inline std::filesystem::path real_data(const std::string& name) {
   return std::filesystem::exists(path) ? path : std::filesystem::path();
 }
 
-#define MARROW_NEED_DATA(variable, name)                         \
+#define MARROW_NEED_DATA(variable, name)                                  \
   const std::filesystem::path variable = ::marrow::test::real_data(name); \
   if (variable.empty()) GTEST_SKIP() << "the real data '" << (name) << "' are not on this machine"
 
-/// Reading each of these damaged copies throws Error that names the file: cut off at several places, empty, text, zeros.
+/// Reading each of these damaged copies throws Error that names the file: cut off at several places, empty, text,
+/// zeros.
 template <class Read>
 void expect_damage_is_diagnosed(const std::filesystem::path& good, const std::filesystem::path& damaged, Read read) {
   const std::string bytes = bytes_of(good);
@@ -84,7 +85,8 @@ void expect_damage_is_diagnosed(const std::filesystem::path& good, const std::fi
   const auto expect_named = [&](const std::string& content, const std::string& how) {
     put(damaged, content);
     const std::string said = message_of([&] { read(damaged); });
-    EXPECT_NE(said.find(damaged.filename().string()), std::string::npos) << how << ": " << (said.empty() ? "(nothing thrown)" : said);
+    EXPECT_NE(said.find(damaged.filename().string()), std::string::npos)
+        << how << ": " << (said.empty() ? "(nothing thrown)" : said);
     EXPECT_EQ(said.find("0x"), std::string::npos) << how << ": " << said;
   };
   for (const double part : {0.01, 0.1, 0.5, 0.9, 0.99})
@@ -94,7 +96,8 @@ void expect_damage_is_diagnosed(const std::filesystem::path& good, const std::fi
   expect_named(std::string(4096, '\0'), "zeros");
   expect_named(bytes.substr(bytes.size() / 2), "the second half alone");
   std::string noisy = bytes;
-  for (std::size_t i = 0; i < std::min<std::size_t>(noisy.size(), 200); ++i) noisy[i] = char(noisy[i] ^ char(i * 37 + 11));
+  for (std::size_t i = 0; i < std::min<std::size_t>(noisy.size(), 200); ++i)
+    noisy[i] = char(noisy[i] ^ char(i * 37 + 11));
   expect_named(noisy, "its first 200 bytes scrambled");
 }
 

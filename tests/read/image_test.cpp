@@ -12,7 +12,9 @@ using marrow::test::ItkGrid;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
 
-marrow::Image read(const std::filesystem::path& path) { return image({path}); }
+marrow::Image read(const std::filesystem::path& path) {
+  return image({path});
+}
 
 template <class T>
 ItkGrid<T> ramp(unsigned width, unsigned height, double step) {
@@ -41,7 +43,8 @@ TEST(ReadImage, KeepsBitsAndOrientation) {
 }
 
 TEST(ReadImage, RealFluoroscopy) {
-  for (const char* name : {"wrist/images/xr_rad_uln_cam01_UND.0002.tif", "wrist/images/xr_rad_uln_cam02_UND.0158.tif"}) {
+  for (const char* name :
+       {"wrist/images/xr_rad_uln_cam01_UND.0002.tif", "wrist/images/xr_rad_uln_cam02_UND.0158.tif"}) {
     MARROW_NEED_DATA(path, name);
     const cv::Mat pixels = read(path).pixels;
     EXPECT_EQ(pixels.type(), CV_8U);
@@ -75,7 +78,8 @@ TEST(ReadImage, DamagedFilesAreDiagnosed) {
   for (const char* extension : {".png", ".tif"}) {
     SCOPED_TRACE(extension);
     write_itk(folder / ("good" + std::string(extension)), noise);
-    marrow::test::expect_damage_is_diagnosed(folder / ("good" + std::string(extension)), folder / ("damaged" + std::string(extension)),
+    marrow::test::expect_damage_is_diagnosed(folder / ("good" + std::string(extension)),
+                                             folder / ("damaged" + std::string(extension)),
                                              [](const auto& path) { read(path); });
   }
 }

@@ -59,7 +59,9 @@ template void write_itk(const std::filesystem::path&, const ItkGrid<double>&, bo
 void write_dicom(const std::filesystem::path& path, const DicomSlice& slice) {
   const auto io = itk::GDCMImageIO::New();
   itk::MetaDataDictionary& tags = io->GetMetaDataDictionary();
-  const auto set = [&](const char* tag, const std::string& value) { itk::EncapsulateMetaData<std::string>(tags, tag, value); };
+  const auto set = [&](const char* tag, const std::string& value) {
+    itk::EncapsulateMetaData<std::string>(tags, tag, value);
+  };
   const auto text = [](double value) { return std::to_string(value); };
   set("0008|0060", slice.modality);
   set("0020|000e", slice.series);

@@ -27,7 +27,8 @@ std::string stl_text() {
   for (const auto& face : kFaces) {
     text += " facet normal 0 0 0\n  outer loop\n";
     for (int corner : face)
-      text += "   vertex " + std::to_string(kCorners[corner][0]) + " " + std::to_string(kCorners[corner][1]) + " " + std::to_string(kCorners[corner][2]) + "\n";
+      text += "   vertex " + std::to_string(kCorners[corner][0]) + " " + std::to_string(kCorners[corner][1]) + " " +
+              std::to_string(kCorners[corner][2]) + "\n";
     text += "  endloop\n endfacet\n";
   }
   return text + "endsolid\n";
@@ -107,7 +108,8 @@ TEST(ReadMesh, RealBonesAreClosed) {
 
 TEST(ReadMesh, DegenerateTrianglesAreLeftOut) {
   const TemporaryFolder folder;
-  const std::string sliver = " facet normal 0 0 0\n outer loop\n vertex 1 0 0\n vertex 1 0 0\n vertex 0 1 0\n endloop\n endfacet\n";
+  const std::string sliver =
+      " facet normal 0 0 0\n outer loop\n vertex 1 0 0\n vertex 1 0 0\n vertex 0 1 0\n endloop\n endfacet\n";
   put(folder / "a.stl", with(stl_text(), "endsolid", sliver + "endsolid"));
   EXPECT_EQ(read(folder / "a.stl").triangles.size(), 4u);
 }

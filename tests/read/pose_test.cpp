@@ -28,18 +28,22 @@ TEST(ReadPose, RotationAndTranslation) {
   EXPECT_FALSE(value.covariance);
 }
 
-// The shipped placements of the real radius agree with the affine matrices that they were made from, which count voxels from
-// their corners.
+// The shipped placements of the real radius agree with the affine matrices that they were made from, which count voxels
+// from their corners.
 TEST(ReadPose, PlacementsOfTheWrist) {
   MARROW_NEED_DATA(data, "wrist/start.json");
   const YAML::Node starts = YAML::LoadFile(data)["radius"];
   for (const char* frame : {"0002", "0158"}) {
-    const marrow::Pose value = pose({std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist" / ("radius-" + std::string(frame) + ".pose.yaml")});
+    const marrow::Pose value = pose({std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist" /
+                                     ("radius-" + std::string(frame) + ".pose.yaml")});
     const auto rows = starts[frame]["index_to_world_3x4"].as<std::vector<std::vector<double>>>();
-    for (const Eigen::Vector3d& index : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(67, 85, 0), Eigen::Vector3d(30, 40, 127)}) {
-      const Eigen::Vector3d world = value.world_from_model * index.cwiseProduct(Eigen::Vector3d(0.39625, 0.39625, 0.625));
+    for (const Eigen::Vector3d& index :
+         {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(67, 85, 0), Eigen::Vector3d(30, 40, 127)}) {
+      const Eigen::Vector3d world =
+          value.world_from_model * index.cwiseProduct(Eigen::Vector3d(0.39625, 0.39625, 0.625));
       for (int r = 0; r < 3; ++r) {
-        const double expected = rows[r][0] * (index[0] + 0.5) + rows[r][1] * (index[1] + 0.5) + rows[r][2] * (index[2] + 0.5) + rows[r][3];
+        const double expected =
+            rows[r][0] * (index[0] + 0.5) + rows[r][1] * (index[1] + 0.5) + rows[r][2] * (index[2] + 0.5) + rows[r][3];
         EXPECT_NEAR(world[r], expected, 0.02) << frame;
       }
     }

@@ -14,7 +14,8 @@ using marrow::test::TemporaryFolder;
 TEST(ReadSeeds, FragmentsInTheirOrder) {
   const TemporaryFolder folder;
   put(folder / "s.yaml",
-      "marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]], register: false}\n  distal:\n    seeds:\n      - [4, 5, 6]\n      - [7, 8, 9]\n");
+      "marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]], register: false}\n  distal:\n    seeds:\n      - "
+      "[4, 5, 6]\n      - [7, 8, 9]\n");
   const marrow::List<marrow::Seeds> value = seeds({folder / "s.yaml"});
   EXPECT_EQ(value.names(), (std::vector<std::string>{"proximal", "distal"}));
   EXPECT_FALSE(value[0].wanted);
@@ -40,7 +41,8 @@ TEST(ReadSeeds, DiagnosesFaults) {
   };
   expect("", "key 'fragments' is missing");
   expect("fragments: {}\n", "fragments: expected fragments by name");
-  expect("fragments: {a: {seeds: [[1, 2]]}}\n", "s.yaml:2:25: fragment 'a': seeds: expected a point [x, y, z] in mm, got a list of 2");
+  expect("fragments: {a: {seeds: [[1, 2]]}}\n",
+         "s.yaml:2:25: fragment 'a': seeds: expected a point [x, y, z] in mm, got a list of 2");
   expect("fragments: {a: {seed: [[1, 2, 3]]}}\n", "unknown key 'seed'; did you mean 'seeds'?");
   expect("fragments: {a: {seeds: [[1, 2, 3]]}, a: {seeds: [[1, 2, 3]]}}\n", "fragment 'a' is given twice");
 }

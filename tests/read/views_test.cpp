@@ -19,7 +19,9 @@ class ReadViews : public testing::Test {
     for (const char* name : {"a.png", "b.png"})
       write_itk(folder / name, ItkGrid<std::uint8_t>{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)});
     for (const char* name : {"a.txt", "b.txt"})
-      put(folder / name, "image size\n4,6\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
+      put(folder / name,
+          "image size\n4,6\n\ncamera "
+          "matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
     options = {{"one", "two"}, {folder / "a.png", folder / "b.png"}, {folder / "a.txt", folder / "b.txt"}};
   }
   TemporaryFolder folder;
@@ -67,7 +69,8 @@ TEST_F(ReadViews, RealWristPairs) {
   options.cameras = {data / "cameras/xr_calib_wrist_cam01.txt", data / "cameras/xr_calib_wrist_cam02.txt"};
   const auto value = views(nullptr, options);
   EXPECT_EQ(value[0].image.width(), 1760);
-  const double angle = std::acos(value[0].camera.camera_from_world.rotation.row(2).dot(value[1].camera.camera_from_world.rotation.row(2)));
+  const double angle = std::acos(
+      value[0].camera.camera_from_world.rotation.row(2).dot(value[1].camera.camera_from_world.rotation.row(2)));
   EXPECT_NEAR(marrow::degrees(angle), 110, 3) << "the cameras stand 110 degrees apart";
 }
 

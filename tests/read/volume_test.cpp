@@ -57,8 +57,9 @@ TEST_P(VolumeFormats, AreReadWithTheirGridAsItkWroteThem) {
 }
 
 INSTANTIATE_TEST_SUITE_P(All, VolumeFormats,
-                         testing::Values(std::tuple{".mha", false}, std::tuple{".mha", true}, std::tuple{".nrrd", false},
-                                         std::tuple{".nrrd", true}, std::tuple{".nii", false}, std::tuple{".nii.gz", true}));
+                         testing::Values(std::tuple{".mha", false}, std::tuple{".mha", true},
+                                         std::tuple{".nrrd", false}, std::tuple{".nrrd", true},
+                                         std::tuple{".nii", false}, std::tuple{".nii.gz", true}));
 
 TEST(ReadVolume, FlipVoxelSizeAndOffset) {
   const TemporaryFolder folder;
@@ -102,7 +103,8 @@ TEST(ReadVolume, DetachedHeadersNeedTheFolderThatHoldsTheirData) {
     EXPECT_SAYS(read(path), "name the folder that holds both");
   }
   const auto header = folder / "mhd/ct.mhd";
-  marrow::test::put(header, marrow::test::with(marrow::test::bytes_of(header), "ElementDataFile = ", "ElementDataFile = ../mhd/"));
+  marrow::test::put(
+      header, marrow::test::with(marrow::test::bytes_of(header), "ElementDataFile = ", "ElementDataFile = ../mhd/"));
   EXPECT_SAYS(read(folder / "mhd"), "expected one file that lies beside it");
 }
 
@@ -135,7 +137,8 @@ TEST(ReadVolume, DamagedFilesAreDiagnosed) {
     for (const bool compressed : {false, true}) {
       SCOPED_TRACE(std::string(extension) + (compressed ? " compressed" : ""));
       write_itk(folder / ("good" + std::string(extension)), grid, compressed);
-      marrow::test::expect_damage_is_diagnosed(folder / ("good" + std::string(extension)), folder / ("damaged" + std::string(extension)),
+      marrow::test::expect_damage_is_diagnosed(folder / ("good" + std::string(extension)),
+                                               folder / ("damaged" + std::string(extension)),
                                                [](const auto& path) { read(path); });
     }
 }
@@ -143,8 +146,9 @@ TEST(ReadVolume, DamagedFilesAreDiagnosed) {
 TEST(ReadVolume, DamagedTiffIsDiagnosed) {
   MARROW_NEED_DATA(path, "wrist/volumes/rad_dcm_cropped.tif");
   const TemporaryFolder folder;
-  marrow::test::expect_damage_is_diagnosed(path, folder / "damaged.tif",
-                                           [](const auto& damaged) { read(damaged, options({1, 1, 1})); });
+  marrow::test::expect_damage_is_diagnosed(path, folder / "damaged.tif", [](const auto& damaged) {
+    read(damaged, options({1, 1, 1}));
+  });
 }
 
 TEST(ReadVolume, HeadersThatClaimTooMuchAreRefusedBeforeAnythingIsAllocated) {
@@ -152,7 +156,8 @@ TEST(ReadVolume, HeadersThatClaimTooMuchAreRefusedBeforeAnythingIsAllocated) {
   write_itk(folder / "ct.mha", turned_grid());
   const std::string good = marrow::test::bytes_of(folder / "ct.mha");
   for (const char* size : {"90000 90000 90000", "-5 4 3", "0 4 3", "2000000000 2000000000 2000000000", "5 4"}) {
-    marrow::test::put(folder / "bad.mha", marrow::test::with(good, "DimSize = 5 4 3", "DimSize = " + std::string(size)));
+    marrow::test::put(folder / "bad.mha",
+                      marrow::test::with(good, "DimSize = 5 4 3", "DimSize = " + std::string(size)));
     SCOPED_TRACE(size);
     EXPECT_SAYS(read(folder / "bad.mha"), "bad.mha");
   }

@@ -69,7 +69,8 @@ TEST(WriteCase, ReplacesAnEarlierOneAndWritesTheSameBytes) {
   for (const char* name : {"case", "other", "case"}) write_case(value, (folder / name).string());
   int files = 0;
   for (const auto& entry : std::filesystem::directory_iterator(folder / "case")) {
-    EXPECT_EQ(marrow::test::bytes_of(entry.path()), marrow::test::bytes_of(folder / "other" / entry.path().filename().string()));
+    EXPECT_EQ(marrow::test::bytes_of(entry.path()),
+              marrow::test::bytes_of(folder / "other" / entry.path().filename().string()));
     ++files;
   }
   EXPECT_EQ(files, 1 + 1 + 3 + 3 + 1);

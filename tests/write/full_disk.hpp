@@ -27,8 +27,8 @@ class FullDisk {
   void (*signal_)(int);
 };
 
-/// That a writer which cannot finish says so with the file's name, keeps what was there before, and leaves nothing else. The
-/// result of `write` must need more than `bytes`.
+/// That a writer which cannot finish says so with the file's name, keeps what was there before, and leaves nothing
+/// else. The result of `write` must need more than `bytes`.
 template <class Write>
 void expect_full_disk_is_diagnosed(const TemporaryFolder& folder, const std::string& name, rlim_t bytes, Write write) {
   const auto path = folder / name;

@@ -9,7 +9,9 @@
 namespace {
 
 marrow::Mesh example() {
-  return {{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}}, {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}, "ct"};
+  return {{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}},
+          {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}},
+          "ct"};
 }
 
 TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
@@ -21,7 +23,8 @@ TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
 TEST(WriteMesh, FullDisk) {
   const marrow::test::TemporaryFolder folder;
   for (const rlim_t bytes : {0, 100, 300})
-    marrow::test::expect_full_disk_is_diagnosed(folder, "m.ply", bytes, [](const std::string& path) { mesh(example(), path); });
+    marrow::test::expect_full_disk_is_diagnosed(folder, "m.ply", bytes,
+                                                [](const std::string& path) { mesh(example(), path); });
 }
 
 }  // namespace

@@ -54,7 +54,10 @@ TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
 
 TEST(WriteText, CameraAndSeedsReadBackTheSame) {
   const TemporaryFolder folder;
-  marrow::Camera written{512, 384, Eigen::Matrix3d::Identity(), {"camera", "world", marrow::rotation_from_vector({1, 2, 3}), {1.0 / 3, 2, 600}}};
+  marrow::Camera written{512,
+                         384,
+                         Eigen::Matrix3d::Identity(),
+                         {"camera", "world", marrow::rotation_from_vector({1, 2, 3}), {1.0 / 3, 2, 600}}};
   written.intrinsics(0, 0) = 1706.484641638225;
   camera(written, (folder / "c.yaml").string());
   EXPECT_EQ(marrow::hash_of(marrow::read::read_camera_file(folder / "c.yaml")), marrow::hash_of(written));
@@ -88,7 +91,8 @@ TEST(WriteText, ShaftLinesAndTruthAreYaml) {
 TEST(WriteText, FullDisk) {
   const TemporaryFolder folder;
   for (const rlim_t bytes : {0, 200})
-    marrow::test::expect_full_disk_is_diagnosed(folder, "p.yaml", bytes, [](const std::string& path) { pose(example_pose(), path); });
+    marrow::test::expect_full_disk_is_diagnosed(folder, "p.yaml", bytes,
+                                                [](const std::string& path) { pose(example_pose(), path); });
 }
 
 TEST(WriteText, AFolderOfThatNameIsNotReplaced) {

@@ -30,7 +30,8 @@ TEST(WriteVolume, ReadsBackTheSame) {
 TEST(WriteVolume, FullDisk) {
   const TemporaryFolder folder;
   for (const rlim_t bytes : {0, 100, 5000})
-    marrow::test::expect_full_disk_is_diagnosed(folder, "ct.mha", bytes, [](const std::string& path) { volume(example(20), path); });
+    marrow::test::expect_full_disk_is_diagnosed(folder, "ct.mha", bytes,
+                                                [](const std::string& path) { volume(example(20), path); });
 }
 
 TEST(WriteVolume, RefusesAnEmptyOne) {

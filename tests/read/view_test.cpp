@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/read/view.cpp"
+
+#include <gtest/gtest.h>
+
+#include "read/files.hpp"
+#include "read/itk_files.hpp"
+
+namespace {
+
+TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
+  const marrow::test::TemporaryFolder folder;
+  const marrow::test::ItkGrid<std::uint8_t> pixels{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)};
+  write_itk(folder / "a.png", pixels);
+  marrow::test::put(folder / "a.txt",
+                    "image size\n4,6\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
+                    "translation\n0\n0\n600\n");
+  const marrow::View from_file = view(nullptr, {"frontal", folder / "a.png", folder / "a.txt"});
+  EXPECT_EQ(from_file.name, "frontal");
+  EXPECT_EQ(from_file.camera.width_px, 6);
+  marrow::Camera camera = from_file.camera;
+  camera.camera_from_world.translation_mm.z() = 700;
+  EXPECT_EQ(view(&camera, {"frontal", folder / "a.png", {}}).camera.camera_from_world.translation_mm.z(), 700);
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", folder / "a.txt"}), "give its camera either as the option");
+  EXPECT_SAYS(view(nullptr, {"frontal", folder / "a.png", {}}), "give its camera either as the option");
+  camera.width_px = 7;
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}}),
+              "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
+}
+
+}  // namespace
