@@ -19,6 +19,9 @@ function(marrow_add_plugin name)
   set_target_properties(${target} PROPERTIES
     PREFIX "" OUTPUT_NAME marrow_${name} LIBRARY_OUTPUT_DIRECTORY ${folder}
     CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  if(TARGET plugin_headers)
+    target_precompile_headers(${target} REUSE_FROM plugin_headers)
+  endif()
   # The command line lists and checks from manifests without loading a library, so each build writes a fresh one.
   if(TARGET marrow_cli)
     add_dependencies(${target} marrow_cli)

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
 #include <sstream>
 
 #include "marrow/runtime/kinds.hpp"
@@ -51,6 +52,7 @@ class Resolver {
     for (const WrittenNode& node : written_.nodes) resolve_node(node);
     for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
+    point_at_renamed();
     if (diagnostics_.empty()) sort_nodes();
     if (diagnostics_.empty())
       for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) find_axes(i);
@@ -114,6 +116,7 @@ class Resolver {
       std::size_t end = i + 1;
       while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
       const std::string name = text.substr(i + 1, end - i - 1);
+      used_inputs_.insert(name);
       const auto input = written_.inputs.find(name);
       if (input != written_.inputs.end()) {
         result += input->second;
@@ -124,6 +127,7 @@ class Resolver {
         std::vector<std::string> names = written_.missing_inputs;
         for (const auto& [known, value] : written_.inputs) names.push_back(known);
         diagnostics_.add(place, "the pipeline has no input '" + name + "'", suggestion(name, names));
+        unknown_inputs_.push_back(name);
       }
       i = end - 1;
     }
@@ -192,7 +196,9 @@ class Resolver {
     std::vector<std::string> parts = split(text), ids;
     for (const PipelineNode& node : pipeline_.nodes) ids.push_back(node.id);
     const auto found = std::find(ids.begin(), ids.end(), parts.empty() ? "" : parts[0]);
+    used_nodes_.insert(parts.empty() ? text : parts[0]);
     if (found == ids.end()) {
+      unknown_nodes_.push_back(parts.empty() ? text : parts[0]);
       diagnostics_.add(place, "there is no node '" + (parts.empty() ? text : parts[0]) + "'", suggestion(parts.empty() ? text : parts[0], ids));
       return source;
     }
@@ -261,6 +267,19 @@ class Resolver {
       return;
     }
     pipeline_.outputs.push_back({name, resolve_reference(value.value.Scalar(), value.place, nullptr)});
+  }
+
+  /// Where a name is unknown, the slip may be at its definition: one of a similar name that nothing uses.
+  void point_at_renamed() {
+    const auto point_at = [&](const Place& place, const std::string& what, const std::string& name, const std::vector<std::string>& unknown) {
+      const std::string wanted = nearest_name(name, unknown);
+      if (!wanted.empty())
+        diagnostics_.add(place, "nothing uses " + what + " '" + name + "'", "'" + wanted + "' is used, but is not there: is this it?");
+    };
+    for (const WrittenNode& node : written_.nodes)
+      if (!used_nodes_.contains(node.id)) point_at(node.place, "node", node.id, unknown_nodes_);
+    for (const auto& [name, place] : written_.input_places)
+      if (!used_inputs_.contains(name)) point_at(place, "input", name, unknown_inputs_);
   }
 
   /// Sources before users, in the file's order otherwise.
@@ -336,77 +355,17 @@ class Resolver {
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
   Pipeline pipeline_;
+  std::set<std::string> used_nodes_, used_inputs_;
+  std::vector<std::string> unknown_nodes_, unknown_inputs_;
 };
 
 }  // namespace
-
-std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
-  const PipelineNode& node = nodes[std::size_t(source.node)];
-  std::vector<std::string> axes = node.mapped_axes;
-  const std::string& own = node.info.outputs[std::size_t(source.output)].axis;
-  if (!own.empty()) axes.push_back(own);
-  axes.erase(axes.begin(), axes.begin() + std::ptrdiff_t(std::min(axes.size(), source.items.size())));
-  return axes;
-}
-
-std::vector<bool> Pipeline::needed(const std::function<bool(const std::string&)>& given) const {
-  std::vector<bool> result(nodes.size(), false);
-  for (const PipelineOutput& output : outputs) result[std::size_t(output.source.node)] = true;
-  for (std::size_t i = nodes.size(); i-- > 0;) {
-    if (result[i] && given && given(nodes[i].id)) result[i] = false;
-    if (!result[i]) continue;
-    for (const Wire& wire : nodes[i].wires)
-      for (const Reference& source : wire.sources) result[std::size_t(source.node)] = true;
-  }
-  return result;
-}
 
 Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue, Diagnostics& diagnostics,
                        bool inputs_required) {
   const WrittenPipeline written = read_written_pipeline(file, arguments, diagnostics, inputs_required);
   if (written.nodes.empty()) return {};
   return Resolver(written, catalogue, diagnostics).resolve();
-}
-
-std::string resolved_yaml(const Pipeline& pipeline) {
-  YAML::Emitter out;
-  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value << pipeline.name;
-  out << YAML::Key << "nodes" << YAML::Value << YAML::BeginMap;
-  out.SetDoublePrecision(17);
-  for (const PipelineNode& node : pipeline.nodes) {
-    out << YAML::Key << node.id << YAML::Value << YAML::BeginMap << YAML::Key << "uses" << YAML::Value << node.info.name;
-    if (!node.wires.empty()) {
-      out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
-      for (const Wire& wire : node.wires) {
-        out << YAML::Key << node.info.inputs[std::size_t(wire.port)].name << YAML::Value;
-        if (wire.is_list_literal) out << YAML::BeginSeq;
-        for (const Reference& source : wire.sources) out << source.text;
-        if (wire.is_list_literal) out << YAML::EndSeq;
-      }
-      out << YAML::EndMap;
-    }
-    if (!node.options.empty()) {
-      out << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
-      for (std::size_t i = 0; i < node.options.size(); ++i) {
-        out << YAML::Key << node.info.options[i].name << YAML::Value;
-        std::visit([&](const auto& value) {
-          if constexpr (requires { value.begin(); value.push_back(value[0]); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
-            out << YAML::Flow << YAML::BeginSeq;
-            for (const auto& item : value) out << item;
-            out << YAML::EndSeq;
-          } else {
-            out << value;
-          }
-        }, node.options[i]);
-      }
-      out << YAML::EndMap;
-    }
-    out << YAML::EndMap;
-  }
-  out << YAML::EndMap << YAML::Key << "outputs" << YAML::Value << YAML::BeginMap;
-  for (const PipelineOutput& output : pipeline.outputs) out << YAML::Key << output.name << YAML::Value << output.source.text;
-  out << YAML::EndMap << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
 }
 
 }  // namespace marrow

@@ -71,6 +71,7 @@ class Reader {
     static const std::vector<std::string> kTypes{"path", "text", "number", "integer", "boolean"};
     for (const YamlEntry& input : yaml_.map(section.value, section.place, "inputs")) {
       declared_.push_back(input.key);
+      pipeline_.input_places[input.key] = input.place;
       OptionInfo info;
       info.type = OptionType::text;
       WrittenValue value;

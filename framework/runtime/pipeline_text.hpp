@@ -32,6 +32,7 @@ struct WrittenPipeline {
   std::filesystem::path file;
   std::map<std::string, std::string> inputs;     ///< values, as texts
   std::vector<std::string> missing_inputs;       ///< declared, with neither a value nor a default
+  std::map<std::string, Place> input_places;     ///< where each is declared
   std::vector<WrittenNode> nodes;
   std::vector<std::pair<std::string, WrittenValue>> outputs;
   std::vector<std::string> notes;

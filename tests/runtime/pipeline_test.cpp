@@ -51,6 +51,24 @@ TEST_F(PipelineTest, ResolvedYamlGivesTheSamePipeline) {
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }
 
+TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
+  read("marrow: 1\nnodes:\n  lefft: {uses: test.constant}\n  n: {uses: test.add, in: {a: left, b: left}}\noutputs: {o: n}\n");
+  const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();
+  ASSERT_EQ(faults.size(), 3u) << diagnostics.text();
+  EXPECT_EQ(faults[0].place.line, 3);
+  EXPECT_EQ(faults[0].message, "nothing uses node 'lefft'");
+  EXPECT_EQ(faults[0].hint, "'left' is used, but is not there: is this it?");
+  EXPECT_EQ(faults[1].message, "there is no node 'left'");
+}
+TEST_F(PipelineTest, RenamedInputIsPointedAtWhereItIsDeclared) {
+  read("marrow: 1\ninputs:\n  casse: {type: number, default: 1}\nnodes:\n  n: {uses: test.constant, with: {value: $case}}\noutputs: {o: n}\n");
+  const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();
+  ASSERT_EQ(faults.size(), 2u) << diagnostics.text();
+  EXPECT_EQ(faults[0].place.line, 3);
+  EXPECT_EQ(faults[0].message, "nothing uses input 'casse'");
+  EXPECT_EQ(faults[1].message, "the pipeline has no input 'case'");
+}
+
 TEST_F(PipelineTest, SyntaxError) { expect_fault("marrow: 1\nnodes: {a: [\n", 3, 1, "not valid YAML"); }
 TEST_F(PipelineTest, UnreadableFile) {
   marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
