@@ -3,6 +3,7 @@
 #include "marrow/runtime/pipeline.hpp"
 
 #include <algorithm>
+#include <map>
 #include <optional>
 #include <set>
 #include <sstream>
@@ -127,7 +128,7 @@ class Resolver {
         std::vector<std::string> names = written_.missing_inputs;
         for (const auto& [known, value] : written_.inputs) names.push_back(known);
         diagnostics_.add(place, "the pipeline has no input '" + name + "'", suggestion(name, names));
-        unknown_inputs_.push_back(name);
+        unknown_inputs_.insert(name);
       }
       i = end - 1;
     }
@@ -198,7 +199,7 @@ class Resolver {
     const auto found = std::find(ids.begin(), ids.end(), parts.empty() ? "" : parts[0]);
     used_nodes_.insert(parts.empty() ? text : parts[0]);
     if (found == ids.end()) {
-      unknown_nodes_.push_back(parts.empty() ? text : parts[0]);
+      unknown_nodes_.insert(parts.empty() ? text : parts[0]);
       diagnostics_.add(place, "there is no node '" + (parts.empty() ? text : parts[0]) + "'", suggestion(parts.empty() ? text : parts[0], ids));
       return source;
     }
@@ -269,17 +270,24 @@ class Resolver {
     pipeline_.outputs.push_back({name, resolve_reference(value.value.Scalar(), value.place, nullptr)});
   }
 
-  /// Where a name is unknown, the slip may be at its definition: one of a similar name that nothing uses.
+  /// Where a name is unknown, the slip may be at its definition: the nearest name, which nothing uses.
   void point_at_renamed() {
-    const auto point_at = [&](const Place& place, const std::string& what, const std::string& name, const std::vector<std::string>& unknown) {
-      const std::string wanted = nearest_name(name, unknown);
-      if (!wanted.empty())
-        diagnostics_.add(place, "nothing uses " + what + " '" + name + "'", "'" + wanted + "' is used, but is not there: is this it?");
-    };
-    for (const WrittenNode& node : written_.nodes)
-      if (!used_nodes_.contains(node.id)) point_at(node.place, "node", node.id, unknown_nodes_);
-    for (const auto& [name, place] : written_.input_places)
-      if (!used_inputs_.contains(name)) point_at(place, "input", name, unknown_inputs_);
+    std::map<std::string, Place> nodes;
+    for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
+    point_at_renamed("node", nodes, used_nodes_, unknown_nodes_);
+    point_at_renamed("input", written_.input_places, used_inputs_, unknown_inputs_);
+  }
+
+  void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined, const std::set<std::string>& used,
+                        const std::set<std::string>& unknown) {
+    std::vector<std::string> names;
+    for (const auto& [name, place] : defined) names.push_back(name);
+    for (const std::string& wanted : unknown) {
+      const std::string nearest = nearest_name(wanted, names);
+      if (!nearest.empty() && !used.contains(nearest))
+        diagnostics_.add(defined.at(nearest), "nothing uses " + what + " '" + nearest + "'",
+                         "'" + wanted + "' is used, but is not there: is this it?");
+    }
   }
 
   /// Sources before users, in the file's order otherwise.
@@ -355,8 +363,7 @@ class Resolver {
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
   Pipeline pipeline_;
-  std::set<std::string> used_nodes_, used_inputs_;
-  std::vector<std::string> unknown_nodes_, unknown_inputs_;
+  std::set<std::string> used_nodes_, unknown_nodes_, used_inputs_, unknown_inputs_;  ///< by references
 };
 
 }  // namespace

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "unclosed.hpp"
+
 namespace marrow {
 namespace {
 
@@ -32,6 +34,9 @@ YAML::Node StrictYaml::parse(const std::string& text) {
     return YAML::Load(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
+    // The parser notices where the text ends or goes on strangely; the slip is where something was left open.
+    if (const auto opened = last_unclosed(text))
+      fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
   } catch (const YAML::Exception& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "cannot be read as YAML: " + error.msg);
   }

@@ -48,13 +48,13 @@ class Mutations(Case):
             elif any(abs(fault["line"] - line) <= 1 for fault in faults):
                 at_line += 1
             else:
-                # A change of YAML's structure or of a node's name shows where it is missed: later in the file.
+                # A change of YAML's structure, such as of an indentation, may show later in the file.
                 elsewhere += 1
                 print("line %d changed, diagnosed at %s" % (line, sorted({fault["line"] for fault in faults})))
                 print("   ", text.splitlines()[line - 1])
         print("%d still good, %d diagnosed at the line, %d where the change is missed" % (good, at_line, elsewhere))
         self.assertEqual(good + at_line + elsewhere, 200)
-        self.assertLess(elsewhere, 40)
+        self.assertLess(elsewhere, 4)
 
 
 if __name__ == "__main__":

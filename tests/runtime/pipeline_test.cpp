@@ -69,7 +69,19 @@ TEST_F(PipelineTest, RenamedInputIsPointedAtWhereItIsDeclared) {
   EXPECT_EQ(faults[1].message, "the pipeline has no input 'case'");
 }
 
-TEST_F(PipelineTest, SyntaxError) { expect_fault("marrow: 1\nnodes: {a: [\n", 3, 1, "not valid YAML"); }
+TEST_F(PipelineTest, SyntaxErrorTellsWhatIsNotClosed) {
+  const auto places = [&](const std::string& text) {
+    read(text);
+    std::string result;
+    for (const marrow::Diagnostic& fault : diagnostics.sorted())
+      result += std::to_string(fault.place.line) + ":" + std::to_string(fault.place.column) + " " + fault.message + "\n";
+    return result;
+  };
+  EXPECT_EQ(places("marrow: 1\nnodes: {a: [\n"), "2:12 this [ is not closed\n3:1 not valid YAML: end of sequence flow not found\n");
+  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: 'test.constant}\n  # all\n\n").find("3:12 this ' is not closed\n"), std::string::npos);
+  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: [test.constant}\n  d: {}\n").find("3:13 this [ is not closed\n"), std::string::npos);
+  EXPECT_EQ(places("marrow: 1\n\tnodes: {}\n").find("closed"), std::string::npos);
+}
 TEST_F(PipelineTest, UnreadableFile) {
   marrow::read_pipeline(scratch.path / "none.yaml", {}, test_catalogue(), diagnostics);
   EXPECT_NE(diagnostics.text().find("the pipeline file cannot be read"), std::string::npos);

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <optional>
+#include <string>
+
+namespace marrow {
+
+struct Unclosed {
+  char mark;  ///< { [ " or '
+  int line;   ///< 1-based
+  int column;
+};
+
+/// The innermost bracket or quote of a YAML text that is opened but not closed, or closed by another kind.
+std::optional<Unclosed> last_unclosed(const std::string& text);
+
+}  // namespace marrow
