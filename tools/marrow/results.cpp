@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
 
 #include "commands.hpp"
@@ -20,16 +21,41 @@ void print_pose(const std::string& name, const Pose& pose) {
   for (const std::string& warning : pose.warnings) std::printf("    warning: %s\n", warning.c_str());
 }
 
-void print_metrics(const std::string& name, const Metrics& metrics) {
-  std::printf("%s:\n", name.c_str());
-  for (const Metric& metric : metrics.items) std::printf("    %-34s %10.4f %s\n", metric.name.c_str(), metric.value, metric.unit.c_str());
+/// One row a figure, one column an item: the stages of a registration stand side by side.
+void print_metrics(const std::string& name, const std::vector<std::string>& columns, const std::vector<const Metrics*>& items) {
+  std::vector<const Metric*> rows;  // the first of each name
+  for (const Metrics* item : items)
+    for (const Metric& metric : item->items)
+      if (std::none_of(rows.begin(), rows.end(), [&](const Metric* row) { return row->name == metric.name; })) rows.push_back(&metric);
+  std::printf("%-34s", (name + ":").c_str());
+  for (const std::string& column : columns) std::printf(" %10s", column.c_str());
+  std::printf("\n");
+  for (const Metric* row : rows) {
+    std::printf("    %-30s", row->name.c_str());
+    for (const Metrics* item : items) {
+      const auto found = std::find_if(item->items.begin(), item->items.end(), [&](const Metric& metric) { return metric.name == row->name; });
+      if (found == item->items.end()) std::printf(" %10s", "");
+      else std::printf(" %10.4f", found->value);
+    }
+    std::printf(" %s\n", row->unit.c_str());
+  }
 }
 
 void print_value(const std::string& name, const Value& value) {
-  for (std::size_t i = 0; i < value.items.size(); ++i) print_value(name + " " + value.names[i], value.items[i]);
+  std::vector<const Metrics*> metrics;
+  std::vector<std::string> columns;
+  for (std::size_t i = 0; i < value.items.size(); ++i) {
+    if (value.items[i].data && value.type == TypeInfo::of<Metrics>()) {
+      metrics.push_back(&value.items[i].as<Metrics>());
+      columns.push_back(value.names[i]);
+    } else {
+      print_value(name + " " + value.names[i], value.items[i]);
+    }
+  }
+  if (!metrics.empty()) print_metrics(name, columns, metrics);
   if (!value.data) return;
   if (value.type == TypeInfo::of<Pose>()) print_pose(name, value.as<Pose>());
-  if (value.type == TypeInfo::of<Metrics>()) print_metrics(name, value.as<Metrics>());
+  if (value.type == TypeInfo::of<Metrics>()) print_metrics(name, {""}, {&value.as<Metrics>()});
 }
 
 }  // namespace
