@@ -7,15 +7,11 @@
 #include <algorithm>
 #include <chrono>
 #include <condition_variable>
-#include <fstream>
-#include <map>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <thread>
 
-#include <unistd.h>
-
-#include "keys.hpp"
+#include "evaluation.hpp"
 #include "mapping.hpp"
 
 namespace marrow {
@@ -26,33 +22,19 @@ using Status = NodeRecord::Status;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-double resident_memory_mb() {
-  std::ifstream stream("/proc/self/statm");
-  double total = 0, resident = 0;
-  stream >> total >> resident;
-  return resident * double(sysconf(_SC_PAGESIZE)) / 1e6;
-}
-
-/// What one call of a node gave.
-struct CallResult {
-  Status status = Status::done;
-  std::string reason;
-  std::vector<Value> outputs;
-};
-
-/// One position along the mapped axes of a node.
-struct Call {
-  std::vector<Value> inputs;
-  std::string item;
-  CallResult result;
-};
-
 class Executor {
  public:
   Executor(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings)
       : pipeline_(pipeline), catalogue_(catalogue), settings_(settings),
-        needed_(pipeline.needed([&](const std::string& id) { return settings.given.count(id) > 0; })), states_(pipeline.nodes.size()) {
+        needed_(pipeline.needed([&](const std::string& id) { return settings.given.count(id) > 0; })), states_(pipeline.nodes.size()),
+        evaluation_(pipeline, catalogue, settings, result_.nodes, mutex_, [this](std::size_t node, Call& call) { finish_call(node, call); }) {
     result_.nodes.resize(pipeline.nodes.size());
+    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+      const auto given = settings.given.find(pipeline.nodes[i].id);
+      if (given == settings.given.end()) continue;
+      result_.nodes[i].outputs = given->second;
+      for (Value& value : result_.nodes[i].outputs) complete_key(value);
+    }
   }
 
   RunResult run() {
@@ -63,11 +45,6 @@ class Executor {
     tbb::task_arena arena(threads, 0);
     arena_ = &arena;
     for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) {
-      const auto given = settings_.given.find(pipeline_.nodes[i].id);
-      if (given != settings_.given.end()) {
-        result_.nodes[i].outputs = given->second;
-        for (Value& value : result_.nodes[i].outputs) complete_key(value);
-      }
       if (!needed_[i]) continue;
       ++unfinished_;
       states_[i].waiting_for = count_sources(i);
@@ -77,9 +54,17 @@ class Executor {
       if (needed_[i] && states_[i].waiting_for == 0) ready.push_back(i);
     for (std::size_t i : ready) arena.enqueue([this, i] { start_node(i); });
     watch();
+    arena.execute([&] { make_outputs(); });
     arena.terminate();
     result_.seconds = seconds_since(start_);
     return std::move(result_);
+  }
+
+  std::vector<PlannedNode> plan() {
+    std::vector<PlannedNode> planned(pipeline_.nodes.size());
+    for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i)
+      if (needed_[i]) planned[i] = plan_node(i, planned);
+    return planned;
   }
 
  private:
@@ -90,17 +75,52 @@ class Executor {
     std::size_t unfinished = 0;
     bool running = false;
   };
-  /// The result of a recipe: in the making until `done`, then shared by all calls with the same key.
-  struct Memo {
-    bool done = false;
-    CallResult result;
-    std::vector<std::pair<std::size_t, std::size_t>> waiting;  ///< (node, call)
-  };
-
   /// Data made outside a run has no key yet; without one, all of it would pass for the same.
   static void complete_key(Value& value) {
     for (Value& item : value.items) complete_key(item);
-    if (value.data && value.hash && value.key == Digest{}) value.key = value.hash(value.data.get());
+    if (value.data && value.type.content && value.key == Digest{}) value.key = value.type.content->hash(value.data.get());
+  }
+
+  /// What the pipeline is to give is made while the nodes can still be called.
+  void make_outputs() {
+    for (const PipelineOutput& output : pipeline_.outputs) {
+      NodeRecord& record = result_.nodes[std::size_t(output.source.node)];
+      const PipelineNode& node = pipeline_.nodes[std::size_t(output.source.node)];
+      const auto type = [&]() -> const TypeInfo& { return catalogue_.load(node.info.name).info.outputs[std::size_t(output.source.output)].type; };
+      if (!record.outputs.empty()) Evaluation::make(record.outputs[std::size_t(output.source.output)], type);
+    }
+  }
+
+  PlannedNode plan_node(std::size_t index, const std::vector<PlannedNode>& planned) {
+    const PipelineNode& node = pipeline_.nodes[index];
+    PlannedNode result;
+    for (const Wire& wire : node.wires)
+      for (const Reference& source : wire.sources) {
+        const PlannedNode& from = planned[std::size_t(source.node)];
+        if (from.what == PlannedNode::What::runs) result.waits_for.insert(pipeline_.nodes[std::size_t(source.node)].id);
+        if (from.what == PlannedNode::What::depends) result.waits_for.insert(from.waits_for.begin(), from.waits_for.end());
+      }
+    if (!result.waits_for.empty()) {
+      result.what = PlannedNode::What::depends;
+      return result;
+    }
+    NodeState& state = states_[index];
+    make_calls(index);
+    result.what = PlannedNode::What::cached;
+    for (Call& call : state.calls) {
+      if (!obstacle(node, call, call.result.status).empty()) continue;
+      ++result.calls;
+      if (evaluation_.find(index, call)) {
+        if (call.result.is_deferred) result.what = PlannedNode::What::function;
+        continue;
+      }
+      ++result.calls_to_make;
+      if (result.why.empty()) result.why = (call.item.empty() ? "" : call.item + ": ") + evaluation_.change_since_last(index, call);
+      result.seconds += evaluation_.seconds_last_time(index, call);
+    }
+    if (result.calls_to_make) result.what = PlannedNode::What::runs;
+    else assemble(index);
+    return result;
   }
 
   int count_sources(std::size_t index) const {
@@ -126,12 +146,6 @@ class Executor {
 
   bool cancelled() const { return settings_.cancelled && settings_.cancelled->load(); }
 
-  void report(RunEvent::Kind kind, std::size_t index, const std::string& item, std::string text, double fraction = 0, double seconds = 0) {
-    if (!settings_.observer) return;
-    const std::scoped_lock lock(observer_mutex_);
-    settings_.observer({kind, pipeline_.nodes[index].id, item, std::move(text), fraction, seconds});
-  }
-
   void start_node(std::size_t index) {
     NodeState& state = states_[index];
     NodeRecord& record = result_.nodes[index];
@@ -149,7 +163,7 @@ class Executor {
       state.calls.assign(1, {});
       state.calls[0].result.status = cancelled() ? Status::cancelled : Status::failed;
       state.calls[0].result.reason = error.what();
-      if (!cancelled()) report(RunEvent::Kind::failed, index, "", failure_text(index, state.calls[0], error.what()));
+      if (!cancelled()) evaluation_.report(RunEvent::Kind::failed, index, "", evaluation_.failure_text(index, "", error.what()));
       finish_node(index);
       return;
     }
@@ -262,140 +276,17 @@ class Executor {
   }
 
   void evaluate(std::size_t index, std::size_t c) {
-    const PipelineNode& node = pipeline_.nodes[index];
     Call& call = states_[index].calls[c];
-    call.result.reason = obstacle(node, call, call.result.status);
+    call.result.reason = obstacle(pipeline_.nodes[index], call, call.result.status);
     if (!call.result.reason.empty()) {
-      finish_call(index, c);
+      finish_call(index, call);
       return;
     }
-    call.result.status = Status::done;
-    const Digest recipe = recipe_of(node, call.inputs);
-    const Digest key = result_key(recipe, catalogue_.library_of(node.info.name)->build_id, node.info.random, settings_.seed);
-    switch (claim(key, index, c)) {
-      case Claim::mine:
-        call.result = perform(index, call, recipe, key);
-        share(key, call.result);
-        finish_call(index, c);
-        break;
-      case Claim::made: finish_call(index, c); break;
-      case Claim::in_the_making: break;  // finished by whoever makes it
-    }
+    evaluation_.evaluate(index, call);
   }
 
-  enum class Claim { mine, made, in_the_making };
-  /// What has the same key is computed once within a run.
-  Claim claim(const Digest& key, std::size_t index, std::size_t c) {
-    const std::scoped_lock lock(mutex_);
-    const auto [memo, is_first] = memos_.try_emplace(key);
-    if (is_first) {
-      ++result_.nodes[index].calls;
-      return Claim::mine;
-    }
-    if (!memo->second.done) {
-      memo->second.waiting.emplace_back(index, c);
-      return Claim::in_the_making;
-    }
-    states_[index].calls[c].result = memo->second.result;
-    return Claim::made;
-  }
-
-  void share(const Digest& key, const CallResult& result) {
-    std::vector<std::pair<std::size_t, std::size_t>> waiting;
-    {
-      const std::scoped_lock lock(mutex_);
-      Memo& memo = memos_[key];
-      memo.done = true;
-      memo.result = result;
-      waiting.swap(memo.waiting);
-    }
-    for (const auto& [node, call] : waiting) {
-      states_[node].calls[call].result = result;
-      finish_call(node, call);
-    }
-  }
-
-  CallResult perform(std::size_t index, const Call& call, const Digest& recipe, const Digest& key) {
-    const PipelineNode& node = pipeline_.nodes[index];
-    CallResult result;
-    const Clock::time_point start = Clock::now();
-    report(RunEvent::Kind::started, index, call.item, "");
-    try {
-      if (cancelled()) throw Cancelled();
-      const NodeDefinition& definition = catalogue_.load(node.info.name);
-      const std::shared_ptr<void> options = definition.make_options();
-      for (std::size_t i = 0; i < node.options.size(); ++i) definition.set_option[i](options.get(), node.options[i]);
-      Context context = make_context(index, call, seed_of(recipe, settings_.seed));
-      // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
-      result.outputs = tbb::this_task_arena::isolate([&] { return definition.call(call.inputs, options.get(), context); });
-      for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], key, i, call);
-      report(RunEvent::Kind::finished, index, call.item, "", 1, seconds_since(start));
-    } catch (const Cancelled&) {
-      result.status = Status::cancelled;
-      result.reason = "stopped before it was done";
-    } catch (const std::bad_alloc&) {
-      result.status = Status::failed;
-      result.reason = "out of memory";
-    } catch (const std::exception& error) {
-      result.status = Status::failed;
-      result.reason = error.what();
-    }
-    if (result.status == Status::failed) report(RunEvent::Kind::failed, index, call.item, failure_text(index, call, result.reason));
-    const std::scoped_lock lock(mutex_);
-    result_.nodes[index].seconds += seconds_since(start);
-    sample_memory();
-    return result;
-  }
-
-  Context make_context(std::size_t index, const Call& call, std::uint64_t seed) {
-    Context::Hooks hooks;
-    hooks.seed = seed;
-    hooks.cancelled = settings_.cancelled;
-    hooks.progress = [this, index, item = call.item](double fraction, std::string_view what) {
-      report(RunEvent::Kind::progress, index, item, std::string(what), fraction);
-    };
-    hooks.log = [this, index, item = call.item](std::string_view text, bool is_warning) {
-      report(is_warning ? RunEvent::Kind::warning : RunEvent::Kind::message, index, item, std::string(text));
-    };
-    return Context(std::move(hooks));
-  }
-
-  /// Gives data its content hash; gives a function its recipe's key and keeps its inputs alive as long as it.
-  static void finish_value(Value& value, const Digest& key, std::size_t output, const Call& call) {
-    for (Value& item : value.items) finish_value(item, key, output, call);
-    if (value.is_absent() || value.is_list()) return;
-    if (value.hash) {
-      value.key = value.hash(value.data.get());
-      return;
-    }
-    Hasher hasher;
-    hasher.add(key);
-    hasher.add(std::uint64_t(output));
-    value.key = hasher.digest();
-    struct Holder {
-      std::shared_ptr<const void> function;
-      std::vector<Value> inputs;
-    };
-    const auto holder = std::make_shared<Holder>(Holder{value.data, call.inputs});
-    value.data = std::shared_ptr<const void>(holder, value.data.get());
-  }
-
-  std::string failure_text(std::size_t index, const Call& call, const std::string& reason) const {
-    const PipelineNode& node = pipeline_.nodes[index];
-    std::string text = "node '" + node.id + "' (" + node.info.name + ")";
-    if (!call.item.empty()) text += " for " + call.item;
-    text += " failed: " + reason;
-    std::string inputs;
-    for (const Wire& wire : node.wires) {
-      inputs += (inputs.empty() ? "" : ", ") + node.info.inputs[std::size_t(wire.port)].name + " = ";
-      for (std::size_t i = 0; i < wire.sources.size(); ++i) inputs += (i ? " + " : "") + wire.sources[i].text;
-    }
-    return inputs.empty() ? text : text + " (its inputs: " + inputs + ")";
-  }
-
-  void finish_call(std::size_t index, std::size_t c) {
-    const CallResult& result = states_[index].calls[c].result;
-    if (result.status == Status::skipped) report(RunEvent::Kind::skipped, index, states_[index].calls[c].item, result.reason);
+  void finish_call(std::size_t index, Call& call) {
+    if (call.result.status == Status::skipped) evaluation_.report(RunEvent::Kind::skipped, index, call.item, call.result.reason);
     bool last = false;
     {
       const std::scoped_lock lock(mutex_);
@@ -409,7 +300,9 @@ class Executor {
     const PipelineNode& node = pipeline_.nodes[index];
     NodeState& state = states_[index];
     NodeRecord& record = result_.nodes[index];
-    record.status = Status::done;
+    // A node all of whose calls are deferred is not needed until something that runs asks for what it makes.
+    const bool deferred = !state.calls.empty() && std::all_of(state.calls.begin(), state.calls.end(), [](const Call& call) { return call.result.is_deferred; });
+    record.status = deferred ? Status::not_needed : Status::done;
     for (const Call& call : state.calls) {
       // The worst of its calls is the node's status; `failed` outranks what follows from other failures.
       static constexpr Status kOrder[] = {Status::failed, Status::cancelled, Status::not_run, Status::skipped};
@@ -419,10 +312,7 @@ class Executor {
           record.reason = (call.item.empty() ? "" : call.item + ": ") + call.result.reason;
         }
     }
-    for (std::size_t output = 0; output < node.info.outputs.size(); ++output) {
-      std::size_t next = 0;
-      record.outputs.push_back(assembled(index, output, 0, next));
-    }
+    assemble(index);
     std::vector<std::size_t> ready;
     {
       const std::scoped_lock lock(mutex_);
@@ -434,6 +324,13 @@ class Executor {
     state.calls.clear();
     const std::scoped_lock lock(mutex_);
     if (--unfinished_ == 0) all_done_.notify_all();
+  }
+
+  void assemble(std::size_t index) {
+    for (std::size_t output = 0; output < pipeline_.nodes[index].info.outputs.size(); ++output) {
+      std::size_t next = 0;
+      result_.nodes[index].outputs.push_back(assembled(index, output, 0, next));
+    }
   }
 
   static int rank(Status status) {
@@ -478,13 +375,13 @@ class Executor {
   const RunSettings& settings_;
   std::vector<bool> needed_;
   std::vector<NodeState> states_;
-  std::map<Digest, Memo> memos_;
   RunResult result_;
   std::size_t unfinished_ = 0;
-  std::mutex mutex_, observer_mutex_;
+  std::mutex mutex_;
   std::condition_variable all_done_;
   tbb::task_arena* arena_ = nullptr;
   Clock::time_point start_ = Clock::now();
+  Evaluation evaluation_;
 };
 
 }  // namespace
@@ -508,6 +405,10 @@ Value value_of(const RunResult& result, const Reference& source) {
   Value value = node.outputs[std::size_t(source.output)];
   for (const std::string& item : source.items) value = picked(value, item, source.text);
   return value;
+}
+
+std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings) {
+  return Executor(pipeline, catalogue, settings).plan();
 }
 
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings) {

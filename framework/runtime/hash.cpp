@@ -25,11 +25,9 @@ Digest Hasher::digest() const {
   return {hash.low64, hash.high64};
 }
 
-void Hasher::add(const cv::Mat& image) {
-  add(std::int32_t(image.rows));
-  add(std::int32_t(image.cols));
-  add(std::int32_t(image.type()));
-  for (int row = 0; row < image.rows; ++row) bytes(image.ptr(row), image.elemSize() * std::size_t(image.cols));
+Digest hash_of_bytes(const void* data, std::size_t size) {
+  const XXH128_hash_t hash = XXH3_128bits(data, size);
+  return {hash.low64, hash.high64};
 }
 
 }  // namespace marrow

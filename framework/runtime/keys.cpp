@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <sstream>
 
 #include "mapping.hpp"
 
@@ -62,6 +63,67 @@ Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std
   hasher.add(build_id);
   if (random) hasher.add(seed);
   return hasher.digest();
+}
+
+Digest function_key(const Digest& result, std::size_t output) {
+  Hasher hasher;
+  hasher.add(result);
+  hasher.add(std::uint64_t(output));
+  return hasher.digest();
+}
+
+std::string text_of(const OptionValue& value, OptionType type) {
+  std::ostringstream out;
+  out.precision(17);
+  const auto add_file = [&](const std::string& path) {
+    Hasher hasher;
+    add_path(hasher, path);
+    out << path << " (content " << hasher.digest().hex().substr(0, 8) << ")";
+  };
+  std::visit([&](const auto& one) {
+    using T = std::decay_t<decltype(one)>;
+    if constexpr (std::is_same_v<T, bool>) {
+      out << (one ? "true" : "false");
+    } else if constexpr (std::is_same_v<T, std::string>) {
+      if (type == OptionType::path) add_file(one);
+      else out << one;
+    } else if constexpr (requires { one.size(); }) {
+      out << '[';
+      for (std::size_t i = 0; i < one.size(); ++i) {
+        if (i) out << ", ";
+        if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+          if (type == OptionType::paths) add_file(one[i]);
+          else out << one[i];
+        } else {
+          out << one[i];
+        }
+      }
+      out << ']';
+    } else {
+      out << one;
+    }
+  }, value);
+  return out.str();
+}
+
+std::string difference(const Provenance& before, const Provenance& now) {
+  std::vector<std::string> changes;
+  if (before.node != now.node) changes.push_back("it uses " + now.node + ", used " + before.node);
+  else if (before.build_id != now.build_id) changes.push_back("the plugin of " + now.node + " was rebuilt");
+  for (const auto& [name, value] : now.options) {
+    const auto old = before.options.find(name);
+    if (before.node == now.node && (old == before.options.end() || old->second != value))
+      changes.push_back("option '" + name + "' is " + value + (old == before.options.end() ? ", was not there" : ", was " + old->second));
+  }
+  for (const auto& [name, key] : now.inputs) {
+    const auto old = before.inputs.find(name);
+    if (old == before.inputs.end() || old->second != key) changes.push_back("input '" + name + "' changed");
+  }
+  if (now.random && before.seed != now.seed)
+    changes.push_back("the seed is " + std::to_string(now.seed) + ", was " + std::to_string(before.seed));
+  std::string text;
+  for (const std::string& change : changes) text += (text.empty() ? "" : "; ") + change;
+  return text;
 }
 
 std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed) {

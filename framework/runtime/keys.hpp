@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/store.hpp"
 
 namespace marrow {
 
@@ -13,6 +14,15 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
 
 /// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
+
+/// The key of a function that a call returns.
+Digest function_key(const Digest& result, std::size_t output);
+
+/// An option's value in words; of a path, with the hash of all that it names.
+std::string text_of(const OptionValue& value, OptionType type);
+
+/// What makes two results differ: "option 'high' is 80, was 75; input 'field' changed". Empty where nothing does.
+std::string difference(const Provenance& before, const Provenance& now);
 
 /// The seed that a call draws from.
 std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed);

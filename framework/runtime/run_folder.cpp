@@ -70,6 +70,7 @@ json json_of(const NodeRecord& record, const PipelineNode& node) {
             {"uses", node.info.name},
             {"status", status_name(record.status)},
             {"calls", record.calls},
+            {"cached", record.cached},
             {"start_s", record.start_s},
             {"seconds", record.seconds},
             {"peak_process_memory_mb", record.peak_memory_mb},

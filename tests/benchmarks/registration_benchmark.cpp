@@ -34,13 +34,6 @@ marrow::RunResult run(const marrow::Pipeline& pipeline, const marrow::Catalogue&
   return result;
 }
 
-/// A value made outside of a run is known by its content.
-Value keyed(Value value) {
-  for (Value& item : value.items) item = keyed(item);
-  if (value.data) value.key = value.hash(value.data.get());
-  return value;
-}
-
 /// A simulated case and its segmented model, made once.
 struct Scene {
   marrow::Catalogue catalogue;
@@ -52,9 +45,9 @@ struct Scene {
     const marrow::Pipeline simulation = read(catalogue, "simulate.yaml", "case", {});
     const marrow::RunResult simulated = run(simulation, catalogue, settings);
     const auto& data = marrow::value_of(simulated, simulation.outputs[0].source).as<marrow::Case>();
-    settings.given["case"] = {keyed(Value::of(std::make_shared<const marrow::Volume>(data.ct))),
-                              keyed(Value::of(data.seeds, "fragment")), keyed(Value::of(data.views, "view")),
-                              keyed(Value::of(data.start, "fragment")), keyed(Value::of(data.truth, "fragment"))};
+    settings.given["case"] = {Value::of(std::make_shared<const marrow::Volume>(data.ct)),
+                              Value::of(data.seeds, "fragment"), Value::of(data.views, "view"),
+                              Value::of(data.start, "fragment"), Value::of(data.truth, "fragment")};
     const marrow::RunResult first = run(registration, catalogue, settings);
     for (std::size_t i = 0; i < registration.nodes.size(); ++i) {
       const std::string& id = registration.nodes[i].id;

@@ -153,7 +153,7 @@ TEST_F(ExecutorTest, FunctionKeepsItsInputsAlive) {
   const RunResult result = run("  c: {uses: test.constant, with: {value: 5}}\n  f: {uses: test.adder, in: {amount: c}}\n  a: {uses: test.apply, in: {adder: f, to: c}}\n", "a: a, f: f");
   EXPECT_EQ(number(result), 10);
   const marrow::Value function = output(result, 1);
-  EXPECT_EQ(function.hash, nullptr) << "a function has no content";
+  EXPECT_EQ(function.type.content, nullptr) << "a function has no content";
   EXPECT_NE(function.key, marrow::Digest{});
 }
 

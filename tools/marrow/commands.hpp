@@ -22,11 +22,16 @@ struct RunRequest {
   std::filesystem::path folder;  ///< empty = runs/NAME, with a number where that is taken
   std::uint64_t seed = 1;
   int threads = 0;
+  bool no_cache = false;
   bool quiet = false;
   bool json = false;
 };
 
 int run(const RunRequest& request);
+int plan(const PipelineRequest& request, std::uint64_t seed);
+int cache_info();
+int cache_why(const std::string& key);
+int cache_collect(double keep_gb);
 int check(const PipelineRequest& request, bool json);
 int list(const std::string& kind, bool json);
 int inspect(const std::string& node, bool yaml, bool json);

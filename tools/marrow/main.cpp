@@ -29,6 +29,7 @@ int main(int argc, char** argv) {
   run_command->add_option("--out", run_request.folder, "folder to write; new or empty (default: runs/NAME)");
   run_command->add_option("--seed", run_request.seed, "seed of all randomness")->capture_default_str();
   run_command->add_option("--threads", run_request.threads, "threads to use (default: all)")->check(CLI::Range(1, 1024));
+  run_command->add_flag("--no-cache", run_request.no_cache, "neither read nor keep results of nodes");
   run_command->add_flag("--quiet", run_request.quiet, "print only errors");
   run_command->add_flag("--json", run_request.json, "print events as JSON, one a line");
   run_command->callback([&] { code = run(run_request); });
@@ -39,6 +40,25 @@ int main(int argc, char** argv) {
   add_pipeline_arguments(check_command, check_request);
   check_command->add_flag("--json", check_json, "print the faults as JSON");
   check_command->callback([&] { code = check(check_request, check_json); });
+
+  PipelineRequest plan_request;
+  std::uint64_t plan_seed = 1;
+  auto* plan_command = app.add_subcommand("plan", "show what a run would compute, what it would read back, and why");
+  add_pipeline_arguments(plan_command, plan_request);
+  plan_command->add_option("--seed", plan_seed, "seed of all randomness")->capture_default_str();
+  plan_command->callback([&] { code = plan(plan_request, plan_seed); });
+
+  std::string cache_key;
+  double keep_gb = 10;
+  auto* cache_command = app.add_subcommand("cache", "look at the store of results, and tidy it up");
+  cache_command->require_subcommand(1);
+  cache_command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&] { code = cache_info(); });
+  auto* why_command = cache_command->add_subcommand("why", "what a kept result was made from");
+  why_command->add_option("key", cache_key, "key of a result or of one of its outputs (run.json shows those), or its first digits")->required();
+  why_command->callback([&] { code = cache_why(cache_key); });
+  auto* gc_command = cache_command->add_subcommand("gc", "remove the least recently used results");
+  gc_command->add_option("--keep-gb", keep_gb, "size to keep, in gigabytes")->capture_default_str()->check(CLI::NonNegativeNumber);
+  gc_command->callback([&] { code = cache_collect(keep_gb); });
 
   std::string kind;
   bool list_json = false;

@@ -95,13 +95,21 @@ class Progress {
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
 
+std::string status_text(const NodeRecord& record) {
+  if (record.status != NodeRecord::Status::done || !record.cached) return status_name(record.status);
+  char text[64];
+  if (record.calls) std::snprintf(text, sizeof text, "done, %d cached", record.cached);
+  else std::snprintf(text, sizeof text, "cached (took %.3f s)", record.cached_seconds);
+  return text;
+}
+
 void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
   std::printf("\n%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed) continue;
     std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls,
-                status_name(record.status), record.reason.empty() ? "" : ": ", record.reason.c_str());
+                status_text(record).c_str(), record.reason.empty() ? "" : ": ", record.reason.c_str());
   }
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);
@@ -131,7 +139,9 @@ int run(const RunRequest& request) {
   std::signal(SIGTERM, on_interrupt);
 
   Progress progress(request, folder);
+  const Store store;
   RunSettings settings;
+  if (!request.no_cache) settings.store = &store;
   settings.seed = request.seed;
   settings.threads = request.threads;
   settings.cancelled = &interrupted;

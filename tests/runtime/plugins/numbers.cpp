@@ -77,6 +77,11 @@ Metrics work(const Metrics* after, const ConstantOptions& options, marrow::Conte
   return number((after ? value_of(*after) : 0) + (x > 0));
 }
 std::shared_ptr<const numbers::Adder> adder(const Metrics& amount) { return std::make_shared<numbers::Adder>(amount); }
+std::shared_ptr<const numbers::Adder> failing_adder(const Metrics&) { throw marrow::Error("it cannot add"); }
+Metrics warn(marrow::Context& context) {
+  context.warn("mind the gap");
+  return number(1);
+}
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
@@ -103,6 +108,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("test.work", work).summary("Keeps a core busy").in("after", "waits for it").out("number", "1")
       .option("value", &ConstantOptions::value, "seconds");
   plugin.node("test.adder", adder).summary("A function").in("amount", "what it adds").out("adder", "adds");
+  plugin.node("test.failing_adder", failing_adder).summary("Fails").in("amount", "anything").out("adder", "none");
+  plugin.node("test.warn", warn).summary("Warns").out("number", "1");
   plugin.node("test.apply", apply).summary("Calls a function").in("adder", "function").in("to", "number").out("number", "result");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
   plugin.node("evaluate.test", judge).summary("Sees the truth").in("of", "number").in("truth", "truth").out("number", "the same");

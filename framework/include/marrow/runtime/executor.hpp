@@ -4,12 +4,14 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "marrow/runtime/catalogue.hpp"
 #include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/store.hpp"
 
 namespace marrow {
 
@@ -30,6 +32,9 @@ struct RunSettings {
   /// Outputs of nodes that are already known, by the node's name: they and what only they need are not run. A program that
   /// holds the model and the images in memory registers new ones this way.
   std::map<std::string, std::vector<Value>> given;
+  /// Where results are looked up before a node is called, and kept for later runs. None: nothing is kept.
+  const Store* store = nullptr;
+  bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
 };
 
 /// How one node fared.
@@ -40,6 +45,8 @@ struct NodeRecord {
   double start_s = 0;          ///< after the run's start
   double seconds = 0;          ///< of its calls together, wall time
   int calls = 0;               ///< how often its function was called: once per item, once where recipes are the same
+  int cached = 0;              ///< calls whose results were read back from the store
+  double cached_seconds = 0;   ///< that those calls took when they were made
   double peak_memory_mb = 0;   ///< most memory of the whole process while it ran
   std::vector<Value> outputs;  ///< in the order of the node's outputs
 };
@@ -55,6 +62,19 @@ struct RunResult {
 /// Evaluates what the pipeline's outputs need, independent nodes in parallel on one pool. A node that fails leaves the others
 /// going; what depends on it is not run. The same pipeline and seed give the same bytes at any number of threads.
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
+
+/// What a run would do with one node.
+struct PlannedNode {
+  enum class What { not_needed, cached, function, runs, depends };
+  What what = What::not_needed;
+  int calls = 0, calls_to_make = 0;
+  std::string why;                  ///< it runs
+  std::set<std::string> waits_for;  ///< of `depends`: it runs unless these come out unchanged
+  double seconds = 0;               ///< that the calls to make took the last time; 0 where that is not known
+};
+
+/// What run_pipeline() would do, in the order of Pipeline::nodes. Calls no node. `settings.store` must be given.
+std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
 
 /// The value that a reference means in a result; absent where it could not be made. Throws Error for a name that a list
 /// does not have.

@@ -33,6 +33,21 @@ concept Registered = requires { ValueType<T>::kId; };
     static constexpr bool kIsFunction = true;         \
   };
 
+/// How the content of a data type is hashed, written and read. The code lies in the library that knows the type.
+struct Content {
+  Digest (*hash)(const void*);
+  void (*pack)(const void*, Archive&);
+  std::shared_ptr<const void> (*unpack)(Unpacker&);
+};
+
+namespace detail {
+template <class T>
+inline constexpr Content kContent{
+    [](const void* data) { return hash_of(*static_cast<const T*>(data)); },
+    [](const void* data, Archive& archive) { archive.add(*static_cast<const T*>(data)); },
+    [](Unpacker& packed) -> std::shared_ptr<const void> { return std::make_shared<const T>(packed.get<T>()); }};
+}  // namespace detail
+
 /// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different layout
 /// would pass for each other.)
 struct TypeInfo {
@@ -40,20 +55,34 @@ struct TypeInfo {
   int version = 0;
   std::size_t size = 0;
   bool is_function = false;
+  const Content* content = nullptr;  ///< of a data type; null where the type is only known from a manifest
 
-  bool operator==(const TypeInfo&) const = default;
+  bool operator==(const TypeInfo& other) const {
+    return id == other.id && version == other.version && size == other.size && is_function == other.is_function;
+  }
   template <Registered T>
   static TypeInfo of() {
-    return {ValueType<T>::kId, ValueType<T>::kVersion, sizeof(T), ValueType<T>::kIsFunction};
+    TypeInfo type{ValueType<T>::kId, ValueType<T>::kVersion, sizeof(T), ValueType<T>::kIsFunction};
+    if constexpr (!ValueType<T>::kIsFunction) type.content = &detail::kContent<T>;
+    return type;
   }
+};
+
+/// Makes the data of a value when it is first needed: reads it from the store, or calls the node that makes it.
+class Source {
+ public:
+  virtual ~Source() = default;
+  /// The same pointer each time; safe to call from several threads. `type` must know the content of a data type. Throws
+  /// Error when it cannot be made.
+  virtual std::shared_ptr<const void> data(const TypeInfo& type) = 0;
 };
 
 /// A value on an edge: absent, one item, or items along an axis (each of which may again have an axis). Immutable and cheap
 /// to copy.
 struct Value {
   TypeInfo type;
-  std::shared_ptr<const void> data;       ///< of one item
-  Digest (*hash)(const void*) = nullptr;  ///< content hash of one item; null for functions
+  std::shared_ptr<const void> data;  ///< of one item
+  std::shared_ptr<Source> source;    ///< of one item whose data are not here yet
 
   std::string axis;  ///< of a list; empty for one item
   std::vector<std::string> names;
@@ -65,15 +94,13 @@ struct Value {
   Digest key;
 
   bool is_list() const { return !axis.empty(); }
-  bool is_absent() const { return !data && !is_list(); }
+  bool is_absent() const { return !data && !source && !is_list(); }
 
   template <Registered T>
   static Value of(std::shared_ptr<const T> item) {
     Value value;
     value.type = TypeInfo::of<T>();
     value.data = std::move(item);
-    if constexpr (!ValueType<T>::kIsFunction)
-      value.hash = [](const void* data) { return hash_of(*static_cast<const T*>(data)); };
     return value;
   }
   template <Registered T>
@@ -88,13 +115,13 @@ struct Value {
   }
   template <Registered T>
   const T& as() const {
-    return *static_cast<const T*>(data.get());
+    return *static_cast<const T*>(data ? data.get() : source->data(TypeInfo::of<T>()).get());
   }
   template <Registered T>
   List<T> as_list() const {
     List<T> list;
     for (std::size_t i = 0; i < items.size(); ++i)
-      list.add_shared(names[i], std::static_pointer_cast<const T>(items[i].data));
+      list.add_shared(names[i], std::static_pointer_cast<const T>(items[i].data ? items[i].data : items[i].source->data(TypeInfo::of<T>())));
     return list;
   }
 };

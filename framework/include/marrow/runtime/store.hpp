@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <filesystem>
+#include <map>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/value.hpp"
+
+namespace marrow {
+
+/// What a result was made from: all that its key depends on, in words, so that two keys can be compared.
+struct Provenance {
+  std::string node;                       ///< kind.name
+  Digest build_id;                        ///< of its library
+  std::map<std::string, std::string> options;
+  std::map<std::string, Digest> inputs;   ///< port -> key
+  bool random = false;
+  std::uint64_t seed = 0;                 ///< counts only where random
+  double seconds = 0;                     ///< that the call took
+  std::vector<std::string> warnings;      ///< that the node gave; repeated when the result is read back
+
+  static constexpr auto fields() {
+    return std::make_tuple(&Provenance::node, &Provenance::build_id, &Provenance::options, &Provenance::inputs, &Provenance::random,
+                           &Provenance::seed, &Provenance::seconds, &Provenance::warnings);
+  }
+};
+
+/// A result read back from the store. The outputs know their keys; their data are read when they are first needed.
+struct StoredResult {
+  Provenance provenance;
+  std::vector<Value> outputs;
+};
+
+/// Thrown by the source of a stored value whose bytes are gone or are not those that were written.
+class DamagedEntry : public Error {
+ public:
+  using Error::Error;
+};
+
+/// Results of nodes on disk, by key: one file a result. Several processes may use one folder at once. A file is written under
+/// a temporary name and then renamed, so an entry is whole or absent, whenever the process is killed and however full the
+/// disk is. The content hash of each value is checked when it is read. Safe to use from several threads.
+class Store {
+ public:
+  explicit Store(std::filesystem::path folder = default_folder());
+  /// MARROW_CACHE, or marrow/results in XDG_CACHE_HOME or ~/.cache.
+  static std::filesystem::path default_folder();
+  const std::filesystem::path& folder() const { return folder_; }
+
+  /// Nothing where there is no entry, or none that is whole; a damaged one is removed.
+  std::optional<StoredResult> find(const Digest& key) const;
+  /// Keeps what can be kept: data, absent items and lists of them. Returns why it was not kept, or an empty text: a full disk
+  /// must not end a run.
+  std::string save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const;
+  /// Removes an entry that turned out to be damaged.
+  void drop(const Digest& key) const;
+
+  /// What a node of a pipeline last came to, for saying why it runs again. `place` names pipeline, node and item.
+  struct Last {
+    Digest key;
+    Provenance provenance;
+    static constexpr auto fields() { return std::make_tuple(&Last::key, &Last::provenance); }
+  };
+  void remember(const std::string& place, const Last& last) const;
+  std::optional<Last> last(const std::string& place) const;
+
+  struct Entry {
+    Digest key;
+    std::uint64_t bytes = 0;
+    std::filesystem::file_time_type used;
+    Provenance provenance;
+    std::vector<Digest> outputs;  ///< content hashes
+  };
+  /// All entries, the least recently used first.
+  std::vector<Entry> entries() const;
+  struct Freed {
+    std::size_t entries = 0;
+    std::uint64_t bytes = 0;
+  };
+  /// Removes the least recently used entries until the rest is at most `keep_bytes`, and what killed processes left behind.
+  Freed collect(std::uint64_t keep_bytes) const;
+
+ private:
+  std::filesystem::path file_of(const Digest& key) const;
+  std::string write_whole(const std::filesystem::path& file, const std::vector<std::string_view>& parts) const;
+
+  std::filesystem::path folder_;
+  mutable std::atomic<std::uint64_t> written_{0};
+};
+
+/// The key that a text of 32 hexadecimal digits names; nothing for any other text.
+std::optional<Digest> digest_of_hex(const std::string& text);
+
+}  // namespace marrow

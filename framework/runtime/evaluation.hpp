@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <chrono>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/executor.hpp"
+
+namespace marrow {
+
+/// How one call of a node ended.
+struct CallResult {
+  NodeRecord::Status status = NodeRecord::Status::done;
+  std::string reason;
+  std::vector<Value> outputs;
+  bool is_deferred = false;  ///< a function, which is made when a node that runs asks for it
+  bool is_cached = false;    ///< read back from the store
+};
+
+/// One call of a node: its place along the mapped axes, what it is given, and what came of it.
+struct Call {
+  std::vector<Value> inputs;
+  std::string item;
+  CallResult result;
+};
+
+/// Finds the results of calls: each recipe once within a run, from the store where an earlier run left it there, else by
+/// calling the node. Functions are made only when something that runs needs them. Safe to use from several threads of the
+/// run's pool.
+class Evaluation {
+ public:
+  /// `finished(node, call)` is told of each call whose result is known. `records` is written under `mutex`.
+  Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings, std::vector<NodeRecord>& records,
+             std::mutex& mutex, std::function<void(std::size_t node, Call& call)> finished);
+  ~Evaluation();
+
+  void evaluate(std::size_t node, Call& call);
+  /// Makes the data of a value that is wanted at the end of the run; what cannot be made becomes missing.
+  static void make(Value& value, const std::function<const TypeInfo&()>& type);
+  /// Why the call has another key than when this node last ran; for plans.
+  std::string change_since_last(std::size_t node, const Call& call) const;
+  double seconds_last_time(std::size_t node, const Call& call) const;
+  /// Whether the store has the result, or the node makes functions; then the call's result is set as evaluate() does.
+  bool find(std::size_t node, Call& call);
+
+  void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0, double seconds = 0) const;
+  std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
+
+ private:
+  struct Memo;
+  class Deferred;
+  class DeferredSource;
+  struct Recipe {
+    Digest recipe, key;
+  };
+
+  Recipe recipe(std::size_t node, const Call& call) const;
+  Provenance provenance(std::size_t node, const std::vector<Value>& inputs) const;
+  std::string place(std::size_t node, const std::string& item) const;
+  void remember(std::size_t node, const Call& call, const Recipe& recipe);
+  bool makes_functions(std::size_t node) const;
+  void defer(std::size_t node, Call& call, const Recipe& recipe);
+  bool read_back(std::size_t node, Call& call, const Recipe& recipe);
+  void share(const Digest& key, const CallResult& result);
+  CallResult perform(std::size_t node, std::vector<Value> inputs, const std::string& item, const Recipe& recipe);
+  std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item, const Recipe& recipe,
+                               std::vector<std::string>& warnings);
+  void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result, double seconds,
+            std::vector<std::string> warnings);
+  Context make_context(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings);
+
+  const Pipeline& pipeline_;
+  const Catalogue& catalogue_;
+  const RunSettings& settings_;
+  std::vector<NodeRecord>& records_;
+  std::mutex& mutex_;
+  std::function<void(std::size_t, Call&)> finished_;
+  std::map<Digest, std::unique_ptr<Memo>> memos_;
+  mutable std::mutex observer_mutex_, warnings_mutex_;
+  bool store_complained_ = false;
+};
+
+/// Of this process.
+double resident_memory_mb();
+
+}  // namespace marrow

@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+
+#include "commands.hpp"
+
+namespace marrow::cli {
+namespace {
+
+struct Share {
+  std::size_t entries = 0;
+  std::uint64_t bytes = 0;
+  double seconds = 0;
+};
+
+double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
+
+}  // namespace
+
+int cache_info() {
+  const Store store;
+  std::map<std::string, Share> shares;
+  Share all;
+  for (const Store::Entry& entry : store.entries())
+    for (Share* share : {&shares[entry.provenance.node], &all}) {
+      ++share->entries;
+      share->bytes += entry.bytes;
+      share->seconds += entry.provenance.seconds;
+    }
+  std::printf("%s\n\n%-34s %8s %12s %12s\n", store.folder().c_str(), "node", "results", "MB", "seconds");
+  const auto print = [](const std::string& name, const Share& share) {
+    std::printf("%-34s %8zu %12.2f %12.2f\n", name.c_str(), share.entries, megabytes(share.bytes), share.seconds);
+  };
+  for (const auto& [name, share] : shares) print(name.empty() ? "(damaged or of another version)" : name, share);
+  print("all", all);
+  return 0;
+}
+
+int cache_why(const std::string& key) {
+  const Store store;
+  int found = 0;
+  for (const Store::Entry& entry : store.entries()) {
+    const auto is_meant = [&](const Digest& digest) { return digest.hex().starts_with(key); };
+    if (!is_meant(entry.key) && std::none_of(entry.outputs.begin(), entry.outputs.end(), is_meant)) continue;
+    ++found;
+    const Provenance& from = entry.provenance;
+    std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), from.node.c_str(), megabytes(entry.bytes), from.seconds,
+                from.build_id.hex().c_str());
+    for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", name.c_str(), value.c_str());
+    for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", name.c_str(), digest.hex().c_str());
+    for (const Digest& digest : entry.outputs) std::printf("  output %s\n", digest.hex().c_str());
+    if (from.random) std::printf("  seed   %llu\n", static_cast<unsigned long long>(from.seed));
+    for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", warning.c_str());
+  }
+  if (!found) std::fprintf(stderr, "marrow: error: the store %s holds no result with a key that begins with '%s'\n", store.folder().c_str(), key.c_str());
+  return found ? 0 : 2;
+}
+
+int cache_collect(double keep_gb) {
+  const Store store;
+  const Store::Freed freed = store.collect(std::uint64_t(keep_gb * 1e9));
+  std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
+  return 0;
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+
+#include "commands.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using What = PlannedNode::What;
+
+std::string text_of(const PlannedNode& node) {
+  switch (node.what) {
+    case What::not_needed: return "not needed";
+    case What::cached: return "cached";
+    case What::function: return "a function, made again when a node that runs needs it";
+    case What::runs: return "runs: " + node.why;
+    case What::depends: break;
+  }
+  std::string names;
+  for (const std::string& name : node.waits_for) names += (names.empty() ? "'" : ", '") + name + "'";
+  return "runs unless " + names + (node.waits_for.size() == 1 ? " comes" : " come") + " out unchanged";
+}
+
+}  // namespace
+
+int plan(const PipelineRequest& request, std::uint64_t seed) {
+  const Catalogue catalogue;
+  Pipeline pipeline;
+  if (!load(request, catalogue, pipeline, true)) return 2;
+  const Store store;
+  RunSettings settings;
+  settings.seed = seed;
+  settings.store = &store;
+  settings.remember = false;
+  const std::vector<PlannedNode> planned = plan_pipeline(pipeline, catalogue, settings);
+  int counts[5] = {};
+  double seconds = 0;
+  for (std::size_t i = 0; i < planned.size(); ++i) {
+    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), text_of(planned[i]).c_str());
+    ++counts[int(planned[i].what)];
+    seconds += planned[i].seconds;
+  }
+  std::printf("\n%d cached, %d to run", counts[int(What::cached)], counts[int(What::runs)]);
+  if (counts[int(What::depends)]) std::printf(", %d that may run", counts[int(What::depends)]);
+  if (seconds > 0) std::printf("; what runs took %.1f s the last time", seconds);
+  std::printf("\n");
+  return 0;
+}
+
+}  // namespace marrow::cli
