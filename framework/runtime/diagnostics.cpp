@@ -37,6 +37,13 @@ void Diagnostics::add(Place place, std::string message, std::string hint) {
   items_.push_back({std::move(place), std::move(message), std::move(hint)});
 }
 
+void Diagnostics::add_all(const Diagnostics& other) {
+  const auto key = [](const Diagnostic& item) { return std::tie(item.place.file, item.place.line, item.place.column, item.message); };
+  for (const Diagnostic& item : other.items_)
+    if (std::none_of(items_.begin(), items_.end(), [&](const Diagnostic& known) { return key(known) == key(item); })) items_.push_back(item);
+  sources_.insert(other.sources_.begin(), other.sources_.end());
+}
+
 std::vector<Diagnostic> Diagnostics::sorted() const {
   std::vector<Diagnostic> items = items_;
   std::stable_sort(items.begin(), items.end(), [](const Diagnostic& a, const Diagnostic& b) {

@@ -2,7 +2,10 @@
 #include "keys.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <map>
+#include <mutex>
 #include <sstream>
 
 #include "mapping.hpp"
@@ -11,6 +14,31 @@ namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
+
+Digest digest_once(const fs::path& file) {
+  struct Known {
+    std::uintmax_t size = 0;
+    fs::file_time_type changed;
+    Digest digest;
+  };
+  static std::mutex mutex;
+  static std::map<fs::path, Known> known;
+  std::error_code error;
+  const std::uintmax_t size = fs::file_size(file, error);
+  const fs::file_time_type changed = fs::last_write_time(file, error);
+  {
+    const std::scoped_lock lock(mutex);
+    const auto found = known.find(file);
+    if (found != known.end() && found->second.size == size && found->second.changed == changed) return found->second.digest;
+  }
+  const Digest digest = file_digest(file);
+  // A file that was changed just now may change again within the resolution of its time.
+  if (fs::file_time_type::clock::now() - changed > std::chrono::seconds(2)) {
+    const std::scoped_lock lock(mutex);
+    known[file] = {size, changed, digest};
+  }
+  return digest;
+}
 
 /// Hashes the content of a file, or of every file below a folder with its relative name.
 void add_path(Hasher& hasher, const std::string& text) {
@@ -30,7 +58,7 @@ void add_path(Hasher& hasher, const std::string& text) {
   }
   for (const fs::path& file : files) {
     hasher.add(fs::relative(file, path, error).generic_string());
-    hasher.add(fs::is_regular_file(file) ? file_digest(file) : Digest{});
+    hasher.add(fs::is_regular_file(file) ? digest_once(file) : Digest{});
   }
 }
 
@@ -62,6 +90,12 @@ Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std
   hasher.add(recipe);
   hasher.add(build_id);
   if (random) hasher.add(seed);
+  return hasher.digest();
+}
+
+Digest path_digest(const fs::path& path) {
+  Hasher hasher;
+  add_path(hasher, path.string());
   return hasher.digest();
 }
 

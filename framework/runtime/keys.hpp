@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <cstdint>
+#include <filesystem>
 #include <vector>
 
 #include "marrow/runtime/pipeline.hpp"
@@ -14,6 +15,10 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
 
 /// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
+
+/// Of the content of a file, or of all files below a folder with their names. Files are read once in a process, and again
+/// when their size or time of change is another.
+Digest path_digest(const std::filesystem::path& path);
 
 /// The key of a function that a call returns.
 Digest function_key(const Digest& result, std::size_t output);

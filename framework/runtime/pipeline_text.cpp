@@ -30,7 +30,7 @@ class Reader {
     const YAML::Node root = yaml_.parse(text.str());
     if (!diagnostics_.empty()) return pipeline_;
     read_root(root);
-    for (const auto& [key, value] : arguments_.overrides) apply_override(key, value);
+    for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
     return pipeline_;
   }
 
@@ -145,8 +145,8 @@ class Reader {
     pipeline_.nodes.push_back(std::move(node));
   }
 
-  void apply_override(const std::string& key, const std::string& text) {
-    const Place place{"--set " + key + "=" + text};
+  void apply_override(const std::string& key, const std::string& text, const Place& written) {
+    const Place place = written.file.empty() ? Place{"--set " + key + "=" + text} : written;
     StrictYaml yaml(place.file, diagnostics_);
     const std::size_t dot = key.find('.');
     std::vector<std::string> ids;

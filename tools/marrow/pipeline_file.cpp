@@ -28,7 +28,9 @@ void print_json(const Diagnostics& diagnostics) {
 }  // namespace
 
 PipelineArguments arguments_of(const PipelineRequest& request) {
-  return {pairs(request.inputs, "name=value"), pairs(request.overrides, "node.option=value")};
+  PipelineArguments arguments{pairs(request.inputs, "name=value"), {}};
+  for (auto& [key, value] : pairs(request.overrides, "node.option=value")) arguments.overrides.push_back({key, value});
+  return arguments;
 }
 
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json) {

@@ -23,6 +23,8 @@ struct Diagnostic {
 class Diagnostics {
  public:
   void add(Place place, std::string message, std::string hint = {});
+  /// Those of another collection that are not here yet.
+  void add_all(const Diagnostics& other);
   bool empty() const { return items_.empty(); }
   std::size_t size() const { return items_.size(); }
   /// By file, line and column.

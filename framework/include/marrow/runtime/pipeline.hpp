@@ -57,9 +57,15 @@ struct Pipeline {
   std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
 
+/// node.option=value, node.uses=kind.name or node.in.port=reference.
+struct Override {
+  std::string key, value;
+  Place place = {};  ///< in the file that it was written in; without one it came from the command line
+};
+
 struct PipelineArguments {
-  std::vector<std::pair<std::string, std::string>> inputs;     ///< name=value
-  std::vector<std::pair<std::string, std::string>> overrides;  ///< node.option=value, node.uses=name, node.in.port=reference
+  std::vector<std::pair<std::string, std::string>> inputs;  ///< name=value
+  std::vector<Override> overrides;
 };
 
 /// Reads and checks a pipeline. All faults go to `diagnostics`; the result may be used only when there are none.

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/compare/cell.hpp"
+
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "marrow/domain/pose.hpp"
+#include "marrow/runtime/run_folder.hpp"
+#include "marrow/runtime/types.hpp"
+#include "runtime/keys.hpp"
+
+namespace marrow::compare {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
+  return parts;
+}
+
+/// All that a run of the pipeline depends on, but for the data that its paths name.
+void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const Catalogue& catalogue) {
+  hasher.add(resolved_yaml(pipeline));
+  std::set<Digest> build_ids;
+  for (const PipelineNode& node : pipeline.nodes) build_ids.insert(catalogue.library_of(node.info.name)->build_id);
+  for (const Digest& id : build_ids) hasher.add(id);
+}
+
+Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue) {
+  Diagnostics diagnostics;
+  Pipeline pipeline = read_pipeline(file, arguments, catalogue, diagnostics);
+  if (!diagnostics.empty()) throw Error("the pipeline has faults:\n" + diagnostics.text());
+  return pipeline;
+}
+
+/// The reason of the first node that failed, in the pipeline's order.
+std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
+    if (result.nodes[i].status == NodeRecord::Status::failed || result.nodes[i].status == NodeRecord::Status::cancelled)
+      return "node '" + pipeline.nodes[i].id + "' (" + pipeline.nodes[i].info.name + ") failed: " + result.nodes[i].reason;
+  return "";
+}
+
+/// The figure that a path names. Throws Error where it is not there or is no number.
+Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
+  const std::vector<std::string> parts = split(path);
+  const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(), [&](const PipelineOutput& one) { return one.name == parts[0]; });
+  Value value = value_of(result, output->source);
+  std::size_t used = 1;
+  for (; value.is_list(); ++used) {
+    const auto item = used < parts.size() ? std::find(value.names.begin(), value.names.end(), parts[used]) : value.names.end();
+    if (item == value.names.end()) {
+      std::string names;
+      for (const std::string& name : value.names) names += (names.empty() ? "" : ", ") + name;
+      throw Error("'" + path + "': there are " + names + " along '" + value.axis + "', name one of them");
+    }
+    const Value picked = value.items[std::size_t(item - value.names.begin())];
+    value = picked;
+  }
+  if (value.is_absent()) throw Error("'" + path + "' was not made" + (value.missing.empty() ? ": its case has no truth, or an item is absent" : ": " + value.missing));
+  std::string name;
+  for (; used < parts.size(); ++used) name += (name.empty() ? "" : ".") + parts[used];
+  std::vector<std::string> known;
+  for (const Metric& metric : value.as<Metrics>().items) {
+    known.push_back(metric.name);
+    if (metric.name != name) continue;
+    if (!std::isfinite(metric.value)) throw Error("'" + path + "' is " + std::to_string(metric.value) + ", not a finite number");
+    return metric;
+  }
+  throw Error("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known));
+}
+
+int evaluations_in(const Value& value) {
+  int sum = 0;
+  for (const Value& item : value.items) sum += evaluations_in(item);
+  if (!value.is_list() && !value.is_absent() && value.type == TypeInfo::of<Pose>()) sum += value.as<Pose>().evaluations;
+  return sum;
+}
+
+}  // namespace
+
+CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder, int threads)
+    : experiment_(experiment), catalogue_(catalogue), store_(store), folder_(std::move(folder)), threads_(threads) {}
+
+fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
+
+fs::path CellRunner::case_folder(std::size_t index) {
+  const ExperimentCase& one = experiment_.cases[index];
+  if (!one.folder.empty()) return one.folder;
+  const auto known = case_folders_.find(index);
+  if (known != case_folders_.end()) return known->second;
+
+  PipelineArguments arguments;
+  arguments.inputs = one.inputs;
+  Pipeline pipeline = checked(experiment_.simulation, arguments, catalogue_);
+  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
+  Hasher hasher;
+  add_pipeline(hasher, pipeline, catalogue_);
+  hasher.add(one.seed);
+  const fs::path cases = (store_ ? store_->folder() : folder_) / "cases", folder = cases / hasher.digest().hex();
+  if (!fs::exists(folder)) {
+    RunSettings settings;
+    settings.seed = one.seed;
+    settings.threads = threads_;
+    settings.store = nullptr;  // the folder itself is what is kept
+    const fs::path temporary = folder.string() + ".tmp-" + std::to_string(getpid()) + "-0";
+    fs::remove_all(temporary);
+    const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+    if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
+    RunFolder written(temporary, pipeline);
+    for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
+      if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
+    std::error_code error;
+    fs::rename(temporary, folder, error);
+    if (error) fs::remove_all(temporary);  // another process was quicker
+    if (!fs::exists(folder)) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
+  }
+  return case_folders_[index] = folder / "outputs" / experiment_.simulation_output;
+}
+
+Pipeline CellRunner::pipeline_of(const CellIndex& cell) {
+  Pipeline pipeline = checked(experiment_.pipeline, arguments_of(experiment_, cell, case_folder(cell.case_index)), catalogue_);
+  std::set<std::string> wanted(experiment_.pictures.begin(), experiment_.pictures.end());
+  for (const MetricChoice& metric : experiment_.metrics) wanted.insert(metric.path.substr(0, metric.path.find('.')));
+  if (!experiment_.initial_error.empty()) wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
+  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
+    const PortInfo& port = pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
+    return !wanted.contains(output.name) && port.type != TypeInfo::of<Pose>();
+  });
+  return pipeline;
+}
+
+std::string CellRunner::key_of(const CellIndex& cell) {
+  Hasher hasher;
+  const Pipeline pipeline = pipeline_of(cell);
+  add_pipeline(hasher, pipeline, catalogue_);
+  hasher.add(std::uint64_t(1));  // the seed of the run
+  std::string& content = case_keys_[cell.case_index];
+  if (content.empty()) content = path_digest(case_folder(cell.case_index)).hex();
+  hasher.add(content);
+  for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
+  hasher.add(experiment_.initial_error);
+  hasher.add(experiment_.pictures);
+  return hasher.digest().hex();
+}
+
+std::optional<CellRow> CellRunner::finished(const CellIndex& cell) {
+  std::ifstream stream(folder_of(cell) / "cell.json", std::ios::binary);
+  if (!stream) return std::nullopt;
+  std::ostringstream text;
+  text << stream.rdbuf();
+  try {
+    CellRow row = row_from_json(text.str());
+    if (row.key == key_of(cell) && row.failed.empty()) return row;
+  } catch (const Error&) {  // half a file is no file
+  }
+  return std::nullopt;
+}
+
+CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
+  CellRow row;
+  row.id = cell_id(experiment_, cell);
+  row.variant = experiment_.variants[cell.variant].name;
+  row.case_name = experiment_.cases[cell.case_index].name;
+  row.start = experiment_.starts[cell.start].name;
+  try {
+    const Pipeline pipeline = pipeline_of(cell);
+    row.key = key_of(cell);
+    const fs::path folder = folder_of(cell);
+    fs::remove_all(folder);
+    RunFolder written(folder, pipeline);
+    RunSettings settings;
+    settings.threads = threads_;
+    settings.store = store_;
+    settings.remember = false;
+    settings.observer = observer;
+    const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+      const NodeRecord& node = result.nodes[i];
+      if (!node.calls && !node.cached) continue;
+      row.nodes[pipeline.nodes[i].id] = {node.calls, node.cached, node.seconds + node.cached_seconds};
+      row.seconds += node.seconds + node.cached_seconds;
+    }
+    const auto outputs = written.write_outputs(pipeline, result, catalogue_);
+    written.write_record(pipeline, result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
+    for (const RunFolder::Written& output : outputs)
+      if (std::find(experiment_.pictures.begin(), experiment_.pictures.end(), output.output) != experiment_.pictures.end())
+        for (const std::string& file : output.files) row.files.push_back((fs::path("cells") / row.id / file).string());
+    row.failed = reason_of(pipeline, result);
+    for (const PipelineOutput& output : pipeline.outputs) row.evaluations += evaluations_in(value_of(result, output.source));
+    for (const MetricChoice& metric : experiment_.metrics) {
+      if (!row.failed.empty()) break;
+      const Metric found = figure(pipeline, result, metric.path);
+      row.values.push_back(found.value);
+      row.units.push_back(found.unit);
+    }
+    if (row.failed.empty() && !experiment_.initial_error.empty()) row.initial_error = figure(pipeline, result, experiment_.initial_error).value;
+  } catch (const std::exception& error) {
+    row.failed = error.what();
+  }
+  row.values.resize(experiment_.metrics.size());
+  row.units.resize(experiment_.metrics.size());
+  return row;
+}
+
+void CellRunner::write(const CellRow& row) const {
+  const fs::path file = folder_ / "cells" / row.id / "cell.json", temporary = file.string() + ".tmp";
+  fs::create_directories(file.parent_path());
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << to_json(row) << '\n';
+  stream.close();
+  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
+  fs::rename(temporary, file);
+}
+
+}  // namespace marrow::compare

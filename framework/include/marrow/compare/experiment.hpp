@@ -1,0 +1,90 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <array>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow::compare {
+
+/// One way of doing it: what is changed in the pipeline.
+struct Variant {
+  std::string name;
+  Place place;
+  std::vector<Override> overrides;
+};
+
+/// Data to try all variants on: a folder that is there, or a simulation that makes one.
+struct ExperimentCase {
+  std::string name;
+  std::filesystem::path folder;  ///< empty for a simulated one
+  std::uint64_t seed = 1;        ///< of the simulation
+  std::vector<std::pair<std::string, std::string>> inputs;  ///< of the simulation's pipeline
+};
+
+/// A displacement of the start, about and along the fragment's frontal, lateral and long axes through its centroid.
+struct Start {
+  std::string name;
+  std::array<double, 3> rotation_deg{}, translation_mm{};
+};
+
+/// How starts are drawn: the direction of the rotation vector and of the translation uniform on the sphere, the angle and
+/// the length uniform in [0, limit].
+struct StartProtocol {
+  std::string node;  ///< whose options rotation_deg and translation_mm are set
+  std::size_t count = 0;
+  std::uint64_t seed = 1;
+  double rotation_deg = 0, translation_mm = 0;
+  Place place;
+};
+
+/// A figure of merit: output.item....figure, as in errors.distal.final.mtre_mm.
+struct MetricChoice {
+  std::string path;
+  std::string label;
+  std::optional<double> success_below;
+};
+
+struct Experiment {
+  std::string name, help;
+  std::filesystem::path file;
+  std::string text;  ///< of the file
+  std::filesystem::path pipeline;
+  std::vector<std::pair<std::string, std::string>> inputs;  ///< of the pipeline, the same in every cell
+  std::string case_input;                                   ///< the pipeline's input that a case's folder is given to
+  std::filesystem::path simulation;                         ///< the pipeline that makes cases; empty where there is none
+  std::string simulation_output;
+  std::vector<ExperimentCase> cases;
+  std::vector<Variant> variants;
+  std::size_t baseline = 0;
+  std::optional<StartProtocol> protocol;
+  std::vector<Start> starts;  ///< one without displacement where there is no protocol
+  std::vector<MetricChoice> metrics;
+  std::string initial_error;          ///< path of the figure that the capture range is drawn over; may be empty
+  std::vector<std::string> pictures;  ///< outputs to show side by side
+  std::size_t timed_cells = 0;        ///< per variant, measured again one at a time
+
+  std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
+};
+
+/// One run of a comparison.
+struct CellIndex {
+  std::size_t variant = 0, case_index = 0, start = 0;
+};
+/// "canny/case-03/0", as `marrow cell` takes it.
+std::string cell_id(const Experiment& experiment, const CellIndex& cell);
+/// Nothing for a name that is none of the experiment's.
+std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string& id);
+
+/// The pipeline of a cell; `case_folder` is where its case lies.
+PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const std::filesystem::path& case_folder);
+
+/// Reads and checks an experiment and the pipelines that it names, with each variant's changes. All faults go to
+/// `diagnostics`, at their lines; the result may be used only when there are none.
+Experiment read_experiment(const std::filesystem::path& file, const Catalogue& catalogue, Diagnostics& diagnostics);
+
+}  // namespace marrow::compare

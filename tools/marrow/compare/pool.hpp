@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <atomic>
+#include <functional>
+#include <string>
+#include <vector>
+
+namespace marrow::cli {
+
+/// A line of work for a worker process.
+struct Job {
+  std::string line;   ///< what the worker reads
+  std::string group;  ///< jobs of a group share results, so one worker takes them one after the other
+  int tries = 0;
+};
+
+struct PoolSettings {
+  std::vector<std::string> command;  ///< that starts a worker
+  int workers = 2;
+  double time_limit_s = 600;         ///< of one job
+  double memory_limit_mb = 4000;     ///< of one worker
+  const std::atomic<bool>* cancelled = nullptr;
+};
+
+/// How a job ended: the worker's answer, or why there is none.
+struct JobEnd {
+  std::string answer;
+  std::string failed;
+  int tries = 1;
+};
+
+/// Gives the jobs to worker processes, each of which takes many. A worker that crashes, takes too long or too much memory is
+/// replaced; its job is tried once more, alone, after all others. `ended` is called by the calling thread. Returns false when
+/// it was cancelled. A worker answers each line with lines "at ...", which say what it is at, and one "end ...".
+bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended);
+
+}  // namespace marrow::cli
