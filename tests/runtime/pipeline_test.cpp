@@ -78,7 +78,7 @@ TEST_F(PipelineTest, SyntaxErrorTellsWhatIsNotClosed) {
     return result;
   };
   EXPECT_EQ(places("marrow: 1\nnodes: {a: [\n"), "2:12 this [ is not closed\n3:1 not valid YAML: end of sequence flow not found\n");
-  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: 'test.constant}\n  # all\n\n").find("3:12 this ' is not closed\n"), std::string::npos);
+  EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: 'test.constant}\n  # all\n\n").find("3:13 this ' is not closed\n"), std::string::npos);
   EXPECT_NE(places("marrow: 1\nnodes:\n  c: {uses: [test.constant}\n  d: {}\n").find("3:13 this [ is not closed\n"), std::string::npos);
   EXPECT_EQ(places("marrow: 1\n\tnodes: {}\n").find("closed"), std::string::npos);
 }

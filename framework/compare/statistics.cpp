@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/compare/statistics.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::compare {
+namespace {
+
+constexpr std::size_t most_exact_cases = 50;
+
+void check_finite(const std::vector<double>& values, const std::string& what) {
+  if (values.empty()) throw Error("there are no " + what + "s; give at least one");
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!std::isfinite(values[i]))
+      throw Error(what + " " + std::to_string(i + 1) + " of " + std::to_string(values.size()) + " is " +
+                  std::to_string(values[i]) +
+                  ", which is no number to compare; count its run as failed, and give the rest");
+}
+
+void check_confidence(double confidence) {
+  if (!(confidence > 0 && confidence < 1))
+    throw Error("the confidence is " + std::to_string(confidence) + "; give a fraction between 0 and 1, such as 0.95");
+}
+
+/// Chance that a standard normal deviate is larger than z.
+double upper_tail(double z) {
+  return 0.5 * std::erfc(z / std::sqrt(2.0));
+}
+
+/// z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles.
+double z_of_tail(double tail) {
+  double below = 0, above = 40;
+  for (;;) {
+    const double middle = 0.5 * (below + above);
+    if (middle <= below || middle >= above) return middle;
+    (upper_tail(middle) > tail ? below : above) = middle;
+  }
+}
+
+double quantile(const std::vector<double>& sorted, double fraction) {
+  const double position = fraction * static_cast<double>(sorted.size() - 1);
+  const std::size_t below = std::min(static_cast<std::size_t>(position), sorted.size() - 1);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return sorted[below] + (position - static_cast<double>(below)) * (sorted[above] - sorted[below]);
+}
+
+/// SplitMix64 (Steele, Lea and Flood 2014, Fig 17).
+class Generator {
+ public:
+  explicit Generator(std::uint64_t seed) : state_(seed) {}
+
+  /// Uniform in 0 ... count - 1. The upper 32 bits are scaled: the chances differ by less than count / 2^32 of
+  /// themselves.
+  std::size_t index(std::size_t count) { return static_cast<std::size_t>(((next() >> 32) * count) >> 32); }
+
+ private:
+  std::uint64_t next() {
+    state_ += 0x9e3779b97f4a7c15u;
+    std::uint64_t bits = state_;
+    bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
+    bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
+    return bits ^ (bits >> 31);
+  }
+
+  std::uint64_t state_;
+};
+
+double median_of_sorted(const std::vector<double>& sorted) {
+  const std::size_t half = sorted.size() / 2;
+  return sorted.size() % 2 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
+}
+
+/// Magnitudes in rising order as ranks, doubled so that the mean rank of ties is an integer; zeros have rank 0 but
+/// count.
+struct Ranks {
+  std::vector<std::size_t> doubled;  ///< of the differences that are not 0
+  std::size_t zeros = 0;
+  std::size_t doubled_positive = 0;  ///< sum over the positive differences
+  double tie_term = 0;               ///< sum of t^3 - t over groups of t equal magnitudes that are not 0
+};
+
+Ranks signed_ranks(std::vector<double> differences) {
+  std::sort(differences.begin(), differences.end(), [](double a, double b) { return std::abs(a) < std::abs(b); });
+  Ranks ranks;
+  for (std::size_t first = 0, last = 0; first < differences.size(); first = last) {
+    while (last < differences.size() && std::abs(differences[last]) == std::abs(differences[first])) ++last;
+    if (differences[first] == 0) {
+      ranks.zeros = last;
+      continue;
+    }
+    const double ties = static_cast<double>(last - first);
+    ranks.tie_term += ties * ties * ties - ties;
+    const std::size_t doubled_rank = first + 1 + last;
+    for (std::size_t i = first; i < last; ++i) {
+      ranks.doubled.push_back(doubled_rank);
+      if (differences[i] > 0) ranks.doubled_positive += doubled_rank;
+    }
+  }
+  return ranks;
+}
+
+/// Two-sided p: twice the chance that, with fair signs, the positive ranks add up to `doubled_smaller` / 2 or less.
+double exact_p(const std::vector<std::size_t>& doubled_ranks, std::size_t doubled_smaller) {
+  std::vector<double> chance(doubled_smaller + 1, 0.0);  // of each sum up to the one of interest
+  chance[0] = 1;
+  for (const std::size_t rank : doubled_ranks)
+    for (std::size_t sum = chance.size(); sum-- > 0;)
+      chance[sum] = 0.5 * (chance[sum] + (sum >= rank ? chance[sum - rank] : 0.0));
+  return std::min(1.0, 2 * std::accumulate(chance.begin(), chance.end(), 0.0));
+}
+
+double normal_p(const Ranks& ranks, double smaller) {
+  const double zeros = static_cast<double>(ranks.zeros);
+  const double n = zeros + static_cast<double>(ranks.doubled.size());
+  const double mean = (n * (n + 1) - zeros * (zeros + 1)) / 4;
+  const double variance = (n * (n + 1) * (2 * n + 1) - zeros * (zeros + 1) * (2 * zeros + 1) - ranks.tie_term / 2) / 24;
+  const double distance = mean - smaller;
+  return distance <= 0.5 ? 1.0 : std::min(1.0, 2 * upper_tail((distance - 0.5) / std::sqrt(variance)));
+}
+
+}  // namespace
+
+Interval wilson_interval(std::size_t successes, std::size_t trials, double confidence) {
+  check_confidence(confidence);
+  if (trials == 0) throw Error("a success rate of no trials has no interval; give at least one trial");
+  if (successes > trials)
+    throw Error("got " + std::to_string(successes) + " successes of " + std::to_string(trials) +
+                " trials; expected at most as many successes as trials");
+  const double n = static_cast<double>(trials);
+  const double rate = static_cast<double>(successes) / n;
+  const double z = z_of_tail((1 - confidence) / 2);
+  const double centre = (rate + z * z / (2 * n)) / (1 + z * z / n);
+  const double half = z / (1 + z * z / n) * std::sqrt(rate * (1 - rate) / n + z * z / (4 * n * n));
+  // At no and at all successes the bound is 0 or 1 exactly, which rounding would miss.
+  return {successes == 0 ? 0.0 : centre - half, successes == trials ? 1.0 : centre + half, confidence};
+}
+
+Summary summarise(const std::vector<double>& values) {
+  check_finite(values, "value");
+  std::vector<double> sorted = values;
+  std::sort(sorted.begin(), sorted.end());
+  Summary summary;
+  summary.count = sorted.size();
+  summary.mean = std::accumulate(sorted.begin(), sorted.end(), 0.0) / static_cast<double>(sorted.size());
+  summary.median = median_of_sorted(sorted);
+  summary.lower_quartile = quantile(sorted, 0.25);
+  summary.upper_quartile = quantile(sorted, 0.75);
+  summary.percentile_95 = quantile(sorted, 0.95);
+  summary.worst = sorted.back();
+  return summary;
+}
+
+std::vector<double> case_differences(const std::vector<Pair>& pairs) {
+  if (pairs.empty()) throw Error("there are no pairs to compare; the variants need at least one case in common");
+  std::map<std::string, std::vector<double>> by_case;
+  for (const Pair& pair : pairs) {
+    const double difference = pair.variant - pair.reference;
+    if (!std::isfinite(difference))
+      throw Error("case '" + pair.case_name + "': got " + std::to_string(pair.reference) + " for the reference and " +
+                  std::to_string(pair.variant) +
+                  " for the variant, expected finite numbers; count such a run as failed, and give the rest");
+    by_case[pair.case_name].push_back(difference);
+  }
+  std::vector<double> means;
+  for (auto& [name, differences] : by_case) {
+    std::sort(differences.begin(), differences.end());  // a sum of doubles depends on its order
+    means.push_back(std::accumulate(differences.begin(), differences.end(), 0.0) /
+                    static_cast<double>(differences.size()));
+  }
+  std::sort(means.begin(), means.end());
+  return means;
+}
+
+Interval median_interval(const std::vector<double>& differences, std::uint64_t seed, double confidence,
+                         std::size_t resamples) {
+  check_finite(differences, "difference");
+  check_confidence(confidence);
+  if (resamples < 1000)
+    throw Error("got " + std::to_string(resamples) +
+                " resamples; the bounds need at least 1000 (10000 is the default)");
+  std::vector<double> sorted = differences;
+  std::sort(sorted.begin(), sorted.end());
+  Generator generator(seed);
+  std::vector<double> drawn(sorted.size());
+  std::vector<double> medians(resamples);
+  for (double& median : medians) {
+    for (double& value : drawn) value = sorted[generator.index(sorted.size())];
+    std::sort(drawn.begin(), drawn.end());
+    median = median_of_sorted(drawn);
+  }
+  std::sort(medians.begin(), medians.end());
+  return {quantile(medians, (1 - confidence) / 2), quantile(medians, (1 + confidence) / 2), confidence};
+}
+
+SignedRank signed_rank_test(const std::vector<double>& differences, SignedRankMethod method) {
+  check_finite(differences, "difference");
+  const Ranks ranks = signed_ranks(differences);
+  const std::size_t doubled_total = std::accumulate(ranks.doubled.begin(), ranks.doubled.end(), std::size_t(0));
+  const std::size_t doubled_smaller = std::min(ranks.doubled_positive, doubled_total - ranks.doubled_positive);
+  SignedRank result;
+  result.cases = differences.size();
+  result.zeros = ranks.zeros;
+  result.positive_ranks = 0.5 * static_cast<double>(ranks.doubled_positive);
+  result.negative_ranks = 0.5 * static_cast<double>(doubled_total - ranks.doubled_positive);
+  const bool few = ranks.doubled.size() <= most_exact_cases;
+  if (method == SignedRankMethod::exact && !few)
+    throw Error("the exact signed-rank test takes at most " + std::to_string(most_exact_cases) +
+                " differences that are not 0, got " + std::to_string(ranks.doubled.size()) + "; use automatic");
+  result.exact = method == SignedRankMethod::exact || (method == SignedRankMethod::automatic && few);
+  result.p = result.exact ? exact_p(ranks.doubled, doubled_smaller)
+                          : normal_p(ranks, 0.5 * static_cast<double>(doubled_smaller));
+  return result;
+}
+
+std::vector<double> holm(const std::vector<double>& p_values) {
+  for (std::size_t i = 0; i < p_values.size(); ++i)
+    if (!(p_values[i] >= 0 && p_values[i] <= 1))
+      throw Error("p-value " + std::to_string(i + 1) + " of " + std::to_string(p_values.size()) + " is " +
+                  std::to_string(p_values[i]) + "; expected a number from 0 to 1");
+  std::vector<std::size_t> order(p_values.size());
+  std::iota(order.begin(), order.end(), std::size_t(0));
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return p_values[a] < p_values[b]; });
+  std::vector<double> corrected(p_values.size());
+  double largest = 0;  // a corrected p is never below that of a smaller p
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    largest = std::max(largest, std::min(1.0, static_cast<double>(order.size() - k) * p_values[order[k]]));
+    corrected[order[k]] = largest;
+  }
+  return corrected;
+}
+
+Comparison compare_pairs(const std::vector<Pair>& pairs, std::uint64_t seed, double confidence) {
+  const std::vector<double> differences = case_differences(pairs);
+  Comparison comparison;
+  comparison.cases = differences.size();
+  comparison.pairs = pairs.size();
+  comparison.median_difference = median_of_sorted(differences);
+  comparison.interval = median_interval(differences, seed, confidence);
+  comparison.test = signed_rank_test(differences);
+  return comparison;
+}
+
+}  // namespace marrow::compare

@@ -1,0 +1,129 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <map>
+#include <sstream>
+
+#include "compare/comparison.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using compare::CellRow;
+using compare::Experiment;
+
+constexpr std::uint64_t kBootstrapSeed = 1;
+
+VariantFigure figure_of(const std::vector<double>& values) {
+  VariantFigure figure;
+  figure.count = values.size();
+  if (!values.empty()) figure.summary = compare::summarise(values);
+  return figure;
+}
+
+VariantSummary summary_of(const Experiment& experiment, const std::string& variant, const std::vector<CellRow>& rows) {
+  VariantSummary summary;
+  std::vector<std::vector<double>> values(experiment.metrics.size());
+  std::vector<double> seconds, evaluations;
+  for (const CellRow& row : rows) {
+    if (row.variant != variant) continue;
+    ++summary.runs;
+    summary.successes += row.is_success(experiment);
+    if (!row.failed.empty()) {
+      ++summary.failed;
+      continue;
+    }
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (row.values[i]) values[i].push_back(*row.values[i]);
+    seconds.push_back(row.seconds);
+    evaluations.push_back(row.evaluations);
+  }
+  if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);
+  for (const auto& figure : values) summary.figures.push_back(figure_of(figure));
+  summary.seconds = figure_of(seconds);
+  summary.evaluations = figure_of(evaluations);
+  return summary;
+}
+
+/// The cells that both variants did, in one figure.
+std::vector<compare::Pair> pairs_of(const Experiment& experiment, std::size_t variant, std::size_t metric, const std::vector<CellRow>& rows) {
+  std::map<std::pair<std::string, std::string>, double> reference;
+  for (const CellRow& row : rows)
+    if (row.variant == experiment.variants[experiment.baseline].name && row.failed.empty() && row.values[metric])
+      reference[{row.case_name, row.start}] = *row.values[metric];
+  std::vector<compare::Pair> pairs;
+  for (const CellRow& row : rows) {
+    const auto found = reference.find({row.case_name, row.start});
+    if (row.variant == experiment.variants[variant].name && row.failed.empty() && row.values[metric] && found != reference.end())
+      pairs.push_back({row.case_name, found->second, *row.values[metric]});
+  }
+  return pairs;
+}
+
+std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
+  for (const CellRow& row : rows)
+    if (metric < row.units.size() && !row.units[metric].empty()) return row.units[metric];
+  return "";
+}
+
+}  // namespace
+
+Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  Answer answer;
+  for (const compare::Variant& variant : experiment.variants) answer.variants.push_back(summary_of(experiment, variant.name, rows));
+  std::vector<double> p;
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
+    for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
+      if (v == experiment.baseline) continue;
+      const std::vector<compare::Pair> pairs = pairs_of(experiment, v, m, rows);
+      if (pairs.empty()) continue;
+      answer.findings.push_back({v, m, compare::compare_pairs(pairs, kBootstrapSeed), 1, ""});
+      p.push_back(answer.findings.back().comparison.test.p);
+    }
+  const std::vector<double> corrected = compare::holm(p);
+  for (std::size_t i = 0; i < corrected.size(); ++i) {
+    Finding& finding = answer.findings[i];
+    finding.p_holm = corrected[i];
+    finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
+                                         {experiment.metrics[finding.metric].path, unit_of(rows, finding.metric), false}, finding.comparison, finding.p_holm);
+  }
+  return answer;
+}
+
+std::string table_text(const Experiment& experiment, const Answer& answer) {
+  std::ostringstream out;
+  char line[400];
+  std::size_t width = 10;
+  for (const compare::Variant& variant : experiment.variants) width = std::max(width, variant.name.size() + 2);
+  std::snprintf(line, sizeof line, "%-*s %5s %6s  %-22s %9s %12s\n", int(width), "variant", "runs", "failed", "success (95 % interval)", "s", "evaluations");
+  out << line;
+  for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+    const VariantSummary& summary = answer.variants[v];
+    char success[60];
+    std::snprintf(success, sizeof success, "%5.1f %% (%.1f to %.1f)", summary.runs ? 100.0 * double(summary.successes) / double(summary.runs) : 0.0,
+                  100 * summary.success.lower, 100 * summary.success.upper);
+    std::snprintf(line, sizeof line, "%-*s %5zu %6zu  %-22s %9.3f %12.0f\n", int(width),
+                  (experiment.variants[v].name + (v == experiment.baseline ? " *" : "")).c_str(), summary.runs, summary.failed, success,
+                  summary.seconds.summary.median, summary.evaluations.summary.median);
+    out << line;
+  }
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
+    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", experiment.metrics[m].path.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
+    out << line;
+    for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+      const VariantFigure& figure = answer.variants[v].figures[m];
+      if (figure.count)
+        std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f\n", int(width), experiment.variants[v].name.c_str(), figure.summary.median,
+                      figure.summary.lower_quartile, figure.summary.upper_quartile, figure.summary.percentile_95, figure.summary.worst);
+      else
+        std::snprintf(line, sizeof line, "%-*s no cell is done\n", int(width), experiment.variants[v].name.c_str());
+      out << line;
+    }
+  }
+  out << "\n* the baseline";
+  if (experiment.variants.size() > 1) out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
+  for (const Finding& finding : answer.findings) out << "  " << finding.sentence << "\n";
+  return out.str();
+}
+
+}  // namespace marrow::cli

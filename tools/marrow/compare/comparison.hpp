@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The commands that compare variants.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/compare/cell.hpp"
+#include "marrow/compare/experiment.hpp"
+#include "marrow/compare/statistics.hpp"
+
+namespace marrow::cli {
+
+struct CompareRequest {
+  std::filesystem::path file;
+  std::filesystem::path folder;  ///< empty = runs/compare/NAME
+  int jobs = 0;                  ///< cells at once; 0 = as many as the machine has cores
+  int threads = 1;               ///< of each cell
+  double time_limit_s = 600;
+  double memory_limit_mb = 4000;
+  bool dry_run = false, no_cache = false, quiet = false;
+};
+
+int compare_variants(const CompareRequest& request);
+/// Runs one cell and writes its row, as a worker would; for cluster engines.
+int run_cell(const CompareRequest& request, const std::string& id);
+int worker(const CompareRequest& request);
+
+/// A figure of merit of one variant, over its cells that are done.
+struct VariantFigure {
+  std::size_t count = 0;
+  compare::Summary summary;
+};
+struct VariantSummary {
+  std::size_t runs = 0, failed = 0, successes = 0;
+  compare::Interval success;
+  std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
+  VariantFigure seconds, evaluations;
+};
+/// A variant against the baseline in one figure.
+struct Finding {
+  std::size_t variant = 0, metric = 0;
+  compare::Comparison comparison;
+  double p_holm = 1;
+  std::string sentence;
+};
+struct Answer {
+  std::vector<VariantSummary> variants;
+  std::vector<Finding> findings;
+};
+
+/// `rows` may be of unfinished comparisons. Failed cells have no figures; the pairs of a finding are the cells that both did.
+Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+/// For the terminal.
+std::string table_text(const compare::Experiment& experiment, const Answer& answer);
+/// cells.csv, cells.jsonl and comparison.json.
+void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
+                  const std::filesystem::path& folder);
+
+}  // namespace marrow::cli
