@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "commands.hpp"
+#include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace {
@@ -12,6 +13,13 @@ void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& req
   command->add_option("inputs", request.inputs, "values of the pipeline's inputs, as name=value");
   command->add_option("--set", request.overrides, "override, as node.option=value, node.uses=kind.name or node.in.port=reference")
       ->take_all()->expected(1)->type_name("NODE.OPTION=VALUE");
+}
+
+void add_compare_arguments(CLI::App* command, marrow::cli::CompareRequest& request) {
+  command->add_option("experiment", request.file, "experiment file (YAML)")->required();
+  command->add_option("--out", request.folder, "folder of the comparison, new or to be continued (default: runs/compare/NAME)");
+  command->add_option("--threads", request.threads, "threads of each cell")->capture_default_str()->check(CLI::Range(1, 1024));
+  command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
 }
 
 }  // namespace
@@ -33,6 +41,28 @@ int main(int argc, char** argv) {
   run_command->add_flag("--quiet", run_request.quiet, "print only errors");
   run_command->add_flag("--json", run_request.json, "print events as JSON, one a line");
   run_command->callback([&] { code = run(run_request); });
+
+  CompareRequest compare_request;
+  auto* compare_command = app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
+  add_compare_arguments(compare_command, compare_request);
+  compare_command->add_option("--jobs", compare_request.jobs, "cells at once (default: as many as there are cores)")->check(CLI::Range(1, 1024));
+  compare_command->add_option("--time-limit", compare_request.time_limit_s, "seconds that one cell may take")->capture_default_str()->check(CLI::PositiveNumber);
+  compare_command->add_option("--memory-limit", compare_request.memory_limit_mb, "megabytes that one cell may use")->capture_default_str()->check(CLI::PositiveNumber);
+  compare_command->add_flag("--quiet", compare_request.quiet, "no progress");
+  compare_command->callback([&] { code = compare_variants(compare_request); });
+
+  CompareRequest cell_request;
+  std::string cell_name;
+  auto* cell_command = app.add_subcommand("cell", "run one cell of an experiment, as VARIANT/CASE/START");
+  add_compare_arguments(cell_command, cell_request);
+  cell_command->add_option("id", cell_name, "the cell")->required();
+  cell_command->callback([&] { code = run_cell(cell_request, cell_name); });
+
+  CompareRequest worker_request;
+  auto* worker_command = app.add_subcommand("worker", "take cells from the standard input; started by compare");
+  worker_command->group("");
+  add_compare_arguments(worker_command, worker_request);
+  worker_command->callback([&] { code = worker(worker_request); });
 
   PipelineRequest check_request;
   bool check_json = false;

@@ -15,6 +15,7 @@
 #include <fstream>
 #include <map>
 #include <memory>
+#include <utility>
 #include <optional>
 
 #include "marrow/domain/error.hpp"

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+// cells.csv and cells.jsonl (a row a cell), comparison.json (all of the answer).
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <set>
+
+#include "compare/comparison.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using compare::CellRow;
+using compare::Experiment;
+using nlohmann::json;
+
+void write_file(const std::filesystem::path& file, const std::string& text) {
+  const std::filesystem::path temporary = file.string() + ".tmp";
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << text;
+  stream.close();
+  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
+  std::filesystem::rename(temporary, file);
+}
+
+/// RFC 4180: quoted where it has to be.
+std::string field(const std::string& text) {
+  if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string number_text(const std::optional<double>& value) {
+  if (!value) return "";
+  char text[40];
+  std::snprintf(text, sizeof text, "%.9g", *value);
+  return text;
+}
+
+/// The options that any variant changes, and what this one makes of them.
+std::vector<std::string> changed_options(const Experiment& experiment) {
+  std::set<std::string> keys;
+  for (const compare::Variant& variant : experiment.variants)
+    for (const Override& one : variant.overrides) keys.insert(one.key);
+  return {keys.begin(), keys.end()};
+}
+
+std::string option_of(const Experiment& experiment, const std::string& variant, const std::string& key) {
+  std::string value;
+  for (const compare::Variant& one : experiment.variants)
+    if (one.name == variant)
+      for (const Override& change : one.overrides)
+        if (change.key == key) value = change.value;
+  return value;
+}
+
+std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  const std::vector<std::string> options = changed_options(experiment);
+  std::string text = "cell,variant,case,start,status,reason,success,tries";
+  for (const std::string& option : options) text += "," + field(option);
+  for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
+  text += ",initial_error,seconds,evaluations\n";
+  for (const CellRow& row : rows) {
+    text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," + (row.failed.empty() ? "done" : "failed") + "," +
+            field(row.failed) + "," + (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries);
+    for (const std::string& option : options) text += "," + field(option_of(experiment, row.variant, option));
+    for (const auto& value : row.values) text += "," + number_text(value);
+    text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," + std::to_string(row.evaluations) + "\n";
+  }
+  return text;
+}
+
+std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  std::string text;
+  for (const CellRow& row : rows) {
+    json j = json::parse(compare::to_json(row));
+    j["success"] = row.is_success(experiment);
+    j["options"] = json::object();
+    for (const std::string& option : changed_options(experiment)) j["options"][option] = option_of(experiment, row.variant, option);
+    for (std::size_t i = 0; i < experiment.metrics.size(); ++i) j[experiment.metrics[i].path] = row.values[i] ? json(*row.values[i]) : json();
+    text += j.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+  }
+  return text;
+}
+
+json of(const VariantFigure& figure) {
+  if (!figure.count) return {{"count", 0}};
+  return {{"count", figure.count}, {"median", figure.summary.median}, {"q1", figure.summary.lower_quartile}, {"q3", figure.summary.upper_quartile},
+          {"p95", figure.summary.percentile_95}, {"worst", figure.summary.worst}, {"mean", figure.summary.mean}};
+}
+
+}  // namespace
+
+void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const std::filesystem::path& folder) {
+  write_file(folder / "cells.csv", csv(experiment, rows));
+  write_file(folder / "cells.jsonl", jsonl(experiment, rows));
+  json variants = json::array(), findings = json::array();
+  for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+    const VariantSummary& summary = answer.variants[v];
+    json figures = json::object();
+    for (std::size_t m = 0; m < experiment.metrics.size(); ++m) figures[experiment.metrics[m].path] = of(summary.figures[m]);
+    variants.push_back({{"name", experiment.variants[v].name}, {"is_baseline", v == experiment.baseline}, {"runs", summary.runs}, {"failed", summary.failed},
+                        {"success", {{"count", summary.successes}, {"of", summary.runs}, {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
+                                     {"low", summary.success.lower}, {"high", summary.success.upper}}},
+                        {"metrics", figures}, {"seconds", of(summary.seconds)}, {"evaluations", of(summary.evaluations)}});
+  }
+  for (const Finding& finding : answer.findings)
+    findings.push_back({{"variant", experiment.variants[finding.variant].name}, {"metric", experiment.metrics[finding.metric].path},
+                        {"pairs", finding.comparison.pairs}, {"cases", finding.comparison.cases}, {"difference", finding.comparison.median_difference},
+                        {"low", finding.comparison.interval.lower}, {"high", finding.comparison.interval.upper}, {"p", finding.comparison.test.p},
+                        {"p_holm", finding.p_holm}, {"sentence", finding.sentence}});
+  const json all = {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+  write_file(folder / "comparison.json", all.dump(1) + "\n");
+}
+
+}  // namespace marrow::cli
