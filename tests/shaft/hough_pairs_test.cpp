@@ -126,6 +126,28 @@ TEST(HoughPairs, AllowsATaperAndPrefersTheLikelierWidth) {
   EXPECT_NE(lines.rejected[0].reason.find(" is below the best one's "), std::string::npos);
 }
 
+// A bowed shaft has many lines; their pairs must not crowd the shaft of a second fragment out of the list.
+TEST(HoughPairs, ListsTheShaftOfASecondFragment) {
+  EdgeMap edges = no_edges();
+  const auto bow = [](double v) { return 0.0008 * (v - 150) * (v - 150); };
+  for (double v = 10; v < 300; v += 10)
+    for (const auto& [u, side] : {std::pair(200.0, kLeft), std::pair(285.0, kRight)})
+      draw(edges, {u + bow(v), v}, {u + bow(v + 10), v + 10}, side);
+  draw(edges, {203, 360}, {196, 470}, kLeft);
+  draw(edges, {282, 360}, {289, 470}, kRight);
+  const ShaftLines lines = hough_pairs(edges, dark_between(200, 285), Options{});
+  EXPECT_LT(lines.left.to_px.y(), 310);
+  int candidates = 0, in_second = 0;
+  for (const auto& pair : lines.rejected) {
+    if (pair.reason.find(" is below the best one's ") == std::string::npos) continue;
+    ++candidates;
+    in_second += pair.left.from_px.y() > 350;
+  }
+  std::printf("%d candidates, %d of them of the second fragment\n", candidates, in_second);
+  EXPECT_GE(in_second, 1);
+  EXPECT_LE(candidates, 3);
+}
+
 TEST(HoughPairs, ToleratesGapsUpToTheLimit) {
   EdgeMap edges = no_edges();
   for (double v = 20; v < 400; v += 60) {  // gaps of 20 px = 7 mm
