@@ -331,7 +331,8 @@ ShaftLines hough_pairs(const EdgeMap& edges, const View& view, const Options& op
     if (pairs.empty()) message += ", none of which run side by side";
     for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 3); ++i)
       message += (i ? "; the next because " : ", best candidate rejected because ") + pairs[i].reason;
-    throw marrow::Error(message);
+    throw marrow::Error(message +
+                        "; look at the edges, and set the edge detector's thresholds or this bone's width_mm");
   }
   ShaftLines lines;
   lines.left = segment_of(pairs[0].left, pairs[0].stretch);

@@ -158,38 +158,43 @@ TEST(HoughPairs, ToleratesGapsUpToTheLimit) {
 }
 
 TEST(HoughPairs, SaysWhyThereIsNoPair) {
+  const std::string advice = "; look at the edges, and set the edge detector's thresholds or this bone's width_mm";
   EdgeMap edges = no_edges();
   draw(edges, {240, 20}, {240, 400}, kRight);  // the canal's polarity
   draw(edges, {275, 20}, {275, 400}, kLeft);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is darker outside than "
             "inside, as a canal or "
-            "a gap between bones is (12.3 mm wide)");
+            "a gap between bones is (12.3 mm wide)" +
+                advice);
   edges = no_edges();
   draw(edges, {40, 20}, {40, 400}, kLeft);  // the thigh's outline
   draw(edges, {440, 20}, {440, 400}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its width of 140.6 mm is "
             "not that of a shaft "
-            "(28.5 +- 3.3, 30.3 +- 3.1 mm, at most 3 deviations)");
+            "(28.5 +- 3.3, 30.3 +- 3.1 mm, at most 3 deviations)" +
+                advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, dark_between(270, 330), Options{}); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what "
             "lies beside it (mean grey "
-            "value 917 inside, 500 and 1000 outside)");
+            "value 917 inside, 500 and 1000 outside)" +
+                advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its borders run side by "
             "side for 7 mm only, of 25 mm "
-            "wanted");
+            "wanted" +
+                advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   EXPECT_EQ(error_of([&] { hough_pairs(edges, empty_view(), Options{}); }),
-            "view 'frontal': no shaft pair found: 1 lines, none of which run side by side");
+            "view 'frontal': no shaft pair found: 1 lines, none of which run side by side" + advice);
 }
 
 TEST(HoughPairs, SaysWhatIsWrongWithItsInputs) {
