@@ -33,7 +33,6 @@ std::string file_name(std::string name) {
 
 void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue, RunFolder::Written& written) {
   if (value.is_list()) {
-    fs::create_directories(stem);
     for (std::size_t i = 0; i < value.items.size(); ++i)
       write_value(value.items[i], stem / file_name(value.names[i]), root, catalogue, written);
     return;
@@ -49,6 +48,7 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
   }
   const fs::path file = stem.string() + writer->extension;
   try {
+    fs::create_directories(file.parent_path());  // a list without any item that was made leaves no folder
     catalogue.load_writer(value.type).write(value.data.get(), file.string());
     written.files.push_back(fs::relative(file, root).string());
   } catch (const std::exception& error) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <marrow/domain/features.hpp>
-#include <optional>
 #include <vector>
 
 namespace marrow::evaluate {
@@ -20,12 +19,12 @@ class EdgeSearch {
     for (const EdgePixel& edge : edges.pixels) cells_[index(column(edge.u_px), row(edge.v_px))].push_back(edge);
   }
 
-  /// Distance in pixels to the nearest edge within `reach_px` whose direction makes an angle with (normal_u, normal_v)
-  /// of at most acos(least_cosine); nothing where there is none. The normal has unit length.
-  std::optional<double> nearest(double u, double v, double normal_u, double normal_v, double reach_px,
-                                double least_cosine) const {
+  /// The nearest edge within `reach_px` whose direction makes an angle with (normal_u, normal_v) of at most
+  /// acos(least_cosine); nullptr where there is none. The normal has unit length.
+  const EdgePixel* nearest(double u, double v, double normal_u, double normal_v, double reach_px,
+                           double least_cosine) const {
     double best = reach_px;
-    bool found = false;
+    const EdgePixel* found = nullptr;
     const int centre_column = column(u), centre_row = row(v);
     // The point lies anywhere in its cell, so ring k holds nothing nearer than (k - 1) cells.
     for (int ring = 0; (ring - 1) * kCell <= best && ring <= std::max(columns_, rows_); ++ring)
@@ -38,11 +37,11 @@ class EdgeSearch {
             const double distance = std::hypot(edge.u_px - u, edge.v_px - v);
             if (!(distance <= best)) continue;
             best = distance;
-            found = true;
+            found = &edge;
           }
         }
       }
-    return found ? std::optional(best) : std::nullopt;
+    return found;
   }
 
  private:

@@ -19,7 +19,7 @@ struct Options {
 /// that match nothing make the figures worse, not better.
 struct Distances {
   std::vector<double> px, mm;
-  std::size_t matched = 0;
+  std::vector<double> across_px;  ///< of matched points: along the outline's normal, positive where the edge is outside
 };
 
 void check_edges(const marrow::View& view, const marrow::EdgeMap* edges) {
@@ -50,10 +50,14 @@ Distances measure(const marrow::RigidTransform& world_from_model, const marrow::
   Distances distances;
   for (const marrow::OutlinePoint& point : projector.outline(view.camera, world_from_model, options.spacing_px)) {
     if (!in_mask(view, point)) continue;
-    const std::optional<double> found =
+    const marrow::EdgePixel* edge =
         search.nearest(point.u_px, point.v_px, point.normal_u, point.normal_v, options.reach_px, least_cosine);
-    distances.matched += found.has_value();
-    const double px = found.value_or(options.reach_px);
+    double px = options.reach_px;
+    if (edge) {
+      const double du = double(edge->u_px) - point.u_px, dv = double(edge->v_px) - point.v_px;
+      px = std::hypot(du, dv);
+      distances.across_px.push_back(du * point.normal_u + dv * point.normal_v);
+    }
     const Eigen::Vector3d world_mm = world_from_model * point.model_mm.cast<double>();
     distances.px.push_back(px);
     distances.mm.push_back(px * marrow::pixel_size_at_mm(view.camera, world_mm));
@@ -78,7 +82,13 @@ void report(const std::string& prefix, const Distances& distances, marrow::Metri
   add("p90_px", quantile(distances.px, 0.9), "px");
   add("median_mm", quantile(distances.mm, 0.5), "mm");
   add("p90_mm", quantile(distances.mm, 0.9), "mm");
-  add("matched_percent", 100.0 * double(distances.matched) / double(distances.px.size()), "%");
+  add("matched_percent", 100.0 * double(distances.across_px.size()) / double(distances.px.size()), "%");
+  if (distances.across_px.empty()) return;
+  const double offset_px = quantile(distances.across_px, 0.5);
+  std::vector<double> spread_px;
+  for (const double across : distances.across_px) spread_px.push_back(std::abs(across - offset_px));
+  add("offset_px", offset_px, "px");
+  add("spread_px", quantile(spread_px, 0.5), "px");
 }
 
 marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Projector& projector,
@@ -100,7 +110,7 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Project
     report(views[i].name + "_", distances, per_view);
     all.px.insert(all.px.end(), distances.px.begin(), distances.px.end());
     all.mm.insert(all.mm.end(), distances.mm.begin(), distances.mm.end());
-    all.matched += distances.matched;
+    all.across_px.insert(all.across_px.end(), distances.across_px.begin(), distances.across_px.end());
   }
   if (all.px.empty())
     throw marrow::Error(
@@ -124,8 +134,9 @@ MARROW_PLUGIN(plugin) {
       .in("edges", "their edges", marrow::over("view"))
       .out("metrics",
            "median and 90th percentile in pixels and in mm at the object, and the share of the outline with an edge in "
-           "reach: of "
-           "all views together, then of each")
+           "reach; then the offset that most of the edges have from the outline (positive: outside), which blur and a "
+           "fat "
+           "or thin model make, and the median distance from that offset: of all views together, then of each")
       .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1),
               marrow::at_most(100))
       .option("reach_px", &Options::reach_px, "how far an edge may be; points with none count with this distance",

@@ -4,6 +4,8 @@
 // away an error of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from
 // the silhouette that the model would show in the same stretches of the same views, so that a bow, a taper or a ridge
 // moves both axes alike.
+// An image may show the shafts of two fragments. A fragment takes the best pair of lines where it lies itself, which
+// may be one that the image's best pair outdid.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -27,6 +29,9 @@ struct Options {
   double border_inset_mm = 0.5;
 };
 
+constexpr double kWidthTolerance = 0.15;  // a pair whose width differs more from the model's belongs to something else
+constexpr double kLeastLength_mm = 25;    // at the isocentre
+
 std::string number(double value) {
   char buffer[40];
   std::snprintf(buffer, sizeof buffer, "%.1f", value);
@@ -37,25 +42,9 @@ std::string number(double value) {
 struct Sight {
   std::string name;
   const Camera* camera;
-  const ShaftLines* lines;
+  ShaftLines lines;
   Plane plane;
 };
-
-std::vector<Sight> sights_of(const List<ShaftLines>& lines, const List<View>& views) {
-  if (lines.empty()) throw marrow::Error("there are no shaft lines; wire the lines of at least one view");
-  std::vector<Sight> sights;
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    const std::string& name = lines.name(i);
-    const View* view = views.find(name);
-    if (!view) throw marrow::Error("there are shaft lines of a view '" + name + "', but no view of that name");
-    marrow::check_camera(view->camera, "view '" + name + "'");
-    for (const marrow::LineSegment* border : {&lines[i].left, &lines[i].right})
-      if (!border->from_px.allFinite() || !border->to_px.allFinite() || (border->to_px - border->from_px).norm() < 1)
-        throw marrow::Error("view '" + name + "': a border of the shaft has no length");
-    sights.push_back({name, &view->camera, &lines[i], bisecting_plane(view->camera, lines[i].left, lines[i].right)});
-  }
-  return sights;
-}
 
 /// Distance of a pair's borders in the middle of their stretch, across it, with the inset added on both sides.
 double width_px(const ShaftLines& lines, double inset_px) {
@@ -66,6 +55,46 @@ double width_px(const ShaftLines& lines, double inset_px) {
   return std::abs(along.x() * between.y() - along.y() * between.x()) + 2 * inset_px;
 }
 
+/// The best pair of a view where the model appears: what the shaft node chose, or else the first of those it turned
+/// away that is as wide as the model there and long enough to tell a direction.
+ShaftLines lines_of_model(const Mesh& model, const RigidTransform& start, const Camera& camera, const ShaftLines& found,
+                          const std::string& view, const Options& options) {
+  const double pixel_mm = std::abs(marrow::pixel_size_at_mm(camera, Eigen::Vector3d::Zero()));
+  const double tolerance_px = options.tolerance_mm / pixel_mm;
+  if (model_borders(model, start, camera, found, tolerance_px)) return found;
+  for (const ShaftLines::Rejected& other : found.rejected) {
+    ShaftLines lines;
+    lines.left = other.left;
+    lines.right = other.right;
+    if ((lines.left.to_px - lines.left.from_px).norm() * pixel_mm < kLeastLength_mm) continue;
+    const auto borders = model_borders(model, start, camera, lines, tolerance_px);
+    if (!borders) continue;
+    const double width = width_px(lines, options.border_inset_mm / pixel_mm);
+    if (std::abs(width - borders->width_px) < kWidthTolerance * borders->width_px) return lines;
+  }
+  throw marrow::Error("view '" + view +
+                      "': where the image shows the shaft, the model at its start does not appear, nor does another "
+                      "pair of lines fit it; give a start nearer to the bone");
+}
+
+std::vector<Sight> sights_of(const Mesh& model, const RigidTransform& start, const List<ShaftLines>& lines,
+                             const List<View>& views, const Options& options) {
+  if (lines.empty()) throw marrow::Error("there are no shaft lines; wire the lines of at least one view");
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const std::string& name = lines.name(i);
+    const View* view = views.find(name);
+    if (!view) throw marrow::Error("there are shaft lines of a view '" + name + "', but no view of that name");
+    marrow::check_camera(view->camera, "view '" + name + "'");
+    for (const marrow::LineSegment* border : {&lines[i].left, &lines[i].right})
+      if (!border->from_px.allFinite() || !border->to_px.allFinite() || (border->to_px - border->from_px).norm() < 1)
+        throw marrow::Error("view '" + name + "': a border of the shaft has no length");
+    const ShaftLines own = lines_of_model(model, start, view->camera, lines[i], name, options);
+    sights.push_back({name, &view->camera, own, bisecting_plane(view->camera, own.left, own.right)});
+  }
+  return sights;
+}
+
 /// The model's borders in every view at a pose.
 std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model,
                                      const std::vector<Sight>& sights, double tolerance_mm) {
@@ -73,7 +102,7 @@ std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& wo
   tbb::parallel_for(std::size_t(0), sights.size(), [&](std::size_t i) {
     const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, Eigen::Vector3d::Zero());
     found[i] =
-        model_borders(model, world_from_model, *sights[i].camera, *sights[i].lines, tolerance_mm / std::abs(pixel_mm));
+        model_borders(model, world_from_model, *sights[i].camera, sights[i].lines, tolerance_mm / std::abs(pixel_mm));
   });
   std::vector<ModelBorders> borders;
   for (std::size_t i = 0; i < sights.size(); ++i) {
@@ -104,7 +133,7 @@ RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, co
                              double inset_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
   const double inset_px = inset_mm / marrow::pixel_size_at_mm(*sight.camera, anchor);
-  const double nearer = borders.width_px / width_px(*sight.lines, inset_px);
+  const double nearer = borders.width_px / width_px(sight.lines, inset_px);
   // The model's own axis is laid into the plane that its borders span, so that a perfect start is left where it is.
   const Plane model_plane = bisecting_plane(*sight.camera, borders.left, borders.right);
   const auto into = [&](const Plane& plane, const Eigen::Vector3d& vector) {
@@ -124,9 +153,9 @@ std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vec
   std::vector<std::string> warnings;
   for (std::size_t i = 0; i < sights.size(); ++i) {
     const double pixel_mm = marrow::pixel_size_at_mm(*sights[i].camera, anchor);
-    const double seen_mm = width_px(*sights[i].lines, inset_mm / pixel_mm) * pixel_mm,
+    const double seen_mm = width_px(sights[i].lines, inset_mm / pixel_mm) * pixel_mm,
                  model_mm = borders[i].width_px * pixel_mm;
-    if (sights.size() > 1 && std::abs(seen_mm - model_mm) > 0.15 * model_mm)
+    if (sights.size() > 1 && std::abs(seen_mm - model_mm) > kWidthTolerance * model_mm)
       warnings.push_back("view '" + sights[i].name + "': the shaft's borders are " + number(seen_mm) +
                          " mm apart, where the model is " + number(model_mm) +
                          " mm wide; they may belong to something else");
@@ -143,13 +172,13 @@ std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vec
 Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start,
                 const Options& options) {
   marrow::check_mesh(model, "model");
-  const std::vector<Sight> sights = sights_of(lines, views);
   Pose pose;
   if (start)
     pose.world_from_model = start->world_from_model;
   else
     pose.world_from_model.source = model.frame;
   marrow::check_rigid(pose.world_from_model, "start");
+  const std::vector<Sight> sights = sights_of(model, pose.world_from_model, lines, views, options);
   pose.frame = marrow::fragment_frame(model);
   for (int round = 0; round < options.rounds; ++round) {
     const std::vector<ModelBorders> borders = borders_of(model, pose.world_from_model, sights, options.tolerance_mm);

@@ -63,7 +63,7 @@ void check_pixels_are_whole(const std::filesystem::path& path) {
   if (begin == 0 || length == 0xFFFFFFFFu) return;
   if (begin + length > bytes.size())
     throw Error(path.string() + ": is cut off: " + std::to_string(length) + " bytes of pixels expected, got " +
-                std::to_string(bytes.size() - std::min(bytes.size(), begin)));
+                std::to_string(bytes.size() - std::min(bytes.size(), begin)) + "; copy or export it again");
 }
 
 std::string tag(itk::GDCMImageIO& io, const std::string& name) {

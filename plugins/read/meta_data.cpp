@@ -93,7 +93,8 @@ void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
   if (is_packed ? got != sample_bytes : got < sample_bytes)
     throw Error(data.string() + ": is cut off or damaged: " + std::to_string(std::uintmax_t(sample_bytes)) +
                 " bytes of samples expected, got " +
-                (got > 0 ? std::to_string(std::uintmax_t(got)) : "a stream that does not unpack"));
+                (got > 0 ? std::to_string(std::uintmax_t(got)) : "a stream that does not unpack") +
+                "; copy or export it again");
 }
 
 }  // namespace marrow::read

@@ -72,7 +72,8 @@ Samples read_png(const std::filesystem::path& path) {
   if (source.bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(source.bytes.data()), 0, 8))
     throw Error(what + ": is not a PNG file, or is damaged at its start");
   const auto fail = [&] {
-    throw Error(what + ": cannot be read as PNG, it may be cut off or damaged (" + source.fault + ")");
+    throw Error(what + ": cannot be read as PNG, it may be cut off or damaged (" + source.fault +
+                "); copy or export it again");
   };
   Reader reader(source);
   if (!read_header(reader)) fail();

@@ -141,7 +141,8 @@ Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, co
     io.Read(samples.bytes.data());
     return samples;
   } catch (const itk::ExceptionObject& error) {
-    throw Error(what + ": cannot be read as " + format_name + ", it may be cut off or damaged (" + reason(error) + ")");
+    throw Error(what + ": cannot be read as " + format_name + ", it may be cut off or damaged (" + reason(error) +
+                "); copy or export it again");
   }
 }
 

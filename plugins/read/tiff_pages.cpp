@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // libtiff takes a stack whose end is cut off as one with fewer pages. So the chain of page directories is followed
-// here: an entry that points behind the end of the file means that pages are missing.
+// here: a directory, or pixels, behind the end of the file mean that pages are missing.
+#include <algorithm>
 #include <fstream>
 #include <stdexcept>
+#include <vector>
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
@@ -26,12 +28,45 @@ class Bytes {
     }
     return value;
   }
+  std::uint64_t size() const { return bytes_.size(); }
   bool is_tiff() const { return big_endian_ || bytes_.rfind("II", 0) == 0; }
 
  private:
   std::string bytes_;
   bool big_endian_ = false;
 };
+
+/// The widths of places and entries: BigTIFF (43) has 8-byte places and 20-byte entries, TIFF (42) 4 and 12.
+struct Layout {
+  int width, count_width;
+  std::uint64_t entry_bytes;
+};
+
+/// The numbers of an entry, which lie in it or, where they are too many, elsewhere.
+std::vector<std::uint64_t> numbers_of(const Bytes& bytes, const Layout& layout, std::uint64_t entry) {
+  const std::uint64_t type = bytes.number(entry + 2, 2), count = bytes.number(entry + 4, layout.width);
+  const int bytes_each = type == 3 ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;
+  if (bytes_each == 0) return {};
+  std::uint64_t at = entry + 4 + std::uint64_t(layout.width);
+  if (count > bytes.size()) throw std::out_of_range("count");
+  if (count * std::uint64_t(bytes_each) > std::uint64_t(layout.width)) at = bytes.number(at, layout.width);
+  std::vector<std::uint64_t> numbers;
+  for (std::uint64_t i = 0; i < count; ++i)
+    numbers.push_back(bytes.number(at + i * std::uint64_t(bytes_each), bytes_each));
+  return numbers;
+}
+
+/// Throws std::out_of_range when strips or tiles of the page whose entries begin here end behind the file.
+void check_pixels(const Bytes& bytes, const Layout& layout, std::uint64_t first_entry, std::uint64_t entries) {
+  std::vector<std::uint64_t> places, lengths;
+  for (std::uint64_t i = 0; i < entries; ++i) {
+    const std::uint64_t entry = first_entry + i * layout.entry_bytes, tag = bytes.number(entry, 2);
+    if (tag == 273 || tag == 324) places = numbers_of(bytes, layout, entry);
+    if (tag == 279 || tag == 325) lengths = numbers_of(bytes, layout, entry);
+  }
+  for (std::size_t i = 0; i < std::min(places.size(), lengths.size()); ++i)
+    if (places[i] > bytes.size() || lengths[i] > bytes.size() - places[i]) throw std::out_of_range("pixels");
+}
 
 }  // namespace
 
@@ -41,20 +76,21 @@ void check_tiff_pages(const std::filesystem::path& path) {
   constexpr std::size_t kMostPages = 100000;
   std::size_t pages = 0;
   try {
-    // BigTIFF (43) has 8-byte places and 20-byte entries, TIFF (42) 4 and 12.
     const bool is_big = bytes.number(2, 2) == 43;
-    const int width = is_big ? 8 : 4, count_width = is_big ? 8 : 2;
-    const std::uint64_t entry_bytes = is_big ? 20 : 12;
-    std::uint64_t at = bytes.number(is_big ? 8 : 4, width);
+    const Layout layout = is_big ? Layout{8, 8, 20} : Layout{4, 2, 12};
+    std::uint64_t at = bytes.number(is_big ? 8 : 4, layout.width);
     for (; at != 0; ++pages) {
       if (pages == kMostPages)
         throw Error(path.string() + ": has more than 100000 pages, or its pages run in a circle");
-      const std::uint64_t entries = bytes.number(at, count_width);
+      const std::uint64_t entries = bytes.number(at, layout.count_width);
       if (entries > 65535) throw std::out_of_range("entries");
-      at = bytes.number(at + std::uint64_t(count_width) + entries * entry_bytes, width);
+      const std::uint64_t first_entry = at + std::uint64_t(layout.count_width);
+      check_pixels(bytes, layout, first_entry, entries);
+      at = bytes.number(first_entry + entries * layout.entry_bytes, layout.width);
     }
   } catch (const std::out_of_range&) {
-    throw Error(path.string() + ": is cut off or damaged: only " + std::to_string(pages) + " pages are whole");
+    throw Error(path.string() + ": is cut off or damaged: only " + std::to_string(pages) +
+                " pages are whole; copy or export it again");
   }
   if (pages == 0) throw Error(path.string() + ": has no page");
 }

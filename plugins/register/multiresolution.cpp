@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <marrow/plugin.hpp>
@@ -14,7 +15,11 @@ struct Options {
   double scan_rotation_step_deg = 3;
   double scan_translation_mm = 15;
   double scan_translation_step_mm = 3;
+  int scan_poses = 0;
+  double scan_side_deg = 3;
+  double scan_side_mm = 3;
   int candidates = 3;
+  int finalists = 1;
   std::vector<double> contour_spacing_px{8, 4, 2};
   std::vector<double> reach_px{24, 12, 6};
   std::vector<double> step_deg{3, 1, 0.3};
@@ -34,6 +39,69 @@ struct Result {
 constexpr int kAxialRotation = 2, kAxialTranslation = 5;
 const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
 
+using Levels = std::vector<std::shared_ptr<const marrow::Cost>>;
+
+/// Where a candidate came to: cost, and poses after the axial and after the last search.
+struct Found {
+  double value;
+  marrow::RigidTransform axial, pose;
+};
+
+/// Motions about the start that are tried first, in degrees and mm, and how far apart two of them count as neighbours.
+struct Scan {
+  std::vector<marrow::Vector6d> motions;
+  marrow::Vector6d reach;  ///< half axes of an ellipsoid; of a grid, half sides of a box
+  bool grid = true;
+
+  bool near(int a, int b) const {
+    const marrow::Vector6d way = (motions[std::size_t(a)] - motions[std::size_t(b)]).cwiseQuotient(reach);
+    return (grid ? way.cwiseAbs().maxCoeff() : way.norm()) <= 1;
+  }
+};
+
+/// A grid of axial rotations and translations, which the first stage leaves open.
+Scan axial_scan(const Options& options) {
+  const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
+  const int turns = steps(options.scan_rotation_deg, options.scan_rotation_step_deg);
+  const int shifts = steps(options.scan_translation_mm, options.scan_translation_step_mm);
+  Scan scan;
+  for (int turn = -turns; turn <= turns; ++turn)
+    for (int shift = -shifts; shift <= shifts; ++shift) {
+      marrow::Vector6d motion = marrow::Vector6d::Zero();
+      motion[kAxialRotation] = turn * options.scan_rotation_step_deg;
+      motion[kAxialTranslation] = shift * options.scan_translation_step_mm;
+      scan.motions.push_back(motion);
+    }
+  scan.reach = marrow::Vector6d::Ones();
+  scan.reach[kAxialRotation] = 2.01 * options.scan_rotation_step_deg;
+  scan.reach[kAxialTranslation] = 2.01 * options.scan_translation_step_mm;
+  return scan;
+}
+
+/// The start, and motions about and along all six axes spread evenly over their ranges (Halton's sequence), for a start
+/// that is wrong in all of them.
+Scan scattered_scan(const Options& options) {
+  marrow::Vector6d range;
+  range << options.scan_side_deg, options.scan_side_deg, options.scan_rotation_deg, options.scan_side_mm,
+      options.scan_side_mm, options.scan_translation_mm;
+  const auto halton = [](int i, int base) {
+    double value = 0, place = 1;
+    for (; i > 0; i /= base) value += (place /= base) * (i % base);
+    return value;
+  };
+  Scan scan;
+  for (int i = 0; i < options.scan_poses; ++i) {
+    marrow::Vector6d motion = marrow::Vector6d::Zero();
+    constexpr std::array<int, 6> kBases{2, 3, 5, 7, 11, 13};
+    for (int axis = 0; i > 0 && axis < 6; ++axis)
+      motion[axis] = range[axis] * (2 * halton(i, kBases[std::size_t(axis)]) - 1);
+    scan.motions.push_back(motion);
+  }
+  scan.reach = 0.5 * range.cwiseMax(1e-9);
+  scan.grid = false;
+  return scan;
+}
+
 /// The search: the pose found so far, moved about the fragment's own axes.
 class Search {
  public:
@@ -49,34 +117,23 @@ class Search {
   void go_to(const marrow::RigidTransform& pose) { pose_ = pose; }
   int evaluations() const { return evaluations_; }
 
-  /// Tries a grid of axial rotations and translations, which the stage before leaves open, and returns the best poses
-  /// that are no neighbours of a better one: the cost has other minima within their range.
+  /// Tries the motions of a scan and returns the best poses that are no neighbours of a better one: the cost has other
+  /// minima within their range.
   std::vector<marrow::RigidTransform> scan(const marrow::Cost& cost) {
-    const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
-    const int turns = steps(options_.scan_rotation_deg, options_.scan_rotation_step_deg);
-    const int shifts = steps(options_.scan_translation_mm, options_.scan_translation_step_mm);
-    const int columns = 2 * shifts + 1, count = (2 * turns + 1) * columns;
+    const Scan scan = options_.scan_poses > 0 ? scattered_scan(options_) : axial_scan(options_);
     std::vector<marrow::RigidTransform> poses;
-    for (int i = 0; i < count; ++i) {
-      marrow::Vector6d motion = marrow::Vector6d::Zero();
-      motion[kAxialRotation] = (i / columns - turns) * options_.scan_rotation_step_deg;
-      motion[kAxialTranslation] = (i % columns - shifts) * options_.scan_translation_step_mm;
-      poses.push_back(moved_by_units(pose_, frame_, motion));
-    }
+    for (const marrow::Vector6d& motion : scan.motions) poses.push_back(moved_by_units(pose_, frame_, motion));
     const std::vector<double> values = cost.values(poses);
-    evaluations_ += count;
+    evaluations_ += int(poses.size());
     std::vector<int> order(poses.size()), chosen;
     std::iota(order.begin(), order.end(), 0);
     std::sort(order.begin(), order.end(), [&](int a, int b) {
       return values[std::size_t(a)] != values[std::size_t(b)] ? values[std::size_t(a)] < values[std::size_t(b)] : a < b;
     });
-    const auto near = [&](int a, int b) {
-      return std::abs(a / columns - b / columns) <= 2 && std::abs(a % columns - b % columns) <= 2;
-    };
     std::vector<marrow::RigidTransform> candidates;
     for (const int i : order) {
       if (int(candidates.size()) == options_.candidates) break;
-      if (std::any_of(chosen.begin(), chosen.end(), [&](int other) { return near(i, other); })) continue;
+      if (std::any_of(chosen.begin(), chosen.end(), [&](int other) { return scan.near(i, other); })) continue;
       chosen.push_back(i);
       candidates.push_back(poses[std::size_t(i)]);
     }
@@ -116,6 +173,34 @@ class Search {
     return result.value;
   }
 
+  /// Follows the candidates up. Each is judged after all six axes had their turn, because the start's errors in the
+  /// other four hide which of them is right; the finalists are judged at the last level, because a coarse cost hardly
+  /// tells a good pose from one whose outline lies on other things in the image.
+  Found best_of(const std::vector<marrow::RigidTransform>& candidates, const Levels& levels) {
+    const std::size_t finalists = std::min(candidates.size(), std::size_t(options_.finalists));
+    const double share = 1.0 / double(candidates.size() + finalists * (levels.size() - 1));
+    double done = 0;
+    std::vector<Found> found;
+    for (const marrow::RigidTransform& candidate : candidates) {
+      go_to(candidate);
+      refine(*levels.front(), {kAxialRotation, kAxialTranslation}, 0, done, share / 2);
+      const marrow::RigidTransform axial = pose_;
+      const double value = refine(*levels.front(), kAllAxes, 0, done + share / 2, share / 2);
+      found.push_back({value, axial, pose_});
+      done += share;
+    }
+    const auto better = [](const Found& a, const Found& b) { return a.value < b.value; };
+    std::stable_sort(found.begin(), found.end(), better);
+    found.resize(finalists);
+    for (Found& finalist : found) {
+      go_to(finalist.pose);
+      for (std::size_t i = 1; i < levels.size(); ++i, done += share)
+        finalist.value = refine(*levels[i], kAllAxes, i, done, share);
+      finalist.pose = pose_;
+    }
+    return *std::min_element(found.begin(), found.end(), better);
+  }
+
  private:
   const marrow::Optimizer& optimizer_;
   const marrow::FragmentFrame& frame_;
@@ -147,7 +232,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
                        const Options& options, marrow::Context& context) {
   check_options(options);
   marrow::check_rigid(initial.world_from_model, "the pose to start from");
-  std::vector<std::shared_ptr<const marrow::Cost>> levels;
+  Levels levels;
   for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
     levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i]}));
   Search search(optimizer, initial, options, context);
@@ -162,28 +247,10 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
     return pose;
   };
   result.stages.add("start", pose_now());
-  // Each candidate is judged after all six axes had their turn, because the start's errors in the other four hide which
-  // of them is right.
-  const std::vector<marrow::RigidTransform> candidates = search.scan(*levels.front());
-  const double share = 1.0 / double(candidates.size() + levels.size());
-  marrow::RigidTransform best_axial, best;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < candidates.size(); ++i) {
-    search.go_to(candidates[i]);
-    search.refine(*levels.front(), {kAxialRotation, kAxialTranslation}, 0, share * double(i), share / 2);
-    const marrow::RigidTransform axial = search.pose();
-    const double value = search.refine(*levels.front(), kAllAxes, 0, share * (double(i) + 0.5), share / 2);
-    if (value < least) {
-      least = value;
-      best_axial = axial;
-      best = search.pose();
-    }
-  }
-  search.go_to(best_axial);
+  const Found best = search.best_of(search.scan(*levels.front()), levels);
+  search.go_to(best.axial);
   result.stages.add("axial", pose_now());
-  search.go_to(best);
-  for (std::size_t i = 1; i < levels.size(); ++i)
-    search.refine(*levels[i], kAllAxes, i, share * double(candidates.size() + i), share);
+  search.go_to(best.pose);
   result.pose = pose_now();
 
   if (const auto factor = levels.back()->likelihood_factor(search.pose())) {
@@ -217,7 +284,18 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0))
       .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these",
               marrow::at_least(0.01))
+      .option("scan_poses", &Options::scan_poses,
+              "instead of this grid, so many poses spread over all six axes: for a start that is approximate in all",
+              marrow::at_least(0))
+      .option("scan_side_deg", &Options::scan_side_deg,
+              "of these, rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
+              marrow::at_most(180))
+      .option("scan_side_mm", &Options::scan_side_mm, "of these, translations along the same axes, to either side",
+              marrow::at_least(0))
       .option("candidates", &Options::candidates, "best places of this scan that are followed up", marrow::at_least(1))
+      .option("finalists", &Options::finalists,
+              "best of these after the first level that go through all levels; the last level chooses",
+              marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
       .option("step_deg", &Options::step_deg,

@@ -16,6 +16,7 @@ using marrow::Volume;
 
 struct Options {
   double threshold_hu = 250;
+  double floor_hu = 150;
   double band_mm = 4;
 };
 
@@ -64,6 +65,17 @@ void claim_from_seeds(const Grid& grid, const std::vector<std::vector<Eigen::Vec
       reached.push(next);
     });
   }
+}
+
+void check_claims(const List<Seeds>& seeds, const Options& options, const std::vector<std::uint8_t>& owner) {
+  std::vector<bool> has_bone(256, false);
+  for (std::uint8_t fragment : owner) has_bone[fragment] = true;
+  for (std::size_t f = 0; f < seeds.size(); ++f)
+    if (!has_bone[f])
+      throw marrow::Error(
+          "seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches the threshold of " +
+          std::to_string(int(options.threshold_hu)) +
+          " HU, or it belongs to another fragment; add a point in cortical bone, or lower threshold_hu");
 }
 
 /// Gives the largest connected set of bright voxels to fragment 0.
@@ -142,7 +154,10 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   }
   if (seeds->size() >= kUnclaimed)
     throw marrow::Error("seeds: at most 253 fragments expected, got " + std::to_string(seeds->size()));
-  claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, options.threshold_hu), owner);
+  // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
+  const double least_hu = std::min(options.floor_hu, options.threshold_hu);
+  claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, least_hu), owner);
+  check_claims(*seeds, options, owner);
   for (std::size_t f = 0; f < seeds->size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds->size()), seeds->name(f));
@@ -161,5 +176,7 @@ MARROW_PLUGIN(plugin) {
       .in("seeds", "points inside each fragment; without any, the largest connected bone", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
       .option("threshold_hu", &Options::threshold_hu, "CT number at the surface", marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker, nor than the threshold",
+              marrow::unit("HU"))
       .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
 }

@@ -272,6 +272,22 @@ Pair settled(const EdgeMap& edges, const cv::Mat& image, Pair pair, const Scale&
   return pair;
 }
 
+/// Whether both pairs show the same piece of shaft: their middles run close to each other over most of the shorter one.
+/// A curved border has many lines, whose pairs would crowd out the shaft of another fragment.
+bool same_shaft(const Pair& a, const Pair& b) {
+  const auto middle = [](const Pair& pair, const Eigen::Vector2d& along, double s) -> Eigen::Vector2d {
+    return 0.5 * (point_at(pair.left, along, s) + point_at(pair.right, along, s));
+  };
+  const Eigen::Vector2d& along = a.stretch.along;
+  const double one = along.dot(middle(b, b.stretch.along, b.stretch.from)),
+               other = along.dot(middle(b, b.stretch.along, b.stretch.to));
+  const double from = std::max(a.stretch.from, std::min(one, other)), to = std::min(a.stretch.to, std::max(one, other));
+  if (to - from < 0.5 * std::min(a.stretch.length(), std::abs(other - one))) return false;
+  const double s = 0.5 * (from + to);
+  const double width = (point_at(a.left, along, s) - point_at(a.right, along, s)).norm();
+  return (middle(a, along, s) - middle(b, along, s)).norm() < 0.05 * width;
+}
+
 marrow::LineSegment segment_of(const Border& border, const Stretch& stretch) {
   return {point_at(border, stretch.along, stretch.from), point_at(border, stretch.along, stretch.to)};
 }
@@ -315,17 +331,23 @@ ShaftLines hough_pairs(const EdgeMap& edges, const View& view, const Options& op
     if (pairs.empty()) message += ", none of which run side by side";
     for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 3); ++i)
       message += (i ? "; the next because " : ", best candidate rejected because ") + pairs[i].reason;
-    throw marrow::Error(message);
+    throw marrow::Error(message +
+                        "; look at the edges, and set the edge detector's thresholds or this bone's width_mm");
   }
   ShaftLines lines;
   lines.left = segment_of(pairs[0].left, pairs[0].stretch);
   lines.right = segment_of(pairs[0].right, pairs[0].stretch);
   lines.width_mm = pairs[0].width_mm;
   lines.log_likelihood = pairs[0].score;
-  for (std::size_t i = 1; i < std::min<std::size_t>(pairs.size(), 20); ++i) {
-    if (pairs[i].reason.empty())
+  std::vector<const Pair*> shafts{&pairs[0]};
+  for (std::size_t i = 1; i < pairs.size() && lines.rejected.size() < 20; ++i) {
+    if (pairs[i].reason.empty()) {
+      if (std::any_of(shafts.begin(), shafts.end(), [&](const Pair* better) { return same_shaft(*better, pairs[i]); }))
+        continue;
+      shafts.push_back(&pairs[i]);
       pairs[i].reason = text("its log-likelihood of %.1f is below the best one's %.1f (%.1f mm wide)", pairs[i].score,
                              pairs[0].score, pairs[i].width_mm);
+    }
     lines.rejected.push_back(
         {segment_of(pairs[i].left, pairs[i].stretch), segment_of(pairs[i].right, pairs[i].stretch), pairs[i].reason});
   }

@@ -56,6 +56,8 @@ TEST(OutlineDistance, OfAParallelLine) {
   auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(102.5f, 1)));
   EXPECT_NEAR(found["median_px"], 2.5, 1e-6);
   EXPECT_NEAR(found["p90_px"], 2.5, 1e-6);
+  EXPECT_NEAR(found["offset_px"], 2.5, 1e-6);
+  EXPECT_NEAR(found["spread_px"], 0, 1e-6);
   EXPECT_NEAR(found["median_mm"], 2.5 * 0.6, 1e-6);
   EXPECT_NEAR(found["matched_percent"], 100, 1e-9);
   EXPECT_NEAR(found["frontal_median_px"], 2.5, 1e-6);
@@ -125,7 +127,7 @@ TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
   marrow::Context::Hooks hooks;
   hooks.log = [&](std::string_view message, bool is_warning) { warning += is_warning ? message : ""; };
   marrow::Context context(hooks);
-  EXPECT_EQ(outline_distance({}, LineProjector(), views, edges, {}, context).items.size(), 10u);
+  EXPECT_EQ(outline_distance({}, LineProjector(), views, edges, {}, context).items.size(), 14u);
   EXPECT_EQ(warning, "view 'narrow': no part of the outline is inside the image at this pose; the view is left out");
 }
 

@@ -80,6 +80,59 @@ TEST(Multiresolution, SurvivesNoiseGapsOutliersAndAFatModel) {
   }
 }
 
+TEST(Multiresolution, ScattersPosesAboutAStartThatIsWrongInAllAxes) {
+  Options options;
+  options.scan_poses = 1000;
+  options.scan_rotation_deg = options.scan_translation_mm = 6;
+  options.scan_side_deg = options.scan_side_mm = 6;
+  options.candidates = 12;
+  options.finalists = 4;
+  ideal_edges::Faults faults{0.5, 0.25, 3000, -1.5, true, 3};
+  const std::vector<marrow::Vector6d> starts{motion(6, -5, 6, 6, -5, 6), motion(-5, -6, -6, 5, 6, -5),
+                                             motion(5, 6, -5, -6, 6, 6)};
+  // Among so many other edges the axial scan alone goes wrong.
+  EXPECT_GT(error_of(femur().run({0, 90}, faults, starts[0]).pose, femur().truth).head<3>().norm(), 3);
+  for (const auto& away : starts) {
+    const Result result = femur().run({0, 90}, faults, away, options);
+    const marrow::Vector6d error = error_of(result.pose, femur().truth);
+    EXPECT_LT(std::abs(error[2]), 1.5) << error.transpose();
+    EXPECT_LT(error.head<2>().norm(), 0.3) << error.transpose();
+    EXPECT_LT(error.tail<3>().norm(), 0.3) << error.transpose();
+    ++faults.seed;
+  }
+}
+
+TEST(Multiresolution, ScattersEvenlyWithinTheRanges) {
+  Options options;
+  options.scan_poses = 500;
+  options.scan_rotation_deg = 6;
+  options.scan_translation_mm = 5;
+  options.scan_side_deg = 4;
+  options.scan_side_mm = 3;
+  const Scan scan = scattered_scan(options);
+  ASSERT_EQ(scan.motions.size(), 500u);
+  EXPECT_EQ(scan.motions[0], motion(0, 0, 0, 0, 0, 0));
+  const marrow::Vector6d range = motion(4, 4, 6, 3, 3, 5);
+  for (int axis = 0; axis < 6; ++axis) {
+    double sum = 0, squares = 0;
+    for (const marrow::Vector6d& m : scan.motions) {
+      EXPECT_LE(std::abs(m[axis]), range[axis]);
+      sum += m[axis] / 500;
+      squares += m[axis] * m[axis] / 500;
+    }
+    EXPECT_NEAR(sum, 0, 0.03 * range[axis]);
+    EXPECT_NEAR(std::sqrt(3 * squares), range[axis], 0.03 * range[axis]);
+  }
+}
+
+TEST(Multiresolution, TheLastLevelChoosesAmongTheFinalists) {
+  ideal_edges::Faults faults{0.5, 0.25, 800, -1.5, true, 3};
+  Options one, three;
+  three.finalists = 3;
+  const marrow::Vector6d away = motion(1.5, -1, 10, 2, 2, 10);
+  EXPECT_LE(femur().run({0, 90}, faults, away, three).pose.cost, femur().run({0, 90}, faults, away, one).pose.cost);
+}
+
 TEST(Multiresolution, PredictsItsScatter) {
   marrow::Vector6d squares = marrow::Vector6d::Zero(), predicted = squares;
   constexpr int kRuns = 16;

@@ -67,6 +67,33 @@ TEST(Threshold, TouchingFragmentsAreSharedOutHalfway) {
   EXPECT_GT(sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, -2})), 0);
 }
 
+TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
+  Volume volume{phantom::ct_grid({24, 24, 24}), {}};
+  volume.values.assign(volume.grid.count(), 200.f);
+  const double middle = 0.5 * (volume.grid.size[2] - 1);
+  for (int z = 0; z < volume.grid.size[2]; ++z)
+    for (int y = 0; y < volume.grid.size[1]; ++y)
+      for (int x = 0; x < volume.grid.size[0]; ++x)
+        if (z > middle + 2) volume.values[volume.grid.offset(x, y, z)] = 1200;
+  const auto at_height = [&](double z) -> Vector3d { return volume.grid.origin_mm + Eigen::Vector3d(8, 8, z); };
+  List<Seeds> seeds;
+  seeds.add("distal", Seeds{"distal", {at_height(4), at_height(20)}});
+  Context context;
+  const auto fields = threshold(volume, &seeds, {}, context);
+  EXPECT_LT(sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(20))), 0);
+  EXPECT_GT(sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(4))), 0);
+  List<Seeds> only_spongy;
+  only_spongy.add("distal", Seeds{"distal", {at_height(4)}});
+  try {
+    threshold(volume, &only_spongy, {}, context);
+    FAIL() << "no error";
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "seeds of fragment 'distal': at none of them the CT reaches the threshold of 250 HU, or it belongs to "
+                 "another fragment; add a point in cortical bone, or lower threshold_hu");
+  }
+}
+
 TEST(Threshold, SaysWhenThereIsNoBone) {
   const Volume volume{phantom::ct_grid({8, 8, 8}), std::vector<float>(512, 30.f)};
   Context context;

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""One pipeline file for one view, three views and two fragments, with every node replaced by each of its siblings."""
+import json
+import pathlib
+import shutil
+import tempfile
+
+import yaml
+
+from cases import FEMUR, SMALL, contents, copy_case, matrix_product, metrics, rotation_vector_deg, simulate, times, transposed
+from marrow_cli import Case, main, marrow
+
+
+class Siblings(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-siblings-"))
+        cls.case = simulate(cls.shared / "simulated", *SMALL)
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.shared, ignore_errors=True)
+
+    def run_femur(self, case, *arguments, out="out"):
+        out = self.scratch / out
+        result = marrow("run", FEMUR, "case=%s" % case, "--out", out, "--quiet", *arguments)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads((out / "run.json").read_text())["status"], "done")
+        return out
+
+    def check_errors(self, out, fragment, what):
+        errors = metrics(out / "outputs" / "errors" / fragment / "final.json")
+        print("%s, %s: %.3f deg, %.3f mm" % (what, fragment, errors["rotation_deg"], errors["translation_mm"]))
+        self.assertLess(errors["rotation_deg"], 1)
+        self.assertLess(errors["translation_mm"], 1)
+
+    def test_one_view(self):
+        case = copy_case(self.case, self.scratch / "case", lambda description: description["views"].pop())
+        out = self.run_femur(case)
+        pose = yaml.safe_load((out / "outputs" / "pose" / "distal.yaml").read_text())
+        truth = yaml.safe_load((case / "case.yaml").read_text())["fragments"]["distal"]["truth"]["matrix"]
+        camera = yaml.safe_load((case / "frontal.camera.yaml").read_text())["camera_from_world"]
+        camera, found, true = ([row[:3] for row in matrix[:3]] for matrix in (camera["matrix"], pose["matrix"], truth))
+        turn = times(camera, rotation_vector_deg(matrix_product(found, transposed(true))))
+        origin = pose["fragment_frame"]["origin_mm"] + [1]
+        shift = times(camera, [a - b for a, b in zip(times(pose["matrix"], origin)[:3], times(truth, origin)[:3])])
+        frontal, lateral, along = pose["predicted_deviation"]["translation_mm"]
+        print("one view, right, down and along the beam: off by %s mm, turned by %s deg" % (
+            " ".join("%.3f" % x for x in shift), " ".join("%.3f" % x for x in turn)))
+        print("   predicted %.3f and %.3f mm in the image, %.3f mm along the beam" % (frontal, along, lateral))
+        self.assertLess(max(abs(shift[0]), abs(shift[1])), 0.5)
+        self.assertLess(abs(turn[2]), 0.5)
+        self.assertGreater(lateral, 3 * max(frontal, along))  # the lateral axis lies along the beam of the frontal view
+        errors = metrics(out / "outputs" / "errors" / "distal" / "final.json")
+        self.assertGreater(errors["predicted_max_mm"], 3 * errors["predicted_along_mm"])
+
+    def test_three_views_60_degrees_apart(self):
+        case = simulate(self.scratch / "simulated", *SMALL, "--set", "cameras.names=[a, b, c]", "--set", "cameras.alpha_deg=[0, 0, 0]", "--set",
+                        "cameras.beta_deg=[0, 60, 120]")
+        self.check_errors(self.run_femur(case), "distal", "three views")
+
+    def test_both_fragments(self):
+        # Tall images, which show condyles and trochanters: the shaft alone is too round to tell its axial rotation.
+        case = simulate(self.scratch / "simulated", "level=0.35", "isocentre_from_distal_end_mm=200", "--set", "cameras.height_px=1024", "--set",
+                        "case.register=[distal, proximal]")
+        out = self.run_femur(case)
+        for fragment in ("distal", "proximal"):
+            self.check_errors(out, fragment, "both fragments")
+
+    def test_every_node_replaced_by_each_sibling(self):
+        nodes = {node["name"]: node for node in json.loads(marrow("list", "--json").stdout)}
+        replaced = set()
+        for name, node in yaml.safe_load(FEMUR.read_text())["nodes"].items():
+            for other in siblings(nodes, node):
+                setting = "%s.uses=%s" % (name, other)
+                with self.subTest(setting):
+                    self.check_errors(self.run_femur(self.case, "--set", setting, out=setting), "distal", setting)
+                replaced.add(other)
+        self.assertLessEqual({"segment.threshold", "mesh.flying_edges", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
+                             replaced)
+
+    def test_the_truth_changes_no_byte_of_a_pose(self):
+        without = copy_case(self.case, self.scratch / "case", lambda description: description["fragments"]["distal"].pop("truth"))
+        one, other = self.run_femur(self.case, out="with"), self.run_femur(without, out="without")
+        self.assertTrue((one / "outputs" / "errors").exists())
+        self.assertFalse((other / "outputs" / "errors").exists())
+        poses = contents(one / "outputs" / "pose")
+        self.assertEqual(list(poses), ["distal.yaml"])
+        self.assertEqual(poses, contents(other / "outputs" / "pose"))
+
+
+def siblings(nodes, used):
+    """The nodes of the same kind that give the same outputs and are given all inputs that they need."""
+    def ports(name):
+        return [(port["name"], port["type"], port["axis"]) for port in nodes[name]["outputs"]]
+
+    for name, node in nodes.items():
+        if name == used["uses"] or name.split(".")[0] != used["uses"].split(".")[0] or ports(name) != ports(used["uses"]):
+            continue
+        if all(port["optional"] or port["name"] in used.get("in", {}) for port in node["inputs"]):
+            yield name
+
+
+if __name__ == "__main__":
+    main()
