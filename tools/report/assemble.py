@@ -4,7 +4,8 @@
 
     tools/report/assemble.py data.json report.html
 
-The scripts may stand in any order: each only defines things, and main.js starts when the page has been read.
+Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is replaced by the
+file or the data that it names, so the template also says in which order the scripts come.
 """
 import argparse
 import json
@@ -16,24 +17,25 @@ FOLDER = pathlib.Path(__file__).resolve().parent
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's libjs-three
 
 
-def script(text, name):
+def script(path):
+    text = path.read_text()
     if re.search(r"</script|<!--", text, re.IGNORECASE):
-        raise SystemExit("%s contains '</script' or '<!--', which would end the script too early" % name)
-    return "<script>\n%s</script>\n" % text
+        raise SystemExit("%s contains '</script' or '<!--', which would end the script too early" % path)
+    return "<script>\n%s</script>" % text
 
 
 def assemble(data, three=THREE):
     """The page's text. Without three.js the page says what is missing and shows all but the 3D view."""
-    page = (FOLDER / "report.html").read_text()
-    scripts = [path for path in [three] if path and path.exists()] + sorted(FOLDER.glob("*.js"))
-    parts = {
-        "style": "<style>\n%s</style>" % (FOLDER / "report.css").read_text(),
-        "scripts": "".join(script(path.read_text(), path.name) for path in scripts),
-        "data": '<script type="application/json" id="data">%s</script>' % json.dumps(data, separators=(",", ":")).replace("<", "\\u003c"),
-    }
-    for name, text in parts.items():
-        page = page.replace("<!-- marrow:%s -->" % name, text, 1)
-    return page
+    def part(marker):
+        kind, name = marker.group(1), marker.group(2)
+        if kind == "data":
+            return '<script type="application/json" id="data">%s</script>' % json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+        if kind == "style":
+            return "<style>\n%s</style>" % (FOLDER / name).read_text()
+        path = three if name == "three.min.js" else FOLDER / name
+        return script(path) if path.exists() or path != three else ""
+
+    return re.sub(r"<!-- marrow:(data|style|script)(?: (\S+))? -->", part, (FOLDER / "report.html").read_text())
 
 
 def main():

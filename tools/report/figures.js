@@ -7,7 +7,7 @@ const Figures = (() => {
   const ROW_HEIGHT = 66, MOST_POINTS = 400;
 
   const axisTitle = (metric) => metric.label + (metric.unit ? " (" + metric.unit + ")" : "");
-  const point = (cell, tip) => ({ "data-tip": tip, "data-cell": cell.id, "fill-opacity": 0.55, class: "point" });
+  const point = (cell, tip) => ({ "data-tip": tip, "data-cell": cell.id, class: "point" });
 
   // All points, or where they are too many evenly many of each rank and the twenty worst.
   function thinned(sorted) {
@@ -18,7 +18,7 @@ const Figures = (() => {
 
   function rowTitle(root, data, variant, top, note) {
     root.append(svg("text", { class: "row-name", x: 8, y: top + 14 }, data.variants[variant].name,
-      svg("tspan", { class: "row-note" }, (data.variants[variant].is_baseline ? "  baseline" : "") + (note ? "  " + note : ""))));
+      svg("tspan", { class: "row-note" }, ["", data.variants[variant].is_baseline && "baseline", note].filter((word) => word !== false && word !== undefined).join("\u2002"))));
   }
 
   function box(root, x, middle, [low, q1, median, q3, high], tip) {

@@ -4,7 +4,7 @@
 
 const Graph = (() => {
   const { el, svg } = Dom;
-  const BOX = { width: 176, height: 46, line: 16, gap: 26, rise: 46 };
+  const BOX = { width: 186, height: 46, line: 16, gap: 26, rise: 46 };
 
   // Layer of each node = longest way from a node without inputs. A cycle, which a pipeline has not, ends at the node count.
   function layersOf(nodes, edges) {
@@ -19,21 +19,32 @@ const Graph = (() => {
       }
       if (!changed) break;
     }
+    for (const node of nodes) { // what needs nothing stands right above its first use
+      const uses = edges.filter((edge) => edge.from === node.id).map((edge) => layer.get(edge.to));
+      if (uses.length && !edges.some((edge) => edge.to === node.id)) layer.set(node.id, Math.max(0, Math.min(...uses) - 1));
+    }
     return layer;
   }
 
-  // Rows of items, with a place held in every layer that an edge crosses, so that edges pass between the boxes.
+  // Rows of items, with a place held in every layer that an edge crosses, so that edges pass between the boxes; edges that
+  // leave one node share these places.
   function rowsOf(nodes, edges) {
     const layer = layersOf(nodes, edges), rows = [];
     const place = (item, at) => ((rows[at] = rows[at] || []).push(item), item);
     const items = new Map(nodes.map((node) => [node.id, place({ node, above: [], below: [], width: BOX.width }, layer.get(node.id))]));
+    const shared = new Map();
+    const passage = (from, at) => {
+      const key = at + " " + from;
+      if (!shared.has(key)) shared.set(key, place({ above: [], below: [], width: 8 }, at));
+      return shared.get(key);
+    };
     const chains = edges.map((edge) => {
       const chain = [items.get(edge.from)];
-      for (let at = layer.get(edge.from) + 1; at < layer.get(edge.to); ++at) chain.push(place({ above: [], below: [], width: 8 }, at));
+      for (let at = layer.get(edge.from) + 1; at < layer.get(edge.to); ++at) chain.push(passage(edge.from, at));
       chain.push(items.get(edge.to));
       for (let i = 1; i < chain.length; ++i) {
-        chain[i].above.push(chain[i - 1]);
-        chain[i - 1].below.push(chain[i]);
+        if (!chain[i].above.includes(chain[i - 1])) chain[i].above.push(chain[i - 1]);
+        if (!chain[i - 1].below.includes(chain[i])) chain[i - 1].below.push(chain[i]);
       }
       return { edge, chain };
     });
@@ -139,7 +150,9 @@ const Graph = (() => {
       details.replaceChildren(...about(node));
     };
     root.append(...lines, ...boxes.map((item) => drawNode(item, chosen)));
-    return el("div", {}, el("div", { class: "scroll graph-box", tabindex: 0, role: "region", "aria-label": "Pipeline" }, root), details);
+    const box = el("div", { class: "scroll graph-box", tabindex: 0, role: "region", "aria-label": "Pipeline" }, root);
+    requestAnimationFrame(() => (box.scrollLeft = (box.scrollWidth - box.clientWidth) / 2)); // on a narrow screen: the middle first
+    return el("div", {}, box, details);
   }
 
   return { draw };

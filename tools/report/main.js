@@ -12,9 +12,15 @@ const Page = (() => {
     return node;
   }
 
+  // Where a tenth of the runs end far off, a linear scale would press the others together.
+  function skewed(data) {
+    const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value)).sort((a, b) => a - b);
+    return values[0] > 0 && Data.quantile(values, 0.9) > 6 * Data.quantile(values, 0.25);
+  }
+
   // A figure over all cells: choice of metric and scale, legend, and the drawing.
   function metricFigure(data, kinds, extra, draw) {
-    const state = { metric: 0, kind: kinds[0][0], extra: extra && extra.options[0][0] };
+    const state = { metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0] };
     const place = Plots.responsive((width) => draw(state, width)), again = () => place.redraw();
     const toolbar = el("div", { class: "toolbar" }, data.metrics.length > 1 && Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => { state.metric = Number(i); again(); }),
       extra && Dom.choice(extra.label, extra.options, state.extra, (value) => { state.extra = value; again(); }), Dom.choice("Scale", kinds, state.kind, (kind) => { state.kind = kind; again(); }));
@@ -38,6 +44,13 @@ const Page = (() => {
     if (!bins.length || !Math.max(...bins.map((row) => row.length))) return null;
     return section("capture", "Capture range", "How far from the truth a start may lie. Runs are counted in bins of the start’s mTRE; bars are Wilson’s 95 % intervals, failed runs count as no success.",
       Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)), el("details", {}, el("summary", {}, "The counts"), Figures.captureTable(data, bins)));
+  }
+
+  function byCase(data) {
+    if (data.cases.length < 2) return null;
+    const place = el("div", {}, Summary.caseTable(data, 0));
+    return section("by-case", "Case by case", "The median over a case’s starts, and how many of them end in success. Sort by a column to find the hard cases.",
+      data.metrics.length > 1 && el("div", { class: "toolbar" }, Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))), place);
   }
 
   // Pictures, 3D view, convergence and landscapes of one case and start, chosen once for all of them.
@@ -112,7 +125,7 @@ const Page = (() => {
     const head = section("summary", data.is_run ? "Result" : "Result", null,
       ...(data.is_run ? (cell ? [Detail.reason(cell), Detail.values(data, cell)] : []) : [Summary.verdicts(data), Summary.table(data)]), Summary.rules(data));
     return [el("div", { class: "head" }, el("p", { class: "kicker" }, data.is_run ? "Run" : "Comparison"), el("h1", {}, experiment.name || "Unnamed"), experiment.help && el("p", { class: "lead" }, experiment.help),
-      !data.is_run && el("p", { class: "facts" }, Summary.facts(data))].filter(Boolean), head];
+      !data.is_run && el("p", { class: "facts" }, Summary.facts(data))), head];
   }
 
   function build(data) {
@@ -120,7 +133,7 @@ const Page = (() => {
     document.title = (experiment.name || "marrow report") + " · marrow";
     const add = (...parts) => main.append(...parts.flat(2).filter(Boolean)); // at once: figures need their width
     add(summary(data));
-    if (many && data.metrics.length) add(distributions(data), paired(data), capture(data));
+    if (many && data.metrics.length) add(distributions(data), paired(data), capture(data), byCase(data));
     add(closer(data));
     if (data.graph && (data.graph.nodes || []).length) {
       add(section("graph", "Pipeline", data.variants.length > 1 ? "Framed nodes differ between the variants." : null, Graph.draw(data.graph)));

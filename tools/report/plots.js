@@ -40,7 +40,7 @@ const Plots = (() => {
     const forward = kind === "log" ? Math.log10 : kind === "signed" ? (x) => Math.asinh(x / unit) : (x) => x;
     const [from, to] = domain.map(forward), [left, right] = range;
     const map = (value) => left + (forward(kind === "log" ? Math.max(value, domain[0]) : value) - from) / (to - from || 1) * (right - left);
-    const count = Math.max(2, Math.abs(right - left) / (kind === "linear" ? 75 : 60));
+    const count = Math.max(2, Math.abs(right - left) / (kind === "linear" && range[0] < range[1] ? 75 : 55));
     map.ticks = kind === "log" ? ticksLog(domain, count) : kind === "signed" ? ticksSigned(domain, unit, count) : ticksLinear(domain, count);
     map.domain = domain;
     return map;

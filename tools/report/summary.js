@@ -79,6 +79,18 @@ const Summary = (() => {
     return el("div", {}, data.metrics.length > 1 && el("div", { class: "toolbar" }, Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))), place);
   }
 
+  // Which cases are hard: each case's median and successes, a column a variant.
+  function caseTable(data, metric) {
+    const cells = data.variants.map((_, variant) => data.cases.map((_, place) => data.cells.filter((cell) => cell.variant === variant && cell.case === place)));
+    const median = (list) => Data.quantile(list.filter((cell) => cell.status !== "failed").map((cell) => cell.values[metric]).filter(Number.isFinite).sort((a, b) => a - b), 0.5);
+    const good = (list) => list.filter((cell) => Data.outcome(cell) === "success").length;
+    const of = (list) => (list.length ? el("span", { "data-tip": good(list) + " of " + list.length + " starts end in success" }, el("span", { class: "share", style: "--part: " + Math.round(100 * good(list) / list.length) + "%" }),
+      number(median(list)), " ", el("small", {}, good(list) + "/" + list.length)) : "–");
+    const all = [{ title: "Case", key: (i) => data.cases[i], cell: (i) => data.cases[i] },
+      ...data.variants.map((variant, v) => ({ title: variant.name, unit: data.metrics[metric].unit, key: (i) => median(cells[v][i]), cell: (i) => of(cells[v][i]), number: true }))];
+    return sortable(data.cases.map((_, i) => i), all, {}, "Medians and successes of each case: " + data.metrics[metric].label);
+  }
+
   // Every comparison with its interval and p: the numbers behind the figure of the pairs.
   function comparisonTable(data) {
     const label = (item) => (data.metrics.find((metric) => metric.name === item.metric) || { label: item.metric }).label;
@@ -102,5 +114,5 @@ const Summary = (() => {
     return lines.length ? el("dl", { class: "rules" }, lines.map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text)))) : null;
   }
 
-  return { facts, verdicts, table, comparisonTable, rules, sortable, rateBar };
+  return { facts, verdicts, table, comparisonTable, caseTable, rules, sortable, rateBar };
 })();
