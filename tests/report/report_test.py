@@ -8,6 +8,7 @@ With --pictures, each section is also photographed: light, dark, and 400 px wide
 """
 import argparse
 import pathlib
+import shutil
 import sys
 import tempfile
 import time
@@ -51,6 +52,7 @@ class ReportTest(unittest.TestCase):
     @classmethod
     def tearDownClass(cls):
         cls.browser.close()
+        shutil.rmtree(cls.folder)
 
     @classmethod
     def write(cls, name, data):
@@ -174,7 +176,12 @@ class ReportTest(unittest.TestCase):
                 reach = 1 - 100 / 255
                 image = max(abs(a - round(b) - side) for a, b, side in zip(marks, wanted, (-reach, reach) * 2))
                 self.assertLess(image, 0.5, "corners in the X-ray against their projection, px")
-                print("look through %-8s zoom %.1f: projection %.2g px, drawn model %.2f px, X-ray %.2f px" % (view["name"], zoom, worst, model, image))
+                self.browser.js("Page.scene.style.through = 'outline'")
+                lines = self.bounds(view, zoom, "pixels[i + 2] > 60")
+                self.browser.js("Page.scene.style.through = 'surface'")
+                outline = max(abs(a - b) for a, b in zip(lines, wanted))
+                self.assertLess(outline, 1.0, "drawn outline against its projection, px")  # the line is 1.8 canvas pixels thick
+                print("look through %-8s zoom %.1f: projection %.2g px, drawn model %.2f px, outline %.2f px, X-ray %.2f px" % (view["name"], zoom, worst, model, outline, image))
 
     def bounds(self, view, zoom, condition):
         """Left, right, top, bottom of the drawn pixels that fulfil a condition, in pixels of the view's image."""
@@ -221,7 +228,7 @@ class ReportTest(unittest.TestCase):
         failed = next(cell for cell in cells if cell["status"] == "failed")
         self.press(failed["id"], "#failures")
         self.assertIn(failed["reason"], self.browser.js("return document.getElementById('cell').innerText"))
-        self.browser.open(self.comparison.as_uri() and self.comparison)
+        self.browser.open(self.comparison)
         self.browser.js("location.hash = '#cell=' + arguments[0]; location.reload()", rich["id"])
         self.browser.wait("return document.documentElement.dataset.ready === 'true' && document.getElementById('cell').open")
 

@@ -51,12 +51,17 @@ const Detail = (() => {
 
   function fillDialog(data, cell, dialog) {
     const list = data.cells, at = list.indexOf(cell), step = (by) => Dom.button(by < 0 ? "Previous" : "Next", () => open(data, list[at + by]), { disabled: !list[at + by] });
-    const closer = Data.hasMaterial(cell) && Dom.button("Compare with the other variants", () => { dialog.close(); Detail.lookAt(cell); });
+    const closer = Data.hasMaterial(cell) && data.variants.length > 1 && Dom.button("Compare with the other variants", () => { dialog.close(); Detail.lookAt(cell); });
     dialog.replaceChildren(
       el("div", { class: "dialog-head" }, el("h2", { tabindex: -1 }, Data.cellName(data, cell)), el("div", { class: "toolbar" }, step(-1), step(1), Dom.button("Close", () => dialog.close()))),
       el("p", { class: "note" }, "Cell ", el("code", {}, String(cell.id))),
       ...[reason(cell), values(data, cell), el("h3", {}, "Options of " + data.variants[cell.variant].name), options(data.variants[cell.variant]), command(data, cell),
         cell.pictures.length > 0 && el("h3", {}, "Pictures"), cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell), ...scene(data, cell)].filter(Boolean));
+  }
+
+  // So that a cell can be linked to. Some browsers refuse it to pages from disk, which does no harm.
+  function nameInAddress(address) {
+    try { history.replaceState(null, "", address); } catch (error) { /* no link then */ }
   }
 
   function disposeScene() {
@@ -69,13 +74,13 @@ const Detail = (() => {
     disposeScene();
     if (!dialog.open) {
       dialog.showModal();
-      dialog.onclose = () => { disposeScene(); history.replaceState(null, "", location.pathname + location.search); };
+      dialog.onclose = () => { disposeScene(); nameInAddress(location.pathname + location.search); };
       dialog.onclick = (event) => event.target === dialog && dialog.close();
     }
     fillDialog(data, cell, dialog);
     dialog.scrollTop = 0;
     dialog.querySelector("h2").focus();
-    history.replaceState(null, "", "#cell=" + encodeURIComponent(cell.id));
+    nameInAddress("#cell=" + encodeURIComponent(cell.id));
   }
 
   // lookAt(cell) is set by the page: it shows the cell's case and start in the comparison of pictures.

@@ -85,7 +85,7 @@ const Dom = (() => {
 
   // The box that says more about what the pointer is on: any element with data-tip.
   function startTooltip() {
-    const box = document.body.appendChild(el("div", { id: "tooltip", role: "status", hidden: true }));
+    const box = document.body.appendChild(el("div", { id: "tooltip", role: "tooltip", hidden: true }));
     const place = (x, y) => {
       box.style.left = Math.max(8, Math.min(x + 14, innerWidth - box.offsetWidth - 8)) + "px";
       box.style.top = (y + 18 + box.offsetHeight > innerHeight ? y - box.offsetHeight - 10 : y + 18) + "px";

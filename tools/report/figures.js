@@ -60,18 +60,19 @@ const Figures = (() => {
     const metric = data.metrics[metricIndex], variants = compared(data);
     const rows = variants.map((variant) => Data.pairedValues(data, variant, metricIndex).map((item) => ({ ...item, difference: item.value - item.base })));
     const sizes = rows.flat().map((item) => item.difference), typical = Data.quantile(sizes.map(Math.abs).sort((a, b) => a - b), 0.5) || 1;
-    const unit = 10 ** Math.floor(Math.log10(typical));
+    const found = variants.map((variant) => comparison(data, variant, metric)), unit = 10 ** Math.floor(Math.log10(typical));
     const { root, box: area, x } = Plots.frame({ width, height: ROW_HEIGHT * rows.length + 62, label: "Difference of " + metric.label + " to the baseline, a row a variant; the numbers are in the table below",
-      x: { kind, unit, domain: Plots.domain(sizes.concat(0), "linear"), title: "variant − baseline: " + axisTitle(metric) } });
+      x: { kind, unit, domain: Plots.domain(sizes.concat(0, found.flatMap((item) => (item ? [item.low, item.high, item.difference] : []))), "linear"), title: "variant − baseline: " + axisTitle(metric) } });
     root.append(svg("line", { class: "zero", x1: x(0), x2: x(0), y1: area.top, y2: area.bottom }));
     rows.forEach((row, i) => {
-      const variant = variants[i], top = area.top + i * ROW_HEIGHT, middle = top + 40, found = comparison(data, variant, metric);
+      const variant = variants[i], top = area.top + i * ROW_HEIGHT, middle = top + 40;
       rowTitle(root, data, variant, top, row.length + " pairs, better in " + row.filter((item) => item.difference < 0).length);
       thinned(row.sort((a, b) => a.difference - b.difference)).forEach((item, k) => root.append(Plots.marker(variant, x(item.difference), middle + 13 * Plots.spread(k), 3.2,
         point(item.cell, Data.pairName(data, data.pairOf(item.cell)) + "\nbaseline " + number(item.base) + ", " + data.variants[variant].name + " " + withUnit(item.value, metric.unit)))));
-      if (!found) return;
-      root.append(svg("g", { class: "estimate", "data-tip": found.sentence || "" },
-        svg("line", { x1: x(found.low), x2: x(found.high), y1: middle, y2: middle, "stroke-width": 4 }), svg("circle", { cx: x(found.difference), cy: middle, r: 5 })));
+      const { low, high, difference, sentence } = found[i] || {};
+      if (!Number.isFinite(difference)) return;
+      root.append(svg("g", { class: "estimate", "data-tip": sentence || "" }, Number.isFinite(low) && Number.isFinite(high) &&
+        svg("line", { x1: x(low), x2: x(high), y1: middle, y2: middle, "stroke-width": 4 }), svg("circle", { cx: x(difference), cy: middle, r: 5 })));
     });
     return root;
   }

@@ -119,9 +119,9 @@ const Graph = (() => {
     const group = svg("g", { class: "node" + (differs.length ? " differs" : ""), tabindex: 0, role: "button", "aria-label": about, "data-node": node.id, onclick: choose,
       onkeydown: (event) => (event.key === "Enter" || event.key === " ") && (event.preventDefault(), choose()) },
       svg("rect", { x: left, y: top, width: BOX.width, height, rx: 6 }), svg("text", { class: "id", x: left + 10, y: top + 19 }, shortened(node.id, 22)),
-      svg("text", { class: "uses", x: left + 10, y: top + 36 }, shortened(node.uses, 26)));
+      svg("text", { class: "uses", x: left + 10, y: top + 36 }, shortened(node.uses, 27)));
     differs.forEach(([variant, text], i) => group.append(svg("text", { class: "other", x: left + 10, y: top + 36 + BOX.line * (i + 1), "data-tip": variant + ": " + text },
-      shortened(variant + ": " + text, 26))));
+      shortened(variant + ": " + text, 27))));
     return group;
   }
 

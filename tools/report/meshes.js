@@ -58,5 +58,24 @@ const Meshes = (() => {
     return new Float32Array(ends);
   }
 
-  return { buffers, outline };
+  // Lines as strips of triangles in normalised coordinates, some pixels thick: WebGL draws lines one pixel wide.
+  // ends: points of pairs; clip: the matrix to clip coordinates, by columns; width, height: the canvas in pixels
+  function strips(ends, clip, width, height, thick_px) {
+    const out = [], half = thick_px / 2;
+    const place = (i) => {
+      const [x, y, z] = [ends[i], ends[i + 1], ends[i + 2]], w = clip[3] * x + clip[7] * y + clip[11] * z + clip[15];
+      return w > 1e-6 ? [(clip[0] * x + clip[4] * y + clip[8] * z + clip[12]) / w * width / 2, (clip[1] * x + clip[5] * y + clip[9] * z + clip[13]) / w * height / 2] : null;
+    };
+    for (let i = 0; i < ends.length; i += 6) {
+      const a = place(i), b = place(i + 3);
+      if (!a || !b) continue;
+      const length = Math.hypot(b[0] - a[0], b[1] - a[1]) || 1, along = [(b[0] - a[0]) / length * half, (b[1] - a[1]) / length * half];
+      const corner = (point, forward, aside) => [(point[0] + forward * along[0] - aside * along[1]) / width * 2, (point[1] + forward * along[1] + aside * along[0]) / height * 2, 0];
+      const [p, q, r, s] = [corner(a, -1, 1), corner(a, -1, -1), corner(b, 1, 1), corner(b, 1, -1)];
+      out.push(...p, ...q, ...r, ...r, ...q, ...s);
+    }
+    return new Float32Array(out);
+  }
+
+  return { buffers, outline, strips };
 })();

@@ -6,7 +6,7 @@
 class Orbit {
   constructor(canvas, changed) {
     Object.assign(this, { canvas, changed, locked: false, pointers: new Map() });
-    this.reset({ target: [0, 0, 0], distance: 500 });
+    this.reset({ target: [0, 0, 0], distance: 500, azimuth_deg: -65 });
     canvas.addEventListener("pointerdown", (event) => this.down(event));
     canvas.addEventListener("pointermove", (event) => this.move(event));
     for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
@@ -15,9 +15,9 @@ class Orbit {
     canvas.addEventListener("keydown", (event) => this.key(event));
   }
 
-  reset({ target, distance }) {
-    this.home = { target: [...target], distance };
-    Object.assign(this, { target: [...target], distance, azimuth_deg: -65, elevation_deg: 12 });
+  reset({ target, distance, azimuth_deg }) {
+    this.home = { target: [...target], distance, azimuth_deg };
+    Object.assign(this, { target: [...target], distance, azimuth_deg, elevation_deg: 14 });
     this.resetFlat();
   }
 

@@ -45,7 +45,7 @@ const Pictures = (() => {
       this.handle = el("div", { class: "handle", role: "slider", tabindex: 0, "aria-label": "Wipe between the two pictures", "aria-valuemin": 0, "aria-valuemax": 100 });
       this.missing = el("p", { class: "note", hidden: true });
       this.stage = el("div", { class: "stage", tabindex: 0, "aria-label": "Pictures: arrow keys move the wipe, the space bar switches in a blink" },
-        el("figure", {}, this.images[0], this.labels[0]), el("figure", {}, this.images[1], this.labels[1]), this.handle);
+        el("figure", { class: "layer-a" }, this.images[0], this.labels[0]), el("figure", { class: "layer-b" }, this.images[1], this.labels[1]), this.handle);
       this.element.append(el("div", { class: "toolbar" }, modes, this.same && common, sideControls(this.data, "A", this.sides[0], this.names, !this.same, update),
         sideControls(this.data, "B", this.sides[1], this.names, !this.same, update), zoom, this.pause, this.flip), this.missing, el("div", { class: "picture-box" }, this.stage));
       this.listen();

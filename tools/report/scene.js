@@ -2,7 +2,9 @@
 // The 3D view: models in the result's, the true and the start's pose, among the X-rays or seen through one of them.
 "use strict";
 
-const POSES = { result: { colour: 0x2f86c9, text: "result" }, truth: { colour: 0x009e73, text: "truth", translucent: true }, start: { colour: 0xd55e00, text: "start", translucent: true } };
+const POSES = { result: { colour: 0x2f86c9, line: 0x4db8ff, text: "result" }, truth: { colour: 0x009e73, line: 0x25e0a4, text: "truth", translucent: true },
+  start: { colour: 0xd55e00, line: 0xff9248, text: "start", translucent: true } };
+const OUTLINE_PX = 1.8;
 
 class SceneView {
   // entries: [{label, scene: id}], one shown at a time
@@ -29,6 +31,7 @@ class SceneView {
     this.renderer.autoClear = false;
     this.camera = new THREE.PerspectiveCamera();
     this.camera.matrixAutoUpdate = false;
+    SceneView.plain = SceneView.plain || new THREE.Camera(); // for what is in normalised coordinates
     this.orbit = new Orbit(this.canvas, () => this.draw());
     this.load(this.entries[0].scene);
     new ResizeObserver(() => this.draw()).observe(this.canvas);
@@ -38,7 +41,9 @@ class SceneView {
   load(id) {
     this.id = id;
     this.source = this.data.scenes[id];
+    this.release();
     this.world = new THREE.Scene();
+    this.rims = new THREE.Scene(); // outlines, already in the canvas's normalised coordinates
     this.lamp = new THREE.DirectionalLight(0xffffff, 0.75);
     this.world.add(new THREE.HemisphereLight(0xffffff, 0x8a8f98, 0.55), this.lamp, this.lamp.target);
     this.bounds = new THREE.Box3();
@@ -47,10 +52,16 @@ class SceneView {
     this.sphere = { centre: sphere.center, radius: sphere.radius || 1 };
     this.views = this.source.views.map((view) => this.view(view));
     if (this.through && !this.views.some((view) => view.name === this.through)) this.through = null;
-    if (!this.kept) this.orbit.reset({ target: sphere.center.toArray(), distance: 1.25 * this.sphere.radius / Math.tan(Orbit.HALF_FIELD) });
+    if (!this.kept) this.orbit.reset({ target: sphere.center.toArray(), distance: 1.5 * this.sphere.radius / Math.tan(Orbit.HALF_FIELD), azimuth_deg: this.facing() });
     this.kept = true; // another variant is shown from where the last one was
     this.buildControls();
     this.draw();
+  }
+
+  // From where all X-rays are seen from the front: the mean side of their sources.
+  facing() {
+    const [x, y] = [8, 9].map((i) => -this.source.views.reduce((sum, view) => sum + view.camera_from_world[i], 0));
+    return Math.hypot(x, y) > 0.01 ? Math.atan2(y, x) * 180 / Math.PI + 12 : -65;
   }
 
   model(pose) {
@@ -60,12 +71,13 @@ class SceneView {
     geometry.setIndex(new THREE.BufferAttribute(mesh.triangles, 1));
     geometry.computeVertexNormals();
     const surface = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({ color: kind.colour, specular: 0x222222, shininess: 25, side: THREE.DoubleSide }));
-    const rim = new THREE.LineSegments(new THREE.BufferGeometry(), new THREE.LineBasicMaterial({ color: kind.colour, depthTest: false, transparent: true }));
+    const rim = new THREE.Mesh(new THREE.BufferGeometry(), new THREE.MeshBasicMaterial({ color: kind.line, depthTest: false, depthWrite: false, transparent: true, side: THREE.DoubleSide }));
     rim.frustumCulled = false;
     const group = new THREE.Group();
     group.matrixAutoUpdate = false;
     group.matrix.set(...pose.world_from_model);
-    group.add(surface, rim);
+    group.add(surface);
+    this.rims.add(rim);
     group.updateMatrixWorld(true);
     geometry.computeBoundingBox();
     this.bounds.union(geometry.boundingBox.clone().applyMatrix4(group.matrix));
@@ -126,8 +138,8 @@ class SceneView {
       ...(this.entries.length > 1 ? [Dom.select("Variant", this.entries.map((entry, i) => [i, entry.label]), this.entries.findIndex((entry) => entry.scene === this.id), (i) => this.load(this.entries[i].scene))] : []),
       Dom.select("View", [["", "free"], ...this.views.map((view) => [view.name, "through " + view.name])], this.through || "", (name) => this.lookThrough(name || null)),
       Dom.select("Drawn as", [["surface", "surface"], ["outline", "outline"], ["both", "surface and outline"]], this.style[mode], (style) => { this.style[mode] = style; draw(); }),
-      ...poses, ...meshes, Dom.slider("Model", this.modelOpacity, (value) => { this.modelOpacity = value; draw(); }),
-      ...(this.through ? [Dom.slider("X-ray", this.imageOpacity, (value) => { this.imageOpacity = value; draw(); }),
+      ...poses, ...meshes, Dom.slider("Model’s opacity", this.modelOpacity, (value) => { this.modelOpacity = value; draw(); }),
+      ...(this.through ? [Dom.slider("X-ray’s opacity", this.imageOpacity, (value) => { this.imageOpacity = value; draw(); }),
         Dom.checkbox("X-ray in front", this.imageInFront, (on) => { this.imageInFront = on; draw(); })] : [Dom.checkbox("X-rays", this.planes, (on) => { this.planes = on; draw(); })]),
       Dom.button("Reset view", () => this.orbit.again()));
     this.hint.textContent = this.through ? "The camera of this X-ray. Drag to shift, wheel (after a click) or + and − to zoom, 0 to reset." : "Drag to turn, shift and drag to move, wheel (after a click) or + and − to zoom, 0 to reset.";
@@ -189,28 +201,30 @@ class SceneView {
     this.lamp.position.copy(eye);
     this.lamp.target.position.copy(this.sphere.centre);
     for (const model of this.models) this.dress(model, eye, this.style[through ? "through" : "free"]);
-    for (const view of this.views) view.group.visible = !through && this.planes;
+    for (const view of this.views) view.group.visible = !through && this.planes && Boolean(view.quad.material.map.image);
     this.renderer.clear();
     if (through && !this.imageInFront) this.drawImage(through);
     this.renderer.render(this.world, this.camera);
     if (through && this.imageInFront) this.drawImage(through);
+    this.renderer.render(this.rims, SceneView.plain);
   }
 
   dress(model, eye, style) {
     const { surface, rim, kind, group } = model;
     group.visible = Boolean(this.shownPoses[model.pose.name]) && !this.hiddenMeshes.has(model.name) && this.modelOpacity > 0;
     surface.visible = style !== "outline";
-    rim.visible = style !== "surface";
+    rim.visible = style !== "surface" && group.visible;
     const opacity = this.modelOpacity * (kind.translucent ? 0.4 : 1);
     Object.assign(surface.material, { opacity, transparent: opacity < 1, depthWrite: opacity === 1 });
     surface.renderOrder = opacity < 1 ? 1 : 0;
     rim.material.opacity = this.modelOpacity;
-    rim.renderOrder = 2;
-    if (!rim.visible || !group.visible) return;
+    if (!rim.visible) return;
     const local = eye.clone().applyMatrix4(new THREE.Matrix4().getInverse(group.matrix));
     rim.geometry.dispose();
     rim.geometry = new THREE.BufferGeometry();
-    rim.geometry.setAttribute("position", new THREE.BufferAttribute(Meshes.outline(model.mesh, local.toArray()), 3));
+    const clip = this.camera.projectionMatrix.clone().multiply(this.camera.matrixWorldInverse).multiply(group.matrix);
+    const strips = Meshes.strips(Meshes.outline(model.mesh, local.toArray()), clip.elements, this.canvas.clientWidth, this.canvas.clientHeight, OUTLINE_PX);
+    rim.geometry.setAttribute("position", new THREE.BufferAttribute(strips, 3));
   }
 
   drawImage({ view, quad, flat }) {
@@ -219,7 +233,7 @@ class SceneView {
     quad.scale.set(sx, sy, 1);
     quad.position.set(x, y, 0);
     quad.material.opacity = this.imageOpacity;
-    this.renderer.render(flat, SceneView.plain || (SceneView.plain = new THREE.Camera()));
+    this.renderer.render(flat, SceneView.plain);
   }
 
   // Where the camera that is looked through shows a point of the world, in pixels of its image. For tests.
@@ -230,8 +244,20 @@ class SceneView {
     return [((at.x - x) / sx + 1) / 2 * view.width_px - 0.5, (1 - (at.y - y) / sy) / 2 * view.height_px - 0.5];
   }
 
+  // Gives back the graphics card's memory of what was shown.
+  release() {
+    for (const scene of this.world ? [this.world, this.rims, ...this.views.map((view) => view.flat)] : []) {
+      scene.traverse((item) => {
+        if (item.geometry) item.geometry.dispose();
+        if (item.material && item.material.map) item.material.map.dispose();
+        if (item.material) item.material.dispose();
+      });
+    }
+  }
+
   dispose() {
     if (!this.renderer) return;
+    this.release();
     cancelAnimationFrame(this.pending);
     this.renderer.dispose();
     this.renderer.forceContextLoss();
