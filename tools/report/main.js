@@ -93,7 +93,7 @@ const Page = (() => {
     const sections = [
       has((cell) => cell.pictures.length) && section("pictures", "Pictures", many ? "Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches." : "Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.", picker(), places.pictures,
         data.is_run && data.cells[0] && el("details", { open: true }, el("summary", {}, "All pictures"), Pictures.gallery(data, data.cells[0]))),
-      has((cell) => cell.scene) && section("scene", "In three dimensions", "The model in the pose that was found, in the true one and at the start, among the X-rays or through the eye of one.", picker(), places.scene),
+      has((cell) => cell.scene) && section("scene", "3D view", "The model in the pose that was found, in the true one and at the start, among the X-rays or through the eye of one.", picker(), places.scene),
       has((cell) => (cell.convergence || []).length) && section("convergence", "Convergence", "The cost that the optimizer had reached, against the evaluations it took.", picker(), el("div", { class: "toolbar" }, each()), many && Plots.legend(data.variants), places.convergence),
       has((cell) => (cell.landscape || []).length) && section("landscape", "Cost landscapes", "The cost about the result along each axis; the mark is the lowest. A mark off zero, a second valley or a flat floor says where the cost misleads.", picker(), el("div", { class: "toolbar" }, each()), many && Plots.legend(data.variants), places.landscape),
     ].filter(Boolean);
