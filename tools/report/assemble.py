@@ -1,0 +1,53 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: Apache-2.0
+"""Joins the template, style, scripts, three.js and a report's data into one HTML file that needs nothing else.
+
+    tools/report/assemble.py data.json report.html
+
+Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is replaced by the
+file or the data that it names, so the template also says in which order the scripts come.
+"""
+import argparse
+import json
+import pathlib
+import re
+import sys
+
+FOLDER = pathlib.Path(__file__).resolve().parent
+THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's libjs-three
+
+
+def script(path):
+    text = path.read_text()
+    if re.search(r"</script|<!--", text, re.IGNORECASE):
+        raise SystemExit("%s contains '</script' or '<!--', which would end the script too early" % path)
+    return "<script>\n%s</script>" % text
+
+
+def assemble(data, three=THREE):
+    """The page's text. Without three.js the page says what is missing and shows all but the 3D view."""
+    def part(marker):
+        kind, name = marker.group(1), marker.group(2)
+        if kind == "data":
+            return '<script type="application/json" id="data">%s</script>' % json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+        if kind == "style":
+            return "<style>\n%s</style>" % (FOLDER / name).read_text()
+        path = three if name == "three.min.js" else FOLDER / name
+        return script(path) if path.exists() or path != three else ""
+
+    return re.sub(r"<!-- marrow:(data|style|script)(?: (\S+))? -->", part, (FOLDER / "report.html").read_text())
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=pathlib.Path, help="JSON, as data.js describes it")
+    parser.add_argument("report", type=pathlib.Path, help="the HTML file to write")
+    parser.add_argument("--three", type=pathlib.Path, default=THREE, help="three.min.js (default: %(default)s)")
+    arguments = parser.parse_args()
+    if not arguments.three.exists():
+        print("%s is missing: the report will have no 3D view. Install the Debian package libjs-three or give --three." % arguments.three, file=sys.stderr)
+    arguments.report.write_text(assemble(json.loads(arguments.data.read_text()), arguments.three))
+
+
+if __name__ == "__main__":
+    main()

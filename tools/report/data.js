@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The data of a report: read from <script type="application/json" id="data">, checked, completed and indexed.
+//
+// Contract, version 1. Lengths mm, angles degrees, images px, times s; matrices row-major; base64 arrays little-endian.
+//   marrow, format (1), kind: "comparison" | "run"
+//   experiment: {name, help, file (path of the YAML), text (its content), pipeline_text, seed, started, finished,
+//     command (how to repeat), folder, machine: {cpu, cores, cpu_level}, plugins: [{file, build_id}],
+//     starts_protocol, success_rule, time_rule}                       sentences
+//   variants: [{name, is_baseline, options: {"edges.uses": "edges.canny"}}]
+//   metrics: [{name, label, unit, success_below: number | null}]      lower is better; the first is the main one
+//   cases: ["case-01", ...], starts: ["0", ...]
+//   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
+//     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median}}]
+//   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
+//   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
+//     initial_mtre_mm, seconds, evaluations, cached_nodes, values: [number | null per metric],
+//     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,
+//     landscape: [{axis, unit, offsets: [...], costs: [...]}] | null, scene: id | null, folder}]
+//   pictures: {id: "data:image/jpeg;base64,..."}
+//   geometries: {id: {vertices: base64 float32 xyz, triangles: base64 uint32}}     for meshes that several scenes share
+//   scenes: {id: {meshes: [{name, vertices, triangles} or {name, geometry: id}],
+//     poses: [{mesh: index, name: "result" | "truth" | "start", world_from_model: [16]}],
+//     views: [{name, width_px, height_px, intrinsics: [9], camera_from_world: [16], image: picture id}]}}
+//   graph: {nodes: [{id, uses, options: {}, differs: {variant name: text}}], edges: [{from, to, port}]}
+// A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray source.
+// "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene may be missing.
+"use strict";
+
+const Data = (() => {
+  const FORMAT = 1;
+
+  function complete(data) {
+    for (const name of ["variants", "metrics", "cases", "starts", "summary", "comparisons", "cells"]) data[name] = data[name] || [];
+    for (const name of ["experiment", "pictures", "scenes", "geometries"]) data[name] = data[name] || {};
+    for (const variant of data.variants) variant.options = variant.options || {};
+    for (const cell of data.cells) {
+      cell.values = cell.values || [];
+      cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
+      cell.scene = data.scenes[cell.scene] ? cell.scene : null;
+    }
+    return data;
+  }
+
+  // Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
+  function index(data) {
+    const key = (caseIndex, start) => caseIndex + "/" + start;
+    data.is_run = data.kind === "run";
+    data.baseline = data.variants.findIndex((variant) => variant.is_baseline);
+    data.pairs = [];
+    const byKey = new Map();
+    for (const cell of data.cells) {
+      const name = key(cell.case, cell.start);
+      if (!byKey.has(name)) {
+        byKey.set(name, { case: cell.case, start: cell.start, cells: [] });
+        data.pairs.push(byKey.get(name));
+      }
+      byKey.get(name).cells[cell.variant] = cell;
+    }
+    data.pairOf = (cell) => byKey.get(key(cell.case, cell.start));
+    data.lookedAt = data.pairs.filter((pair) => pair.cells.some(hasMaterial));
+    data.byId = new Map(data.cells.map((cell) => [String(cell.id), cell]));
+    data.variantIndex = (variant) => (typeof variant === "number" ? variant : data.variants.findIndex((item) => item.name === variant));
+    return data;
+  }
+
+  const hasMaterial = (cell) => Boolean(cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
+
+  function load() {
+    const data = JSON.parse(document.getElementById("data").textContent);
+    if (!(data.format <= FORMAT)) {
+      throw new Error("This page reads format " + FORMAT + " of a report's data, the data are in format " + data.format + ": make the report again with one version of marrow.");
+    }
+    return index(complete(data));
+  }
+
+  // What became of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
+  function outcome(cell) {
+    if (cell.status === "failed") return "failed";
+    if (cell.success === true) return "success";
+    return cell.success === false ? "missed" : "done";
+  }
+
+  // Wilson's 95 % interval of a proportion.
+  function wilson(count, of) {
+    if (!of) return { count, of, rate: null, low: null, high: null };
+    const z = 1.959964, rate = count / of, shrink = 1 + z * z / of;
+    const centre = (rate + z * z / (2 * of)) / shrink;
+    const half = z * Math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of)) / shrink;
+    return { count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half) };
+  }
+
+  // Quantile of sorted numbers, linear between the two neighbours.
+  function quantile(sorted, fraction) {
+    if (!sorted.length) return null;
+    const position = fraction * (sorted.length - 1), low = Math.floor(position);
+    return sorted[low] + (position - low) * ((sorted[low + 1] ?? sorted[low]) - sorted[low]);
+  }
+
+  // The finite values of a metric, one variant's, with their cells.
+  function valuesOf(data, variant, metric) {
+    return data.cells.filter((cell) => cell.variant === variant && cell.status !== "failed" && Number.isFinite(cell.values[metric]))
+      .map((cell) => ({ value: cell.values[metric], cell }));
+  }
+
+  // Variant against baseline: the (case, start) pairs in which both gave a value.
+  function pairedValues(data, variant, metric) {
+    const finite = (cell) => cell && cell.status !== "failed" && Number.isFinite(cell.values[metric]);
+    return data.pairs.filter((pair) => finite(pair.cells[variant]) && finite(pair.cells[data.baseline]))
+      .map((pair) => ({ base: pair.cells[data.baseline].values[metric], value: pair.cells[variant].values[metric], cell: pair.cells[variant] }));
+  }
+
+  const pairName = (data, pair) => data.cases[pair.case] + ", start " + data.starts[pair.start];
+  const cellName = (data, cell) => data.variants[cell.variant].name + ", " + pairName(data, cell);
+
+  return { load, outcome, wilson, quantile, valuesOf, pairedValues, hasMaterial, pairName, cellName };
+})();
