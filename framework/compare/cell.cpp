@@ -93,42 +93,56 @@ CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue,
 
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
+Pipeline CellRunner::simulation_of(std::size_t index) const {
+  PipelineArguments arguments;
+  arguments.inputs = experiment_.cases[index].inputs;
+  Pipeline pipeline = checked(experiment_.simulation, arguments, catalogue_);
+  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
+  return pipeline;
+}
+
+fs::path CellRunner::case_place(std::size_t index) const {
+  const ExperimentCase& one = experiment_.cases[index];
+  if (!one.folder.empty()) return one.folder;
+  Hasher hasher;
+  add_pipeline(hasher, simulation_of(index), catalogue_);
+  hasher.add(one.seed);
+  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" / experiment_.simulation_output;
+}
+
 fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
   if (!one.folder.empty()) return one.folder;
-  const auto known = case_folders_.find(index);
-  if (known != case_folders_.end()) return known->second;
-
-  PipelineArguments arguments;
-  arguments.inputs = one.inputs;
-  Pipeline pipeline = checked(experiment_.simulation, arguments, catalogue_);
-  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
-  Hasher hasher;
-  add_pipeline(hasher, pipeline, catalogue_);
-  hasher.add(one.seed);
-  const fs::path cases = (store_ ? store_->folder() : folder_) / "cases", folder = cases / hasher.digest().hex();
-  if (!fs::exists(folder)) {
-    RunSettings settings;
-    settings.seed = one.seed;
-    settings.threads = threads_;
-    settings.store = nullptr;  // the folder itself is what is kept
-    const fs::path temporary = folder.string() + ".tmp-" + std::to_string(getpid()) + "-0";
-    fs::remove_all(temporary);
-    const RunResult result = run_pipeline(pipeline, catalogue_, settings);
-    if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
-    RunFolder written(temporary, pipeline);
-    for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
-      if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
-    std::error_code error;
-    fs::rename(temporary, folder, error);
-    if (error) fs::remove_all(temporary);  // another process was quicker
-    if (!fs::exists(folder)) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
-  }
-  return case_folders_[index] = folder / "outputs" / experiment_.simulation_output;
+  fs::path& place = case_folders_[index];
+  if (!place.empty()) return place;
+  const fs::path outputs = case_place(index), folder = outputs.parent_path().parent_path();
+  if (!fs::exists(outputs)) simulate(index, folder);
+  std::error_code ignored;
+  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now
+  return place = outputs;
 }
 
-Pipeline CellRunner::pipeline_of(const CellIndex& cell) {
-  Pipeline pipeline = checked(experiment_.pipeline, arguments_of(experiment_, cell, case_folder(cell.case_index)), catalogue_);
+void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
+  const ExperimentCase& one = experiment_.cases[index];
+  const Pipeline pipeline = simulation_of(index);
+  RunSettings settings;
+  settings.seed = one.seed;
+  settings.threads = threads_;
+  const fs::path temporary = folder.string() + ".tmp-" + std::to_string(getpid()) + "-0";
+  fs::remove_all(temporary);
+  const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+  if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
+  RunFolder written(temporary, pipeline);
+  for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
+    if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
+  std::error_code error;
+  fs::rename(temporary, folder, error);
+  if (error) fs::remove_all(temporary);  // another process was quicker
+  if (!fs::exists(folder)) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
+}
+
+Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_folder) const {
+  Pipeline pipeline = checked(experiment_.pipeline, arguments_of(experiment_, cell, case_folder), catalogue_);
   std::set<std::string> wanted(experiment_.pictures.begin(), experiment_.pictures.end());
   for (const MetricChoice& metric : experiment_.metrics) wanted.insert(metric.path.substr(0, metric.path.find('.')));
   if (!experiment_.initial_error.empty()) wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
@@ -141,7 +155,7 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell) {
 
 std::string CellRunner::key_of(const CellIndex& cell) {
   Hasher hasher;
-  const Pipeline pipeline = pipeline_of(cell);
+  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index));
   add_pipeline(hasher, pipeline, catalogue_);
   hasher.add(std::uint64_t(1));  // the seed of the run
   std::string& content = case_keys_[cell.case_index];
@@ -173,7 +187,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   row.case_name = experiment_.cases[cell.case_index].name;
   row.start = experiment_.starts[cell.start].name;
   try {
-    const Pipeline pipeline = pipeline_of(cell);
+    const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index));
     row.key = key_of(cell);
     const fs::path folder = folder_of(cell);
     fs::remove_all(folder);

@@ -242,6 +242,7 @@ class Reader {
   void read_simulation(const YamlEntry& section) {
     static const std::vector<std::string> kKeys{"pipeline", "output", "seeds", "inputs", "draw", "seed_input"};
     std::vector<std::int64_t> seeds;
+    bool has_seeds = false;
     std::vector<std::pair<std::string, std::string>> inputs;
     std::vector<std::pair<std::string, std::array<double, 2>>> ranges;
     std::vector<std::string> seed_inputs;
@@ -250,7 +251,10 @@ class Reader {
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "simulate", &kKeys)) {
       if (entry.key == "pipeline") experiment_.simulation = (folder_ / yaml_.text(entry.value, entry.place, "pipeline").value_or("")).lexically_normal();
       if (entry.key == "output") experiment_.simulation_output = yaml_.text(entry.value, entry.place, "output").value_or("");
-      if (entry.key == "seeds") seeds = read_seeds(entry);
+      if (entry.key == "seeds") {
+        has_seeds = true;
+        seeds = read_seeds(entry);
+      }
       if (entry.key == "inputs") inputs = scalars(entry);
       if (entry.key == "draw")
         for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "draw")) ranges.emplace_back(range.key, read_range(range));
@@ -258,7 +262,7 @@ class Reader {
         for (const auto& [name, place] : texts(entry)) seed_inputs.push_back(name);
     }
     if (experiment_.simulation.empty()) yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
-    if (seeds.empty()) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
+    if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     for (std::int64_t seed : seeds) add_simulated(std::uint64_t(seed), inputs, ranges, seed_inputs);
   }
 

@@ -161,6 +161,15 @@ void list_keys(const Leaf& leaf, std::vector<Digest>& keys) {
   for (const Leaf& item : leaf.items) list_keys(item, keys);
 }
 
+std::uint64_t bytes_below(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) return fs::file_size(path, error);
+  std::uint64_t sum = 0;
+  for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error))
+    if (at->is_regular_file(error)) sum += at->file_size(error);
+  return sum;
+}
+
 bool is_temporary(const fs::path& file) { return file.filename().string().find(".tmp-") != std::string::npos; }
 
 /// Whether the process that named a temporary file has ended.
@@ -267,7 +276,7 @@ std::vector<Store::Entry> Store::entries() const {
   std::error_code error;
   for (fs::recursive_directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
     const auto key = digest_of_hex(at->path().filename().string());
-    if (!key || at->path().parent_path().filename() == "last") continue;
+    if (!key || !at->is_regular_file(error) || at->path().parent_path().filename() == "last") continue;
     const File file(at->path());
     if (!file.is_open()) continue;
     Entry entry{*key, file.size(), {}, {}, {}};
@@ -287,21 +296,33 @@ std::vector<Store::Entry> Store::entries() const {
 }
 
 Store::Freed Store::collect(std::uint64_t keep_bytes) const {
-  Freed freed;
-  std::error_code error;
+  struct Kept {
+    fs::path path;
+    std::uint64_t bytes = 0;
+    fs::file_time_type used;
+  };
+  std::vector<Kept> all;
   std::vector<fs::path> abandoned;
-  for (fs::recursive_directory_iterator at(folder_, error), end; !error && at != end; at.increment(error))
-    if (is_temporary(at->path()) && is_abandoned(at->path())) abandoned.push_back(at->path());
-  std::error_code ignored;
-  for (const fs::path& file : abandoned) fs::remove(file, ignored);
-  const std::vector<Entry> all = entries();
+  std::error_code error, ignored;
+  for (fs::recursive_directory_iterator at(folder_, error), end; !error && at != end; at.increment(error)) {
+    if (is_temporary(at->path())) {
+      if (is_abandoned(at->path())) abandoned.push_back(at->path());
+      if (at->is_directory(ignored)) at.disable_recursion_pending();
+    } else if (digest_of_hex(at->path().filename().string()) && at->path().parent_path().filename() != "last") {
+      all.push_back({at->path(), bytes_below(at->path()), fs::last_write_time(at->path(), ignored)});
+      if (at->is_directory(ignored)) at.disable_recursion_pending();
+    }
+  }
+  for (const fs::path& path : abandoned) fs::remove_all(path, ignored);
+  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.used < b.used; });
   std::uint64_t total = 0;
-  for (const Entry& entry : all) total += entry.bytes;
-  for (const Entry& entry : all) {
+  for (const Kept& one : all) total += one.bytes;
+  Freed freed;
+  for (const Kept& one : all) {
     if (total <= keep_bytes) break;
-    drop(entry.key);
-    total -= entry.bytes;
-    freed.bytes += entry.bytes;
+    fs::remove_all(one.path, ignored);
+    total -= one.bytes;
+    freed.bytes += one.bytes;
     ++freed.entries;
   }
   return freed;

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the command line share: where things are, and how to run the program."""
+import atexit
 import os
 import pathlib
 import shutil
@@ -12,6 +13,9 @@ SOURCE = pathlib.Path(sys.argv[1])
 BUILD = pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
 TEST_PLUGINS = BUILD / "tests" / "plugins"
+CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
+atexit.register(shutil.rmtree, CACHE, ignore_errors=True)
+os.environ["MARROW_CACHE"] = str(CACHE)
 
 
 def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None):

@@ -48,6 +48,7 @@ int main(int argc, char** argv) {
   compare_command->add_option("--jobs", compare_request.jobs, "cells at once (default: as many as there are cores)")->check(CLI::Range(1, 1024));
   compare_command->add_option("--time-limit", compare_request.time_limit_s, "seconds that one cell may take")->capture_default_str()->check(CLI::PositiveNumber);
   compare_command->add_option("--memory-limit", compare_request.memory_limit_mb, "megabytes that one cell may use")->capture_default_str()->check(CLI::PositiveNumber);
+  compare_command->add_flag("--dry-run", compare_request.dry_run, "say what there is to do, and how long that took before");
   compare_command->add_flag("--quiet", compare_request.quiet, "no progress");
   compare_command->callback([&] { code = compare_variants(compare_request); });
 

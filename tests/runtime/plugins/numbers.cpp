@@ -85,6 +85,8 @@ Metrics warn(marrow::Context& context) {
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
+struct DisplacedOptions { std::array<double, 3> rotation_deg{}, translation_mm{}; };
+Metrics displaced(const DisplacedOptions& options) { return number(options.translation_mm[0]); }
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
@@ -106,11 +108,14 @@ MARROW_PLUGIN(plugin) {
       .option("value", &ConstantOptions::value, "largest number that passes");
   plugin.node("test.draw", draw).summary("Random").random().out("number", "from the seed");
   plugin.node("test.work", work).summary("Keeps a core busy").in("after", "waits for it").out("number", "1")
-      .option("value", &ConstantOptions::value, "seconds");
+      .option("value", &ConstantOptions::value, "seconds")
+      .option("path", &ConstantOptions::path, "a file that counts by its content");
   plugin.node("test.adder", adder).summary("A function").in("amount", "what it adds").out("adder", "adds");
   plugin.node("test.failing_adder", failing_adder).summary("Fails").in("amount", "anything").out("adder", "none");
   plugin.node("test.warn", warn).summary("Warns").out("number", "1");
   plugin.node("test.apply", apply).summary("Calls a function").in("adder", "function").in("to", "number").out("number", "result");
+  plugin.node("test.displaced", displaced).summary("Takes a displacement").out("number", "its first part")
+      .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation").option("translation_mm", &DisplacedOptions::translation_mm, "translation");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
   plugin.node("evaluate.test", judge).summary("Sees the truth").in("of", "number").in("truth", "truth").out("number", "the same");
 }

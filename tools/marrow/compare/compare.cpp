@@ -210,6 +210,11 @@ int compare_variants(const CompareRequest& request) {
   const Catalogue catalogue;
   Experiment experiment;
   if (!load(request, catalogue, experiment)) return 2;
+  if (request.dry_run) {
+    const Store store;
+    print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder_of(request, experiment));
+    return 0;
+  }
   return Comparison(request, catalogue, experiment).run();
 }
 

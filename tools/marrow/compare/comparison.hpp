@@ -26,6 +26,9 @@ int compare_variants(const CompareRequest& request);
 int run_cell(const CompareRequest& request, const std::string& id);
 int worker(const CompareRequest& request);
 
+/// Prints what a comparison would do, and calls no node.
+void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store, const std::filesystem::path& folder);
+
 /// A figure of merit of one variant, over its cells that are done.
 struct VariantFigure {
   std::size_t count = 0;

@@ -43,6 +43,8 @@ class CellRunner {
  public:
   CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder, int threads);
 
+  /// Where a case lies, or will lie once it was simulated.
+  std::filesystem::path case_place(std::size_t case_index) const;
   /// The folder of a case; a simulated one is made where it is not in the store yet. Throws Error when that fails.
   std::filesystem::path case_folder(std::size_t case_index);
   /// The row that is there already, where it is whole and of the same experiment, data and plugins.
@@ -54,9 +56,12 @@ class CellRunner {
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
   std::string key_of(const CellIndex& cell);
+  /// The pipeline of a cell, with the outputs that the experiment asks for.
+  Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder) const;
 
  private:
-  Pipeline pipeline_of(const CellIndex& cell);
+  Pipeline simulation_of(std::size_t case_index) const;
+  void simulate(std::size_t case_index, const std::filesystem::path& folder) const;
 
   const Experiment& experiment_;
   const Catalogue& catalogue_;

@@ -58,6 +58,8 @@ class Store {
   std::string save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const;
   /// Removes an entry that turned out to be damaged.
   void drop(const Digest& key) const;
+  /// Folders of simulated cases, by key; made by whoever needs one, and collected like entries.
+  std::filesystem::path cases() const { return folder_ / "cases"; }
 
   /// What a node of a pipeline last came to, for saying why it runs again. `place` names pipeline, node and item.
   struct Last {
@@ -81,7 +83,8 @@ class Store {
     std::size_t entries = 0;
     std::uint64_t bytes = 0;
   };
-  /// Removes the least recently used entries until the rest is at most `keep_bytes`, and what killed processes left behind.
+  /// Removes the least recently used entries and simulated cases until the rest is at most `keep_bytes`, and what killed
+  /// processes left behind.
   Freed collect(std::uint64_t keep_bytes) const;
 
  private:

@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Comparisons as a person runs them: what goes wrong in one cell stays there, and an interrupted one goes on."""
+import csv
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import time
+
+from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+
+PIPELINE = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  shared: {uses: test.work, with: {value: 0.05, path: $case}}
+  m: {uses: test.misbehave, in: {a: shared}}
+outputs: {number: m}
+"""
+HEAD = """experiment: 1
+pipeline: p.yaml
+cases: {folders: [cases/*]}
+metrics: [number.value]
+success: {number.value: 10}
+"""
+
+
+class Compare(Case):
+    def experiment(self, variants, cases=3):
+        self.write("p.yaml", PIPELINE)
+        for i in range(cases):
+            (self.scratch / "cases" / str(i)).mkdir(parents=True)
+            self.write("cases/%d/data" % i, "case %d" % i)
+        return self.write("e.yaml", HEAD + "variants:\n" + "".join("  %s: %s\n" % item for item in variants.items()))
+
+    def compare(self, *arguments, cache="cache", **more):
+        return marrow("compare", *arguments, plugins=[TEST_PLUGINS], extra_environment={"MARROW_CACHE": str(self.scratch / cache)}, **more)
+
+    def rows(self, out):
+        with open(self.scratch / out / "cells.csv", newline="") as stream:
+            return {row["cell"]: row for row in csv.DictReader(stream)}
+
+    def results(self, out):
+        """Of each cell all but times and how often it was tried."""
+        return {name: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for name, row in self.rows(out).items()}
+
+    def test_what_goes_wrong_in_a_cell_stays_there(self):
+        path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
+                                "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)
+        result = self.compare(path, "--out", self.scratch / "out", "--time-limit", 2, "--memory-limit", 1000)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        rows = self.rows("out")
+        self.assertEqual(len(rows), 14)
+        reasons = {"crash": "crashed in node 'm': Segmentation fault", "hang": "its process in node 'm' took longer than 2 s",
+                   "memory": "its process in node 'm' used more than 1000 MB of memory", "nan": "'number.value' is nan, not a finite number",
+                   "error": "node 'm' (test.misbehave) failed: it will not do", "exit": "ended in node 'm' with exit code 3"}
+        for name, row in rows.items():
+            variant = name.split("/")[0]
+            self.assertEqual(row["status"], "done" if variant == "good" else "failed", row)
+            self.assertEqual(row["reason"], reasons.get(variant, ""))
+            self.assertEqual(row["tries"], "2" if variant in ("crash", "hang", "memory", "exit") else "1", row)
+            self.assertEqual(row["success"], "1" if variant == "good" else "0")
+        self.assertIn("crash/0/0: crashed in node 'm'", result.stdout)
+        self.assertRegex(result.stdout, r"good \*\s+2\s+0\s+100.0 %")
+        self.assertRegex(result.stdout, r"crash\s+2\s+2\s+0.0 %")
+
+    def test_what_variants_share_is_computed_once_and_read_back_the_second_time(self):
+        path = self.experiment({name: "{m.value: %d}" % i for i, name in enumerate("abcd")}, cases=5)
+        first = self.compare(path, "--out", self.scratch / "one")
+        self.assertEqual(first.returncode, 0, first.stderr)
+        self.assertIn("20 cells: 4 variants, 5 cases, 1 starts; 0 were there already", first.stdout)
+        rows = [json.loads(line) for line in (self.scratch / "one" / "cells.jsonl").read_text().splitlines()]
+        self.assertEqual(sum(row["nodes"]["shared"]["made"] for row in rows), 5, "once a case")
+        self.assertEqual(sum(row["nodes"]["shared"]["cached"] for row in rows), 15)
+        second = self.compare(path, "--out", self.scratch / "two")
+        self.assertIn("calls of nodes: 0 made", second.stdout)
+        self.assertEqual(self.results("one"), self.results("two"))
+        again = self.compare(path, "--out", self.scratch / "one")
+        self.assertIn("20 were there already", again.stdout)
+
+    def test_killed_at_any_moment_and_continued(self):
+        path = self.experiment({name: "{m.value: %d}" % i for i, name in enumerate("abc")}, cases=6)
+        whole = self.compare(path, "--out", self.scratch / "whole", cache="other")
+        self.assertEqual(whole.returncode, 0, whole.stderr)
+        chance = random.Random(3)
+        environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
+        killed = 0
+        for _ in range(20):
+            process = subprocess.Popen([str(MARROW), "compare", str(path), "--out", str(self.scratch / "out"), "--quiet"], env=environment,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            time.sleep(chance.uniform(0.01, 0.3))
+            process.send_signal(signal.SIGKILL)
+            killed += process.wait() == -signal.SIGKILL
+            if chance.random() < 0.3:  # begin anew, so that every moment is met
+                shutil.rmtree(self.scratch / "out", ignore_errors=True)
+                shutil.rmtree(self.scratch / "cache", ignore_errors=True)
+        self.assertGreater(killed, 5)
+        continued = self.compare(path, "--out", self.scratch / "out")
+        self.assertEqual(continued.returncode, 0, continued.stderr)
+        self.assertEqual(self.results("out"), self.results("whole"))
+
+    def test_two_at_once_on_one_cache(self):
+        path = self.experiment({name: "{m.value: %d}" % i for i, name in enumerate("abc")}, cases=5)
+        environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
+        both = [subprocess.Popen([str(MARROW), "compare", str(path), "--out", str(self.scratch / name), "--quiet"], env=environment,
+                                 stdout=subprocess.DEVNULL) for name in ("one", "two")]
+        self.assertEqual([process.wait() for process in both], [0, 0])
+        self.assertEqual(self.results("one"), self.results("two"))
+
+    def test_one_cell_by_itself(self):
+        path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
+        environment = {"MARROW_CACHE": str(self.scratch / "cache")}
+        result = marrow("cell", path, "b/1/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(json.loads(result.stdout)["values"], [6])
+        self.assertTrue((self.scratch / "out" / "cells" / "b" / "1" / "0" / "run.json").exists())
+        whole = self.compare(path, "--out", self.scratch / "out")
+        self.assertIn("1 were there already", whole.stdout)
+        wrong = marrow("cell", path, "b/l/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment)
+        self.assertEqual(wrong.returncode, 2)
+        self.assertIn("the experiment has no cell 'b/l/0'; did you mean", wrong.stderr)
+
+    def test_dry_run_says_what_there_is_to_do(self):
+        path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
+        before = self.compare(path, "--dry-run")
+        self.assertEqual(before.returncode, 0, before.stderr)
+        self.assertIn("6 cells: 2 variants, 3 cases, 1 starts", before.stdout)
+        self.assertIn("12 evaluations of nodes: 3 shared, 0 cached, 9 to make", before.stdout)
+        self.assertFalse((self.scratch / "runs").exists())
+        self.compare(path, "--out", self.scratch / "out")
+        after = self.compare(path, "--dry-run")
+        self.assertIn("12 evaluations of nodes: 3 shared, 9 cached, 0 to make", after.stdout)
+
+    def test_faults_come_before_anything_runs(self):
+        path = self.experiment({"a": "{m.vlaue: 1}"})
+        result = self.compare(path, "--out", self.scratch / "out")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("e.yaml:7:7: error: 'test.misbehave' has no option 'vlaue'", result.stderr)
+        self.assertFalse((self.scratch / "out").exists())
+
+    def test_another_folder_is_not_touched(self):
+        path = self.experiment({"a": "{}"})
+        (self.scratch / "mine").mkdir()
+        self.write("mine/file", "keep")
+        result = self.compare(path, "--out", self.scratch / "mine")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("holds something else than a comparison", result.stderr)
+        self.assertEqual([entry.name for entry in (self.scratch / "mine").iterdir()], ["file"])
+
+
+if __name__ == "__main__":
+    main()
