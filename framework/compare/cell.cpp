@@ -141,21 +141,23 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   if (!fs::exists(folder)) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
 }
 
-Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_folder) const {
+Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_folder, Depth depth) const {
   Pipeline pipeline = checked(experiment_.pipeline, arguments_of(experiment_, cell, case_folder), catalogue_);
-  std::set<std::string> wanted(experiment_.pictures.begin(), experiment_.pictures.end());
+  std::set<std::string> wanted;
+  if (depth == Depth::pictures) wanted.insert(experiment_.pictures.begin(), experiment_.pictures.end());
   for (const MetricChoice& metric : experiment_.metrics) wanted.insert(metric.path.substr(0, metric.path.find('.')));
   if (!experiment_.initial_error.empty()) wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
     const PortInfo& port = pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
-    return !wanted.contains(output.name) && port.type != TypeInfo::of<Pose>();
+    const bool is_shown = depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
+    return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>();
   });
   return pipeline;
 }
 
 std::string CellRunner::key_of(const CellIndex& cell) {
   Hasher hasher;
-  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index));
+  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   add_pipeline(hasher, pipeline, catalogue_);
   hasher.add(std::uint64_t(1));  // the seed of the run
   std::string& content = case_keys_[cell.case_index];
@@ -163,7 +165,6 @@ std::string CellRunner::key_of(const CellIndex& cell) {
   hasher.add(content);
   for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
   hasher.add(experiment_.initial_error);
-  hasher.add(experiment_.pictures);
   return hasher.digest().hex();
 }
 
@@ -180,6 +181,21 @@ std::optional<CellRow> CellRunner::finished(const CellIndex& cell) {
   return std::nullopt;
 }
 
+RunResult CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
+                               const std::function<void(const RunEvent&)>& observer) {
+  fs::remove_all(folder);
+  RunFolder written(folder, pipeline);
+  RunSettings settings;
+  settings.threads = threads_;
+  settings.store = store_;
+  settings.remember = false;
+  settings.observer = observer;
+  RunResult result = run_pipeline(pipeline, catalogue_, settings);
+  const auto outputs = written.write_outputs(pipeline, result, catalogue_);
+  written.write_record(pipeline, result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
+  return result;
+}
+
 CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   CellRow row;
   row.id = cell_id(experiment_, cell);
@@ -187,28 +203,14 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   row.case_name = experiment_.cases[cell.case_index].name;
   row.start = experiment_.starts[cell.start].name;
   try {
-    const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index));
+    const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
     row.key = key_of(cell);
-    const fs::path folder = folder_of(cell);
-    fs::remove_all(folder);
-    RunFolder written(folder, pipeline);
-    RunSettings settings;
-    settings.threads = threads_;
-    settings.store = store_;
-    settings.remember = false;
-    settings.observer = observer;
-    const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+    const RunResult result = run_into(folder_of(cell), pipeline, cell, observer);
     for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
       const NodeRecord& node = result.nodes[i];
       if (!node.calls && !node.cached) continue;
       row.nodes[pipeline.nodes[i].id] = {node.calls, node.cached, node.seconds + node.cached_seconds};
-      row.seconds += node.seconds + node.cached_seconds;
     }
-    const auto outputs = written.write_outputs(pipeline, result, catalogue_);
-    written.write_record(pipeline, result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
-    for (const RunFolder::Written& output : outputs)
-      if (std::find(experiment_.pictures.begin(), experiment_.pictures.end(), output.output) != experiment_.pictures.end())
-        for (const std::string& file : output.files) row.files.push_back((fs::path("cells") / row.id / file).string());
     row.failed = reason_of(pipeline, result);
     for (const PipelineOutput& output : pipeline.outputs) row.evaluations += evaluations_in(value_of(result, output.source));
     for (const MetricChoice& metric : experiment_.metrics) {
@@ -224,6 +226,49 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
   return row;
+}
+
+fs::path CellRunner::pictures_of(const CellIndex& cell) const { return folder_ / "pictures" / cell_id(experiment_, cell); }
+
+void CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
+  const fs::path folder = pictures_of(cell);
+  const std::string key = key_of(cell) + " " + file_digest(experiment_.file).hex();
+  std::string found;
+  std::getline(std::ifstream(folder / "key.txt") >> std::ws, found);
+  if (found == key) return;
+  run_into(folder, pipeline_of(cell, case_folder(cell.case_index), Depth::pictures), cell, observer);
+  std::ofstream(folder / "key.txt") << key << '\n';
+}
+
+double CellRunner::time(const CellIndex& cell) {
+  const fs::path data = case_folder(cell.case_index);
+  const std::string& case_name = experiment_.cases[cell.case_index].name;
+  const Pipeline pipeline = pipeline_of(cell, data, Depth::figures);
+  Hasher hasher;
+  hasher.add(std::string("seconds"));
+  hasher.add(key_of(cell));
+  hasher.add(std::int64_t(threads_));
+  const Digest key = hasher.digest();
+  if (const auto known = store_ ? store_->find(key) : std::nullopt) return known->outputs.at(0).as<Metrics>().items.at(0).value;
+
+  std::map<Digest, std::size_t> variants_with;
+  for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
+    const auto others = histories(pipeline_of({v, cell.case_index, cell.start}, data, Depth::figures), case_name);
+    for (const Digest& one : std::set<Digest>(others.begin(), others.end())) ++variants_with[one];
+  }
+  RunSettings settings;
+  settings.threads = threads_;
+  settings.store = store_;
+  settings.remember = false;
+  const std::vector<Digest> own = histories(pipeline, case_name);
+  for (std::size_t i = 0; i < own.size(); ++i)
+    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size()) settings.made_anew.insert(pipeline.nodes[i].id);
+  const RunResult result = run_pipeline(pipeline, catalogue_, settings);
+  if (result.failed()) throw Error(reason_of(pipeline, result));
+  Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", result.seconds, "s"}}}));
+  seconds.key = seconds.type.content->hash(seconds.data.get());
+  if (store_) store_->save(key, {seconds}, {"time of " + cell_id(experiment_, cell), {}, {}, {}, false, 0, result.seconds, {}});
+  return result.seconds;
 }
 
 void CellRunner::write(const CellRow& row) const {

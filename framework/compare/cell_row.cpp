@@ -24,7 +24,7 @@ bool CellRow::is_success(const Experiment& experiment) const {
 std::string to_json(const CellRow& row) {
   json j = {{"id", row.id}, {"variant", row.variant}, {"case", row.case_name}, {"start", row.start}, {"status", row.failed.empty() ? "done" : "failed"},
             {"tries", row.tries}, {"values", json::array()}, {"units", row.units}, {"initial_error", of(row.initial_error)},
-            {"seconds", row.seconds}, {"evaluations", row.evaluations}, {"nodes", json::object()}, {"files", row.files}, {"key", row.key}};
+            {"seconds", of(row.seconds)}, {"evaluations", row.evaluations}, {"nodes", json::object()}, {"key", row.key}};
   if (!row.failed.empty()) j["reason"] = row.failed;
   for (const auto& value : row.values) j["values"].push_back(of(value));
   for (const auto& [name, calls] : row.nodes) j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
@@ -44,10 +44,9 @@ CellRow row_from_json(const std::string& text) {
     for (const json& value : j.at("values")) row.values.push_back(number(value));
     row.units = j.at("units").get<std::vector<std::string>>();
     row.initial_error = number(j.at("initial_error"));
-    row.seconds = j.at("seconds");
+    row.seconds = number(j.at("seconds"));
     row.evaluations = j.at("evaluations");
     for (const auto& [name, calls] : j.at("nodes").items()) row.nodes[name] = {calls.at("made"), calls.at("cached"), calls.at("seconds")};
-    row.files = j.at("files").get<std::vector<std::string>>();
     row.key = j.at("key");
     return row;
   } catch (const json::exception& error) {

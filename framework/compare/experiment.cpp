@@ -433,6 +433,14 @@ class Reader {
 
 }  // namespace
 
+std::vector<CellIndex> cells_of(const Experiment& experiment) {
+  std::vector<CellIndex> cells;
+  for (std::size_t c = 0; c < experiment.cases.size(); ++c)
+    for (std::size_t s = 0; s < experiment.starts.size(); ++s)
+      for (std::size_t v = 0; v < experiment.variants.size(); ++v) cells.push_back({v, c, s});
+  return cells;
+}
+
 std::string cell_id(const Experiment& experiment, const CellIndex& cell) {
   return experiment.variants[cell.variant].name + "/" + experiment.cases[cell.case_index].name + "/" + experiment.starts[cell.start].name;
 }

@@ -196,7 +196,7 @@ void Evaluation::defer(std::size_t node, Call& call, const Recipe& recipe) {
 }
 
 bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
-  if (!settings_.store) return false;
+  if (!settings_.store || settings_.made_anew.contains(pipeline_.nodes[node].id)) return false;
   std::optional<StoredResult> stored = settings_.store->find(recipe.key);
   if (!stored || stored->outputs.size() != pipeline_.nodes[node].info.outputs.size()) return false;
   const auto deferred = std::make_shared<Deferred>(*this, node, call, recipe);

@@ -15,7 +15,7 @@ const std::vector<Kind>& kinds() {
       {"segment", "signed distance field per fragment, negative inside",
        {{"volume", "volume", ""}, {"seeds", "seeds", "fragment"}},
        {{"field", "signed_field", "fragment"}}},
-      {"mesh", "closed surface of a signed field", {{"field", "signed_field", ""}}, {{"mesh", "mesh", ""}}},
+      {"mesh", "closed surface: of a signed field, or made from another one", {{"field", "signed_field", ""}, {"mesh", "mesh", ""}}, {{"mesh", "mesh", ""}}},
       {"project", "draws a model as a view would see it",
        {{"mesh", "mesh", ""}, {"volume", "volume", ""}},
        {{"projector", "projector", ""}}},

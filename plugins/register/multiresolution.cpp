@@ -117,6 +117,17 @@ class Search {
   void go_to(const marrow::RigidTransform& pose) { pose_ = pose; }
   int evaluations() const { return evaluations_; }
 
+  /// The least cost on the way so far; costs of different levels do not compare, so this asks one for all.
+  std::vector<marrow::Pose::Progress> convergence(const marrow::Cost& cost) const {
+    std::vector<marrow::RigidTransform> poses;
+    for (const auto& [evaluations, pose] : path_) poses.push_back(pose);
+    const std::vector<double> values = cost.values(poses);
+    std::vector<marrow::Pose::Progress> steps;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (steps.empty() || values[i] < steps.back().cost) steps.push_back({path_[i].first, values[i]});
+    return steps;
+  }
+
   /// Tries the motions of a scan and returns the best poses that are no neighbours of a better one: the cost has other
   /// minima within their range.
   std::vector<marrow::RigidTransform> scan(const marrow::Cost& cost) {
@@ -163,13 +174,17 @@ class Search {
       context_.check_cancelled();
       return cost.value(pose_at(x));
     };
-    problem.observer = [&](int evaluation, const Eigen::VectorXd&, double) {
+    double least = std::numeric_limits<double>::infinity();
+    problem.observer = [&](int evaluation, const Eigen::VectorXd& x, double value) {
+      if (value < least) note(evaluations_ + evaluation, pose_at(x));
+      least = std::min(least, value);
       if (evaluation % 50 == 0)
         context_.progress(done + share * std::min(1.0, double(evaluation) / options_.max_evaluations), "registration");
     };
     const marrow::MinimisationResult result = optimizer_.minimise(problem);
     evaluations_ += result.evaluations;
     pose_ = pose_at(result.x);
+    path_.push_back({evaluations_, pose_});
     return result.value;
   }
 
@@ -202,12 +217,18 @@ class Search {
   }
 
  private:
+  /// Keeps a pose of the way, one in ten evaluations at most.
+  void note(int evaluations, const marrow::RigidTransform& pose) {
+    if (path_.empty() || evaluations >= path_.back().first + 10) path_.push_back({evaluations, pose});
+  }
+
   const marrow::Optimizer& optimizer_;
   const marrow::FragmentFrame& frame_;
   marrow::RigidTransform pose_;
   const Options& options_;
   marrow::Context& context_;
   int evaluations_ = 0;
+  std::vector<std::pair<int, marrow::RigidTransform>> path_;  ///< after so many evaluations
 };
 
 void check_options(const Options& options) {
@@ -252,6 +273,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   result.stages.add("axial", pose_now());
   search.go_to(best.pose);
   result.pose = pose_now();
+  result.pose.convergence = search.convergence(*levels.back());
 
   if (const auto factor = levels.back()->likelihood_factor(search.pose())) {
     const PredictedCovariance predicted(*levels.back(), search.pose(), initial.frame, *factor);

@@ -49,8 +49,7 @@ bool write_rows(Writer& writer, int width, int height, int channels, int bits, p
 
 }  // namespace
 
-void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
-               const void* pixels) {
+std::string png_of(int width, int height, int channels, Sample sample, const void* pixels) {
   const int bits = sample == Sample::u16 ? 16 : 8;
   const std::size_t row_bytes = std::size_t(width) * std::size_t(channels) * std::size_t(bits / 8);
   std::vector<png_bytep> rows;
@@ -60,9 +59,13 @@ void write_png(const std::filesystem::path& path, int width, int height, int cha
   std::string bytes;
   Writer writer(bytes);
   if (!write_rows(writer, width, height, channels, bits, rows.data()))
-    throw Error(path.string() + ": cannot be written: libpng takes no image of " + std::to_string(width) + " x " +
-                std::to_string(height) + " pixels");
-  write_text_plainly(path, bytes);
+    throw Error("libpng takes no image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels");
+  return bytes;
+}
+
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
+               const void* pixels) {
+  write_text_plainly(path, png_of(width, height, channels, sample, pixels));
 }
 
 }  // namespace marrow::write

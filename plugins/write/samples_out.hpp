@@ -3,6 +3,7 @@
 // The narrow door to ITK for writing: its headers bring an Eigen of their own.
 #include <array>
 #include <filesystem>
+#include <string>
 
 namespace marrow::write {
 
@@ -16,7 +17,10 @@ struct GridOut {
 };
 void write_mha(const std::filesystem::path& path, const GridOut& grid, const float* values);
 
-/// An image as PNG, rows from the top, pixels without gaps, one or three channels of 8 or 16 bits. Throws Error.
+/// An image as the bytes of a PNG file, rows from the top, pixels without gaps, one or three channels of 8 or 16 bits.
+/// Throws Error.
+std::string png_of(int width, int height, int channels, Sample sample, const void* pixels);
+/// The same as a file.
 void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
                const void* pixels);
 

@@ -93,6 +93,9 @@ std::string pose(const Pose& pose) {
   if (pose.covariance && pose.covariance->allFinite())
     text += "covariance:  # of rotation [rad] and translation [mm] about and along these axes\n" +
             matrix(*pose.covariance, "  ");
+  if (!pose.convergence.empty()) text += "convergence:  # evaluations, and the least cost after them\n";
+  for (const Pose::Progress& step : pose.convergence)
+    text += "  - [" + std::to_string(step.evaluations) + ", " + number(step.cost) + "]\n";
   return text;
 }
 

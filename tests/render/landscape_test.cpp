@@ -5,63 +5,26 @@
 
 namespace {
 
-/// A bowl about a known pose: squared offset in degrees and mm about a frame away from the origin.
-class Bowl : public marrow::Cost {
- public:
-  Bowl(marrow::RigidTransform floor, marrow::FragmentFrame frame)
-      : floor_(std::move(floor)), frame_(std::move(frame)) {}
-  double value(const marrow::RigidTransform& pose) const override {
-    const marrow::Vector6d motion = marrow::motion_between(floor_, pose, frame_);
-    return motion.head<3>().squaredNorm() * marrow::degrees(1) * marrow::degrees(1) + motion.tail<3>().squaredNorm();
+/// Parabolas (x - 2.5)^2 over -10 to 10, their truth at +5.
+marrow::Landscape parabolas() {
+  marrow::Landscape landscape;
+  for (int axis = 0; axis < 6; ++axis) {
+    Profile profile{"rotation about the long axis", "deg", {}, {}, 5.0};
+    for (int i = 0; i <= 80; ++i) {
+      profile.offsets.push_back(0.25 * i - 10);
+      profile.costs.push_back((profile.offsets.back() - 2.5) * (profile.offsets.back() - 2.5));
+    }
+    landscape.profiles.push_back(profile);
   }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
-
- private:
-  marrow::RigidTransform floor_;
-  marrow::FragmentFrame frame_;
-};
-
-class NotANumber : public marrow::Cost {
- public:
-  double value(const marrow::RigidTransform&) const override { return std::nan(""); }
-  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
-};
-
-marrow::Pose some_pose() {
-  marrow::Pose pose;
-  pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.2, 0.3});
-  pose.world_from_model.translation_mm = {5, 6, 7};
-  pose.frame.origin_mm = {10, 20, 300};
-  return pose;
+  return landscape;
 }
 
-TEST(Landscape, FindsTheFloorAlongEachAxis) {
-  const marrow::Pose pose = some_pose();
-  for (int axis = 0; axis < 6; ++axis) {
-    marrow::Vector6d motion = marrow::Vector6d::Zero();
-    motion[axis] = axis < 3 ? marrow::radians(2.5) : 2.5;
-    const Bowl bowl(marrow::moved(pose.world_from_model, pose.frame, motion), pose.frame);
-    const Profile profile = sample(bowl, pose, axis, {});
-    ASSERT_EQ(profile.costs.size(), 81u);
-    EXPECT_NEAR(profile.offsets.front(), -10, 1e-12);
-    EXPECT_NEAR(profile.offsets.back(), 10, 1e-12);
-    ASSERT_TRUE(profile.least);
-    EXPECT_NEAR(profile.least->x, 2.5, 1e-12);
-    EXPECT_NEAR(profile.least->y, 0, 1e-9);
-    EXPECT_NEAR(profile.costs[40], 6.25, 1e-6);   // at the pose itself
-    EXPECT_NEAR(profile.costs[80], 56.25, 1e-6);  // 10 - 2.5 squared
-    EXPECT_EQ(title(axis, profile),
-              std::string(kTitles[std::size_t(axis)]) + ": least at +2.50 " + (axis < 3 ? "deg" : "mm"));
-  }
+TEST(Landscape, TitleSaysWhereTheCostIsLeast) {
+  EXPECT_EQ(title(parabolas().profiles[0]), "rotation about the long axis: least at +2.50 deg");
 }
 
 TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
-  const marrow::Pose pose = some_pose();
-  marrow::Vector6d motion = marrow::Vector6d::Zero();
-  motion[0] = marrow::radians(5);
-  const marrow::Truth truth{marrow::moved(pose.world_from_model, pose.frame, motion)};
-  marrow::Context context;
-  const cv::Mat picture = landscape(Bowl(truth.world_from_model, pose.frame), pose, &truth, {}, context).pixels;
+  const cv::Mat picture = draw(parabolas()).pixels;
   EXPECT_EQ(picture.cols, 3 * 500);
   EXPECT_GT(picture.rows, 600);
   const auto count = [&](const cv::Rect& area, const cv::Scalar& colour) {
@@ -78,9 +41,10 @@ TEST(Landscape, DrawsSixPlotsWithTheirMarks) {
 }
 
 TEST(Landscape, CostsThatAreNotFiniteGiveAPictureThatSaysSo) {
-  EXPECT_EQ(title(2, sample(NotANumber(), some_pose(), 2, {})), "rotation about the long axis: no finite cost");
-  marrow::Context context;
-  EXPECT_FALSE(landscape(NotANumber(), some_pose(), nullptr, {}, context).pixels.empty());
+  const marrow::Landscape nothing{{{"rotation about the long axis", "deg", {-1, 0, 1}, {NAN, NAN, NAN}, {}}}};
+  EXPECT_EQ(title(nothing.profiles[0]), "rotation about the long axis: no finite cost");
+  EXPECT_FALSE(draw(nothing).pixels.empty());
+  EXPECT_FALSE(draw({}).pixels.empty());
 }
 
 TEST(Plot, TicksAreRound) {

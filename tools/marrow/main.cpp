@@ -5,6 +5,7 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
+#include "report/report.hpp"
 
 namespace {
 
@@ -48,6 +49,7 @@ int main(int argc, char** argv) {
   compare_command->add_option("--jobs", compare_request.jobs, "cells at once (default: as many as there are cores)")->check(CLI::Range(1, 1024));
   compare_command->add_option("--time-limit", compare_request.time_limit_s, "seconds that one cell may take")->capture_default_str()->check(CLI::PositiveNumber);
   compare_command->add_option("--memory-limit", compare_request.memory_limit_mb, "megabytes that one cell may use")->capture_default_str()->check(CLI::PositiveNumber);
+  compare_command->add_option("--shown", compare_request.shown, "cases and starts whose pictures go into the report")->capture_default_str()->check(CLI::Range(0, 10000));
   compare_command->add_flag("--dry-run", compare_request.dry_run, "say what there is to do, and how long that took before");
   compare_command->add_flag("--quiet", compare_request.quiet, "no progress");
   compare_command->callback([&] { code = compare_variants(compare_request); });
@@ -64,6 +66,12 @@ int main(int argc, char** argv) {
   worker_command->group("");
   add_compare_arguments(worker_command, worker_request);
   worker_command->callback([&] { code = worker(worker_request); });
+
+  std::filesystem::path shown_run, shown_file;
+  auto* show_command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
+  show_command->add_option("run", shown_run, "folder of the run")->required();
+  show_command->add_option("--out", shown_file, "HTML file to write (default: RUN/report.html)");
+  show_command->callback([&] { code = show(shown_run, shown_file); });
 
   PipelineRequest check_request;
   bool check_json = false;

@@ -3,6 +3,7 @@
 """Joins the template, style, scripts, three.js and a report's data into one HTML file that needs nothing else.
 
     tools/report/assemble.py data.json report.html
+    tools/report/assemble.py --page page.html          # without data, as the program carries it
 
 Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is replaced by the
 file or the data that it names, so the template also says in which order the scripts come.
@@ -25,9 +26,11 @@ def script(path):
 
 
 def assemble(data, three=THREE):
-    """The page's text. Without three.js the page says what is missing and shows all but the 3D view."""
+    """The page's text; its marker for data stays where `data` is None. Without three.js the page says what is missing and shows all but the 3D view."""
     def part(marker):
         kind, name = marker.group(1), marker.group(2)
+        if kind == "data" and data is None:
+            return marker.group(0)
         if kind == "data":
             return '<script type="application/json" id="data">%s</script>' % json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
         if kind == "style":
@@ -40,13 +43,17 @@ def assemble(data, three=THREE):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("data", type=pathlib.Path, help="JSON, as data.js describes it")
-    parser.add_argument("report", type=pathlib.Path, help="the HTML file to write")
+    parser.add_argument("data", type=pathlib.Path, nargs="?", help="JSON, as data.js describes it")
+    parser.add_argument("report", type=pathlib.Path, nargs="?", help="the HTML file to write")
+    parser.add_argument("--page", type=pathlib.Path, help="write the page without data here")
     parser.add_argument("--three", type=pathlib.Path, default=THREE, help="three.min.js (default: %(default)s)")
     arguments = parser.parse_args()
+    if not arguments.page and not arguments.report:
+        parser.error("give data and report, or --page")
     if not arguments.three.exists():
-        print("%s is missing: the report will have no 3D view. Install the Debian package libjs-three or give --three." % arguments.three, file=sys.stderr)
-    arguments.report.write_text(assemble(json.loads(arguments.data.read_text()), arguments.three))
+        print("%s is missing: reports will have no 3D view. Install the Debian package libjs-three or give --three." % arguments.three, file=sys.stderr)
+    data = None if arguments.page else json.loads(arguments.data.read_text())
+    (arguments.page or arguments.report).write_text(assemble(data, arguments.three))
 
 
 if __name__ == "__main__":

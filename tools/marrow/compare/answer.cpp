@@ -35,7 +35,7 @@ VariantSummary summary_of(const Experiment& experiment, const std::string& varia
     }
     for (std::size_t i = 0; i < values.size(); ++i)
       if (row.values[i]) values[i].push_back(*row.values[i]);
-    seconds.push_back(row.seconds);
+    if (row.seconds) seconds.push_back(*row.seconds);
     evaluations.push_back(row.evaluations);
   }
   if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);

@@ -2,6 +2,7 @@
 #pragma once
 // The commands that compare variants.
 #include <filesystem>
+#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ struct CompareRequest {
   int threads = 1;               ///< of each cell
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
+  std::size_t shown = 8;         ///< cases and starts with pictures in the report
   bool dry_run = false, no_cache = false, quiet = false;
 };
 
@@ -25,6 +27,12 @@ int compare_variants(const CompareRequest& request);
 /// Runs one cell and writes its row, as a worker would; for cluster engines.
 int run_cell(const CompareRequest& request, const std::string& id);
 int worker(const CompareRequest& request);
+/// All cells that are not there yet, then times, tables, pictures and the report. The folder is the experiment's own.
+int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment, const std::filesystem::path& folder);
+
+/// Cells whose pictures are worth a look, all variants of at most `most` cases and starts: those where a variant was worst,
+/// best or nearest to its median in the first metric, those that failed, then the first.
+std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, std::size_t most);
 
 /// Prints what a comparison would do, and calls no node.
 void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store, const std::filesystem::path& folder);
@@ -56,6 +64,8 @@ struct Answer {
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 /// For the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
+/// {experiment, variants, comparisons}: all of the answer.
+nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
 /// cells.csv, cells.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
                   const std::filesystem::path& folder);

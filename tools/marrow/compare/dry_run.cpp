@@ -17,31 +17,6 @@ struct Counts {
   std::map<std::string, long> to_make;  ///< by what the node uses
 };
 
-/// What a node will come to, as far as that can be said before anything ran: equal for equal nodes of equal histories.
-std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name) {
-  std::vector<Digest> result;
-  for (const PipelineNode& node : pipeline.nodes) {
-    Hasher hasher;
-    hasher.add(node.info.name);
-    bool names_a_path = false;
-    for (std::size_t i = 0; i < node.options.size(); ++i) {
-      const OptionType type = node.info.options[i].type;
-      names_a_path |= type == OptionType::path || type == OptionType::paths;
-      std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
-    }
-    if (names_a_path) hasher.add(case_name);
-    for (const Wire& wire : node.wires)
-      for (const Reference& source : wire.sources) {
-        hasher.add(node.info.inputs[std::size_t(wire.port)].name);
-        hasher.add(result[std::size_t(source.node)]);
-        hasher.add(std::int64_t(source.output));
-        hasher.add(source.items);
-      }
-    result.push_back(hasher.digest());
-  }
-  return result;
-}
-
 bool makes_functions(const PipelineNode& node) {
   for (const PortInfo& output : node.info.outputs)
     if (!output.type.is_function) return false;
@@ -51,8 +26,8 @@ bool makes_functions(const PipelineNode& node) {
 void count_cell(const Experiment& experiment, const CellRunner& runner, const CellIndex& cell, const Catalogue& catalogue, const Store* store,
                 std::set<Digest>& seen, Counts& counts) {
   const fs::path place = runner.case_place(cell.case_index);
-  const Pipeline pipeline = runner.pipeline_of(cell, place);
-  const std::vector<Digest> keys = histories(pipeline, experiment.cases[cell.case_index].name);
+  const Pipeline pipeline = runner.pipeline_of(cell, place, CellRunner::Depth::figures);
+  const std::vector<Digest> keys = compare::histories(pipeline, experiment.cases[cell.case_index].name);
   std::vector<PlannedNode> planned;
   if (store && fs::exists(place)) {
     RunSettings settings;

@@ -93,9 +93,7 @@ json of(const VariantFigure& figure) {
 
 }  // namespace
 
-void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const std::filesystem::path& folder) {
-  write_file(folder / "cells.csv", csv(experiment, rows));
-  write_file(folder / "cells.jsonl", jsonl(experiment, rows));
+json answer_json(const Experiment& experiment, const Answer& answer) {
   json variants = json::array(), findings = json::array();
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
@@ -111,8 +109,13 @@ void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows
                         {"pairs", finding.comparison.pairs}, {"cases", finding.comparison.cases}, {"difference", finding.comparison.median_difference},
                         {"low", finding.comparison.interval.lower}, {"high", finding.comparison.interval.upper}, {"p", finding.comparison.test.p},
                         {"p_holm", finding.p_holm}, {"sentence", finding.sentence}});
-  const json all = {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
-  write_file(folder / "comparison.json", all.dump(1) + "\n");
+  return {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
+}
+
+void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const std::filesystem::path& folder) {
+  write_file(folder / "cells.csv", csv(experiment, rows));
+  write_file(folder / "cells.jsonl", jsonl(experiment, rows));
+  write_file(folder / "comparison.json", answer_json(experiment, answer).dump(1) + "\n");
 }
 
 }  // namespace marrow::cli

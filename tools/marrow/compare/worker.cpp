@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker process of a comparison: reads "case N" and "cell VARIANT CASE START" (numbers), answers "end ...".
+// A worker process of a comparison: reads "case N" and "cell", "time" or "draw" VARIANT CASE START (numbers), answers "end ...".
 #include <unistd.h>
 
 #include <cstdio>
@@ -56,19 +56,26 @@ int worker(const CompareRequest& request) {
     std::istringstream words(line);
     std::string what;
     words >> what;
-    if (what == "case") {
-      std::size_t index = 0;
-      words >> index;
-      try {
+    try {
+      if (what == "case") {
+        std::size_t index = 0;
+        words >> index;
         runner.case_folder(index);
         answers.line("end good");
-      } catch (const std::exception& error) {
-        answers.line("end " + one_line(error.what()));
+        continue;
       }
-    } else {
       CellIndex cell;
       words >> cell.variant >> cell.case_index >> cell.start;
-      answers.line("end " + compare::to_json(runner.run(cell, observer)));
+      if (what == "cell") {
+        answers.line("end " + compare::to_json(runner.run(cell, observer)));
+      } else if (what == "time") {
+        answers.line("end " + std::to_string(runner.time(cell)));
+      } else {
+        runner.draw(cell, observer);
+        answers.line("end good");
+      }
+    } catch (const std::exception& error) {
+      answers.line("end " + one_line(error.what()));
     }
   }
   return 0;

@@ -19,14 +19,13 @@ struct CellRow {
   std::vector<std::optional<double>> values;   ///< of the experiment's metrics, in their order
   std::optional<double> initial_error;
   std::vector<std::string> units;              ///< of the metrics
-  double seconds = 0;                          ///< of all its nodes, those read back included with what they took then
+  std::optional<double> seconds;               ///< measured with nothing else running; without what all variants share
   int evaluations = 0;                         ///< of the cost, by all poses of the cell
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;
   };
   std::map<std::string, Calls> nodes;          ///< by the node's name in the pipeline
-  std::vector<std::string> files;              ///< pictures, relative to the comparison's folder
   std::string key;                             ///< of all that it depends on; another key, and the row is of no use
 
   /// Whether it is done and within every limit of the experiment.
@@ -37,8 +36,12 @@ std::string to_json(const CellRow& row);
 /// Throws Error for a text that is no row.
 CellRow row_from_json(const std::string& text);
 
-/// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (pictures, the run's record) and FOLDER/cells/ID/cell.json,
-/// which is written last and in one go.
+/// What each node will come to, as far as that can be said before anything ran: equal for equal nodes of equal histories.
+/// `case_name` stands for all data that paths name.
+std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name);
+
+/// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record) and FOLDER/cells/ID/cell.json,
+/// which is written last and in one go; what there is to look at goes to FOLDER/pictures/ID/.
 class CellRunner {
  public:
   CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder, int threads);
@@ -51,15 +54,24 @@ class CellRunner {
   std::optional<CellRow> finished(const CellIndex& cell);
   /// Never throws for what goes wrong in a node: that is the row's reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
+  /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. Does nothing
+  /// where they are there already. Throws Error where the folder cannot be written.
+  void draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
+  /// Seconds that a run of the cell takes when the results that all variants share are read back and all others are made
+  /// anew. Measured once: later runs with as many threads find it in the store. Throws Error where the run fails.
+  double time(const CellIndex& cell);
+  std::filesystem::path pictures_of(const CellIndex& cell) const;
   /// Writes the row where finished() finds it.
   void write(const CellRow& row) const;
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
   std::string key_of(const CellIndex& cell);
-  /// The pipeline of a cell, with the outputs that the experiment asks for.
-  Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder) const;
+  enum class Depth { figures, pictures };
+  /// The pipeline of a cell, with its poses and the outputs that the experiment's metrics need, and those that are looked at.
+  Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
 
  private:
+  RunResult run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell, const std::function<void(const RunEvent&)>& observer);
   Pipeline simulation_of(std::size_t case_index) const;
   void simulate(std::size_t case_index, const std::filesystem::path& folder) const;
 

@@ -66,7 +66,7 @@ struct Experiment {
   std::vector<MetricChoice> metrics;
   std::string initial_error;          ///< path of the figure that the capture range is drawn over; may be empty
   std::vector<std::string> pictures;  ///< outputs to show side by side
-  std::size_t timed_cells = 0;        ///< per variant, measured again one at a time
+  std::size_t timed_cells = 3;        ///< per variant, run again one at a time to measure their time
 
   std::size_t cell_count() const { return variants.size() * cases.size() * starts.size(); }
 };
@@ -75,6 +75,8 @@ struct Experiment {
 struct CellIndex {
   std::size_t variant = 0, case_index = 0, start = 0;
 };
+/// All cells: by case, then by start, then by variant.
+std::vector<CellIndex> cells_of(const Experiment& experiment);
 /// "canny/case-03/0", as `marrow cell` takes it.
 std::string cell_id(const Experiment& experiment, const CellIndex& cell);
 /// Nothing for a name that is none of the experiment's.

@@ -23,10 +23,17 @@ struct Pose {
   std::vector<std::string> warnings;
   double cost = 0;
   int evaluations = 0;
+  /// The least cost that the search had come to after so many evaluations, all counted at its last level; may be empty.
+  struct Progress {
+    int evaluations = 0;
+    double cost = 0;
+    static constexpr auto fields() { return std::make_tuple(&Progress::evaluations, &Progress::cost); }
+  };
+  std::vector<Progress> convergence;
 
   static constexpr auto fields() {
     return std::make_tuple(&Pose::world_from_model, &Pose::frame, &Pose::covariance, &Pose::warnings, &Pose::cost,
-                           &Pose::evaluations);
+                           &Pose::evaluations, &Pose::convergence);
   }
 };
 

@@ -34,6 +34,7 @@ struct RunSettings {
   std::map<std::string, std::vector<Value>> given;
   /// Where results are looked up before a node is called, and kept for later runs. None: nothing is kept.
   const Store* store = nullptr;
+  std::set<std::string> made_anew = {};  ///< nodes that are called although the store may have their results; for measuring time
   bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
 };
 

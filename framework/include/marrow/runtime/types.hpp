@@ -4,6 +4,7 @@
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/scene.hpp"
 #include "marrow/runtime/value.hpp"
 
 MARROW_VALUE_TYPE(marrow::Image, "image", 1)
@@ -16,9 +17,11 @@ MARROW_VALUE_TYPE(marrow::Camera, "camera", 1)
 MARROW_VALUE_TYPE(marrow::View, "view", 1)
 MARROW_VALUE_TYPE(marrow::EdgeMap, "edge_map", 1)
 MARROW_VALUE_TYPE(marrow::ShaftLines, "shaft_lines", 1)
-MARROW_VALUE_TYPE(marrow::Pose, "pose", 1)
+MARROW_VALUE_TYPE(marrow::Pose, "pose", 2)
 MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
 MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
+MARROW_VALUE_TYPE(marrow::Scene, "scene", 1)
+MARROW_VALUE_TYPE(marrow::Landscape, "landscape", 1)
 MARROW_VALUE_TYPE(marrow::Case, "case", 1)
 MARROW_FUNCTION_TYPE(marrow::Projector, "projector", 1)
 MARROW_FUNCTION_TYPE(marrow::Cost, "cost", 1)

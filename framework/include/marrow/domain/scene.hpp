@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What reports show interactively: models in their poses behind the X-ray views, and the cost about a pose.
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "marrow/domain/camera.hpp"
+#include "marrow/domain/mesh.hpp"
+
+namespace marrow {
+
+/// Models in their poses, and the views that show them.
+struct Scene {
+  struct Model {
+    std::string name;
+    Mesh mesh;  ///< may be coarser than the one that was registered
+    static constexpr auto fields() { return std::make_tuple(&Model::name, &Model::mesh); }
+  };
+  /// "result", "start" or "truth" of a model.
+  struct Placement {
+    std::string model, name;
+    RigidTransform world_from_model{"world", "ct"};
+    static constexpr auto fields() { return std::make_tuple(&Placement::model, &Placement::name, &Placement::world_from_model); }
+  };
+  /// A view's camera and its image as shown: 8 bit, grey, and as large as the camera says.
+  struct Backdrop {
+    std::string name;
+    Camera camera;
+    Picture picture;
+    static constexpr auto fields() { return std::make_tuple(&Backdrop::name, &Backdrop::camera, &Backdrop::picture); }
+  };
+  std::vector<Model> models;
+  std::vector<Placement> placements;
+  std::vector<Backdrop> views;
+  static constexpr auto fields() { return std::make_tuple(&Scene::models, &Scene::placements, &Scene::views); }
+};
+
+/// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b).
+struct Landscape {
+  struct Profile {
+    std::string axis;   ///< "rotation about the frontal axis"
+    std::string unit;   ///< of the offsets: "deg" or "mm"
+    std::vector<double> offsets, costs;
+    std::optional<double> truth;  ///< where the exact pose lies
+    static constexpr auto fields() {
+      return std::make_tuple(&Profile::axis, &Profile::unit, &Profile::offsets, &Profile::costs, &Profile::truth);
+    }
+  };
+  std::vector<Profile> profiles;
+  static constexpr auto fields() { return std::make_tuple(&Landscape::profiles); }
+};
+
+}  // namespace marrow

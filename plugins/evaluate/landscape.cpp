@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): how wide the valley is, where
+// its floor lies, and which direction is poorly determined.
+#include <array>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+struct Options {
+  double range_deg = 10;
+  double range_mm = 10;
+  int samples = 81;
+};
+
+constexpr std::array<const char*, 6> kAxes{"rotation about the frontal axis",    "rotation about the lateral axis",
+                                           "rotation about the long axis",       "translation along the frontal axis",
+                                           "translation along the lateral axis", "translation along the long axis"};
+
+marrow::Landscape landscape(const marrow::Cost& cost, const marrow::Pose& pose, const marrow::Truth* truth,
+                            const Options& options, marrow::Context& context) {
+  marrow::check_rigid(pose.world_from_model, "pose");
+  marrow::Landscape landscape;
+  for (int axis = 0; axis < 6; ++axis) {
+    context.check_cancelled();
+    context.progress(axis / 6.0, kAxes[std::size_t(axis)]);
+    const bool turns = axis < 3;
+    const auto motion_of = [&](double offset) {
+      marrow::Vector6d motion = marrow::Vector6d::Zero();
+      motion[axis] = turns ? marrow::radians(offset) : offset;
+      return motion;
+    };
+    marrow::Landscape::Profile profile{kAxes[std::size_t(axis)], turns ? "deg" : "mm", {}, {}, {}};
+    std::vector<marrow::RigidTransform> poses;
+    for (int i = 0; i < options.samples; ++i) {
+      profile.offsets.push_back((turns ? options.range_deg : options.range_mm) * (2.0 * i / (options.samples - 1) - 1));
+      poses.push_back(marrow::moved(pose.world_from_model, pose.frame, motion_of(profile.offsets.back())));
+    }
+    profile.costs = cost.values(poses);
+    if (truth) {
+      const double part = marrow::motion_between(pose.world_from_model, truth->world_from_model, pose.frame)[axis];
+      profile.truth = turns ? marrow::degrees(part) : part;
+    }
+    landscape.profiles.push_back(std::move(profile));
+  }
+  return landscape;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.landscape", landscape)
+      .summary("The cost about a pose along each of the six axes of the fragment")
+      .in("cost", "cost to look at")
+      .in("pose", "pose in the middle; its frame gives the axes")
+      .in("truth", "exact pose; its part about or along each axis is noted")
+      .out("landscape", "six profiles; offsets in degrees or mm from the pose")
+      .option("range_deg", &Options::range_deg, "rotations to either side", marrow::at_least(1e-3), marrow::at_most(180))
+      .option("range_mm", &Options::range_mm, "translations to either side", marrow::at_least(1e-3), marrow::at_most(1000))
+      .option("samples", &Options::samples, "points of a profile", marrow::at_least(3), marrow::at_most(2001));
+}

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <vtkCellArray.h>
+#include <vtkNew.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkQuadricDecimation.h>
+
+#include <marrow/plugin.hpp>
+
+namespace {
+
+struct Options {
+  int triangles = 20000;
+};
+
+vtkSmartPointer<vtkPolyData> to_vtk(const marrow::Mesh& mesh) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Eigen::Vector3d& vertex : mesh.vertices_mm) points->InsertNextPoint(vertex.data());
+  vtkNew<vtkCellArray> polygons;
+  for (const auto& triangle : mesh.triangles) {
+    const vtkIdType corners[3] = {vtkIdType(triangle[0]), vtkIdType(triangle[1]), vtkIdType(triangle[2])};
+    polygons->InsertNextCell(3, corners);
+  }
+  auto data = vtkSmartPointer<vtkPolyData>::New();
+  data->SetPoints(points);
+  data->SetPolys(polygons);
+  return data;
+}
+
+marrow::Mesh simplify(const marrow::Mesh& mesh, const Options& options) {
+  marrow::check_mesh(mesh, "mesh to simplify");
+  if (mesh.triangles.size() <= std::size_t(options.triangles)) return mesh;
+  vtkNew<vtkQuadricDecimation> filter;
+  filter->SetInputData(to_vtk(mesh));
+  filter->SetTargetReduction(1.0 - double(options.triangles) / double(mesh.triangles.size()));
+  filter->VolumePreservationOn();
+  filter->Update();
+  vtkPolyData* surface = filter->GetOutput();
+
+  marrow::Mesh result;
+  result.frame = mesh.frame;
+  for (vtkIdType v = 0; v < surface->GetNumberOfPoints(); ++v) result.vertices_mm.emplace_back(surface->GetPoint(v));
+  vtkIdType count = 0;
+  const vtkIdType* corners = nullptr;
+  for (surface->GetPolys()->InitTraversal(); surface->GetPolys()->GetNextCell(count, corners);)
+    result.triangles.push_back({std::uint32_t(corners[0]), std::uint32_t(corners[1]), std::uint32_t(corners[2])});
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("mesh.simplify", simplify)
+      .summary("Fewer triangles for display, by quadric error (Garland and Heckbert, SIGGRAPH 1997; VTK)")
+      .in("mesh", "surface")
+      .out("mesh", "the same surface with at most about so many triangles")
+      .option("triangles", &Options::triangles, "how many to keep; a mesh that has fewer is left as it is", marrow::at_least(100));
+}

@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/mesh/simplify.cpp"
+
+#include <gtest/gtest.h>
+
+#include "domain/shapes.hpp"
+#include "project/shapes.hpp"
+
+namespace {
+
+TEST(Simplify, KeepsTheShapeOfASphere) {
+  const marrow::Mesh sphere = shapes::sphere(25);
+  ASSERT_GT(sphere.triangles.size(), 20000u);
+  Options options;
+  options.triangles = 2000;
+  const marrow::Mesh simple = simplify(sphere, options);
+  EXPECT_LE(simple.triangles.size(), 2000u);
+  EXPECT_GT(simple.triangles.size(), 1800u);
+  EXPECT_EQ(simple.frame, sphere.frame);
+  EXPECT_TRUE(marrow::is_closed(simple));
+  for (const Eigen::Vector3d& vertex : simple.vertices_mm) EXPECT_NEAR((vertex - Eigen::Vector3d(0, 0, 25)).norm(), 25, 0.1);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(simple), 4.0 / 3 * M_PI * 25 * 25 * 25, 0.01 * 4.0 / 3 * M_PI * 25 * 25 * 25);
+}
+
+TEST(Simplify, LeavesASmallMeshAsItIs) {
+  const marrow::Mesh box = marrow::test::box({0, 0, 0}, {20, 20, 20});
+  const marrow::Mesh same = simplify(box, {});
+  EXPECT_EQ(same.vertices_mm, box.vertices_mm);
+  EXPECT_EQ(same.triangles, box.triangles);
+}
+
+TEST(Simplify, DeclarationHasNoFault) {
+  marrow::Plugin plugin;
+  marrow_register_nodes(plugin);
+  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
+}
+
+}  // namespace

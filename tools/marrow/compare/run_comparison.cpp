@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: Apache-2.0
+// A comparison from its start, or from where it was left, to its report.
+#include <unistd.h>
+
+#include <atomic>
+#include <chrono>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <thread>
+
+#include "compare/comparison.hpp"
+#include "compare/pool.hpp"
+#include "marrow/domain/error.hpp"
+#include "report/report.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using compare::CellIndex;
+using compare::CellRow;
+using compare::CellRunner;
+using compare::Experiment;
+
+std::atomic<bool> interrupted{false};
+extern "C" void on_compare_interrupt(int) {
+  if (interrupted.exchange(true)) _exit(130);
+}
+
+class Progress {
+ public:
+  Progress(std::size_t all, bool quiet) : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {}
+  void done(std::size_t number, const std::string& what) {
+    const auto now = std::chrono::steady_clock::now();
+    if (quiet_ || (number < all_ && now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)))) return;
+    last_ = now;
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number, all_, seconds,
+                 number ? seconds * double(all_ - number) / double(number) : 0.0, what.c_str(), is_terminal_ && number < all_ ? "" : "\n");
+  }
+
+ private:
+  std::size_t all_;
+  bool quiet_, is_terminal_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
+};
+
+PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int threads) {
+  PoolSettings pool;
+  pool.workers = request.jobs > 0 ? request.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
+  pool.time_limit_s = request.time_limit_s;
+  pool.memory_limit_mb = request.memory_limit_mb;
+  pool.cancelled = &interrupted;
+  pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
+  if (request.no_cache) pool.command.push_back("--no-cache");
+  return pool;
+}
+
+class Comparison {
+ public:
+  Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder)
+      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)), rows_(cells_.size()),
+        runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {}
+
+  int run() {
+    std::signal(SIGINT, on_compare_interrupt);
+    std::signal(SIGTERM, on_compare_interrupt);
+    if (!make_cases() || !make_cells()) return stopped();
+    std::vector<CellRow> rows;
+    for (auto& row : rows_) rows.push_back(std::move(*row));
+    if (!measure_times(rows)) return stopped();
+    const Answer answer = answer_of(experiment_, rows);
+    write_tables(experiment_, rows, answer, folder_);
+    const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
+    if (!draw(shown)) return stopped();
+    write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
+    print_counts(rows);
+    std::printf("\n%s", table_text(experiment_, answer).c_str());
+    print_failures(rows);
+    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n", folder_.c_str(), fs::absolute(folder_ / "report.html").lexically_normal().c_str());
+    return 0;
+  }
+
+ private:
+  static int stopped() {
+    std::fprintf(stderr, "marrow: stopped; the same command goes on from here\n");
+    return 130;
+  }
+
+  static std::string line_of(const char* what, const CellIndex& cell) {
+    return std::string(what) + " " + std::to_string(cell.variant) + " " + std::to_string(cell.case_index) + " " + std::to_string(cell.start);
+  }
+
+  static CellIndex cell_of_line(const std::string& line) {
+    CellIndex cell;
+    std::sscanf(line.c_str(), "%*s %zu %zu %zu", &cell.variant, &cell.case_index, &cell.start);
+    return cell;
+  }
+
+  bool make_cases() {
+    std::vector<Job> jobs;
+    for (std::size_t i = 0; i < experiment_.cases.size(); ++i)
+      if (experiment_.cases[i].folder.empty()) jobs.push_back({"case " + std::to_string(i), std::to_string(i)});
+    Progress progress(jobs.size(), request_.quiet);
+    std::size_t done = 0;
+    return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
+      const std::size_t index = std::stoul(job.group);
+      if (!end.failed.empty()) case_faults_[index] = "case '" + experiment_.cases[index].name + "' cannot be made: " + end.failed;
+      else if (end.answer != "good") case_faults_[index] = end.answer;
+      progress.done(++done, "case " + experiment_.cases[index].name);
+    });
+  }
+
+  bool make_cells() {
+    std::vector<Job> jobs;
+    for (std::size_t i = 0; i < cells_.size(); ++i) {
+      const CellIndex& cell = cells_[i];
+      const auto fault = case_faults_.find(cell.case_index);
+      if (fault != case_faults_.end()) rows_[i] = failed_row(cell, fault->second, 1);
+      else rows_[i] = runner_.finished(cell);
+      found_ += rows_[i] && fault == case_faults_.end();
+      if (!rows_[i])
+        jobs.push_back({line_of("cell", cell), experiment_.cases[cell.case_index].name});
+    }
+    Progress progress(jobs.size(), request_.quiet);
+    std::size_t done = 0;
+    return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
+      const CellIndex cell = cell_of_line(job.line);
+      CellRow row = end.failed.empty() ? compare::row_from_json(end.answer) : failed_row(cell, end.failed, end.tries);
+      row.tries = end.tries;
+      runner_.write(row);
+      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
+      rows_[number_of(cell)] = std::move(row);
+    });
+  }
+
+  /// The same cases and starts for all variants, spread over all that there are, one run at a time on all threads.
+  bool measure_times(std::vector<CellRow>& rows) {
+    const std::size_t variants = experiment_.variants.size(), places = rows.size() / variants, count = std::min(places, experiment_.timed_cells);
+    std::vector<Job> jobs;
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t v = 0; v < variants; ++v) {
+        const std::size_t row = i * places / count * variants + v;
+        if (rows[row].failed.empty()) jobs.push_back({line_of("time", cells_[row]), "times"});
+      }
+    PoolSettings alone = pool_of(request_, folder_, int(std::thread::hardware_concurrency()));
+    alone.workers = 1;
+    Progress progress(jobs.size(), request_.quiet);
+    std::size_t done = 0;
+    return run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
+      CellRow& row = rows[number_of(cell_of_line(job.line))];
+      char* rest = nullptr;
+      const double seconds = std::strtod(end.answer.c_str(), &rest);
+      if (end.failed.empty() && rest != end.answer.c_str() && !*rest) row.seconds = seconds;
+      progress.done(++done, "time of " + row.id);
+    });
+  }
+
+  bool draw(const std::vector<CellIndex>& cells) {
+    std::vector<Job> jobs;
+    for (const CellIndex& cell : cells) jobs.push_back({line_of("draw", cell), experiment_.cases[cell.case_index].name});
+    Progress progress(jobs.size(), request_.quiet);
+    std::size_t done = 0;
+    return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
+      const std::string id = compare::cell_id(experiment_, cell_of_line(job.line)), fault = end.failed.empty() ? end.answer : end.failed;
+      if (fault != "good") std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), fault.c_str());
+      progress.done(++done, "pictures of " + id);
+    });
+  }
+
+  std::size_t number_of(const CellIndex& cell) const {
+    return (cell.case_index * experiment_.starts.size() + cell.start) * experiment_.variants.size() + cell.variant;
+  }
+
+  CellRow failed_row(const CellIndex& cell, const std::string& reason, int tries) const {
+    CellRow row;
+    row.id = compare::cell_id(experiment_, cell);
+    row.variant = experiment_.variants[cell.variant].name;
+    row.case_name = experiment_.cases[cell.case_index].name;
+    row.start = experiment_.starts[cell.start].name;
+    row.failed = reason;
+    row.tries = tries;
+    row.values.resize(experiment_.metrics.size());
+    row.units.resize(experiment_.metrics.size());
+    return row;
+  }
+
+  void print_counts(const std::vector<CellRow>& rows) const {
+    long made = 0, cached = 0;
+    for (const CellRow& row : rows)
+      for (const auto& [name, calls] : row.nodes) {
+        made += calls.made;
+        cached += calls.cached;
+      }
+    std::printf("\n%zu cells: %zu variants, %zu cases, %zu starts; %zu were there already\n", rows.size(), experiment_.variants.size(), experiment_.cases.size(),
+                experiment_.starts.size(), found_);
+    std::printf("calls of nodes: %ld made, %ld shared or read back\n", made, cached);
+  }
+
+  static void print_failures(const std::vector<CellRow>& rows) {
+    std::size_t count = 0;
+    for (const CellRow& row : rows)
+      if (!row.failed.empty() && ++count <= 20) std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", row.id.c_str(), row.failed.c_str());
+    if (count > 20) std::printf("  and %zu more, in cells.csv\n", count - 20);
+  }
+
+  const CompareRequest& request_;
+  const Experiment& experiment_;
+  fs::path folder_;
+  Store store_;
+  std::vector<CellIndex> cells_;
+  std::vector<std::optional<CellRow>> rows_;
+  std::map<std::size_t, std::string> case_faults_;
+  std::size_t found_ = 0;
+  CellRunner runner_;
+};
+
+}  // namespace
+
+int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
+  return Comparison(request, catalogue, experiment, folder).run();
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,135 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+#include "report/report.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using compare::CellRow;
+using compare::Experiment;
+using nlohmann::json;
+
+std::string text_of_file(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+json of(const std::optional<double>& value) { return value ? json(*value) : json(); }
+
+std::string starts_sentence(const Experiment& experiment) {
+  if (!experiment.protocol) return "Each run starts where its pipeline starts.";
+  const compare::StartProtocol& protocol = *experiment.protocol;
+  char text[400];
+  std::snprintf(text, sizeof text,
+                "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a direction uniform on the sphere through the "
+                "fragment's centroid, and shifted by 0 to %g mm, uniform, in a direction uniform on the sphere.",
+                protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg, protocol.translation_mm);
+  return text;
+}
+
+std::string success_sentence(const Experiment& experiment) {
+  std::string limits;
+  for (const compare::MetricChoice& metric : experiment.metrics)
+    if (metric.success_below) {
+      char text[300];
+      std::snprintf(text, sizeof text, "%s%s below %g", limits.empty() ? "" : " and ", metric.path.c_str(), *metric.success_below);
+      limits += text;
+    }
+  return limits.empty() ? "A run that ends without a fault is a success." : "A run is a success with " + limits + "; a failed run is none.";
+}
+
+std::string time_sentence(const Experiment& experiment) {
+  if (!experiment.timed_cells) return "Times were not measured.";
+  return "Times: up to " + std::to_string(experiment.timed_cells) + " runs of each variant, the same cases for all, one at a time on " +
+         std::to_string(std::thread::hardware_concurrency()) + " threads with nothing else running; what all variants share is read back and does not count.";
+}
+
+json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, const CellRow& row) {
+  json cell = {{"id", row.id}, {"variant", index.variant}, {"case", index.case_index}, {"start", index.start}, {"status", row.failed.empty() ? "done" : "failed"},
+               {"tries", row.tries}, {"success", row.is_success(experiment)}, {"initial_mtre_mm", of(row.initial_error)}, {"seconds", of(row.seconds)},
+               {"values", json::array()}, {"folder", "cells/" + row.id}};
+  if (row.failed.empty()) cell["evaluations"] = row.evaluations;
+  else cell["reason"] = row.failed;
+  for (const auto& value : row.values) cell["values"].push_back(row.failed.empty() ? of(value) : json());
+  int cached = 0;
+  for (const auto& [name, calls] : row.nodes) cached += calls.made == 0 && calls.cached > 0;
+  cell["cached_nodes"] = cached;
+  return cell;
+}
+
+json metrics_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  json metrics = json::array();
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
+    std::string unit;
+    for (const CellRow& row : rows)
+      if (unit.empty() && m < row.units.size()) unit = row.units[m];
+    const compare::MetricChoice& metric = experiment.metrics[m];
+    metrics.push_back({{"name", metric.path}, {"label", metric.label.empty() ? metric.path : metric.label}, {"unit", unit}, {"success_below", of(metric.success_below)}});
+  }
+  return metrics;
+}
+
+json pipeline_graph(const Experiment& experiment, const compare::CellRunner& runner) {
+  const fs::path place = runner.case_place(0);
+  const auto of_variant = [&](std::size_t v) { return runner.pipeline_of({v, 0, 0}, place, compare::CellRunner::Depth::pictures); };
+  std::vector<std::pair<std::string, Pipeline>> others;
+  for (std::size_t v = 0; v < experiment.variants.size(); ++v)
+    if (v != experiment.baseline) others.emplace_back(experiment.variants[v].name, of_variant(v));
+  return graph_of(of_variant(experiment.baseline), others);
+}
+
+std::string command_of(const Experiment& experiment, const CompareRequest& request) {
+  std::string command = "marrow compare " + experiment.file.string();
+  if (!request.folder.empty()) command += " --out " + request.folder.string();
+  return command;
+}
+
+}  // namespace
+
+void write_report(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const compare::CellRunner& runner,
+                  const std::vector<compare::CellIndex>& shown, const CompareRequest& request, const fs::path& folder) {
+  json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", metrics_of(experiment, rows)}};
+  data["experiment"] = {{"name", experiment.name}, {"help", experiment.help}, {"file", experiment.file.string()}, {"text", experiment.text},
+                        {"pipeline_text", text_of_file(experiment.pipeline)}, {"seed", 1}, {"command", command_of(experiment, request)},
+                        {"folder", folder.string()}, {"starts_protocol", starts_sentence(experiment)}, {"success_rule", success_sentence(experiment)},
+                        {"time_rule", time_sentence(experiment)}};
+  for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
+    json options = json::object();
+    for (const Override& one : experiment.variants[v].overrides) options[one.key] = one.value;
+    data["variants"].push_back({{"name", experiment.variants[v].name}, {"is_baseline", v == experiment.baseline}, {"options", options}});
+  }
+  for (const auto& one : experiment.cases) data["cases"].push_back(one.name);
+  for (const auto& start : experiment.starts) data["starts"].push_back(start.name);
+  const json answers = answer_json(experiment, answer);
+  data["summary"] = answers["variants"];
+  data["comparisons"] = answers["comparisons"];
+
+  ReportMaterial material;
+  const std::size_t starts = experiment.starts.size(), variants = experiment.variants.size();
+  for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of cells: cases, then starts, then variants
+    data["cells"].push_back(cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
+  for (const compare::CellIndex& cell : shown)
+    material.add_run(runner.pictures_of(cell), data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
+  data["pictures"] = std::move(material.pictures);
+  data["geometries"] = std::move(material.geometries);
+  data["scenes"] = std::move(material.scenes);
+  data["graph"] = pipeline_graph(experiment, runner);
+
+  json record;
+  if (!shown.empty()) record = json::parse(text_of_file(runner.pictures_of(shown.front()) / "run.json"), nullptr, false);
+  if (!record.is_object()) record = json::object();
+  data["marrow"] = record.value("marrow", "");
+  data["experiment"]["machine"] = machine_of(record);
+  data["experiment"]["finished"] = record.value("finished", "");
+  data["experiment"]["plugins"] = json::array();
+  for (const json& plugin : record.value("plugins", json::array()))
+    data["experiment"]["plugins"].push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+  write_page(data, folder / "report.html");
+}
+
+}  // namespace marrow::cli

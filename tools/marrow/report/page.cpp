@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+
+#include "marrow/domain/error.hpp"
+#include "report/report.hpp"
+
+// The page without its data, put together by tools/report/assemble.py when marrow is built.
+asm(".section .rodata\n"
+    ".global marrow_report_page\n"
+    ".global marrow_report_page_end\n"
+    "marrow_report_page:\n"
+    ".incbin \"" MARROW_REPORT_PAGE "\"\n"
+    "marrow_report_page_end:\n"
+    ".byte 0\n"
+    ".previous\n");
+extern "C" const char marrow_report_page[], marrow_report_page_end[];
+
+namespace marrow::cli {
+
+void write_page(const nlohmann::json& data, const std::filesystem::path& file) {
+  static constexpr std::string_view kMarker = "<!-- marrow:data -->";
+  const std::string_view page(marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page));
+  const std::size_t at = page.find(kMarker);
+  std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+  // No text among the data may end the script: "<" is written as JSON's escape of it.
+  std::string safe;
+  safe.reserve(text.size() + text.size() / 16);
+  for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
+  const std::filesystem::path temporary = file.string() + ".tmp-" + std::to_string(getpid());
+  std::ofstream stream(temporary, std::ios::binary);
+  stream << page.substr(0, at) << "<script type=\"application/json\" id=\"data\">" << safe << "</script>" << page.substr(at + kMarker.size());
+  stream.close();
+  std::error_code error;
+  if (stream) std::filesystem::rename(temporary, file, error);
+  if (stream && !error) return;
+  std::filesystem::remove(temporary, error);
+  throw Error("cannot write " + file.string() + "; is the disk full?");
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,44 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// One HTML file that shows a run or a comparison, and needs nothing else. tools/report holds the page, its data.js says what
+// the data are.
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "compare/comparison.hpp"
+
+namespace marrow::cli {
+
+/// What cells share in a report: pictures, meshes and scenes by the hash of their content.
+struct ReportMaterial {
+  nlohmann::json pictures = nlohmann::json::object();
+  nlohmann::json geometries = nlohmann::json::object();
+  nlohmann::json scenes = nlohmann::json::object();
+
+  /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left out.
+  void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
+};
+
+/// The file as a data URL: a PNG at most `size_px` long, as WebP. Throws Error for a file that is no PNG.
+std::string picture_url(const std::filesystem::path& png_file, int size_px);
+
+/// Writes the page with these data in it.
+void write_page(const nlohmann::json& data, const std::filesystem::path& file);
+
+/// {nodes, edges} of a pipeline, with what each of `variants` makes otherwise.
+nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants);
+
+/// What runs say of the machine and the plugins that they used.
+nlohmann::json machine_of(const nlohmann::json& run_record);
+
+/// FOLDER/report.html of a comparison; `shown` are the cells whose pictures were made.
+void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
+                  const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown, const CompareRequest& request,
+                  const std::filesystem::path& folder);
+
+/// Writes the page of a single run; empty `file` = RUN/report.html.
+int show(const std::filesystem::path& run_folder, std::filesystem::path file);
+
+}  // namespace marrow::cli
