@@ -167,7 +167,9 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
   if (makes_functions(node)) {
     defer(node, call, key);
   } else if (!read_back(node, call, key)) {
-    call.result = perform(node, call.inputs, call.item, key);
+    const Store::Claim claim = settings_.store ? settings_.store->claim(key.key, settings_.cancelled) : Store::Claim();
+    // Another process may have made it in the meantime.
+    if (!read_back(node, call, key)) call.result = perform(node, call.inputs, call.item, key);
   }
   share(key.key, call.result);
   finished_(node, call);
@@ -207,6 +209,7 @@ bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
       ++leaf;
     });
   for (const std::string& warning : stored->provenance.warnings) report(RunEvent::Kind::warning, node, call.item, warning);
+  report(RunEvent::Kind::cached, node, call.item, "", 1, stored->provenance.seconds);
   call.result = {Status::done, "", std::move(stored->outputs), false, true};
   const std::scoped_lock lock(mutex_);
   ++records_[node].cached;

@@ -10,6 +10,7 @@
 #include <algorithm>
 #include <array>
 #include <charconv>
+#include <chrono>
 #include <cstdlib>
 #include <cstring>
 
@@ -326,6 +327,17 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
     ++freed.entries;
   }
   return freed;
+}
+
+void Store::tidy() const {
+  const fs::path mark = folder_ / "tidied";
+  std::error_code error;
+  const auto last = fs::last_write_time(mark, error);
+  if (!error && fs::file_time_type::clock::now() - last < std::chrono::hours(24)) return;
+  write_whole(mark, {"when the store was last brought back to its size\n"});
+  const char* limit = std::getenv("MARROW_CACHE_GB");
+  const double keep_gb = limit && *limit ? std::strtod(limit, nullptr) : 20;
+  collect(std::uint64_t(std::max(0.0, keep_gb) * 1e9));
 }
 
 std::optional<Digest> digest_of_hex(const std::string& text) {

@@ -128,7 +128,6 @@ class BadData(Case):
                                       damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000 + 10 * u)))
         self.assertIn("node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': the edge map is empty, so there is no shaft in it; "
                       "look at the image, and lower the thresholds of the edge detector (its inputs: edges = edges, view = case.views)", error)
-        self.assertIn("node 'cost' (similarity.contour_distance) for distal failed: view 'lateral': the edge map is empty", error)
         self.assert_kept(out, "shaft")
 
     def test_no_shaft_pair(self):

@@ -224,6 +224,48 @@ TEST_F(StoreTest, KilledWritersLeaveNothingHalf) {
   EXPECT_TRUE(only_file(store.folder()).empty()) << "temporary files of killed processes are collected too: " << only_file(store.folder());
 }
 
+/// Starts a process that claims a key, then does `work`; returns once the key is claimed.
+template <class Work>
+pid_t claimer(const Store& store, const Digest& key, const Work& work) {
+  int pipe_ends[2];
+  EXPECT_EQ(pipe(pipe_ends), 0);
+  const pid_t child = fork();
+  if (child == 0) {
+    const Store::Claim claim = store.claim(key, nullptr);
+    if (write(pipe_ends[1], "c", 1) != 1) _exit(1);
+    work();
+    _exit(0);
+  }
+  char told = 0;
+  EXPECT_EQ(read(pipe_ends[0], &told, 1), 1);
+  close(pipe_ends[0]);
+  close(pipe_ends[1]);
+  return child;
+}
+
+TEST_F(StoreTest, AResultThatAnotherProcessMakesIsWaitedFor) {
+  const Digest key = marrow::hash_of(1);
+  const pid_t child = claimer(store, key, [&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    store.save(key, {number(7)}, {});
+  });
+  EXPECT_FALSE(store.find(key));
+  { const Store::Claim other = store.claim(marrow::hash_of(2), nullptr); }  // another key is free
+  const Store::Claim claim = store.claim(key, nullptr);
+  EXPECT_TRUE(store.find(key));
+  waitpid(child, nullptr, 0);
+}
+
+TEST_F(StoreTest, AKilledProcessGivesItsClaimsBack) {
+  const Digest key = marrow::hash_of(1);
+  const pid_t child = claimer(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
+  std::atomic<bool> cancelled{true};
+  { const Store::Claim none = store.claim(key, &cancelled); }  // does not wait for the hour
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+  const Store::Claim claim = store.claim(key, nullptr);
+}
+
 TEST_F(StoreTest, FullDiskDoesNotEndTheRun) {
   const pid_t child = fork();  // a limit on file size stands for the full disk
   if (child == 0) {

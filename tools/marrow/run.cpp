@@ -39,7 +39,8 @@ class Progress {
       case Kind::warning: line(where, "warning: " + event.text); break;
       case Kind::message: folder_.append_log(where + ": " + event.text); break;
       case Kind::progress: moving_line(where, event); break;
-      case Kind::started: break;
+      case Kind::started:
+      case Kind::cached: break;
     }
   }
 
@@ -79,12 +80,12 @@ class Progress {
   }
 
   static void print_json(const RunEvent& event) {
-    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning"};
+    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning", "cached"};
     json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
     if (!event.item.empty()) j["item"] = event.item;
     if (!event.text.empty()) j["text"] = event.text;
     if (event.kind == Kind::progress) j["fraction"] = event.fraction;
-    if (event.kind == Kind::finished) j["seconds"] = event.seconds;
+    if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
     std::printf("%s\n", j.dump().c_str());
     std::fflush(stdout);
   }
@@ -154,6 +155,7 @@ int run(const RunRequest& request) {
   progress.clear();
   const std::vector<RunFolder::Written> written = folder.write_outputs(pipeline, result, catalogue);
   folder.write_record(pipeline, result, settings, catalogue, arguments_of(request.pipeline), written);
+  if (settings.store) settings.store->tidy();
 
   bool faulty = result.failed();
   for (const RunFolder::Written& output : written) {

@@ -6,7 +6,7 @@
 //   experiment: {name, help, file (path of the YAML), text (its content), pipeline_text, seed, started, finished,
 //     command (how to repeat), folder, machine: {cpu, cores, cpu_level}, plugins: [{file, build_id}],
 //     starts_protocol, success_rule, time_rule}                       sentences
-//   variants: [{name, is_baseline, options: {"edges.uses": "edges.canny"}}]
+//   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   metrics: [{name, label, unit, success_below: number | null}]      lower is better; the first is the main one
 //   cases: ["case-01", ...], starts: ["0", ...]
 //   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
@@ -16,7 +16,7 @@
 //     initial_mtre_mm, seconds, evaluations, cached_nodes, values: [number | null per metric],
 //     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,
 //     landscape: [{axis, unit, offsets: [...], costs: [...]}] | null, scene: id | null, folder}]
-//   pictures: {id: "data:image/jpeg;base64,..."}
+//   pictures: {id: "data:image/webp;base64,..."}
 //   geometries: {id: {vertices: base64 float32 xyz, triangles: base64 uint32}}     for meshes that several scenes share
 //   scenes: {id: {meshes: [{name, vertices, triangles} or {name, geometry: id}],
 //     poses: [{mesh: index, name: "result" | "truth" | "start", world_from_model: [16]}],

@@ -75,6 +75,7 @@ class Comparison {
     write_tables(experiment_, rows, answer, folder_);
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
+    if (!request_.no_cache) store_.tidy();
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());

@@ -35,7 +35,7 @@ std::string wires_of(const PipelineNode& node) {
   return text;
 }
 
-/// "uses edges.canny; high = 80", or nothing where both are the same.
+/// "uses KIND.NAME; high = 80", or nothing where both are the same.
 std::string difference(const PipelineNode& base, const PipelineNode& other) {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };

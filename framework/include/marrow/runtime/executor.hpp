@@ -15,9 +15,9 @@
 
 namespace marrow {
 
-/// What a run reports while it goes on. `item` names the place along the mapped axes ("lateral", "distal/final").
+/// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names the place along the mapped axes ("lateral", "distal/final").
 struct RunEvent {
-  enum class Kind { started, progress, finished, failed, skipped, message, warning };
+  enum class Kind { started, progress, finished, failed, skipped, message, warning, cached };
   Kind kind = Kind::message;
   std::string node, item, text;
   double fraction = 0;

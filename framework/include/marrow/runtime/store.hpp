@@ -6,6 +6,7 @@
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "marrow/runtime/value.hpp"
@@ -56,6 +57,19 @@ class Store {
   /// Keeps what can be kept: data, absent items and lists of them. Returns why it was not kept, or an empty text: a full disk
   /// must not end a run.
   std::string save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const;
+  /// The right to make one result. Others that want the same one wait until the holder has kept it, or is gone.
+  class Claim {
+   public:
+    explicit Claim(int descriptor = -1) : descriptor_(descriptor) {}
+    Claim(Claim&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    ~Claim();
+
+   private:
+    int descriptor_;
+  };
+  /// Waits for it; look the result up again then. Comes back empty-handed where the folder cannot be written or when
+  /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back.
+  Claim claim(const Digest& key, const std::atomic<bool>* cancelled) const;
   /// Removes an entry that turned out to be damaged.
   void drop(const Digest& key) const;
   /// Folders of simulated cases, by key; made by whoever needs one, and collected like entries.
@@ -86,6 +100,9 @@ class Store {
   /// Removes the least recently used entries and simulated cases until the rest is at most `keep_bytes`, and what killed
   /// processes left behind.
   Freed collect(std::uint64_t keep_bytes) const;
+  /// The same with MARROW_CACHE_GB (20 where it is not set), once a day at most: after a run, so that the store does not fill
+  /// the disk.
+  void tidy() const;
 
  private:
   std::filesystem::path file_of(const Digest& key) const;
