@@ -7,6 +7,7 @@
 //     command (how to repeat), folder, machine: {cpu, cores, cpu_level}, plugins: [{file, build_id}],
 //     starts_protocol, success_rule, time_rule}                       sentences
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
+//   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
 //   metrics: [{name, label, unit, success_below: number | null}]      lower is better; the first is the main one
 //   cases: ["case-01", ...], starts: ["0", ...]
 //   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
@@ -30,7 +31,7 @@ const Data = (() => {
   const FORMAT = 1;
 
   function complete(data) {
-    for (const name of ["variants", "metrics", "cases", "starts", "summary", "comparisons", "cells"]) data[name] = data[name] || [];
+    for (const name of ["figures", "variants", "metrics", "cases", "starts", "summary", "comparisons", "cells"]) data[name] = data[name] || [];
     for (const name of ["experiment", "pictures", "scenes", "geometries"]) data[name] = data[name] || {};
     for (const variant of data.variants) variant.options = variant.options || {};
     for (const cell of data.cells) {

@@ -22,6 +22,12 @@ const Detail = (() => {
     ]);
   }
 
+  // Figures of merit of a run, a table for each group of them.
+  const figures = (data) => data.figures.map((table) => el("div", { class: "scroll" }, el("table", { class: "figures" }, el("caption", {}, table.name),
+    el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Figure"), table.columns.map((column) => el("th", { scope: "col", class: "number" }, column)), el("th", { scope: "col" }, "Unit"))),
+    el("tbody", {}, table.rows.map((row) => el("tr", {}, el("th", { scope: "row" }, row.name),
+      table.columns.map((_, i) => el("td", { class: "number" }, Number.isFinite(row.values[i]) ? number(row.values[i]) : "")), el("td", {}, row.unit)))))));
+
   function options(variant) {
     const entries = Object.entries(variant.options);
     return entries.length ? rows(entries.map(([name, value]) => [el("code", {}, name), el("code", {}, typeof value === "string" ? value : JSON.stringify(value))])) : el("p", { class: "note" }, "The pipeline as it is, no option changed.");
@@ -84,5 +90,5 @@ const Detail = (() => {
   }
 
   // lookAt(cell) is set by the page: it shows the cell's case and start in the comparison of pictures.
-  return { open, values, options, reason, lookAt: () => {} };
+  return { open, values, figures, options, reason, lookAt: () => {} };
 })();

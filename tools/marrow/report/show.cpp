@@ -18,27 +18,31 @@ std::string text_of_file(const fs::path& file) {
   return text.str();
 }
 
-/// "distal.final.mtre_mm" of outputs/errors/distal/final.json.
-std::string figure_name(const std::string& file, const std::string& metric) {
-  std::string name = fs::path(file).lexically_relative("outputs").replace_extension().string();
-  std::replace(name.begin(), name.end(), '/', '.');
-  return name + "." + metric;
-}
-
-/// The figures of merit that the run wrote become the cell's metrics.
-void add_figures(const fs::path& folder, const json& record, json& metrics, json& cell) {
+/// The figures of merit that the run wrote: a table for each folder of files, a column for each file in it.
+json figures_of(const fs::path& folder, const json& record) {
+  json tables = json::array();
   for (const json& output : record.value("outputs", json::array()))
     for (const json& file : output.value("files", json::array())) {
-      const std::string name = file;
-      if (!name.ends_with(".json")) continue;
-      const json figures = json::parse(text_of_file(folder / name), nullptr, false);
+      const fs::path path = file.get<std::string>();
+      const json figures = path.extension() == ".json" ? json::parse(text_of_file(folder / path), nullptr, false) : json();
       if (!figures.is_object() || !figures.contains("metrics")) continue;
+      const std::string name = path.parent_path().lexically_relative("outputs").string();
+      if (tables.empty() || tables.back()["name"] != name) tables.push_back({{"name", name}, {"columns", json::array()}, {"rows", json::array()}});
+      json& table = tables.back();
+      table["columns"].push_back(path.stem().string());
       for (const json& metric : figures["metrics"]) {
-        const std::string label = figure_name(name, metric.value("name", ""));
-        metrics.push_back({{"name", label}, {"label", label}, {"unit", metric.value("unit", "")}, {"success_below", nullptr}});
-        cell["values"].push_back(metric["value"]);
+        json* row = nullptr;
+        for (json& one : table["rows"])
+          if (one["name"] == metric.value("name", "")) row = &one;
+        if (!row) {
+          table["rows"].push_back({{"name", metric.value("name", "")}, {"unit", metric.value("unit", "")}, {"values", json::array()}});
+          row = &table["rows"].back();
+        }
+        while ((*row)["values"].size() + 1 < table["columns"].size()) (*row)["values"].push_back(nullptr);
+        (*row)["values"].push_back(metric.contains("value") ? metric["value"] : json());
       }
     }
+  return tables;
 }
 
 json graph_of_run(const fs::path& folder) {
@@ -67,7 +71,7 @@ int show(const fs::path& folder, fs::path file) {
   if (cell["status"] == "failed") cell["reason"] = reason_of(record);
   json data = {{"marrow", record.value("marrow", "")}, {"format", 1}, {"kind", "run"}, {"metrics", json::array()}, {"cases", {name}}, {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
-  add_figures(folder, record, data["metrics"], cell);
+  data["figures"] = figures_of(folder, record);
   ReportMaterial material;
   material.add_run(folder, cell);
   data["cells"] = {cell};
