@@ -230,14 +230,15 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
 
 fs::path CellRunner::pictures_of(const CellIndex& cell) const { return folder_ / "pictures" / cell_id(experiment_, cell); }
 
-void CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
+bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   const fs::path folder = pictures_of(cell);
   const std::string key = key_of(cell) + " " + file_digest(experiment_.file).hex();
   std::string found;
   std::getline(std::ifstream(folder / "key.txt") >> std::ws, found);
-  if (found == key) return;
+  if (found == key) return false;
   run_into(folder, pipeline_of(cell, case_folder(cell.case_index), Depth::pictures), cell, observer);
   std::ofstream(folder / "key.txt") << key << '\n';
+  return true;
 }
 
 double CellRunner::time(const CellIndex& cell) {

@@ -79,6 +79,7 @@ void print_node(const NodeInfo& node, const LibraryInfo& library) {
     std::printf("  %-26s %s; %s\n", "", range_text(option).c_str(), option.required ? "must be given" : ("default " + yaml_text(option.default_value)).c_str());
   }
   if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
+  print_limits(node);
   std::printf("\nLibrary\n  %s\n  build id %s\n", library.file.c_str(), library.build_id.hex().c_str());
 }
 

@@ -38,6 +38,10 @@ int inspect(const std::string& node, bool yaml, bool json);
 int graph(const PipelineRequest& request, bool dot);
 int schema(const std::filesystem::path& file);
 int doctor(bool json);
+/// Nodes, kinds or libraries; each node must pass the suite of its kind.
+int run_conformance(const std::vector<std::string>& subjects);
+/// The checks that a node of this kind must pass, with their limits.
+void print_limits(const NodeInfo& node);
 int describe(const std::filesystem::path& library, bool write);
 
 /// Splits name=value texts. Throws Error for one without '='.

@@ -131,6 +131,11 @@ int main(int argc, char** argv) {
   doctor_command->add_flag("--json", doctor_json, "as JSON");
   doctor_command->callback([&] { code = doctor(doctor_json); });
 
+  std::vector<std::string> subjects;
+  auto* conformance_command = app.add_subcommand("conformance", "check that nodes do what every node of their kind must do");
+  conformance_command->add_option("subject", subjects, "node, kind or library (.so file)")->required();
+  conformance_command->callback([&] { code = run_conformance(subjects); });
+
   std::filesystem::path library;
   bool write = false;
   auto* describe_command = app.add_subcommand("describe", "load one plugin library in a child process and print its manifest");

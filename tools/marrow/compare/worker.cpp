@@ -9,6 +9,7 @@
 
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
+#include "report/report.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -71,7 +72,7 @@ int worker(const CompareRequest& request) {
       } else if (what == "time") {
         answers.line("end " + std::to_string(runner.time(cell)));
       } else {
-        runner.draw(cell, observer);
+        if (runner.draw(cell, observer)) ReportMaterial::prepare(runner.pictures_of(cell));
         answers.line("end good");
       }
     } catch (const std::exception& error) {

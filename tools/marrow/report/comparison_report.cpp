@@ -114,7 +114,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of cells: cases, then starts, then variants
     data["cells"].push_back(cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
   for (const compare::CellIndex& cell : shown)
-    material.add_run(runner.pictures_of(cell), data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
+    material.add_prepared(runner.pictures_of(cell), data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
   data["pictures"] = std::move(material.pictures);
   data["geometries"] = std::move(material.geometries);
   data["scenes"] = std::move(material.scenes);

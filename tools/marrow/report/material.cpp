@@ -90,6 +90,22 @@ void ReportMaterial::add_run(const fs::path& run_folder, json& cell) {
     }
 }
 
+void ReportMaterial::prepare(const fs::path& run_folder) {
+  ReportMaterial material;
+  json cell = json::object();
+  material.add_run(run_folder, cell);
+  std::ofstream(run_folder / "report.json") << json{{"cell", cell}, {"pictures", material.pictures}, {"geometries", material.geometries}, {"scenes", material.scenes}};
+}
+
+void ReportMaterial::add_prepared(const fs::path& run_folder, json& cell) {
+  const json prepared = json::parse(text_of_file(run_folder / "report.json"), nullptr, false);
+  if (!prepared.is_object()) return add_run(run_folder, cell);
+  cell.update(prepared.at("cell"));
+  pictures.update(prepared.at("pictures"));
+  geometries.update(prepared.at("geometries"));
+  scenes.update(prepared.at("scenes"));
+}
+
 json machine_of(const json& run_record) {
   std::string cpu;
   std::ifstream info("/proc/cpuinfo");

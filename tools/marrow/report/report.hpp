@@ -19,6 +19,10 @@ struct ReportMaterial {
 
   /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left out.
   void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
+  /// Encoding pictures is what a report takes longest for: keeps what add_run() finds in the folder itself.
+  static void prepare(const std::filesystem::path& run_folder);
+  /// The same as add_run(), from what prepare() kept where it is there.
+  void add_prepared(const std::filesystem::path& run_folder, nlohmann::json& cell);
 };
 
 /// The file as a data URL: a PNG at most `size_px` long, as WebP. Throws Error for a file that is no PNG.

@@ -54,9 +54,9 @@ class CellRunner {
   std::optional<CellRow> finished(const CellIndex& cell);
   /// Never throws for what goes wrong in a node: that is the row's reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
-  /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. Does nothing
-  /// where they are there already. Throws Error where the folder cannot be written.
-  void draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
+  /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. False where
+  /// they were there already. Throws Error where the folder cannot be written.
+  bool draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Seconds that a run of the cell takes when the results that all variants share are read back and all others are made
   /// anew. Measured once: later runs with as many threads find it in the store. Throws Error where the run fails.
   double time(const CellIndex& cell);
