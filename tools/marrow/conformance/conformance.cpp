@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 
@@ -19,7 +20,12 @@ namespace {
 using conformance::Check;
 using conformance::Suite;
 
-constexpr int kTimeLimit_s = 60;
+/// Seconds that one check may take.
+int time_limit_s() {
+  const char* text = std::getenv("MARROW_CHECK_SECONDS");
+  const int seconds = text ? std::atoi(text) : 0;
+  return seconds > 0 ? seconds : 60;
+}
 
 struct Outcome {
   bool passed = false;
@@ -44,7 +50,7 @@ std::string measured(const NodeDefinition& node, const Check& check) {
 bool read_all(int descriptor, std::string& text) {
   pollfd wait{descriptor, POLLIN, 0};
   for (;;) {
-    if (poll(&wait, 1, kTimeLimit_s * 1000) <= 0) return false;
+    if (poll(&wait, 1, time_limit_s() * 1000) <= 0) return false;
     char buffer[4096];
     const ssize_t count = read(descriptor, buffer, sizeof buffer);
     if (count <= 0) return true;
@@ -75,7 +81,7 @@ Outcome run_check(const Catalogue& catalogue, const std::string& node, const Che
   if (!in_time) kill(child, SIGKILL);
   int status = 0;
   waitpid(child, &status, 0);
-  if (!in_time) return {false, "it took longer than " + std::to_string(kTimeLimit_s) + " s"};
+  if (!in_time) return {false, "it took longer than " + std::to_string(time_limit_s()) + " s"};
   if (WIFSIGNALED(status)) return {false, std::string("it crashed: ") + strsignal(WTERMSIG(status))};
   if (text.empty()) return {false, "it ended the process with exit code " + std::to_string(WEXITSTATUS(status))};
   return {text[0] == '+', text.substr(1)};

@@ -181,8 +181,8 @@ std::vector<Trial> trials() {
            }},
           {"large_field", [] {
              Grid grid;
-             grid.size = {200, 200, 200};
-             return Inputs{{"field", item(field_of(grid, [](const Eigen::Vector3d& p) { return (p - Eigen::Vector3d(100, 100, 100)).norm() - 80; }))}};
+             grid.size = {128, 128, 128};
+             return Inputs{{"field", item(field_of(grid, [](const Eigen::Vector3d& p) { return (p - Eigen::Vector3d(64, 64, 64)).norm() - 50; }))}};
            }}};
 }
 

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The suites catch nodes that are wrong in one way each, by name, and pass a plain right one."""
+import os
+import pathlib
+import re
+import subprocess
+import sys
+import unittest
+
+BUILD = pathlib.Path(sys.argv[1])
+WRONG = {  # node: checks of which at least one must fail; the others of the suite may
+    "edges.shifted": {"disc_bias", "bar_bias"},
+    "edges.turned": {"disc_direction", "bar_direction"},
+    "edges.changing": {"determinism", "threads"},
+    "edges.unsorted": {"contract"},
+    "edges.crashing": {"one_pixel", "empty_image"},
+    "mesh.inward": {"sphere_topology", "torus_topology"},
+    "mesh.open": {"contract"},
+    "mesh.fat": {"sphere_distance", "torus_distance"},
+    "mesh.unturned": {"turned_sphere_distance"},
+    "mesh.endless": {"nothing_inside"},
+}
+
+
+def conformance(*subjects):
+    """Exit code, and {node: {check: (passed, text)}}."""
+    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS="3")
+    result = subprocess.run([str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment)
+    nodes, checks = {}, {}
+    for line in result.stdout.splitlines():
+        if re.fullmatch(r"[a-z_]+\.[a-z_0-9]+", line):
+            checks = nodes.setdefault(line, {})
+        found = re.match(r"  (pass|FAIL) (\S+)\s*(.*)", line)
+        if found:
+            checks[found.group(2)] = (found.group(1) == "pass", found.group(3))
+    return result, nodes
+
+
+class Conformance(unittest.TestCase):
+    def test_each_wrong_node_is_caught_by_name(self):
+        for node, expected in WRONG.items():
+            with self.subTest(node):
+                result, nodes = conformance(node)
+                failed = {name for name, (passed, _) in nodes[node].items() if not passed}
+                self.assertEqual(result.returncode, 1)
+                self.assertTrue(failed & expected, "failed: %s, expected one of %s" % (failed, expected))
+
+    def test_a_fault_in_one_place_fails_there_alone(self):
+        self.assertEqual({name for name, (passed, _) in conformance("edges.shifted")[1]["edges.shifted"].items() if not passed}, WRONG["edges.shifted"])
+        self.assertEqual({name for name, (passed, _) in conformance("mesh.unturned")[1]["mesh.unturned"].items() if not passed}, WRONG["mesh.unturned"])
+
+    def test_what_happened_is_said(self):
+        texts = {name: text for name, (_, text) in conformance("edges.crashing")[1]["edges.crashing"].items()}
+        self.assertEqual(texts["one_pixel"], "it crashed: Aborted")
+        texts = {name: text for name, (_, text) in conformance("mesh.endless")[1]["mesh.endless"].items()}
+        self.assertEqual(texts["nothing_inside"], "it took longer than 3 s")
+        texts = {name: text for name, (_, text) in conformance("mesh.fat")[1]["mesh.fat"].items()}
+        self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
+
+    def test_right_ones_pass(self):
+        for node in ("edges.plain", "mesh.plain"):
+            result, nodes = conformance(node)
+            self.assertEqual(result.returncode, 0, result.stdout)
+
+    def test_unknown(self):
+        result, _ = conformance("edges.cany")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("there is no node, kind or library 'edges.cany'; did you mean 'edges.canny'?", result.stderr)
+
+    def test_a_library_means_its_nodes(self):
+        result, nodes = conformance("marrow_wrong_edges.so")
+        self.assertEqual(sorted(nodes), ["edges.changing", "edges.crashing", "edges.plain", "edges.shifted", "edges.turned", "edges.unsorted"])
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
