@@ -195,11 +195,13 @@ void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
   for (const EdgePixel& pixel : b.pixels) {
     const auto found = before.find({std::lround(pixel.v_px), std::lround(pixel.u_px)});
     if (found == before.end()) continue;
+    const EdgePixel& old = *found->second;
     ++common;
-    changed += hash_of(pixel) != hash_of(*found->second);
-    largest_px = std::max(largest_px, std::hypot(double(pixel.u_px) - found->second->u_px, double(pixel.v_px) - found->second->v_px));
+    changed += hash_of(pixel) != hash_of(old);
+    largest_px = std::max(largest_px, std::hypot(double(pixel.u_px) - old.u_px, double(pixel.v_px) - old.v_px));
+    before.erase(found);
   }
-  const std::size_t gone = a.pixels.size() - common, added = b.pixels.size() - common;
+  const std::size_t gone = before.size(), added = b.pixels.size() - common;
   amount.facts = {{"pixels", {a.pixels.size(), b.pixels.size()}}, {"gone", gone}, {"new", added}, {"changed", changed}, {"largest_px", largest_px}};
   amount.lines.push_back(text("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
   if (changed) amount.lines.push_back(text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
