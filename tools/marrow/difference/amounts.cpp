@@ -84,7 +84,8 @@ void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
     amount.lines.push_back("its predicted deviations or the way of the search differ");
   amount.facts["cost"] = {a.cost, b.cost};
   amount.facts["evaluations"] = {a.evaluations, b.evaluations};
-  if (a.covariance.has_value() != b.covariance.has_value()) amount.lines.push_back(std::string("its deviations are ") + (b.covariance ? "" : "not ") + "predicted, were " + (a.covariance ? "" : "not "));
+  if (a.covariance.has_value() != b.covariance.has_value())
+    amount.lines.push_back(b.covariance ? "its deviations are predicted, were not" : "its deviations are not predicted, were");
   for (const std::string& warning : b.warnings)
     if (std::find(a.warnings.begin(), a.warnings.end(), warning) == a.warnings.end()) amount.lines.push_back("it warns now: " + warning);
   for (const std::string& warning : a.warnings)
@@ -125,7 +126,8 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   if (before != now || a.triangles.size() != b.triangles.size()) {
     const double area_before = surface_area_mm2(a), area_now = surface_area_mm2(b);
     amount.facts["area_mm2"] = {area_before, area_now};
-    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now, before, b.triangles.size(), a.triangles.size(), area_now, area_before));
+    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now, before, b.triangles.size(),
+                                a.triangles.size(), area_now, area_before));
   }
   if (before != now) return;
   double largest_mm = 0;
@@ -143,7 +145,8 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
 
 void add_samples(const NumberDifference& numbers, const char* what, const char* unit, Amount& amount) {
   amount.facts.update({{"samples", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}});
-  amount.lines.push_back(text("%zu of %zu %s differ (%.2g %%), by at most %.4g %s", numbers.differ, numbers.count, what, percent(numbers.differ, numbers.count), numbers.largest, unit));
+  amount.lines.push_back(text("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count, what, percent(numbers.differ, numbers.count),
+                              numbers.largest, unit));
 }
 
 /// Samples on grids; where those differ in size, samples cannot be matched.

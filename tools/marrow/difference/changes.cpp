@@ -168,9 +168,13 @@ class Comparer {
       if (!text.empty()) changes.push_back({now.files.contains(name) ? "content" : "option", now.id, name, a ? *a : "", b ? *b : "", text});
     }
     if (with_builds && now.random && before_.seed != now_.seed)
-      changes.push_back({"seed", now.id, "", std::to_string(before_.seed), std::to_string(now_.seed),
-                         "it draws random numbers, and the seed is " + std::to_string(now_.seed) + ", was " + std::to_string(before_.seed)});
+      changes.push_back(seed_change(now.id, "it draws random numbers, and the seed is "));
     return changes;
+  }
+
+  Change seed_change(const std::string& node, const std::string& text) const {
+    const std::string before = std::to_string(before_.seed), now = std::to_string(now_.seed);
+    return {"seed", node, "", before, now, text + now + ", was " + before};
   }
 
   Change other_build(const RecordedNode& before, const RecordedNode& now) const {
@@ -238,7 +242,7 @@ class Comparer {
     const auto is_seed = [](const Change& change) { return change.what == "seed"; };
     const bool is_told = std::any_of(result.roots.begin(), result.roots.end(), [&](const Root& root) { return std::any_of(root.why.begin(), root.why.end(), is_seed); });
     if (before_.seed != now_.seed && !is_told)
-      result.others.push_back({"seed", "", "", std::to_string(before_.seed), std::to_string(now_.seed), "the seed is " + std::to_string(now_.seed) + ", was " + std::to_string(before_.seed)});
+      result.others.push_back(seed_change("", "the seed is "));
   }
 
   void add_rebuilt(RunDifference& result) const {

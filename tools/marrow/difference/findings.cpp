@@ -143,9 +143,16 @@ json json_of(const Findings& findings) {
   for (const Change& change : difference.others) others.push_back(json_of(change));
   for (const Change& change : difference.rebuilt) rebuilt.push_back({{"file", change.name}, {"before", change.before}, {"now", change.now}});
   for (const Root& root : difference.roots) roots.push_back(json_of(root));
-  json result = {{"before", findings.before.folder.string()}, {"now", findings.now.folder.string()}, {"identical", findings.identical()},
+  json result = {{"before", findings.before.folder.string()},
+                 {"now", findings.now.folder.string()},
+                 {"identical", findings.identical()},
                  {"nodes", {{"same", difference.same}, {"in_consequence", difference.in_consequence}, {"only_before", difference.only_before}, {"only_now", difference.only_now}}},
-                 {"first", nullptr}, {"differ_by_themselves", roots}, {"other_changes", others}, {"rebuilt_plugins", rebuilt}, {"framework_rebuilt", findings.before.framework != findings.now.framework}, {"outputs", json_of(findings.results)}};
+                 {"first", nullptr},
+                 {"differ_by_themselves", roots},
+                 {"other_changes", others},
+                 {"rebuilt_plugins", rebuilt},
+                 {"framework_rebuilt", findings.before.framework != findings.now.framework},
+                 {"outputs", json_of(findings.results)}};
   if (!roots.empty()) {
     result["first"] = roots[0];
     result["first"]["outputs"] = json_of(findings.first);

@@ -76,7 +76,8 @@ void read_nodes(const fs::path& file, const json& record, RunRecord& run) {
     for (const auto& option : entry.second["with"]) node.options[option.first.Scalar()] = text_of(option.second);
     add_record(*recorded, node);
     if (!recorded->contains("items"))
-      throw Error((run.folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " + std::to_string(run.seed));
+      throw Error((run.folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
+                  std::to_string(run.seed));
     run.nodes.push_back(std::move(node));
   }
 }
