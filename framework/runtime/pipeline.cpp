@@ -105,13 +105,15 @@ class Resolver {
     }
   }
 
-  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none.
+  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none. $$ is a dollar.
   std::optional<std::string> substituted(const std::string& text, const Place& place) {
     std::string result;
     bool known = true;
     for (std::size_t i = 0; i < text.size(); ++i) {
-      if (text[i] != '$') {
+      const bool doubled = text[i] == '$' && i + 1 < text.size() && text[i + 1] == '$';
+      if (text[i] != '$' || doubled) {
         result += text[i];
+        i += doubled;
         continue;
       }
       std::size_t end = i + 1;
