@@ -94,9 +94,7 @@ CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue,
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
 Pipeline CellRunner::simulation_of(std::size_t index) const {
-  PipelineArguments arguments;
-  arguments.inputs = experiment_.cases[index].inputs;
-  Pipeline pipeline = checked(experiment_.simulation, arguments, catalogue_);
+  Pipeline pipeline = checked(experiment_.simulation, simulation_arguments_of(experiment_, index), catalogue_);
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
   return pipeline;
 }

@@ -58,8 +58,8 @@ class Reader {
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{"experiment", "name", "help", "pipeline", "inputs", "cases", "variants", "matrix", "starts",
-                                                "metrics", "success", "initial_error", "baseline", "pictures", "timed_cells"};
+    static const std::vector<std::string> kKeys{"experiment", "name", "help", "pipeline", "inputs", "set", "cases", "variants", "matrix",
+                                                "starts", "metrics", "success", "initial_error", "baseline", "pictures", "timed_cells"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
@@ -89,11 +89,12 @@ class Reader {
     if (entry.key == "help") experiment_.help = text();
     if (entry.key == "pipeline") experiment_.pipeline = (folder_ / text()).lexically_normal();
     if (entry.key == "inputs") experiment_.inputs = scalars(entry);
+    if (entry.key == "set") experiment_.common = overrides(entry, "'set'");
     if (entry.key == "cases") read_cases(entry);
     if (entry.key == "variants")
       for (const YamlEntry& variant : yaml_.map(entry.value, entry.place, "variants")) {
         check_name(variant.key, variant.place, "a variant's name");
-        experiment_.variants.push_back({variant.key, variant.place, overrides(variant)});
+        experiment_.variants.push_back({variant.key, variant.place, overrides(variant, "variant '" + variant.key + "'")});
       }
     if (entry.key == "matrix") read_matrix(entry);
     if (entry.key == "starts") read_starts(entry);
@@ -133,10 +134,10 @@ class Reader {
       yaml_.fault(place, what + " becomes a file name: '" + name + "' cannot be one", "use letters, digits, '-' and '_'");
   }
 
-  std::vector<std::pair<std::string, std::string>> scalars(const YamlEntry& section) {
-    std::vector<std::pair<std::string, std::string>> result;
+  std::vector<InputValue> scalars(const YamlEntry& section) {
+    std::vector<InputValue> result;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, section.key)) {
-      if (entry.value.IsScalar()) result.emplace_back(entry.key, entry.value.Scalar());
+      if (entry.value.IsScalar()) result.push_back({entry.key, entry.value.Scalar(), entry.place});
       else yaml_.fault(entry.place, "'" + entry.key + "' must be one value");
     }
     return result;
@@ -159,10 +160,10 @@ class Reader {
     return out.c_str();
   }
 
-  std::vector<Override> overrides(const YamlEntry& section) {
+  std::vector<Override> overrides(const YamlEntry& section, const std::string& what) {
     std::vector<Override> result;
     if (section.value.IsNull()) return result;
-    for (const YamlEntry& entry : yaml_.map(section.value, section.place, "variant '" + section.key + "'"))
+    for (const YamlEntry& entry : yaml_.map(section.value, section.place, what))
       result.push_back({entry.key, yaml_of(entry.value), entry.place});
     // What a node uses goes first: it drops the options that were written for another one.
     std::stable_partition(result.begin(), result.end(), [](const Override& one) { return one.key.ends_with(".uses"); });
@@ -216,6 +217,7 @@ class Reader {
   void read_cases(const YamlEntry& section) {
     static const std::vector<std::string> kKeys{"input", "folders", "simulate"};
     experiment_.case_input = "case";
+    experiment_.cases_place = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "cases", &kKeys)) {
       if (entry.key == "input") experiment_.case_input = yaml_.text(entry.value, entry.place, "input").value_or("");
       if (entry.key == "folders")
@@ -240,38 +242,45 @@ class Reader {
   }
 
   void read_simulation(const YamlEntry& section) {
-    static const std::vector<std::string> kKeys{"pipeline", "output", "seeds", "inputs", "draw", "seed_input"};
+    static const std::vector<std::string> kKeys{"pipeline", "output", "set", "seeds", "inputs", "draw", "seed_input"};
     std::vector<std::int64_t> seeds;
     bool has_seeds = false;
-    std::vector<std::pair<std::string, std::string>> inputs;
-    std::vector<std::pair<std::string, std::array<double, 2>>> ranges;
-    std::vector<std::string> seed_inputs;
+    std::vector<InputValue> inputs;
+    std::vector<Range> ranges;
+    std::vector<std::pair<std::string, Place>> seed_inputs;
     experiment_.simulation_output = "case";
     simulation_place_ = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "simulate", &kKeys)) {
       if (entry.key == "pipeline") experiment_.simulation = (folder_ / yaml_.text(entry.value, entry.place, "pipeline").value_or("")).lexically_normal();
       if (entry.key == "output") experiment_.simulation_output = yaml_.text(entry.value, entry.place, "output").value_or("");
+      if (entry.key == "set") experiment_.simulation_changes = overrides(entry, "'set'");
       if (entry.key == "seeds") {
         has_seeds = true;
         seeds = read_seeds(entry);
       }
       if (entry.key == "inputs") inputs = scalars(entry);
       if (entry.key == "draw")
-        for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "draw")) ranges.emplace_back(range.key, read_range(range));
-      if (entry.key == "seed_input")
-        for (const auto& [name, place] : texts(entry)) seed_inputs.push_back(name);
+        for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "draw")) ranges.push_back({range.key, read_range(range), range.place});
+      if (entry.key == "seed_input") seed_inputs = texts(entry);
     }
     if (experiment_.simulation.empty()) yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     for (std::int64_t seed : seeds) add_simulated(std::uint64_t(seed), inputs, ranges, seed_inputs);
   }
 
-  void add_simulated(std::uint64_t seed, const std::vector<std::pair<std::string, std::string>>& inputs,
-                     const std::vector<std::pair<std::string, std::array<double, 2>>>& ranges, const std::vector<std::string>& seed_inputs) {
+  struct Range {
+    std::string input;
+    std::array<double, 2> ends;
+    Place place;
+  };
+
+  void add_simulated(std::uint64_t seed, const std::vector<InputValue>& inputs, const std::vector<Range>& ranges,
+                     const std::vector<std::pair<std::string, Place>>& seed_inputs) {
     ExperimentCase one{"seed-" + std::to_string(seed), {}, seed, inputs};
     Random random(seed);
-    for (const auto& [name, range] : ranges) one.inputs.emplace_back(name, number_text(range[0] + (range[1] - range[0]) * random.uniform()));
-    for (const std::string& name : seed_inputs) one.inputs.emplace_back(name, std::to_string(seed));
+    for (const Range& range : ranges)
+      one.inputs.push_back({range.input, number_text(range.ends[0] + (range.ends[1] - range.ends[0]) * random.uniform()), range.place});
+    for (const auto& [name, place] : seed_inputs) one.inputs.push_back({name, std::to_string(seed), place});
     experiment_.cases.push_back(std::move(one));
   }
 
@@ -380,9 +389,10 @@ class Reader {
   /// The pipelines, with the inputs that cells give them and each variant's changes.
   void check_pipelines() {
     if (!experiment_.simulation.empty()) {
-      PipelineArguments arguments;
-      arguments.inputs = experiment_.cases[0].inputs;
-      check_output(read_pipeline(experiment_.simulation, arguments, catalogue_, diagnostics_, true), experiment_.simulation_output, simulation_place_);
+      const std::size_t first = std::size_t(std::find_if(experiment_.cases.begin(), experiment_.cases.end(), [](const ExperimentCase& one) { return one.folder.empty(); }) -
+                                            experiment_.cases.begin());
+      check_output(read_pipeline(experiment_.simulation, simulation_arguments_of(experiment_, first), catalogue_, diagnostics_, true), experiment_.simulation_output,
+                   simulation_place_);
     }
     for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
       Diagnostics faults;
@@ -456,13 +466,22 @@ std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string
 PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const fs::path& case_folder) {
   PipelineArguments arguments;
   arguments.inputs = experiment.inputs;
-  arguments.inputs.emplace_back(experiment.case_input, fs::absolute(case_folder).string());
-  arguments.overrides = experiment.variants[cell.variant].overrides;
+  arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
+  arguments.overrides = experiment.common;
+  const std::vector<Override>& own = experiment.variants[cell.variant].overrides;
+  arguments.overrides.insert(arguments.overrides.end(), own.begin(), own.end());
   if (!experiment.protocol) return arguments;
   const Start& start = experiment.starts[cell.start];
   const auto list = [](const std::array<double, 3>& v) { return "[" + number_text(v[0]) + ", " + number_text(v[1]) + ", " + number_text(v[2]) + "]"; };
   arguments.overrides.push_back({experiment.protocol->node + ".rotation_deg", list(start.rotation_deg), experiment.protocol->place});
   arguments.overrides.push_back({experiment.protocol->node + ".translation_mm", list(start.translation_mm), experiment.protocol->place});
+  return arguments;
+}
+
+PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index) {
+  PipelineArguments arguments;
+  arguments.inputs = experiment.cases[case_index].inputs;
+  arguments.overrides = experiment.simulation_changes;
   return arguments;
 }
 

@@ -57,6 +57,20 @@ TEST_F(ExperimentTest, FoldersVariantsAndSuccess) {
   EXPECT_EQ(arguments.overrides[0].key + "=" + arguments.overrides[0].value, "c.value=2");
 }
 
+TEST_F(ExperimentTest, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
+  const std::string set = "set: {f.value: 3, c.word: two, c.uses: test.constant}\n";
+  const Experiment e = read(std::string(kHead) + kCases + set + kVariants + kMetrics);
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const auto text = [&](std::size_t variant) {
+    std::string all;
+    for (const auto& one : marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder).overrides) all += one.key + "=" + one.value + " ";
+    return all;
+  };
+  EXPECT_EQ(text(0), "c.uses=test.constant f.value=3 c.word=two ");
+  EXPECT_EQ(text(1), "c.uses=test.constant f.value=3 c.word=two c.value=2 ");
+  EXPECT_EQ(e.variants[0].overrides.size(), 0u) << "what all have in common tells no variant from another";
+}
+
 TEST_F(ExperimentTest, MatrixGivesEveryCombination) {
   const Experiment e = read(std::string(kHead) + kCases + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
@@ -94,14 +108,15 @@ TEST_F(ExperimentTest, StartsAreDrawnByTheirProtocol) {
 TEST_F(ExperimentTest, SimulatedCasesDrawTheirInputs) {
   scratch.write("s.yaml", "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
                           "  c: {uses: test.constant, with: {value: $x, count: $shape}}\noutputs: {case: c}\n");
-  const Experiment e = read(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, draw: {x: [-2, 2]}, seed_input: [shape]}}\n" + kVariants + kMetrics);
+  const Experiment e = read(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, set: {c.word: two}, draw: {x: [-2, 2]}, seed_input: [shape]}}\n" + kVariants + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.cases.size(), 3u);
+  EXPECT_EQ(marrow::compare::simulation_arguments_of(e, 0).overrides.at(0).key, "c.word");
   EXPECT_EQ(e.cases[2].name, "seed-5");
   EXPECT_EQ(e.cases[2].seed, 5u);
-  EXPECT_EQ(e.cases[2].inputs[1], (std::pair<std::string, std::string>("shape", "5")));
-  EXPECT_LE(std::abs(std::stod(e.cases[2].inputs[0].second)), 2);
-  EXPECT_NE(e.cases[1].inputs[0].second, e.cases[2].inputs[0].second);
+  EXPECT_EQ(e.cases[2].inputs[1].name + "=" + e.cases[2].inputs[1].value, "shape=5");
+  EXPECT_LE(std::abs(std::stod(e.cases[2].inputs[0].value)), 2);
+  EXPECT_NE(e.cases[1].inputs[0].value, e.cases[2].inputs[0].value);
 }
 
 TEST_F(ExperimentTest, WhatIsMissing) {
@@ -119,6 +134,17 @@ TEST_F(ExperimentTest, UnknownOptionOfAVariantIsAtItsLine) {
 }
 TEST_F(ExperimentTest, UnknownNodeOfAVariant) {
   expect_fault(std::string(kHead) + kCases + "variants:\n  two: {d.value: 2}\n" + kMetrics, 5, "the pipeline has no node 'd'", "did you mean 'c'?");
+}
+TEST_F(ExperimentTest, WhatIsSetIsCheckedAtItsLine) {
+  const auto with = [](const std::string& set) { return std::string(kHead) + kCases + "set:\n  f.value: 3\n  " + set + "\n" + kVariants + kMetrics; };
+  expect_fault(with("c.vlaue: 2"), 6, "'test.constant' has no option 'vlaue'", "did you mean 'value'?");
+  expect_fault(with("d.value: 2"), 6, "the pipeline has no node 'd'", "did you mean 'c'?");
+  expect_fault(with("c.value: 2000"), 6, "1000");
+  expect_fault(with("c.numbers: [1,\n    two]"), 6, "expected a number, got 'two'");
+  expect_fault(with("n.in.a: [c, d]"), 6, "takes one metrics, not a list");
+  expect_fault(with("n.in.a: d"), 6, "there is no node 'd'");
+  expect_fault(with("n: 1"), 6, "an override is node.option=value");
+  expect_fault(std::string(kHead) + kCases + "set: [c.value]\n" + kVariants + kMetrics, 4, "'set' must be a map, got a list");
 }
 TEST_F(ExperimentTest, ValueOutOfRangeInTheMatrix) {
   expect_fault(std::string(kHead) + kCases + "matrix:\n  c.value: [1, 2000]\n" + kMetrics, 5, "1000");
