@@ -357,11 +357,34 @@ class Reader {
   }
 
   void read_metrics(const YamlEntry& entry) {
-    for (const auto& [path, place] : texts(entry)) {
-      experiment_.metrics.push_back({path, path.substr(path.rfind('.') + 1), std::nullopt});
-      metric_places_.push_back(place);
+    if (!entry.value.IsSequence()) {
+      yaml_.fault(entry.place, "'metrics' must be a list", "write it as  metrics: [errors.distal.final.mtre_mm]");
+      return;
     }
-    if (experiment_.metrics.empty() && diagnostics_.empty()) yaml_.fault(entry.place, "'metrics' names no figure");
+    for (const YAML::Node& item : entry.value) {
+      const MetricChoice metric = read_metric(item);
+      if (metric.path.empty()) continue;
+      experiment_.metrics.push_back(metric);
+      metric_places_.push_back(yaml_.place(item));
+    }
+    if (experiment_.metrics.empty() && diagnostics_.empty()) yaml_.fault(entry.place, "'metrics' names no figure", "write it as  metrics: [errors.distal.final.mtre_mm]");
+  }
+
+  /// A path, or a path with a name for people.
+  MetricChoice read_metric(const YAML::Node& item) {
+    static const std::vector<std::string> kKeys{"figure", "label"};
+    const Place place = yaml_.place(item);
+    MetricChoice metric;
+    if (item.IsMap()) {
+      for (const YamlEntry& part : yaml_.map(item, place, "a metric", &kKeys))
+        (part.key == "figure" ? metric.path : metric.label) = yaml_.text(part.value, part.place, part.key).value_or("");
+      if (metric.path.empty() && diagnostics_.empty())
+        yaml_.fault(place, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
+    } else {
+      metric.path = yaml_.text(item, place, "an item of 'metrics'").value_or("");
+    }
+    if (metric.label.empty()) metric.label = metric.path;
+    return metric;
   }
 
   void set_success(const std::string& path, double value, const Place& place) {

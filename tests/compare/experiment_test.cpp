@@ -57,6 +57,15 @@ TEST_F(ExperimentTest, FoldersVariantsAndSuccess) {
   EXPECT_EQ(arguments.overrides[0].key + "=" + arguments.overrides[0].value, "c.value=2");
 }
 
+TEST_F(ExperimentTest, MetricsHaveNamesForPeople) {
+  const Experiment e = read(std::string(kHead) + kCases + kVariants + "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  ASSERT_EQ(e.metrics.size(), 2u);
+  EXPECT_EQ(e.metrics[0].path + " " + e.metrics[0].label, "number.value Sum");
+  EXPECT_EQ(e.metrics[0].success_below, 3.0);
+  EXPECT_EQ(e.metrics[1].label, "other.value");
+}
+
 TEST_F(ExperimentTest, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   const std::string set = "set: {f.value: 3, c.word: two, c.uses: test.constant}\n";
   const Experiment e = read(std::string(kHead) + kCases + set + kVariants + kMetrics);

@@ -45,7 +45,7 @@ struct StartProtocol {
 /// A figure of merit: output.item....figure, as in errors.distal.final.mtre_mm.
 struct MetricChoice {
   std::string path;
-  std::string label;
+  std::string label;  ///< for people; the path where the experiment gives none
   std::optional<double> success_below;
 };
 
