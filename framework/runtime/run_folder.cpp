@@ -219,7 +219,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
                  {"nodes", json::array()},
                  {"plugins", plugins_used(pipeline, result, catalogue)},
                  {"outputs", json::array()}};
-  for (const auto& [name, value] : arguments.inputs) record["inputs"][name] = value;
+  for (const InputValue& one : arguments.inputs) record["inputs"][one.name] = one.value;
   for (const Override& one : arguments.overrides) record["overrides"].push_back(one.key + "=" + one.value);
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     if (!took_part(result.nodes[i])) continue;

@@ -108,6 +108,18 @@ class Compare(Case):
         self.assertEqual([process.wait() for process in both], [0, 0])
         self.assertEqual(self.results("one"), self.results("two"))
 
+    def test_a_time_counts_what_the_variants_of_its_own_experiment_do_not_share(self):
+        self.experiment({"a": "{}"}, cases=1)
+        self.write("p.yaml", PIPELINE.replace("0.05", "0.3"))
+        seconds = {}
+        for name, variants in (("one", "  a: {}\n  b: {m.value: 5}\n"), ("two", "  a: {}\n  b: {shared.value: 0.1}\n")):
+            path = self.write(name + ".yaml", HEAD + "variants:\n" + variants)
+            result = self.compare(path, "--out", self.scratch / name)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            seconds[name] = float(self.rows(name)["a/0/0"]["seconds"])
+        self.assertLess(seconds["one"], 0.3, "both share it")
+        self.assertGreater(seconds["two"], 0.3, "the same cell, and the other variant makes another one")
+
     def test_one_cell_by_itself(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
         environment = {"MARROW_CACHE": str(self.scratch / "cache")}

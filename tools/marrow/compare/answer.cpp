@@ -71,6 +71,7 @@ std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
   for (const compare::Variant& variant : experiment.variants) answer.variants.push_back(summary_of(experiment, variant.name, rows));
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
@@ -85,7 +86,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     Finding& finding = answer.findings[i];
     finding.p_holm = corrected[i];
     finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
-                                         {experiment.metrics[finding.metric].path, unit_of(rows, finding.metric), false}, finding.comparison, finding.p_holm);
+                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric], false}, finding.comparison, finding.p_holm);
   }
   return answer;
 }
@@ -108,7 +109,9 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
     out << line;
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", experiment.metrics[m].path.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
+    const compare::MetricChoice& metric = experiment.metrics[m];
+    const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") + (metric.label == metric.path ? "" : ", " + metric.path);
+    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", title.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
     out << line;
     for (std::size_t v = 0; v < answer.variants.size(); ++v) {
       const VariantFigure& figure = answer.variants[v].figures[m];
