@@ -214,7 +214,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     for (const MetricChoice& metric : experiment_.metrics) {
       if (!row.failed.empty()) break;
       const Metric found = figure(pipeline, result, metric.path);
-      row.values.push_back(found.value);
+      row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
       row.units.push_back(found.unit);
     }
     if (row.failed.empty() && !experiment_.initial_error.empty()) row.initial_error = figure(pipeline, result, experiment_.initial_error).value;

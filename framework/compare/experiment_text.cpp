@@ -193,13 +193,15 @@ class Reader {
 
   /// A path, or a path with a name for people.
   MetricChoice read_metric(const YAML::Node& item, const Place& place) {
-    static const std::vector<std::string> kKeys{"figure", "label"};
+    static const std::vector<std::string> kKeys{"figure", "label", "better"};
     MetricChoice metric;
     if (item.IsMap()) {
       bool has_figure = false;
       for (const YamlEntry& part : yaml_.map(item, place, "a metric", &kKeys)) {
         has_figure |= part.key == "figure";
-        (part.key == "figure" ? metric.path : metric.label) = yaml_.text(part.value, part.place, part.key).value_or("");
+        const std::string text = yaml_.text(part.value, part.place, part.key).value_or("");
+        if (part.key == "better") metric.better = read_better(text, part.place);
+        else (part.key == "figure" ? metric.path : metric.label) = text;
       }
       if (!has_figure) yaml_.fault(place, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
     } else {
@@ -209,12 +211,19 @@ class Reader {
     return metric;
   }
 
+  MetricChoice::Better read_better(const std::string& text, const Place& place) {
+    static const std::vector<std::string> kNames{"lower", "higher", "nearest_zero"};
+    const auto found = std::find(kNames.begin(), kNames.end(), text);
+    if (found == kNames.end()) yaml_.fault(place, "'" + text + "' is no way to be better", suggestion(text, kNames));
+    return found == kNames.end() ? MetricChoice::Better::lower : MetricChoice::Better(found - kNames.begin());
+  }
+
   void set_success(const std::string& path, double value, const Place& place) {
     std::vector<std::string> paths;
     for (MetricChoice& metric : experiment_.metrics) {
       paths.push_back(metric.path);
       if (metric.path != path) continue;
-      metric.success_below = value;
+      metric.limit = value;
       return;
     }
     yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));

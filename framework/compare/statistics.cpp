@@ -120,7 +120,7 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double confi
   return {successes == 0 ? 0.0 : centre - half, successes == trials ? 1.0 : centre + half, confidence};
 }
 
-Summary summarise(const std::vector<double>& values) {
+Summary summarise(const std::vector<double>& values, bool higher_is_better) {
   check_finite(values, "value");
   std::vector<double> sorted = values;
   std::sort(sorted.begin(), sorted.end());
@@ -130,8 +130,8 @@ Summary summarise(const std::vector<double>& values) {
   summary.median = median_of_sorted(sorted);
   summary.lower_quartile = quantile(sorted, 0.25);
   summary.upper_quartile = quantile(sorted, 0.75);
-  summary.percentile_95 = quantile(sorted, 0.95);
-  summary.worst = sorted.back();
+  summary.percentile_95 = quantile(sorted, higher_is_better ? 0.05 : 0.95);
+  summary.worst = higher_is_better ? sorted.front() : sorted.back();
   return summary;
 }
 

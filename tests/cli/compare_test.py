@@ -45,6 +45,20 @@ class Compare(Case):
         """Of each cell all but times and how often it was tried."""
         return {name: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for name, row in self.rows(out).items()}
 
+    def test_which_values_are_better(self):
+        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
+        for i in range(8):
+            (self.scratch / "cases" / str(i)).mkdir(parents=True)
+        variants = "variants: {one: {m.value: -1}, four: {m.value: 4}}\n"
+        better = {"lower": ("5.0 worse", "1", "0"), "higher": ("5.0 better", "0", "1"), "nearest_zero": ("3.0 worse", "1", "0")}
+        for name, (sentence, one, four) in better.items():
+            with self.subTest(name):
+                head = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [{figure: number.value, label: sum, better: %s}]\nsuccess: {number.value: 2}\n" % name
+                result = self.compare(self.write("e.yaml", head + variants), "--out", self.scratch / name)
+                self.assertIn("four, sum: %s" % sentence, result.stdout)
+                rows = self.rows(name)
+                self.assertEqual((rows["one/0/0"]["success"], rows["four/0/0"]["success"]), (one, four))
+
     def test_what_goes_wrong_in_a_cell_stays_there(self):
         path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
                                 "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)

@@ -189,6 +189,7 @@ TEST_F(ExperimentFaults, Metrics) {
   expect_fault(metrics("\n- number.value\n- number.value"), 9, "'number.value' is given twice in 'metrics'");
   expect_fault(metrics("\n- {label: Sum}"), 8, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
   expect_fault(metrics("\n- {figure: number.value, lable: Sum}"), 8, "unknown key 'lable' in a metric", "did you mean 'label'?");
+  expect_fault(metrics("\n- {figure: number.value, better: highest}"), 8, "'highest' is no way to be better", "did you mean 'higher'?");
   expect_fault(metrics("\n- {figure: number.value, label: [Sum]}"), 8, "label: expected a text, got a list");
   expect_fault(metrics("\n- {figure: [number.value]}"), 8, "figure: expected a text, got a list");
   expect_fault(metrics("[nubmer.value]"), 7, "the pipeline p has no output 'nubmer'", "did you mean 'number'?");

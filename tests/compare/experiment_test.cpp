@@ -14,7 +14,7 @@ TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[0].name, "a");
   EXPECT_EQ(e.baseline, 1u);
-  EXPECT_EQ(e.metrics[0].success_below, 3.0);
+  EXPECT_EQ(e.metrics[0].limit, 3.0);
   EXPECT_EQ(e.cell_count(), 4u);
   EXPECT_EQ(marrow::compare::cell_id(e, {1, 0, 0}), "two/a/0");
   EXPECT_EQ(marrow::compare::cell_of(e, "two/a/0")->variant, 1u);
@@ -29,7 +29,7 @@ TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.metrics.size(), 2u);
   EXPECT_EQ(e.metrics[0].path + " " + e.metrics[0].label, "number.value Sum");
-  EXPECT_EQ(e.metrics[0].success_below, 3.0);
+  EXPECT_EQ(e.metrics[0].limit, 3.0);
   EXPECT_EQ(e.metrics[1].label, "other.value");
 }
 

@@ -14,10 +14,10 @@ using compare::Experiment;
 
 constexpr std::uint64_t kBootstrapSeed = 1;
 
-VariantFigure figure_of(const std::vector<double>& values) {
+VariantFigure figure_of(const std::vector<double>& values, bool higher_is_better = false) {
   VariantFigure figure;
   figure.count = values.size();
-  if (!values.empty()) figure.summary = compare::summarise(values);
+  if (!values.empty()) figure.summary = compare::summarise(values, higher_is_better);
   return figure;
 }
 
@@ -39,7 +39,7 @@ VariantSummary summary_of(const Experiment& experiment, const std::string& varia
     evaluations.push_back(row.evaluations);
   }
   if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);
-  for (const auto& figure : values) summary.figures.push_back(figure_of(figure));
+  for (std::size_t i = 0; i < values.size(); ++i) summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
   summary.seconds = figure_of(seconds);
   summary.evaluations = figure_of(evaluations);
   return summary;
@@ -86,7 +86,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     Finding& finding = answer.findings[i];
     finding.p_holm = corrected[i];
     finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
-                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric], false}, finding.comparison, finding.p_holm);
+                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric], experiment.metrics[finding.metric].higher_is_better()}, finding.comparison, finding.p_holm);
   }
   return answer;
 }

@@ -35,9 +35,9 @@ std::string starts_sentence(const Experiment& experiment) {
 std::string success_sentence(const Experiment& experiment, const std::vector<std::string>& units) {
   std::string limits;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
-    if (const compare::MetricChoice& metric = experiment.metrics[m]; metric.success_below) {
+    if (const compare::MetricChoice& metric = experiment.metrics[m]; metric.limit) {
       char limit[40];
-      std::snprintf(limit, sizeof limit, " below %g", *metric.success_below);
+      std::snprintf(limit, sizeof limit, metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
       limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
   return limits.empty() ? "A run that ends without a fault is a success." : "A run is a success with " + limits + "; a failed run is none.";
@@ -66,7 +66,7 @@ json metrics_of(const Experiment& experiment, const std::vector<std::string>& un
   json metrics = json::array();
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
     const compare::MetricChoice& metric = experiment.metrics[m];
-    metrics.push_back({{"name", metric.path}, {"label", metric.label}, {"unit", units[m]}, {"success_below", of(metric.success_below)}});
+    metrics.push_back({{"name", metric.path}, {"label", metric.label}, {"unit", units[m]}, {metric.higher_is_better() ? "success_above" : "success_below", of(metric.limit)}, {"higher_is_better", metric.higher_is_better()}});
   }
   return metrics;
 }

@@ -46,7 +46,11 @@ struct StartProtocol {
 struct MetricChoice {
   std::string path;
   std::string label;  ///< for people; the path where the experiment gives none
-  std::optional<double> success_below;
+  enum class Better { lower, higher, nearest_zero };  ///< of nearest_zero, the magnitude is compared
+  Better better = Better::lower;
+  std::optional<double> limit;  ///< of success: below it, or above it where higher is better
+
+  bool higher_is_better() const { return better == Better::higher; }
 };
 
 struct Experiment {
