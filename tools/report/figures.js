@@ -34,10 +34,12 @@ const Figures = (() => {
     const metric = data.metrics[metricIndex];
     const rows = data.variants.map((_, variant) => Data.valuesOf(data, variant, metricIndex).sort((a, b) => a.value - b.value));
     const all = rows.flatMap((row) => row.map((item) => item.value));
+    // A limit far from all values would press them into a corner of a linear scale.
+    const limit = Data.limit(metric), drawn = limit !== null && (kind === "log" || limit <= 3 * Math.max(...all));
     const { root, box: area, x } = Plots.frame({ width, height: ROW_HEIGHT * rows.length + 62, label: "Distribution of " + metric.label + ", a row a variant; the numbers are in the table of the result",
-      x: { kind, domain: Plots.domain(all.concat(Data.limit(metric) ?? []), kind, true), title: axisTitle(metric) } });
-    if (Data.limit(metric) !== null) {
-      root.append(svg("line", { class: "threshold", x1: x(Data.limit(metric)), x2: x(Data.limit(metric)), y1: area.top, y2: area.bottom, "data-tip": "Success: " + Data.limitText(metric) }));
+      x: { kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind, true), title: axisTitle(metric) } });
+    if (drawn) {
+      root.append(svg("line", { class: "threshold", x1: x(limit), x2: x(limit), y1: area.top, y2: area.bottom, "data-tip": "Success: " + Data.limitText(metric) }));
     }
     rows.forEach((row, variant) => {
       const top = area.top + variant * ROW_HEIGHT, middle = top + 40, failed = data.cells.filter((cell) => cell.variant === variant && cell.status === "failed").length;
