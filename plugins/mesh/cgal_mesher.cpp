@@ -82,6 +82,7 @@ Surface mesh(const LevelSet& level_set, const Criteria& criteria, const std::fun
   const Implicit implicit(value, Kernel::Sphere_3(CGAL::ORIGIN, level_set.radius_mm * level_set.radius_mm), kRelativeError);
   Triangulation triangulation;
   for (const Eigen::Vector3d& p : level_set.points_mm) triangulation.insert(Point(p.x(), p.y(), p.z()));
+  if (triangulation.dimension() < 3) return {{}, {}, true};  // too few points to begin with
   Complex complex(triangulation);
   const Traits traits;
   const Limits limits(criteria.angle_deg, criteria.size_mm, criteria.distance_mm);

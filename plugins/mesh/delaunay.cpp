@@ -46,57 +46,58 @@ class Interpolated {
 };
 
 /// Some points of the surface: one in each block of samples, so that there are some on each part of it.
-std::vector<Vector3d> spread_points(const surface::Signs& signs, std::size_t& crossings) {
-  constexpr int kBlock = 4;
+std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
   std::array<std::size_t, 3> blocks;
-  for (std::size_t axis = 0; axis < 3; ++axis) blocks[axis] = std::size_t(signs.size()[axis] / kBlock + 1);
+  for (std::size_t axis = 0; axis < 3; ++axis) blocks[axis] = std::size_t(signs.size()[axis] / block + 1);
   std::vector<bool> taken(blocks[0] * blocks[1] * blocks[2], false);
   std::vector<Vector3d> points;
-  crossings = 0;
   signs.for_edges([&](int axis, int x, int y, int z) {
-    ++crossings;
-    auto block = taken[(std::size_t(z / kBlock) * blocks[1] + std::size_t(y / kBlock)) * blocks[0] + std::size_t(x / kBlock)];
-    if (block) return;
-    block = true;
+    auto place = taken[(std::size_t(z / block) * blocks[1] + std::size_t(y / block)) * blocks[0] + std::size_t(x / block)];
+    if (place) return;
+    place = true;
     points.push_back(signs.crossing(axis, x, y, z));
   });
   return points;
+}
+
+/// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than its cells.
+std::size_t most_points(const surface::Signs& signs, const Grid& grid, const Options& options) {
+  double crossings = 0;
+  signs.for_edges([&](int, int, int, int) { ++crossings; });
+  const double smallest_mm = std::min(options.size_mm, 4 * options.distance_mm);
+  return std::size_t(1000 + 8 * crossings * std::max(1.0, std::pow(grid.spacing_mm.minCoeff() / smallest_mm, 2)));
 }
 
 Mesh delaunay(const SignedField& field, const Options& options, marrow::Context& context) {
   const Grid& grid = field.grid;
   const surface::Signs signs(field);
   const Interpolated interpolated(field);
-  // In mm about the middle of the grid, along its axes.
+  // CGAL works in mm about the middle of the grid, along its axes.
   const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
   cgal_mesher::LevelSet level_set;
   level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
-  std::size_t crossings = 0;
-  for (const Vector3d& index : spread_points(signs, crossings)) level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
-
-  cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm};
-  // More vertices than the marching cubes' are no longer about the field, unless triangles are to be smaller than its cells.
-  const double cells_per_triangle = std::pow(std::min(options.size_mm, 4 * options.distance_mm) / grid.spacing_mm.minCoeff(), 2);
-  criteria.most_points = std::size_t(1000 + 8 * double(crossings) * std::max(1.0, 1 / cells_per_triangle));
-  cgal_mesher::Surface surface;
-  try {
-    surface = cgal_mesher::mesh(level_set, criteria, [&] { context.check_cancelled(); });
-  } catch (const marrow::Cancelled&) {
-    throw;
-  } catch (const std::exception& error) {
-    throw marrow::Error(std::string("field: CGAL's surface mesher gave up (") + error.what() + "); use mesh.marching_cubes, which takes every field");
+  const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm, most_points(signs, grid, options)};
+  std::string fault;
+  for (const int block : {4, 2, 1}) {  // parts smaller than the triangles need more points to begin with
+    level_set.points_mm.clear();
+    for (const Vector3d& index : spread_points(signs, block))
+      level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
+    try {
+      cgal_mesher::Surface surface = cgal_mesher::mesh(level_set, criteria, [&] { context.check_cancelled(); });
+      Mesh mesh;
+      mesh.frame = grid.frame;
+      for (const Vector3d& p : surface.vertices_mm) mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
+      mesh.triangles = std::move(surface.triangles);
+      mesh = surface::finish(std::move(mesh), options);
+      if (surface.complete && marrow::is_manifold(mesh)) return mesh;
+      fault = surface.complete ? "its parts are smaller than the triangles" : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
+    } catch (const std::logic_error&) {  // a condition that CGAL asserts
+      fault = "CGAL's mesher came to a degenerate case";
+    }
   }
-  if (!surface.complete)
-    throw marrow::Error("field: its surface is too rough for Delaunay refinement, which stopped at " + std::to_string(criteria.most_points) +
-                        " vertices; smooth the field, make size_mm and distance_mm larger, or use mesh.marching_cubes");
-  Mesh mesh;
-  mesh.frame = grid.frame;
-  for (const Vector3d& p : surface.vertices_mm) mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
-  mesh.triangles = std::move(surface.triangles);
-  if (!marrow::is_manifold(mesh))
-    throw marrow::Error("field: Delaunay refinement did not close its surface; make size_mm smaller, or use mesh.marching_cubes");
-  return surface::finish(std::move(mesh), options);
+  throw marrow::Error("field: Delaunay refinement does not close its surface: " + fault +
+                      "; smooth the field, change size_mm and distance_mm, or use mesh.marching_cubes, which takes every field");
 }
 
 }  // namespace
