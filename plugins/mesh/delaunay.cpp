@@ -79,7 +79,9 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
   const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm, most_points(signs, grid, options)};
   std::string fault;
-  for (const int block : {4, 2, 1}) {  // parts smaller than the triangles need more points to begin with
+  // About as far apart as the triangles are large; parts that are smaller need more points to begin with.
+  const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
+  for (int block = largest_block; block > 0; block /= 2) {
     level_set.points_mm.clear();
     for (const Vector3d& index : spread_points(signs, block))
       level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
