@@ -7,25 +7,50 @@
 
 #include <algorithm>
 #include <mutex>
+#include <unordered_set>
 
 namespace pcl_poisson {
 namespace {
 
-/// A triangle as it is; a larger one is divided from its middle, as a diagonal could be that of another polygon too.
-void add_polygon(const pcl::Indices& corners, Surface& surface) {
-  const std::size_t size = corners.size();
-  const auto corner = [&](std::size_t k) { return std::uint32_t(corners[k % size]); };
-  if (size == 3) {
-    surface.triangles.push_back({corner(0), corner(1), corner(2)});
-    return;
+/// Cuts polygons into triangles so that no edge belongs to more than two: a polygon into a fan from a corner whose diagonals join
+/// vertices that nothing else joins, or, where there is none, from its middle.
+class Triangulation {
+ public:
+  Triangulation(const std::vector<pcl::Vertices>& polygons, Surface& surface) : surface_(surface) {
+    for (const pcl::Vertices& polygon : polygons)
+      for (std::size_t k = 0; k < polygon.vertices.size(); ++k) joined_.insert(edge(polygon.vertices, k, k + 1));
+    for (const pcl::Vertices& polygon : polygons) add(polygon.vertices);
   }
-  std::array<float, 3> middle{};
-  for (std::size_t k = 0; k < size; ++k)
-    for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] += surface.vertices[corner(k)][axis] / float(size);
-  const auto centre = std::uint32_t(surface.vertices.size());
-  surface.vertices.push_back(middle);
-  for (std::size_t k = 0; k < size; ++k) surface.triangles.push_back({centre, corner(k), corner(k + 1)});
-}
+
+ private:
+  static std::uint32_t corner(const pcl::Indices& corners, std::size_t k) { return std::uint32_t(corners[k % corners.size()]); }
+  static std::uint64_t edge(const pcl::Indices& corners, std::size_t k, std::size_t other) {
+    const std::uint64_t a = corner(corners, k), b = corner(corners, other);
+    return std::min(a, b) << 32 | std::max(a, b);
+  }
+
+  void add(const pcl::Indices& corners) {
+    const std::size_t size = corners.size();
+    for (std::size_t from = 0; from < size; ++from) {
+      bool free = true;
+      for (std::size_t k = 2; k + 1 < size; ++k) free &= !joined_.count(edge(corners, from, from + k));
+      if (!free) continue;
+      for (std::size_t k = 2; k + 1 < size; ++k) joined_.insert(edge(corners, from, from + k));
+      for (std::size_t k = 1; k + 1 < size; ++k)
+        surface_.triangles.push_back({corner(corners, from), corner(corners, from + k), corner(corners, from + k + 1)});
+      return;
+    }
+    std::array<float, 3> middle{};
+    for (std::size_t k = 0; k < size; ++k)
+      for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] += surface_.vertices[corner(corners, k)][axis] / float(size);
+    const auto centre = std::uint32_t(surface_.vertices.size());
+    surface_.vertices.push_back(middle);
+    for (std::size_t k = 0; k < size; ++k) surface_.triangles.push_back({centre, corner(corners, k), corner(corners, k + 1)});
+  }
+
+  Surface& surface_;
+  std::unordered_set<std::uint64_t> joined_;
+};
 
 }  // namespace
 
@@ -55,7 +80,7 @@ Surface reconstruct(const std::vector<OrientedPoint>& points, const Settings& se
   }
   Surface surface;
   for (const pcl::PointNormal& vertex : vertices) surface.vertices.push_back({vertex.x, vertex.y, vertex.z});
-  for (const pcl::Vertices& polygon : polygons) add_polygon(polygon.vertices, surface);
+  Triangulation(polygons, surface);
   return surface;
 }
 

@@ -48,7 +48,7 @@ std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const V
 }
 
 /// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges out. In
-/// it, the least depth of the octree at which the smallest cells are no larger than the field's.
+/// it, the depth of the octree at which the smallest cells are about as large as the field's.
 pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>& points, double cell_mm, const Options& options) {
   double extent_mm = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -56,7 +56,7 @@ pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>
     extent_mm = std::max(extent_mm, double(high->place[axis] - low->place[axis]));
   }
   const double side_mm = 1.1 * extent_mm + 4 * cell_mm;
-  const int depth = std::clamp(int(std::ceil(std::log2(side_mm / cell_mm))), kLeastDepth, kMostDepth);
+  const int depth = std::clamp(int(std::lround(std::log2(side_mm / cell_mm))), kLeastDepth, kMostDepth);
   return {options.depth > 0 ? options.depth : depth, float(side_mm / extent_mm), float(options.point_weight)};
 }
 
@@ -91,7 +91,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Poisson reconstruction (Kazhdan and Hoppe, ACM Transactions on Graphics 2013; PCL): smooth")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("depth", &Options::depth, "of the octree: at most 2^depth cells a side; 0: cells as small as the field's", marrow::at_least(0),
+      .option("depth", &Options::depth, "of the octree: at most 2^depth cells a side; 0: cells about as small as the field's", marrow::at_least(0),
               marrow::at_most(kMostDepth))
       .option("point_weight", &Options::point_weight, "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
               marrow::at_least(0))
