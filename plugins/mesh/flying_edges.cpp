@@ -5,7 +5,6 @@
 #include <vtkNew.h>
 #include <vtkPolyData.h>
 
-#include <cstdlib>
 #include <marrow/plugin.hpp>
 
 #include "surface.hpp"
@@ -15,10 +14,7 @@ namespace {
 using marrow::Mesh;
 using marrow::SignedField;
 
-struct Options {
-  bool largest_only = true;
-  int smoothing = 0;
-};
+using Options = surface::Finish;
 
 /// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes
 /// half a voxel outside the last samples.
@@ -26,15 +22,11 @@ void fill(vtkImageData& image, const SignedField& field) {
   const auto& size = field.grid.size;
   image.SetExtent(-1, size[0], -1, size[1], -1, size[2]);
   image.AllocateScalars(VTK_FLOAT, 1);
+  const surface::Padded padded(field);
   float* out = static_cast<float*>(image.GetScalarPointer());
   for (int z = -1; z <= size[2]; ++z)
     for (int y = -1; y <= size[1]; ++y)
-      for (int x = -1; x <= size[0]; ++x) {
-        const float value =
-            field.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1));
-        const float padded = field.grid.contains(x, y, z) ? value : std::abs(value);
-        *out++ = padded;
-      }
+      for (int x = -1; x <= size[0]; ++x) *out++ = padded(x, y, z);
 }
 
 Mesh flying_edges(const SignedField& field, const Options& options) {
@@ -62,9 +54,7 @@ Mesh flying_edges(const SignedField& field, const Options& options) {
     for (int k = 0; k < 3; ++k) triangle[k] = std::uint32_t(corners[2 - k]);  // VTK's normals point down the field
     mesh.triangles.push_back(triangle);
   }
-  if (options.largest_only) mesh = surface::largest_component(mesh);
-  surface::smooth(mesh, options.smoothing);
-  return mesh;
+  return surface::finish(std::move(mesh), options);
 }
 
 }  // namespace
@@ -74,8 +64,6 @@ MARROW_PLUGIN(plugin) {
       .summary("Flying edges of VTK (Schroeder, Maynard and Geveci, LDAV 2015)")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("largest_only", &Options::largest_only,
-              "keep only the part that encloses the largest volume; drops specks and inner walls")
-      .option("smoothing", &Options::smoothing, "iterations of Taubin smoothing, which keeps the volume",
-              marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
 }

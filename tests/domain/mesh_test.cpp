@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <marrow/domain/manifold.hpp>
 #include <marrow/domain/mesh.hpp>
 
 #include "domain/message_of.hpp"
@@ -30,6 +31,24 @@ TEST(Mesh, ClosedMeansEachEdgeTwiceInOppositeSenses) {
   mesh = box({5, 6, 7}, {20, 30, 40});
   mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
   EXPECT_FALSE(is_closed(mesh)) << "each edge is used four times";
+}
+
+TEST(Mesh, TwoSheetsThatMeetInOneVertexAreNoManifold) {
+  Mesh mesh = box({0, 0, 0}, {2, 2, 2});
+  EXPECT_TRUE(is_manifold(mesh));
+  const auto count = std::uint32_t(mesh.vertices_mm.size());
+  const Mesh other = box({5, 0, 0}, {2, 2, 2});
+  mesh.vertices_mm.insert(mesh.vertices_mm.end(), other.vertices_mm.begin(), other.vertices_mm.end());
+  for (auto triangle : other.triangles) {
+    for (auto& v : triangle) v += count;
+    mesh.triangles.push_back(triangle);
+  }
+  EXPECT_TRUE(is_manifold(mesh)) << "two parts";
+  for (auto& triangle : mesh.triangles) std::replace(triangle.begin(), triangle.end(), count, 0u);
+  EXPECT_TRUE(is_closed(mesh));
+  EXPECT_FALSE(is_manifold(mesh)) << "which share a corner";
+  mesh.triangles.pop_back();
+  EXPECT_FALSE(is_manifold(mesh)) << "and one is open";
 }
 
 TEST(Mesh, VolumeAndAreaAwayFromTheOrigin) {

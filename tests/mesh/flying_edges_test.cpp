@@ -38,18 +38,18 @@ TEST(FlyingEdges, KeepsTheLargestPart) {
   EXPECT_NEAR(marrow::enclosed_volume_mm3(largest) / (4.0 / 3 * kPi * 14 * 14 * 14), 1, 3e-3);
 }
 
+TEST(FlyingEdges, EveryPatternIsAClosedManifold) {
+  Options options;
+  options.largest_only = false;
+  for (const bool around : {false, true})
+    for (unsigned inside = 0; inside < 256; ++inside) {
+      if (inside == (around ? 255u : 0u)) continue;  // no surface
+      EXPECT_TRUE(marrow::is_manifold(flying_edges(shapes::pattern_field(inside, around), options))) << "pattern " << inside;
+    }
+}
+
 TEST(FlyingEdges, SaysWhatIsWrongWithAField) {
-  SignedField field;
-  field.grid.size = {3, 3, 3};
-  field.values_mm.assign(27, 2.f);
-  try {
-    flying_edges(field, {});
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "field: there is no surface, as no value is negative (inside); the segmentation found "
-                 "nothing: check its seeds and thresholds");
-  }
+  shapes::expect_texts_for_bad_fields([](const SignedField& field) { flying_edges(field, {}); });
 }
 
 }  // namespace

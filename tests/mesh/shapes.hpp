@@ -8,6 +8,7 @@
 #include <functional>
 #include <random>
 
+#include "marrow/domain/manifold.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
 
@@ -43,14 +44,60 @@ inline marrow::SignedField field_of(const marrow::Grid& grid, const Distance& di
   return field;
 }
 
-/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour.
-inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed) {
+/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour. `inside_part`: how much is inside.
+inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed, double inside_part = 0.5) {
   marrow::SignedField field;
   field.grid.size = size;
   std::mt19937 random(seed);
   for (std::size_t i = 0; i < field.grid.count(); ++i)
-    field.values_mm.push_back(float(random()) / float(std::mt19937::max()) - 0.5f);
+    field.values_mm.push_back(float(random()) / float(std::mt19937::max()) - float(inside_part));
   return field;
+}
+
+/// A cell with the pattern's signs (bit c: corner c is inside) in a field whose other samples are on one side.
+inline marrow::SignedField pattern_field(unsigned pattern, bool inside_around) {
+  marrow::SignedField field;
+  field.grid.size = {4, 4, 4};
+  field.values_mm.assign(64, inside_around ? -0.8f : 0.6f);
+  for (int c = 0; c < 8; ++c) field.values_mm[field.grid.offset(1 + (c & 1), 1 + (c >> 1 & 1), 1 + (c >> 2))] = pattern >> c & 1 ? -0.7f : 0.9f;
+  return field;
+}
+
+/// Two thick walls a sample apart, which a mesher may not join, in a grid of CT-like spacing.
+inline double two_slabs(const Eigen::Vector3d& p, double gap_mm) {
+  const Eigen::Vector3d half(12, 12, 4);
+  const auto box = [&](const Eigen::Vector3d& q) { return (q.cwiseAbs() - half).maxCoeff(); };
+  const double shift_mm = half.z() + gap_mm / 2;
+  return std::min(box(p - Eigen::Vector3d(0, 0, shift_mm)), box(p + Eigen::Vector3d(0, 0, shift_mm)));
+}
+
+/// What a node refuses a field with, or "no error".
+template <class Node>
+std::string message_of(const Node& node, const marrow::SignedField& field) {
+  try {
+    node(field);
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+/// Every mesher says the same of a field that is no good.
+template <class Node>
+void expect_texts_for_bad_fields(const Node& node) {
+  EXPECT_EQ(message_of(node, {}), "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
+  marrow::SignedField field;
+  field.grid.size = {3, 3, 3};
+  field.values_mm.assign(27, 2.f);
+  EXPECT_EQ(message_of(node, field),
+            "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its seeds and thresholds");
+  field.values_mm.assign(27, -2.f);
+  EXPECT_EQ(message_of(node, field),
+            "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole volume: raise its threshold");
+  field.values_mm[13] = std::nanf("");
+  EXPECT_EQ(message_of(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
+  field.values_mm[13] = -INFINITY;
+  EXPECT_EQ(message_of(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
 }
 
 /// Euler's number of a closed mesh: vertices - edges + faces, 2 for a sphere, 0 for a torus.

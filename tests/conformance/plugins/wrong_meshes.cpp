@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// A blocky mesher made smooth by projection, and five that are wrong in one way each: the suite must catch each of them.
+// A plain mesher, and others that are wrong in one way each: the suite must catch each of them.
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <marrow/plugin.hpp>
 
 namespace {
 
-enum class Fault { none, inward, open, fat, unturned, endless };
+enum class Fault { none, inward, open, pinched, hasty, fat, unturned, endless };
 
 /// Marching tetrahedra: six in each cell, so that every field gives a closed surface.
 class Tetrahedra {
@@ -89,7 +90,11 @@ marrow::Mesh polygonise(const marrow::SignedField& field) {
     while (fault == Fault::endless) std::atomic_signal_fence(std::memory_order_seq_cst);
     throw marrow::Error("the field has no surface");
   }
-  if (fault == Fault::open) mesh.triangles.pop_back();
+  const bool rough = field.grid.count() > 100 && mesh.triangles.size() > 4 * field.grid.count();
+  if (fault == Fault::open || (fault == Fault::hasty && rough)) mesh.triangles.pop_back();
+  if (fault == Fault::pinched)
+    for (auto& triangle : mesh.triangles)
+      std::replace(triangle.begin(), triangle.end(), std::uint32_t(mesh.vertices_mm.size() - 1), std::uint32_t(0));
   if (fault == Fault::inward)
     for (auto& triangle : mesh.triangles) std::swap(triangle[0], triangle[1]);
   mesh.frame = field.grid.frame;
@@ -103,6 +108,8 @@ MARROW_PLUGIN(plugin) {
   add("mesh.plain", polygonise<Fault::none>);
   add("mesh.inward", polygonise<Fault::inward>);
   add("mesh.open", polygonise<Fault::open>);
+  add("mesh.pinched", polygonise<Fault::pinched>);
+  add("mesh.hasty", polygonise<Fault::hasty>);
   add("mesh.fat", polygonise<Fault::fat>);
   add("mesh.unturned", polygonise<Fault::unturned>);
   add("mesh.endless", polygonise<Fault::endless>);

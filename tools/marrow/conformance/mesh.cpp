@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshers, on signed fields of known shape: a sphere, a torus, two spheres that nearly touch, and random fields, on grids with
+// Meshers, on signed fields of known shape: a sphere, a torus, smooth bodies without symmetry, and fields of noise, on grids with
 // non-cubic voxels and turned axes. Nodes that make a mesh of a mesh are given the same shapes as meshes.
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -8,6 +8,7 @@
 #include <set>
 
 #include "conformance/suite.hpp"
+#include "marrow/domain/manifold.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -94,10 +95,15 @@ Shape torus() {
   return shape;
 }
 
-Mesh mesh_of(const Subject& subject, const Inputs& inputs) {
-  Mesh mesh = subject.output(inputs, "mesh").as<Mesh>();
+void expect_surface(const Mesh& mesh) {
   check_mesh(mesh, "its mesh");
   expect(is_closed(mesh), "its mesh is not closed, or an edge has more or fewer than two triangles");
+  expect(is_manifold(mesh), "its mesh is pinched: two sheets meet in one vertex");
+}
+
+Mesh mesh_of(const Subject& subject, const Inputs& inputs) {
+  Mesh mesh = subject.output(inputs, "mesh").as<Mesh>();
+  expect_surface(mesh);
   expect(enclosed_volume_mm3(mesh) > 0, "its triangles are turned inwards");
   return mesh;
 }
@@ -129,23 +135,96 @@ double distance_95(const Subject& subject, const Shape& shape) {
 double area_error(const Subject& subject, const Shape& shape) { return 100 * std::abs(surface_area_mm2(mesh_of(subject, shape.inputs)) / shape.area_mm2 - 1); }
 double volume_error(const Subject& subject, const Shape& shape) { return 100 * std::abs(enclosed_volume_mm3(mesh_of(subject, shape.inputs)) / shape.volume_mm3 - 1); }
 
-/// Fields without any smoothness: every configuration of a cell occurs.
-double random_fields(const Subject& subject) {
+/// A smooth shape without symmetry: a chain of round bodies that run into each other, well resolved by the grid.
+Shape blobs(unsigned seed) {
+  constexpr double kWidth_mm = 5, kLevel = 0.4;
+  const Grid grid = grid_of(true);
+  std::mt19937 random(seed);
+  const auto uniform = [&random] { return 2 * (double(random()) / 4294967296.0) - 1; };
+  std::vector<Eigen::Vector3d> centres{Eigen::Vector3d::Zero()};
+  while (centres.size() < 9) {
+    const Eigen::Vector3d step(uniform(), uniform(), uniform());
+    if (step.norm() > 0.1) centres.push_back((centres.back() + 1.4 * kWidth_mm * step.normalized()).cwiseMax(-11).cwiseMin(11));
+  }
+  const auto level = [=, middle = middle(grid)](const Eigen::Vector3d& p, Eigen::Vector3d& slope) {
+    double sum = 0;
+    slope.setZero();
+    for (const Eigen::Vector3d& centre : centres) {
+      const Eigen::Vector3d from = grid.direction.transpose() * (p - middle) - centre;
+      const double part = std::exp(-from.squaredNorm() / (2 * kWidth_mm * kWidth_mm));
+      sum += part;
+      slope += part / (kWidth_mm * kWidth_mm) * from;
+    }
+    return kLevel - sum;
+  };
+  Shape shape{[=](const Eigen::Vector3d& p) {
+                Eigen::Vector3d slope;
+                const double value = level(p, slope);
+                return value / std::max(slope.norm(), 0.02);  // a distance, close to the surface
+              }, {}, 0, 0, 0};
+  shape.inputs["field"] = item(field_of(grid, shape.distance));
+  Grid fine = grid;
+  for (std::size_t axis = 0; axis < 3; ++axis) fine.size[axis] *= 2;
+  fine.spacing_mm /= 2;
+  const SignedField samples = field_of(fine, shape.distance);
+  shape.volume_mm3 = fine.spacing_mm.prod() * double(std::count_if(samples.values_mm.begin(), samples.values_mm.end(), [](float v) { return v < 0; }));
+  return shape;
+}
+
+double worst_of_blobs(const Subject& subject, double (*figure)(const Subject&, const Shape&)) {
+  double worst = 0;
+  for (unsigned seed = 1; seed <= 4; ++seed) worst = std::max(worst, figure(subject, blobs(seed)));
+  return worst;
+}
+
+/// How many of the fields the node refuses. What it does not refuse it must close: a field may be too rough for a method, but
+/// no field is a reason for a hole.
+double refused(const Subject& subject, const std::vector<SignedField>& fields) {
+  int count = 0;
+  for (const SignedField& field : fields) {
+    const Result result = subject.call({{"field", item(field)}});
+    if (result.refusal) {
+      expect_reason(*result.refusal);
+      ++count;
+    } else {
+      expect_surface(result.outputs.at(0).as<Mesh>());
+    }
+  }
+  return count;
+}
+
+/// Fields without any smoothness: every configuration of neighbouring cells occurs.
+std::vector<SignedField> random_fields() {
+  std::vector<SignedField> fields;
   std::mt19937 random(5);
   for (int round = 0; round < 20; ++round) {
     Grid grid;
     grid.size = {9, 8, 10};
-    const SignedField field = field_of(grid, [&](const Eigen::Vector3d&) { return double(random()) / 4294967296.0 - (round % 2 ? 0.5 : 0.3); });
-    mesh_of(subject, {{"field", item(field)}});
+    fields.push_back(field_of(grid, [&](const Eigen::Vector3d&) { return double(random()) / 4294967296.0 - (round % 2 ? 0.5 : 0.3); }));
   }
-  return 0;
+  return fields;
+}
+
+/// A cell with each pattern of signs, in a field that is outside elsewhere; and in one that is inside elsewhere.
+std::vector<SignedField> all_patterns() {
+  std::vector<SignedField> fields;
+  for (const bool around : {false, true})
+    for (unsigned pattern = 0; pattern < 256; ++pattern) {
+      Grid grid;
+      grid.size = {4, 4, 4};
+      fields.push_back(field_of(grid, [=](const Eigen::Vector3d& p) {
+        const Eigen::Array3i corner = p.array().cast<int>() - 1;
+        const bool of_cell = (corner >= 0).all() && (corner <= 1).all();
+        const bool inside = of_cell ? pattern >> (corner.x() + 2 * corner.y() + 4 * corner.z()) & 1 : around;
+        return inside ? -0.8 : 0.6;
+      }));
+    }
+  return fields;
 }
 
 void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>& outputs) {
   expect(outputs.size() == 1 && !outputs[0].is_absent(), "it gives no mesh");
-  const Mesh& mesh = outputs[0].as<Mesh>();
-  check_mesh(mesh, "its mesh");
-  expect(is_closed(mesh), "its mesh is not closed, or an edge has more or fewer than two triangles");
+  expect_surface(outputs[0].as<Mesh>());
 }
 
 std::vector<Trial> trials() {
@@ -194,7 +273,10 @@ Suite mesh_suite() {
     suite.accuracy.push_back({name, what, limit, unit, std::move(measure)});
   };
   const std::string voxels = " at 0.9 x 0.9 x 1.2 mm";
-  add("random_fields", "closed and oriented on 20 random fields", 0, "", random_fields);
+  add("random_fields", "fields of noise: closed, without a pinch, or refused in words", 20, "of 20 refused", [](const Subject& subject) { return refused(subject, random_fields()); });
+  add("all_patterns", "the sign patterns of a cell: closed, without a pinch, or refused in words", 512, "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
+  add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm", [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
+  add("blobs_volume", "error of their volume" + voxels, 1.5, "%", [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
   for (const auto& [name, make] : {std::pair<std::string, std::function<Shape()>>{"sphere", [] { return sphere(); }}, {"turned_sphere", [] { return sphere(true); }}, {"torus", torus}}) {
     add(name + "_topology", "closed, oriented, its Euler number", 0, "", [make = make](const Subject& subject) { return topology(subject, make()); });
     add(name + "_distance", "95th percentile of the distance to it" + voxels, 0.15, "mm", [make = make](const Subject& subject) { return distance_95(subject, make()); });

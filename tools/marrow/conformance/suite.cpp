@@ -32,7 +32,7 @@ std::vector<Value> good_call(const Suite& suite, const Subject& subject, const I
 double check_trial(const Suite& suite, const Trial& trial, const Subject& subject) {
   const Inputs inputs = trial.inputs();
   const Result result = subject.call(inputs);
-  if (result.refusal) expect(result.refusal->size() > 10, "it refuses without saying why: '" + *result.refusal + "'");
+  if (result.refusal) expect_reason(*result.refusal);
   else suite.validate(inputs, subject.info().outputs, result.outputs);
   return 0;
 }
@@ -41,6 +41,10 @@ double check_trial(const Suite& suite, const Trial& trial, const Subject& subjec
 
 void expect(bool good, const std::string& text) {
   if (!good) throw Failure(text);
+}
+
+void expect_reason(const std::string& refusal) {
+  expect(refusal.size() > 10, "it refuses without saying why: '" + refusal + "'");
 }
 
 std::string digits(double value) {

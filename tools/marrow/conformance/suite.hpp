@@ -53,6 +53,8 @@ class NotApplicable : public Error {
 };
 /// Throws Failure unless `good`.
 void expect(bool good, const std::string& text);
+/// Throws Failure for a refusal that says too little.
+void expect_reason(const std::string& refusal);
 /// "0.41", with three significant digits.
 std::string digits(double value);
 

@@ -10,9 +10,10 @@
 // a closed manifold for every field.
 #include <array>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
-namespace marching_cubes {
+namespace cells {
 
 // Corner c of a cell lies at (c & 1, c >> 1 & 1, c >> 2 & 1). Edge 4 * axis + k runs along `axis` from
 // kEdgeStart[edge].
@@ -58,8 +59,9 @@ inline bool cut(const std::vector<int>& loop, std::size_t first, std::size_t las
   return false;
 }
 
-/// The triangles of the pattern in which corner c is inside when bit c is set.
-inline std::vector<Triangle> cell_triangles(unsigned inside) {
+/// The loops in which the surface crosses the edges of a cell, in the pattern in which corner c is inside when bit c is
+/// set. Counter-clockwise seen from outside.
+inline std::vector<std::vector<int>> cell_loops(unsigned inside) {
   std::array<int, 12> next;
   next.fill(-1);
   for (const auto& face : kFaces)
@@ -69,31 +71,39 @@ inline std::vector<Triangle> cell_triangles(unsigned inside) {
       while (inside >> face[(leave + 1) % 4] & 1) ++leave;
       next[edge_between(face[k], face[(k + 1) % 4])] = edge_between(face[leave % 4], face[(leave + 1) % 4]);
     }
-  std::vector<Triangle> triangles;
+  std::vector<std::vector<int>> loops;
   for (int start = 0; start < 12; ++start) {
-    std::vector<int> loop;
+    if (next[start] < 0) continue;
+    loops.emplace_back();
     for (int edge = start; next[edge] >= 0;) {
-      loop.push_back(edge);
-      const int following = next[edge];
-      next[edge] = -1;
-      edge = following;
+      loops.back().push_back(edge);
+      edge = std::exchange(next[edge], -1);
     }
-    if (!loop.empty()) cut(loop, 0, loop.size() - 1, triangles);
   }
+  return loops;
+}
+
+inline std::vector<Triangle> cell_triangles(unsigned inside) {
+  std::vector<Triangle> triangles;
+  for (const std::vector<int>& loop : cell_loops(inside)) cut(loop, 0, loop.size() - 1, triangles);
   return triangles;
 }
 
-struct CellTable {
+struct TriangleTable {
   static constexpr int kMost = 12;
   std::array<std::uint8_t, 256> counts{};
+  std::array<std::uint16_t, 256> crossed{};  ///< bit e: the surface crosses edge e
   std::array<std::array<Triangle, kMost>, 256> triangles{};
-  CellTable() {
+  TriangleTable() {
     for (unsigned inside = 0; inside < 256; ++inside) {
       const std::vector<Triangle> all = cell_triangles(inside);
       counts[inside] = std::uint8_t(all.size());
-      for (std::size_t i = 0; i < all.size(); ++i) triangles[inside].at(i) = all[i];
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        triangles[inside].at(i) = all[i];
+        for (const int edge : all[i]) crossed[inside] |= std::uint16_t(1u << edge);
+      }
     }
   }
 };
 
-}  // namespace marching_cubes
+}  // namespace cells

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Under the GPL as it is linked to CGAL's surface mesher; see cgal_mesher.cpp.
+#include <marrow/domain/manifold.hpp>
+#include <marrow/plugin.hpp>
+
+#include "cgal_mesher.hpp"
+#include "signs.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using marrow::Grid;
+using marrow::Mesh;
+using marrow::SignedField;
+
+struct Options : surface::Finish {
+  double angle_deg = 30, size_mm = 2, distance_mm = 0.05;
+};
+
+/// Trilinear between the samples, and outside everywhere beyond the layer about the grid.
+class Interpolated {
+ public:
+  explicit Interpolated(const SignedField& field) : padded_(field), size_(field.grid.size) {}
+
+  double operator()(const Vector3d& index) const {
+    int first[3];
+    double part[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (!(index[axis] > -1 && index[axis] < size_[std::size_t(axis)])) return kOutside;
+      first[axis] = int(std::floor(index[axis]));
+      part[axis] = index[axis] - first[axis];
+    }
+    double sum = 0;
+    for (int c = 0; c < 8; ++c) {
+      double weight = 1;
+      for (int axis = 0; axis < 3; ++axis) weight *= c >> axis & 1 ? part[axis] : 1 - part[axis];
+      sum += weight * padded_(first[0] + (c & 1), first[1] + (c >> 1 & 1), first[2] + (c >> 2));
+    }
+    return sum < 0 ? sum : std::max(sum, kLeast);
+  }
+
+ private:
+  static constexpr double kOutside = 1, kLeast = 1e-12;
+  surface::Padded padded_;
+  std::array<int, 3> size_;
+};
+
+/// Some points of the surface: one in each block of samples, so that there are some on each part of it.
+std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
+  std::array<std::size_t, 3> blocks;
+  for (std::size_t axis = 0; axis < 3; ++axis) blocks[axis] = std::size_t(signs.size()[axis] / block + 1);
+  std::vector<bool> taken(blocks[0] * blocks[1] * blocks[2], false);
+  std::vector<Vector3d> points;
+  signs.for_edges([&](int axis, int x, int y, int z) {
+    auto place = taken[(std::size_t(z / block) * blocks[1] + std::size_t(y / block)) * blocks[0] + std::size_t(x / block)];
+    if (place) return;
+    place = true;
+    points.push_back(signs.crossing(axis, x, y, z));
+  });
+  return points;
+}
+
+/// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than its cells.
+std::size_t most_points(const surface::Signs& signs, const Grid& grid, const Options& options) {
+  double crossings = 0;
+  signs.for_edges([&](int, int, int, int) { ++crossings; });
+  const double smallest_mm = std::min(options.size_mm, 4 * options.distance_mm);
+  return std::size_t(1000 + 8 * crossings * std::max(1.0, std::pow(grid.spacing_mm.minCoeff() / smallest_mm, 2)));
+}
+
+Mesh delaunay(const SignedField& field, const Options& options, marrow::Context& context) {
+  const Grid& grid = field.grid;
+  const surface::Signs signs(field);
+  const Interpolated interpolated(field);
+  // CGAL works in mm about the middle of the grid, along its axes.
+  const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
+  cgal_mesher::LevelSet level_set;
+  level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
+  level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
+  const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm, most_points(signs, grid, options)};
+  std::string fault;
+  // About as far apart as the triangles are large; parts that are smaller need more points to begin with.
+  const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
+  for (int block = largest_block; block > 0; block /= 2) {
+    level_set.points_mm.clear();
+    for (const Vector3d& index : spread_points(signs, block))
+      level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
+    try {
+      cgal_mesher::Surface surface = cgal_mesher::mesh(level_set, criteria, [&] { context.check_cancelled(); });
+      Mesh mesh;
+      mesh.frame = grid.frame;
+      for (const Vector3d& p : surface.vertices_mm) mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
+      mesh.triangles = std::move(surface.triangles);
+      mesh = surface::finish(std::move(mesh), options);
+      if (surface.complete && marrow::is_manifold(mesh)) return mesh;
+      fault = surface.complete ? "its parts are smaller than the triangles" : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
+    } catch (const std::logic_error&) {  // a condition that CGAL asserts
+      fault = "CGAL's mesher came to a degenerate case";
+    }
+  }
+  throw marrow::Error("field: Delaunay refinement does not close its surface: " + fault +
+                      "; smooth the field, change size_mm and distance_mm, or use mesh.marching_cubes, which takes every field");
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("mesh.delaunay", delaunay)
+      .summary("Delaunay refinement (Boissonnat and Oudot, Graphical Models 2005; CGAL, so under the GPL): even triangles")
+      .in("field", "signed distance, negative inside")
+      .out("mesh", "closed surface of the field's zero level, normals outward")
+      .option("angle_deg", &Options::angle_deg, "smallest angle of a triangle, before smoothing", marrow::at_least(0), marrow::at_most(30))
+      .option("size_mm", &Options::size_mm, "largest radius of the circle through a triangle's corners", marrow::at_least(0.01))
+      .option("distance_mm", &Options::distance_mm, "largest distance of a triangle's middle from the surface", marrow::at_least(0.001))
+      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+}

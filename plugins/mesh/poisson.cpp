@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/domain/manifold.hpp>
+#include <marrow/plugin.hpp>
+
+#include "pcl_poisson.hpp"
+#include "signs.hpp"
+
+namespace {
+
+using Eigen::Vector3d;
+using marrow::Grid;
+using marrow::Mesh;
+using marrow::SignedField;
+
+struct Options : surface::Finish {
+  int depth = 0;
+  double point_weight = 4;
+};
+
+constexpr int kLeastDepth = 5, kMostDepth = 11;
+
+std::array<float, 3> to_array(const Vector3d& v) { return {float(v.x()), float(v.y()), float(v.z())}; }
+
+/// Where the field changes sign along the edges of its grid, with the field's direction there, in mm about the middle of the
+/// grid and along its axes.
+std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const Vector3d& middle) {
+  const surface::Signs signs(field);
+  const surface::Padded padded(field);
+  const Vector3d& spacing = field.grid.spacing_mm;
+  const auto gradient = [&](int x, int y, int z) {
+    return Vector3d((padded(x + 1, y, z) - padded(x - 1, y, z)) / spacing.x(), (padded(x, y + 1, z) - padded(x, y - 1, z)) / spacing.y(),
+                    (padded(x, y, z + 1) - padded(x, y, z - 1)) / spacing.z());
+  };
+  std::vector<pcl_poisson::OrientedPoint> points;
+  signs.for_edges([&](int axis, int x, int y, int z) {
+    const Vector3d index = signs.crossing(axis, x, y, z);
+    const int from[3] = {x - 1, y - 1, z - 1};
+    const double part = index[axis] - from[axis];
+    Vector3d normal = (1 - part) * gradient(from[0], from[1], from[2]) +
+                      part * gradient(from[0] + (axis == 0), from[1] + (axis == 1), from[2] + (axis == 2));
+    if (!(normal.norm() > 0)) {
+      normal = Vector3d::Unit(axis);
+      if (padded(from[0], from[1], from[2]) >= 0) normal = -normal;
+    }
+    points.push_back({to_array((index - middle).cwiseProduct(spacing)), to_array(normal.normalized())});
+  });
+  return points;
+}
+
+/// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges out. In
+/// it, the depth of the octree at which the smallest cells are about as large as the field's.
+pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>& points, double cell_mm, const Options& options) {
+  double extent_mm = 0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax_element(points.begin(), points.end(), [axis](auto& a, auto& b) { return a.place[axis] < b.place[axis]; });
+    extent_mm = std::max(extent_mm, double(high->place[axis] - low->place[axis]));
+  }
+  const double side_mm = 1.1 * extent_mm + 4 * cell_mm;
+  const int depth = std::clamp(int(std::lround(std::log2(side_mm / cell_mm))), kLeastDepth, kMostDepth);
+  return {options.depth > 0 ? options.depth : depth, float(side_mm / extent_mm), float(options.point_weight)};
+}
+
+Mesh poisson(const SignedField& field, const Options& options) {
+  const Grid& grid = field.grid;
+  surface::check_grid(field);
+  const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
+  const std::vector<pcl_poisson::OrientedPoint> points = sample(field, middle);
+  const pcl_poisson::Settings settings = settings_for(points, grid.spacing_mm.minCoeff(), options);
+  pcl_poisson::Surface surface;
+  try {
+    surface = pcl_poisson::reconstruct(points, settings);
+  } catch (const std::exception& error) {
+    throw marrow::Error(std::string("field: PCL's Poisson reconstruction gave up (") + error.what() + "); use mesh.marching_cubes, which takes every field");
+  }
+  Mesh mesh;
+  mesh.frame = grid.frame;
+  for (const auto& [x, y, z] : surface.vertices) mesh.vertices_mm.push_back(grid.point_from_index(Vector3d(x, y, z).cwiseQuotient(grid.spacing_mm) + middle));
+  mesh.triangles = std::move(surface.triangles);
+  const bool finite = std::all_of(mesh.vertices_mm.begin(), mesh.vertices_mm.end(), [](const Vector3d& p) { return p.allFinite(); });
+  if (finite) mesh = surface::finish(std::move(mesh), options);
+  if (!finite || !marrow::is_manifold(mesh))
+    throw marrow::Error("field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; smooth the "
+                        "field, or use mesh.marching_cubes, which takes every field");
+  return mesh;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("mesh.poisson", poisson)
+      .summary("Poisson reconstruction (Kazhdan and Hoppe, ACM Transactions on Graphics 2013; PCL): smooth")
+      .in("field", "signed distance, negative inside")
+      .out("mesh", "closed surface of the field's zero level, normals outward")
+      .option("depth", &Options::depth, "of the octree: at most 2^depth cells a side; 0: cells about as small as the field's", marrow::at_least(0),
+              marrow::at_most(kMostDepth))
+      .option("point_weight", &Options::point_weight, "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
+              marrow::at_least(0))
+      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+}

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/mesh/poisson.cpp"
+
+#include <tbb/parallel_for.h>
+
+#include "mesh/shapes.hpp"
+
+namespace {
+
+using marrow::kPi;
+
+TEST(Poisson, SphereInATurnedGrid) {
+  const shapes::Distance distance = [](const Vector3d& p) { return shapes::sphere(p, 15); };
+  const Mesh mesh = poisson(shapes::field_of(shapes::turned_grid({48, 48, 40}), distance), {});
+  EXPECT_EQ(mesh.frame, "scanner");
+  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_EQ(shapes::euler_number(mesh), 2);
+  EXPECT_LT(shapes::largest_error_mm(mesh, distance), 0.05);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 2e-3);
+  EXPECT_TRUE(shapes::normals_point_outward(mesh, distance));
+}
+
+TEST(Poisson, Torus) {
+  const shapes::Distance distance = [](const Vector3d& p) { return shapes::torus(p, 12, 5); };
+  const Mesh mesh = poisson(shapes::field_of(shapes::turned_grid({50, 50, 50}), distance), {});
+  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_EQ(shapes::euler_number(mesh), 0);
+  EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, 5e-3);
+}
+
+TEST(Poisson, ClosesABoneThatIsCutByTheBorder) {
+  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 24}), [](const Vector3d& p) { return p.head<2>().norm() - 9; });
+  const Mesh mesh = poisson(field, {});
+  EXPECT_TRUE(marrow::is_manifold(mesh));
+  EXPECT_EQ(shapes::euler_number(mesh), 2);
+}
+
+TEST(Poisson, KeepsTheLargestPart) {
+  const auto field = shapes::field_of(shapes::turned_grid({64, 64, 52}), [](const Vector3d& p) {
+    return std::min(std::abs(p.norm() - 12) - 2, (p - Vector3d(0, 0, 19)).norm() - 3);
+  });
+  Options options;
+  EXPECT_EQ(shapes::euler_number(poisson(field, options)), 2);
+  options.largest_only = false;
+  EXPECT_EQ(shapes::euler_number(poisson(field, options)), 6) << "outer wall, inner wall, speck";
+}
+
+TEST(Poisson, ADeeperOctreeHasMoreTriangles) {
+  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
+  Options options;
+  options.depth = 5;
+  const Mesh coarse = poisson(field, options);
+  options.depth = 6;
+  const Mesh fine = poisson(field, options);
+  EXPECT_GT(fine.triangles.size(), 2 * coarse.triangles.size());
+}
+
+TEST(Poisson, SeveralAtOnceGiveTheSameBytes) {
+  const auto field = shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
+  const Mesh alone = poisson(field, {});
+  std::array<Mesh, 4> together;
+  tbb::parallel_for(0, 4, [&](int i) { together[std::size_t(i)] = poisson(field, {}); });
+  for (const Mesh& mesh : together) {
+    EXPECT_EQ(mesh.triangles, alone.triangles);
+    EXPECT_EQ(mesh.vertices_mm, alone.vertices_mm);
+  }
+}
+
+TEST(Poisson, NoiseIsClosedOrRefusedInWords) {
+  int refused = 0;
+  for (unsigned seed = 0; seed < 12; ++seed) {
+    const auto field = shapes::noise_field({9, 8, 10}, seed, 0.4);
+    try {
+      EXPECT_TRUE(marrow::is_manifold(poisson(field, {}))) << "seed " << seed;
+    } catch (const marrow::Error& error) {
+      ++refused;
+      EXPECT_STREQ(error.what(),
+                   "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; smooth the field, "
+                   "or use mesh.marching_cubes, which takes every field");
+    }
+  }
+  std::printf("%d of 12 fields of noise refused\n", refused);
+}
+
+TEST(Poisson, SaysWhatIsWrongWithAField) {
+  shapes::expect_texts_for_bad_fields([](const SignedField& field) { poisson(field, {}); });
+}
+
+}  // namespace
