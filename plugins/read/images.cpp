@@ -8,6 +8,7 @@ namespace {
 struct Options {
   std::vector<std::string> names;
   std::vector<std::filesystem::path> paths;
+  int frame = 0;
 };
 
 marrow::List<marrow::Image> images(const Options& options) {
@@ -19,7 +20,7 @@ marrow::List<marrow::Image> images(const Options& options) {
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
-    images.add(name, marrow::read::read_image_file(options.paths[i]));
+    images.add(name, marrow::read::read_image_file(options.paths[i], options.frame));
   }
   return images;
 }
@@ -30,6 +31,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.images", images)
       .summary("Grey images whose cameras are not known yet, as a calibration takes them")
       .out("images", "the grey values as stored", marrow::over("view"))
-      .option("paths", &Options::paths, "image files (PNG, TIFF)", marrow::required())
-      .option("names", &Options::names, "one name per image; without names, the files' names without extension");
+      .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
+      .option("names", &Options::names, "one name per image; without names, the files' names without extension")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "samples.hpp"
 
+#include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkMultiThreaderBase.h>
 #include <itkNiftiImageIO.h>
@@ -91,12 +92,14 @@ itk::ImageIOBase::Pointer reader_of(Format format) {
       return itk::NiftiImageIO::New().GetPointer();
     case Format::tiff:
       return itk::TIFFImageIO::New().GetPointer();
+    case Format::dicom:
+      return itk::GDCMImageIO::New().GetPointer();
   }
   return {};
 }
 
 const char* name_of(Format format) {
-  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF"};
+  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF", "DICOM"};
   return kNames[int(format)];
 }
 
@@ -165,6 +168,7 @@ Samples read_samples(const std::filesystem::path& path, Format format) {
   check_file(path);
   if (format == Format::nifti) check_nifti_data(path);
   if (format == Format::tiff) check_tiff_pages(path);
+  if (format == Format::dicom) check_dicom_file(path);
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
   const itk::ImageIOBase::Pointer io = reader_of(format);
   return read_through(*io, path, name_of(format));

@@ -10,13 +10,14 @@ struct Options {
   std::filesystem::path image;
   std::filesystem::path camera;
   std::filesystem::path calibration;
+  int frame = 0;
 };
 
 marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (bool(camera) == !options.camera.empty())
     throw marrow::Error("view '" + options.name +
                         "': give its camera either as the option (a file) or as the input (a value)");
-  return marrow::read::read_view_files({options.name, options.image, camera, options.camera, options.calibration});
+  return marrow::read::read_view_files({options.name, options.image, camera, options.camera, options.calibration, options.frame});
 }
 
 }  // namespace
@@ -27,8 +28,9 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "geometry, where no camera file is given")
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
-      .option("image", &Options::image, "image file (PNG, TIFF)", marrow::required())
+      .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
       .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)")
       .option("calibration", &Options::calibration,
-              "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image");
+              "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }

@@ -11,7 +11,7 @@ namespace marrow::read {
 View read_view_files(const ViewSource& source) {
   View view;
   view.name = source.name;
-  view.image = read_image_file(source.image);
+  view.image = read_image_file(source.image, source.frame);
   DistortedCamera camera;
   if (source.camera)
     camera.camera = *source.camera;

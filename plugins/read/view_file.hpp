@@ -14,6 +14,7 @@ struct ViewSource {
   const Camera* camera = nullptr;
   std::filesystem::path camera_file;
   std::filesystem::path calibration;  ///< may be empty
+  int frame = 0;                      ///< of the image file, from 1; 0 = there is only one
 };
 
 /// One view whose image is that of a plain pinhole: the distortion that its camera file or calibration tells of is removed

@@ -11,6 +11,7 @@ struct Options {
   std::vector<std::filesystem::path> images;
   std::vector<std::filesystem::path> cameras;
   std::filesystem::path calibration;
+  int frame = 0;
 };
 
 void check_options(const marrow::List<marrow::Camera>* cameras, const Options& options) {
@@ -42,7 +43,7 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
     const std::string& name = options.names[i];
     views.add(name, marrow::read::read_view_files({name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
                                                    cameras ? std::filesystem::path() : options.cameras[i],
-                                                   options.calibration}));
+                                                   options.calibration, options.frame}));
   }
   return views;
 }
@@ -55,9 +56,10 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "geometry per view, by the views' names, where no camera files are given", marrow::over("view"))
       .out("views", "the views", marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
-      .option("images", &Options::images, "one image file (PNG, TIFF) per view", marrow::required())
+      .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
       .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view")
       .option("calibration", &Options::calibration,
               "calibration file of the device that took all views: its camera matrix replaces the cameras', its distortion is "
-              "removed from the images");
+              "removed from the images")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }
