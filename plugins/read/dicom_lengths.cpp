@@ -115,11 +115,15 @@ class Walk {
   void elements(const Syntax& syntax, std::uint64_t end, int depth, bool delimited = false) {
     if (depth > kDeepest) damaged("its sequences are nested more than 32 deep");
     while (at_ < end) {
-      if (depth == 0 && end - at_ < 8) return;  // padding
+      if (depth == 0 && end - at_ < 8) {
+        if (take(end - at_).find_first_not_of('\0') == std::string::npos) return;  // padding
+        damaged("it ends in the middle of an element");
+      }
       const Element element = next(syntax);
       if (element.tag == 0 && depth == 0) return;
       if (element.tag == kItemEnd && delimited) return;
       if (element.tag >> 16 == 0xFFFE) damaged("an item's end stands where an element should");
+      has_pixels_ = has_pixels_ || (element.tag == kPixels && depth == 0);
       if (element.length == kUndefined) {
         items(element.kind == "UN" ? Syntax{false, false} : syntax, end, depth, element.tag == kPixels && depth == 0);
         continue;
@@ -170,7 +174,9 @@ class Walk {
   }
 
   void check_pixel_count() const {
-    if (pixel_bytes_ < 0 || samples_ != 1) return;  // of colours, some are left out
+    if (!has_pixels_) damaged("it has no pixels");
+    if (!(rows_ > 0 && columns_ > 0)) damaged("its header does not say how large the image is");
+    if (pixel_bytes_ < 0 || samples_ != 1) return;  // compressed; or of colours, some of which may be left out
     const double expected = rows_ * columns_ * samples_ * frames_ * bits_ / 8;
     if (expected > double(pixel_bytes_) + 1)
       damaged("its header tells of " + std::to_string(std::int64_t(expected)) + " bytes of pixels, but there are " +
@@ -180,7 +186,7 @@ class Walk {
   std::filesystem::path path_;
   std::ifstream stream_;
   std::uint64_t size_ = 0, at_ = 0, elements_ = 0;
-  bool is_deflated_ = false;
+  bool is_deflated_ = false, has_pixels_ = false;
   double rows_ = 0, columns_ = 0, samples_ = 1, bits_ = 16, frames_ = 1, pixel_bytes_ = -1;
 };
 
