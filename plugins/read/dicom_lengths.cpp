@@ -176,8 +176,10 @@ class Walk {
   void check_pixel_count() const {
     if (!has_pixels_) damaged("it has no pixels");
     if (!(rows_ > 0 && columns_ > 0)) damaged("its header does not say how large the image is");
-    if (pixel_bytes_ < 0 || samples_ != 1) return;  // compressed; or of colours, some of which may be left out
-    const double expected = rows_ * columns_ * samples_ * frames_ * bits_ / 8;
+    if (!(samples_ >= 1 && samples_ <= 4)) damaged("its header tells of " + std::to_string(int(samples_)) + " values per pixel");
+    if (pixel_bytes_ < 0) return;  // compressed
+    // Of colours, a third may be left out (YBR_FULL_422).
+    const double expected = rows_ * columns_ * samples_ * frames_ * bits_ / 8 * (samples_ > 1 ? 2.0 / 3 : 1);
     if (expected > double(pixel_bytes_) + 1)
       damaged("its header tells of " + std::to_string(std::int64_t(expected)) + " bytes of pixels, but there are " +
               std::to_string(std::int64_t(pixel_bytes_)));

@@ -137,6 +137,7 @@ Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, co
     const double claimed = double(samples.count()) * samples.components * io.GetComponentSize();
     check_claim(what, samples, claimed, stored_bytes(path));
     if (dynamic_cast<itk::MetaImageIO*>(&io)) check_meta_data(path, claimed);
+    if (dynamic_cast<itk::NrrdImageIO*>(&io)) check_nrrd_data(path, claimed, double(samples.count()) * samples.components);
     itk::ImageIORegion region(io.GetNumberOfDimensions());
     for (unsigned k = 0; k < io.GetNumberOfDimensions(); ++k) region.SetSize(k, io.GetDimensions(k));
     io.SetIORegion(region);
@@ -166,6 +167,7 @@ void check_claim(const std::string& what, const Samples& samples, double claimed
 
 Samples read_samples(const std::filesystem::path& path, Format format) {
   check_file(path);
+  if (format == Format::meta) check_meta_header(path);
   if (format == Format::nifti) check_nifti_data(path);
   if (format == Format::tiff) check_tiff_pages(path);
   if (format == Format::dicom) check_dicom_file(path);

@@ -107,14 +107,40 @@ TEST(Damaged, TiffStack) {
   expect_handled(folder, sample, volume_at);
 }
 
+std::string tiff_pages(const std::vector<std::pair<int, int>>& sizes) {
+  std::string bytes = "II" + little_bytes(42, 2) + little_bytes(8, 4);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const auto [width, height] = sizes[i];
+    const std::uint64_t values = std::uint64_t(width) * std::uint64_t(height) * 2, begin = bytes.size() + 2 + 12 * 9 + 4;
+    const std::pair<int, std::uint64_t> tags[] = {{256, width}, {257, height}, {258, 16}, {259, 1}, {262, 1}, {273, begin}, {277, 1}, {278, height}, {279, values}};
+    bytes += little_bytes(9, 2);
+    for (const auto& [tag, value] : tags) bytes += little_bytes(std::uint64_t(tag), 2) + little_bytes(4, 2) + little_bytes(1, 4) + little_bytes(value, 4);
+    bytes += little_bytes(i + 1 < sizes.size() ? begin + values : 0, 4) + std::string(values, 'x');
+  }
+  return bytes;
+}
+
+TEST(Damaged, TiffPagesOfDifferentSizes) {
+  const TemporaryFolder folder;
+  for (const auto& sizes : std::vector<std::vector<std::pair<int, int>>>{{{8, 8}, {200, 200}}, {{200, 200}, {8, 8}}, {{8, 8}, {8, 9}}}) {
+    put(folder / "a.tif", tiff_pages(sizes));
+    std::string said;
+    EXPECT_EQ(outcome_of([&] { volume_at(folder / "a.tif"); }, "a.tif", kMemory, said), Outcome::refused) << said;
+    EXPECT_NE(said.find("page 2 has another size"), std::string::npos) << said;
+  }
+  put(folder / "a.tif", tiff_pages({{8, 8}, {8, 8}}));
+  EXPECT_NO_THROW(volume_at(folder / "a.tif"));
+}
+
 TEST(Damaged, MetaImage) {
   const TemporaryFolder folder;
   expect_handled(folder, written(folder, "a.mha", stack(), false, 300,
                                  {{"DimSize = 20 16 12", "DimSize = 20 16 99999"}, {"DimSize = 20 16 12", "DimSize = 50000 50000 50000"},
                                   {"DimSize = 20 16 12", "DimSize = -20 16 12"}, {"DimSize = 20 16 12", "DimSize = 20 16"},
-                                  {"MET_SHORT", "MET_DOUBLE"}, {"NDims = 3", "NDims = 30000000"}}), volume_at);
+                                  {"MET_SHORT", "MET_DOUBLE"}, {"NDims = 3", "NDims = 30000000"}, {"NDims = 3", "NDims = 11"}, {"NDims = 3", "NDims = 0"}, {"NDims = 3", "NDims = -3"},
+                                  {"BinaryData = True", "HeaderSize = 999999999\nBinaryData = True"}, {"BinaryData = True", "ElementNumberOfChannels = 100000000\nBinaryData = True"}}), volume_at);
   expect_handled(folder, written(folder, "packed.mha", stack(), true, 300,
-                                 {{"DimSize = 20 16 12", "DimSize = 20 16 4000"}, {"DimSize = 20 16 12", "DimSize = 50000 50000 50000"}}), volume_at);
+                                 {{"DimSize = 20 16 12", "DimSize = 20 16 4000"}, {"DimSize = 20 16 12", "DimSize = 50000 50000 50000"}, {"CompressedDataSize = ", "CompressedDataSize = 99999999"}}), volume_at);
 }
 
 TEST(Damaged, MetaImageWithItsDataBeside) {
@@ -137,7 +163,8 @@ TEST(Damaged, Nrrd) {
   const TemporaryFolder folder;
   expect_handled(folder, written(folder, "a.nrrd", stack(), false, 250,
                                  {{"sizes: 20 16 12", "sizes: 20 16 99999"}, {"sizes: 20 16 12", "sizes: 50000 50000 50000"},
-                                  {"sizes: 20 16 12", "sizes: 0 16 12"}, {"type: short", "type: double"}}), volume_at);
+                                  {"sizes: 20 16 12", "sizes: 0 16 12"}, {"type: short", "type: double"}, {"dimension: 3", "dimension: 300"}, {"encoding: raw", "byte skip: 999999999\nencoding: raw"},
+                                  {"sizes: 20 16 12", "sizes: 20 16 12 12"}, {"encoding: raw", "encoding: ascii"}, {"sizes: 20 16 12", "sizes: 20 16 3000"}}), volume_at);
   expect_handled(folder, written(folder, "packed.nrrd", stack(), true, 250,
                                  {{"sizes: 20 16 12", "sizes: 20 16 4000"}, {"sizes: 20 16 12", "sizes: 50000 50000 50000"}}), volume_at);
 }
@@ -147,7 +174,8 @@ TEST(Damaged, Nifti) {
   const auto dimensions = [](int x, int y, int z) { return little_bytes(3, 2) + little_bytes(std::uint64_t(x), 2) + little_bytes(std::uint64_t(y), 2) + little_bytes(std::uint64_t(z), 2); };
   expect_handled(folder, written(folder, "a.nii", stack(), false, 352,
                                  {{dimensions(20, 16, 12), dimensions(20, 16, 13)}, {dimensions(20, 16, 12), dimensions(32767, 32767, 32767)},
-                                  {dimensions(20, 16, 12), dimensions(-20, 16, 12)}, {dimensions(20, 16, 12), dimensions(0, 16, 12)}}), volume_at);
+                                  {dimensions(20, 16, 12), dimensions(-20, 16, 12)}, {dimensions(20, 16, 12), dimensions(0, 16, 12)},
+                                  {dimensions(20, 16, 12), little_bytes(9, 2) + dimensions(20, 16, 12).substr(2)}, {dimensions(20, 16, 12), little_bytes(0, 2) + dimensions(20, 16, 12).substr(2)}}), volume_at);
   Sample packed = written(folder, "a.nii.gz", stack(), true, 352);
   packed.header_bytes = 200;
   expect_handled(folder, packed, volume_at);
@@ -168,7 +196,10 @@ TEST(Damaged, DicomImage) {
   const std::string rows = dicom_element(0x00280010, "US", little_bytes(32, 2));
   const std::string pixels = little_bytes(48 * 32 * 2, 4);
   sample.lies = {{rows, dicom_element(0x00280010, "US", little_bytes(60000, 2))}, {pixels, little_bytes(0xFFFFFFF0u, 4)},
-                 {pixels, little_bytes(48 * 32 * 2 + 2, 4)}, {"CS" + little_bytes(2, 2) + "XA", "CS" + little_bytes(0xFFFE, 2) + "XA"}};
+                 {pixels, little_bytes(48 * 32 * 2 + 2, 4)}, {dicom_element(0x00280100, "US", little_bytes(16, 2)), dicom_element(0x00280100, "US", little_bytes(64, 2))},
+                 {dicom_element(0x00280002, "US", little_bytes(1, 2)), dicom_element(0x00280002, "US", little_bytes(30000, 2))},
+                 {dicom_element(0x00280010, "US", little_bytes(32, 2)), dicom_element(0x00280008, "IS", "999999999 ") + rows},
+                 {rows, dicom_element(0x00280010, "US", little_bytes(0, 2))}, {"CS" + little_bytes(2, 2) + "XA", "CS" + little_bytes(0xFFFE, 2) + "XA"}};
   expect_handled(folder, sample, image_at);
   // The camera needs the header alone, so a file whose pixels are damaged in themselves may pass.
   expect_handled(folder, sample, [](const Path& path) { marrow::read::read_xray_geometry(path, 1, {}); });
@@ -268,6 +299,7 @@ TEST(Damaged, YamlBombs) {
 
 TEST(Damaged, Case) {
   const TemporaryFolder folder;
+  std::filesystem::create_directory(folder / "case");
   write_itk(folder / "case/ct.mha", stack());
   write_itk(folder / "case/a.png", picture());
   put(folder / "case/a.yaml", marrow::test::with(marrow::test::with(marrow::test::with(kCamera, "640", "60"), "480", "40"), "[0.1, 0, 0]", "[0, 0, 0]"));
