@@ -2,9 +2,10 @@
 // Views of an isocentric C-arm from its two angles: the chapter's Eq 4 in corrected form. As printed, equal poses of
 // the gantry do not give the identity; what is meant is the absolute pose W_i = R_beta R_alpha R_0 of each view, from
 // which the relative motion follows as R_21 = W_2^T W_1.
-#include <Eigen/Geometry>
 #include <marrow/plugin.hpp>
 #include <set>
+
+#include "carm_geometry.hpp"
 
 namespace {
 
@@ -20,34 +21,15 @@ struct Options {
   Eigen::Vector3d isocentre_mm = Eigen::Vector3d::Zero();
 };
 
-/// Axes of the camera (columns u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs are
-/// those of DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector
-/// towards the patient's left, +alpha (secondary, cranial) towards the head.
-Eigen::Matrix3d world_from_camera_rotation(double alpha_rad, double beta_rad) {
-  // At (0, 0) the detector is in front of the chest: the rays run to -y, the head is up (v to -z), and as the image is
-  // seen from the source, u runs to the patient's right.
-  Eigen::Matrix3d r_0;
-  r_0.col(0) = -Eigen::Vector3d::UnitX();
-  r_0.col(1) = -Eigen::Vector3d::UnitZ();
-  r_0.col(2) = -Eigen::Vector3d::UnitY();
-  const Eigen::AngleAxisd r_alpha(-alpha_rad, Eigen::Vector3d::UnitX());
-  const Eigen::AngleAxisd r_beta(beta_rad, Eigen::Vector3d::UnitZ());
-  return r_beta.toRotationMatrix() * r_alpha.toRotationMatrix() * r_0;
-}
-
-marrow::Camera carm_camera(const Options& options, double alpha_deg, double beta_deg) {
-  marrow::Camera camera;
-  camera.width_px = options.width_px;
-  camera.height_px = options.height_px;
-  // Integer coordinates are pixel centres, so the middle of the detector is half a pixel less than half its width.
-  const double focal_px = options.source_to_detector_mm / options.pixel_mm;
-  camera.intrinsics << focal_px, 0, (options.width_px - 1) / 2.0, 0, focal_px, (options.height_px - 1) / 2.0, 0, 0, 1;
-  const Eigen::Matrix3d world_from_camera =
-      world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg));
-  const Eigen::Vector3d source_mm = options.isocentre_mm - options.source_to_isocentre_mm * world_from_camera.col(2);
-  camera.camera_from_world.rotation = world_from_camera.transpose();
-  camera.camera_from_world.translation_mm = -(world_from_camera.transpose() * source_mm);
-  return camera;
+marrow::Camera camera_at(const Options& options, double alpha_deg, double beta_deg) {
+  const marrow::camera::CArm arm{options.width_px,
+                                 options.height_px,
+                                 Eigen::Vector2d::Constant(options.pixel_mm),
+                                 options.source_to_detector_mm,
+                                 options.source_to_isocentre_mm,
+                                 options.isocentre_mm};
+  return marrow::camera::carm_camera(
+      arm, marrow::camera::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
 }
 
 void check_options(const Options& options) {
@@ -69,7 +51,7 @@ marrow::List<marrow::Camera> carm(const Options& options) {
   check_options(options);
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
-    marrow::Camera camera = carm_camera(options, options.alpha_deg[i], options.beta_deg[i]);
+    marrow::Camera camera = camera_at(options, options.alpha_deg[i], options.beta_deg[i]);
     marrow::check_camera(camera, "view '" + options.names[i] + "'");
     cameras.add(options.names[i], std::move(camera));
   }

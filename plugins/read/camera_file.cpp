@@ -105,8 +105,8 @@ Camera read_xmalab(const std::filesystem::path& path) {
 
 }  // namespace
 
-Camera read_camera_file(const std::filesystem::path& path) {
-  if (path.extension() != ".yaml" && path.extension() != ".yml") return read_xmalab(path);
+DistortedCamera read_camera_file(const std::filesystem::path& path) {
+  if (path.extension() != ".yaml" && path.extension() != ".yml") return {read_xmalab(path), {}};
   YamlFile file(path);
   const auto camera = camera_from(file.root(), file);
   if (!file.root()["marrow-camera"]) file.fault(file.root().Mark(), "camera: key 'marrow-camera' is missing");

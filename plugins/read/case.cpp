@@ -72,7 +72,7 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
     result.ct = std::move(*volume);
 }
 
-std::optional<marrow::Camera> read_camera(const fs::path& folder, const YamlMap& map) {
+std::optional<marrow::read::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map) {
   const auto node = map.required("camera");
   if (!node) return std::nullopt;
   if (node->IsMap()) return marrow::read::camera_from(*node, map.file());
@@ -103,9 +103,10 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result)
   if (result.views.find(*name)) return map.fault("name", "name: two views are named '" + *name + "'");
   view.name = *name;
   view.image = *image;
-  view.camera = *camera;
+  view.camera = camera->camera;
   try {
     check_view(view);
+    if (!camera->distortion.is_none()) remove_distortion(view, camera->distortion);
   } catch (const marrow::Error& error) {
     return map.fault("image", error.what());
   }

@@ -35,37 +35,6 @@ bool looks_like_dicom(const std::filesystem::path& path) {
   return stream.gcount() == sizeof head && std::equal(head + 128, head + 132, "DICM");
 }
 
-/// GDCM takes a file whose pixels are cut off, so the length that the pixel data element (7FE0,0010) claims is held
-/// against the file's size. Compressed pixels have no length here; they fail when they are unpacked.
-void check_pixels_are_whole(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  const std::string bytes((std::istreambuf_iterator<char>(stream)), {});
-  static const std::string kTag("\xE0\x7F\x10\x00", 4);
-  const auto length_at = [&](std::size_t at) {
-    std::uint32_t length = 0;
-    if (at + 4 <= bytes.size()) std::memcpy(&length, bytes.data() + at, 4);
-    return length;
-  };
-  // An icon may come earlier and the same bytes may occur among the pixels, so the last element with an explicit type
-  // counts; only where there is none, the last with an implicit one.
-  std::size_t begin = 0, length = 0;
-  for (const char* type : {"OW", "OB"})
-    if (const std::size_t at = bytes.rfind(kTag + type + std::string(2, '\0'));
-        at != std::string::npos && at + 12 > begin) {
-      begin = at + 12;
-      length = length_at(at + 8);
-    }
-  if (begin == 0)
-    if (const std::size_t at = bytes.rfind(kTag); at != std::string::npos) {
-      begin = at + 8;
-      length = length_at(at + 4);
-    }
-  if (begin == 0 || length == 0xFFFFFFFFu) return;
-  if (begin + length > bytes.size())
-    throw Error(path.string() + ": is cut off: " + std::to_string(length) + " bytes of pixels expected, got " +
-                std::to_string(bytes.size() - std::min(bytes.size(), begin)) + "; copy or export it again");
-}
-
 std::string tag(itk::GDCMImageIO& io, const std::string& name) {
   std::string value;
   io.GetValueFromTag(name, value);
@@ -78,7 +47,7 @@ Vector column(const Samples& samples, int k) {
 }
 
 Slice read_slice(const std::filesystem::path& path) {
-  check_pixels_are_whole(path);
+  check_dicom_file(path);
   const auto io = itk::GDCMImageIO::New();
   Slice slice;
   slice.path = path;

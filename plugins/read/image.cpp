@@ -7,17 +7,19 @@ namespace {
 
 struct Options {
   std::filesystem::path path;
+  int frame = 0;
 };
 
 marrow::Image image(const Options& options) {
-  return marrow::read::read_image_file(options.path);
+  return marrow::read::read_image_file(options.path, options.frame);
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.image", image)
-      .summary("Grey image from PNG or TIFF (8 or 16 bit, or float)")
+      .summary("Grey image from PNG or TIFF (8 or 16 bit, or float) or DICOM")
       .out("image", "the grey values as stored")
-      .option("path", &Options::path, "image file", marrow::required());
+      .option("path", &Options::path, "image file", marrow::required())
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }

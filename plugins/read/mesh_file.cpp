@@ -124,6 +124,12 @@ class PlyBody {
   PlyBody(std::string format, std::string_view bytes, std::string what)
       : format_(std::move(format)), bytes_(bytes), what_(std::move(what)) {}
 
+  /// Throws Error where text is left over: then the header claims too little, or of the wrong kind.
+  void finish() const {
+    if (format_ == "ascii" && bytes_.find_first_not_of(" \t\r\n", at_) != std::string_view::npos)
+      throw Error(what_ + ": has more numbers than its header claims; it is damaged");
+  }
+
   double next(const std::string& type) {
     if (format_ == "ascii") return next_text();
     if (type == "float" || type == "float32") return take<float>();
@@ -262,6 +268,7 @@ Mesh read_ply(const std::string& bytes, const std::string& what) {
       else
         read_ply_face(element, body, builder, element.name == "face" ? index : std::vector<std::uint32_t>(), what);
     }
+  body.finish();
   return std::move(builder.mesh);
 }
 

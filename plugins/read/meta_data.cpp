@@ -40,6 +40,17 @@ MetaHeader read_header(std::istream& stream) {
   return header;
 }
 
+/// A whole number of a header; `missing` where the key is not there. Throws Error where it is none.
+long long whole_number(const std::filesystem::path& path, const MetaHeader& header, const std::string& key, long long missing) {
+  const auto found = header.values.find(key);
+  if (found == header.values.end()) return missing;
+  char* end = nullptr;
+  const long long value = std::strtoll(found->second.c_str(), &end, 10);
+  if (found->second.empty() || *end)
+    throw Error(path.string() + ": its header says '" + key + " = " + found->second.substr(0, 40) + "'; expected a whole number");
+  return value;
+}
+
 /// The number of bytes that a zlib or gzip stream unpacks to, up to just over `expected`; 0 when it is damaged or cut
 /// off.
 double unpacked_bytes(std::istream& stream, double expected) {
@@ -65,6 +76,23 @@ double unpacked_bytes(std::istream& stream, double expected) {
 
 }  // namespace
 
+void check_meta_header(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  MetaHeader header = read_header(stream);
+  const auto refuse = [&](const std::string& key, long long value) {
+    throw Error(path.string() + ": its header says '" + key + " = " + std::to_string(value) +
+                "', which cannot be; it is damaged: copy or export it again");
+  };
+  const long long dimensions = whole_number(path, header, "NDims", 3);
+  if (dimensions < 1 || dimensions > 4) refuse("NDims", dimensions);
+  std::error_code failure;
+  const std::string data = header.values["ElementDataFile"];
+  const std::uintmax_t beside = std::filesystem::file_size(path.parent_path() / data, failure);
+  const long long size = std::max((long long)std::filesystem::file_size(path), failure ? 0 : (long long)beside);
+  for (const char* key : {"CompressedDataSize", "HeaderSize"})
+    if (const long long bytes = whole_number(path, header, key, 0); bytes < -1 || bytes > size) refuse(key, bytes);
+}
+
 void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
   std::ifstream stream(path, std::ios::binary);
   const MetaHeader header = read_header(stream);
@@ -85,6 +113,10 @@ void check_meta_data(const std::filesystem::path& path, double sample_bytes) {
   const std::uintmax_t size = std::filesystem::file_size(data, failure);
   if (failure)
     throw Error(path.string() + ": names '" + data.filename().string() + "' for its samples, which is not there");
+  if (const long long skipped = whole_number(path, header, "HeaderSize", 0); skipped > 0)
+    begin = std::uintmax_t(skipped);
+  else if (skipped == -1)  // the samples are what the file ends with
+    begin = size - std::min(size, std::uintmax_t(sample_bytes));
   std::ifstream samples(data, std::ios::binary);
   samples.seekg(std::streamoff(begin));
   const bool is_packed = is_true(value("CompressedData"));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "samples.hpp"
 
+#include <itkGDCMImageIO.h>
 #include <itkMetaImageIO.h>
 #include <itkMultiThreaderBase.h>
 #include <itkNiftiImageIO.h>
@@ -91,12 +92,14 @@ itk::ImageIOBase::Pointer reader_of(Format format) {
       return itk::NiftiImageIO::New().GetPointer();
     case Format::tiff:
       return itk::TIFFImageIO::New().GetPointer();
+    case Format::dicom:
+      return itk::GDCMImageIO::New().GetPointer();
   }
   return {};
 }
 
 const char* name_of(Format format) {
-  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF"};
+  static constexpr const char* kNames[] = {"MetaImage", "NRRD", "NIfTI", "TIFF", "DICOM"};
   return kNames[int(format)];
 }
 
@@ -134,6 +137,7 @@ Samples read_through(itk::ImageIOBase& io, const std::filesystem::path& path, co
     const double claimed = double(samples.count()) * samples.components * io.GetComponentSize();
     check_claim(what, samples, claimed, stored_bytes(path));
     if (dynamic_cast<itk::MetaImageIO*>(&io)) check_meta_data(path, claimed);
+    if (dynamic_cast<itk::NrrdImageIO*>(&io)) check_nrrd_data(path, claimed, double(samples.count()) * samples.components);
     itk::ImageIORegion region(io.GetNumberOfDimensions());
     for (unsigned k = 0; k < io.GetNumberOfDimensions(); ++k) region.SetSize(k, io.GetDimensions(k));
     io.SetIORegion(region);
@@ -163,8 +167,10 @@ void check_claim(const std::string& what, const Samples& samples, double claimed
 
 Samples read_samples(const std::filesystem::path& path, Format format) {
   check_file(path);
+  if (format == Format::meta) check_meta_header(path);
   if (format == Format::nifti) check_nifti_data(path);
   if (format == Format::tiff) check_tiff_pages(path);
+  if (format == Format::dicom) check_dicom_file(path);
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
   const itk::ImageIOBase::Pointer io = reader_of(format);
   return read_through(*io, path, name_of(format));

@@ -23,7 +23,7 @@ struct Samples {
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
 };
 
-enum class Format { meta, nrrd, nifti, tiff };
+enum class Format { meta, nrrd, nifti, tiff, dicom };
 
 /// Reads a whole file. Throws Error when it is damaged, is not of this format, or its header claims more samples than
 /// the file can hold.
@@ -32,12 +32,18 @@ Samples read_png(const std::filesystem::path& path);
 
 /// Throws Error unless there is a regular file with something in it.
 void check_file(const std::filesystem::path& path);
+/// Throws Error where numbers of a MetaImage's header cannot be; MetaIO trusts them.
+void check_meta_header(const std::filesystem::path& path);
 /// Throws Error unless a MetaImage holds this many bytes of samples.
 void check_meta_data(const std::filesystem::path& path, double sample_bytes);
+/// Throws Error unless an NRRD file whose samples are not compressed holds this many bytes of them.
+void check_nrrd_data(const std::filesystem::path& path, double sample_bytes, double samples);
 /// Throws Error unless a NIfTI-1 file holds the samples that its header claims.
 void check_nifti_data(const std::filesystem::path& path);
-/// Throws Error when pages of a TIFF are missing at its end.
+/// Throws Error when pages of a TIFF are missing at its end, differ in size, or claim more than the file holds.
 void check_tiff_pages(const std::filesystem::path& path);
+/// Throws Error when the file is not DICOM, or an element of it claims more than the file holds.
+void check_dicom_file(const std::filesystem::path& path);
 /// Throws Error when a file of `stored_bytes` cannot hold the `claimed_bytes` of samples that its header claims.
 void check_claim(const std::string& what, const Samples& samples, double claimed_bytes, double stored_bytes);
 

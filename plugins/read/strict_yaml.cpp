@@ -201,19 +201,23 @@ bool YamlMap::boolean_or(const std::string& key, bool default_value) const {
   return default_value;
 }
 
-std::optional<Eigen::Vector3d> YamlMap::vector3(const std::string& key) const {
+std::optional<std::vector<double>> YamlMap::numbers(const std::string& key, std::size_t count) const {
   const auto value = required(key);
   if (!value) return std::nullopt;
-  Eigen::Vector3d vector;
-  bool good = value->IsSequence() && value->size() == 3;
-  for (int i = 0; good && i < 3; ++i) {
-    const auto number = parse_number((*value)[i]);
-    good = number.has_value();
-    if (good) vector[i] = *number;
-  }
-  if (good) return vector;
-  fault(key, key + ": expected 3 numbers [x, y, z], got " + got(*value));
+  std::vector<double> numbers;
+  if (value->IsSequence() && value->size() == count)
+    for (const auto& item : *value)
+      if (const auto number = parse_number(item)) numbers.push_back(*number);
+  if (numbers.size() == count) return numbers;
+  fault(key, key + ": expected " + std::to_string(count) + " numbers" + (count == 3 ? " [x, y, z]" : "") + ", got " +
+                 got(*value));
   return std::nullopt;
+}
+
+std::optional<Eigen::Vector3d> YamlMap::vector3(const std::string& key) const {
+  const auto vector = numbers(key, 3);
+  if (!vector) return std::nullopt;
+  return Eigen::Vector3d(vector->data());
 }
 
 std::optional<Eigen::MatrixXd> YamlMap::matrix(const std::string& key, int rows, int columns) const {

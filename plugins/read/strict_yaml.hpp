@@ -60,6 +60,8 @@ class YamlMap {
   std::optional<int> integer(const std::string& key) const;
   bool boolean_or(const std::string& key, bool default_value) const;
   std::optional<Eigen::Vector3d> vector3(const std::string& key) const;
+  /// A list of `count` numbers.
+  std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count) const;
   /// A matrix as a list of rows.
   std::optional<Eigen::MatrixXd> matrix(const std::string& key, int rows, int columns) const;
   /// A list of points, each [x, y, z]; at least one.

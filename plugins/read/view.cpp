@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "camera_file.hpp"
-#include "volume_file.hpp"
+#include "view_file.hpp"
 
 namespace {
 
@@ -10,28 +9,28 @@ struct Options {
   std::string name = "view";
   std::filesystem::path image;
   std::filesystem::path camera;
+  std::filesystem::path calibration;
+  int frame = 0;
 };
 
 marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (bool(camera) == !options.camera.empty())
     throw marrow::Error("view '" + options.name +
                         "': give its camera either as the option (a file) or as the input (a value)");
-  marrow::View view;
-  view.name = options.name;
-  view.image = marrow::read::read_image_file(options.image);
-  view.camera = camera ? *camera : marrow::read::read_camera_file(options.camera);
-  check_view(view);
-  return view;
+  return marrow::read::read_view_files({options.name, options.image, camera, options.camera, options.calibration, options.frame});
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.view", view)
-      .summary("One X-ray view: an image and its camera")
+      .summary("One X-ray view: an image and its camera; a distortion that is known of is removed")
       .in("camera", "geometry, where no camera file is given")
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
-      .option("image", &Options::image, "image file (PNG, TIFF)", marrow::required())
-      .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)");
+      .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
+      .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)")
+      .option("calibration", &Options::calibration,
+              "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }

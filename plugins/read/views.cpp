@@ -2,8 +2,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "camera_file.hpp"
-#include "volume_file.hpp"
+#include "view_file.hpp"
 
 namespace {
 
@@ -11,6 +10,8 @@ struct Options {
   std::vector<std::string> names;
   std::vector<std::filesystem::path> images;
   std::vector<std::filesystem::path> cameras;
+  std::filesystem::path calibration;
+  int frame = 0;
 };
 
 void check_options(const marrow::List<marrow::Camera>* cameras, const Options& options) {
@@ -28,7 +29,7 @@ void check_options(const marrow::List<marrow::Camera>* cameras, const Options& o
                         std::to_string(options.cameras.size()) + " files; give one camera per view");
 }
 
-marrow::Camera camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
+const marrow::Camera& camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
   if (const marrow::Camera* camera = cameras.find(name)) return *camera;
   std::string known;
   for (const std::string& other : cameras.names()) known += (known.empty() ? "'" : ", '") + other + "'";
@@ -39,12 +40,10 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   check_options(cameras, options);
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
-    marrow::View view;
-    view.name = options.names[i];
-    view.image = marrow::read::read_image_file(options.images[i]);
-    view.camera = cameras ? camera_of(view.name, *cameras) : marrow::read::read_camera_file(options.cameras[i]);
-    check_view(view);
-    views.add(options.names[i], std::move(view));
+    const std::string& name = options.names[i];
+    views.add(name, marrow::read::read_view_files({name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
+                                                   cameras ? std::filesystem::path() : options.cameras[i],
+                                                   options.calibration, options.frame}));
   }
   return views;
 }
@@ -53,10 +52,14 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.views", views)
-      .summary("X-ray views: images and their cameras")
+      .summary("X-ray views: images and their cameras; a distortion that is known of is removed")
       .in("camera", "geometry per view, by the views' names, where no camera files are given", marrow::over("view"))
       .out("views", "the views", marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
-      .option("images", &Options::images, "one image file (PNG, TIFF) per view", marrow::required())
-      .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view");
+      .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
+      .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view")
+      .option("calibration", &Options::calibration,
+              "calibration file of the device that took all views: its camera matrix replaces the cameras', its distortion is "
+              "removed from the images")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
 }

@@ -8,6 +8,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
+#include "xray_header.hpp"
 
 namespace marrow::read {
 namespace {
@@ -147,32 +148,71 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading) {
   return volume;
 }
 
-Image read_image_file(const fs::path& path) {
-  const std::string extension = lower_extension(path);
-  const bool is_tiff = extension == ".tif" || extension == ".tiff";
-  if (!is_tiff && extension != ".png")
-    throw Error(path.string() + ": not an image that can be read; known are .png and .tif");
-  check_file(path);
-  const Samples samples = is_tiff ? read_samples(path, Format::tiff) : read_png(path);
-  if (samples.size[2] != 1)
-    throw Error(path.string() + ": has " + std::to_string(samples.size[2]) +
-                " pages; an image has one (read.volume reads stacks)");
-  if (samples.components != 1)
-    throw Error(path.string() + ": has " + std::to_string(samples.components) +
-                " channels; an X-ray image has one: save it as grey levels");
-  int type = CV_8U;
-  if (samples.type == Samples::Type::u16)
-    type = CV_16U;
-  else if (samples.type == Samples::Type::f32)
-    type = CV_32F;
-  else if (samples.type != Samples::Type::u8)
-    throw Error(path.string() + ": expected 8 or 16 bit grey levels without sign, or float");
+namespace {
+
+/// One page or frame of samples as an image.
+Image image_of(const Samples& samples, int frame, const fs::path& path) {
+  const std::size_t pixels = std::size_t(samples.size[0]) * std::size_t(samples.size[1]);
+  const std::size_t bytes_each = samples.bytes.size() / samples.count();
+  const std::byte* first = samples.bytes.data() + std::size_t(frame - 1) * pixels * bytes_each;
+  const int type = samples.type == Samples::Type::u8    ? CV_8U
+                   : samples.type == Samples::Type::u16 ? CV_16U
+                   : samples.type == Samples::Type::f32 ? CV_32F
+                                                        : -1;
+  if (type < 0) throw Error(path.string() + ": expected 8 or 16 bit grey levels without sign, or float");
   Image image{cv::Mat(samples.size[1], samples.size[0], type)};
-  std::memcpy(image.pixels.data, samples.bytes.data(), samples.bytes.size());
+  std::memcpy(image.pixels.data, first, pixels * bytes_each);
   if (type == CV_32F)
     for (const float value : cv::Mat_<float>(image.pixels))
       if (!std::isfinite(value)) throw Error(path.string() + ": has pixels that are not finite numbers");
   return image;
+}
+
+Samples read_dicom_image(const fs::path& path) {
+  Samples samples = read_samples(path, Format::dicom);
+  if (samples.components != 1 || samples.type == Samples::Type::u8 || samples.type == Samples::Type::u16) return samples;
+  const std::vector<float> values = to_float(samples);  // signed, or scaled by its header
+  samples.type = Samples::Type::f32;
+  samples.bytes.resize(values.size() * sizeof(float));
+  std::memcpy(samples.bytes.data(), values.data(), samples.bytes.size());
+  return samples;
+}
+
+Image as_its_camera_sees(Image image, const fs::path& path) {
+  const XrayPixels stored = read_xray_pixels(path);
+  if (stored.mirrored) {
+    cv::Mat mirrored;
+    cv::flip(image.pixels, mirrored, 1);
+    image.pixels = mirrored;
+  }
+  if (stored.inverted) {
+    double largest = 0;
+    cv::minMaxLoc(image.pixels, nullptr, &largest);
+    image.pixels = cv::Mat(largest - image.pixels);
+  }
+  return image;
+}
+
+}  // namespace
+
+Image read_image_file(const fs::path& path, int frame) {
+  const std::string extension = lower_extension(path);
+  const bool is_tiff = extension == ".tif" || extension == ".tiff", is_dicom = extension == ".dcm" || extension == ".dicom";
+  if (!is_tiff && !is_dicom && extension != ".png")
+    throw Error(path.string() + ": not an image that can be read; known are .png, .tif and .dcm");
+  check_file(path);
+  const Samples samples = is_dicom ? read_dicom_image(path) : is_tiff ? read_samples(path, Format::tiff) : read_png(path);
+  if (samples.size[2] != 1 && frame == 0)
+    throw Error(path.string() + ": has " + std::to_string(samples.size[2]) +
+                (is_dicom ? " frames; name one with frame (from 1)"
+                          : " pages; an image has one (read.volume reads stacks; frame, from 1, picks a page)"));
+  if (frame > samples.size[2])
+    throw Error(path.string() + ": has " + std::to_string(samples.size[2]) + " frames; there is no frame " + std::to_string(frame));
+  if (samples.components != 1)
+    throw Error(path.string() + ": has " + std::to_string(samples.components) +
+                " channels; an X-ray image has one: save it as grey levels");
+  const Image image = image_of(samples, std::max(1, frame), path);
+  return is_dicom ? as_its_camera_sees(image, path) : image;
 }
 
 }  // namespace marrow::read

@@ -68,9 +68,9 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
   return transform;
 }
 
-std::optional<Camera> camera_from(const YAML::Node& node, YamlFile& file) {
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
   const YamlMap map(file, node, "camera",
-                    {"marrow-camera", "width_px", "height_px", "intrinsics", "camera_from_world"});
+                    {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
   const auto width = map.integer("width_px");
   const auto height = map.integer("height_px");
@@ -80,14 +80,20 @@ std::optional<Camera> camera_from(const YAML::Node& node, YamlFile& file) {
   const YamlMap transform_map(file, *transform_node, "camera_from_world", transform_keys());
   const auto transform = transform_from(transform_map, Camera{}.camera_from_world);
   if (!width || !height || !intrinsics || !transform) return std::nullopt;
-  const Camera camera{*width, *height, *intrinsics, *transform};
+  DistortedCamera result{{*width, *height, *intrinsics, *transform}, {}};
+  if (map.has("radial_distortion")) {
+    const auto terms = map.vector3("radial_distortion");
+    if (!terms) return std::nullopt;
+    for (int i = 0; i < 3; ++i) result.distortion.k[std::size_t(i)] = (*terms)[i];
+  }
   try {
-    check_camera(camera, "camera");
+    check_camera(result.camera, "camera");
+    check_distortion(*intrinsics, result.distortion, *width, *height, "camera");
   } catch (const Error& error) {
     file.fault(node.Mark(), error.what());
     return std::nullopt;
   }
-  return camera;
+  return result;
 }
 
 Seeds seeds_from(const YamlMap& map, const std::string& fragment) {

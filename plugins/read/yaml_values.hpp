@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The values that marrow keeps in YAML files: transforms, poses, cameras and seeds (docs/case.md).
+#include "calibration.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
@@ -15,8 +16,9 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 /// The keys that transform_from reads.
 const std::vector<std::string>& transform_keys();
 
-/// A camera from the keys width_px, height_px, intrinsics, camera_from_world.
-std::optional<Camera> camera_from(const YAML::Node& node, YamlFile& file);
+/// A camera from the keys width_px, height_px, intrinsics, camera_from_world and, where its images are distorted,
+/// radial_distortion.
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.
 Seeds seeds_from(const YamlMap& map, const std::string& fragment);

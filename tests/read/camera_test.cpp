@@ -13,7 +13,8 @@ using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
 marrow::Camera read(const std::filesystem::path& path) {
-  return camera({path});
+  marrow::Context context;
+  return camera({path}, context);
 }
 
 const std::string kXmalab =
@@ -100,6 +101,13 @@ TEST(ReadCamera, OwnYaml) {
   const marrow::Camera camera = read(folder / "cam.yaml");
   EXPECT_EQ(camera.width_px, 640);
   EXPECT_EQ(camera.camera_from_world.translation_mm.z(), 900);
+  put(folder / "cam.yaml", kYaml + "radial_distortion: [0.5, 0, 0]\n");
+  std::string warning;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, bool) { warning = text; };
+  marrow::Context context(hooks);
+  EXPECT_EQ(::camera({folder / "cam.yaml"}, context).width_px, 640);
+  EXPECT_NE(warning.find("cam.yaml: the images of this camera are distorted"), std::string::npos);
   put(folder / "cam.yaml", with(kYaml, "target: camera", "target: detector"));
   EXPECT_SAYS(read(folder / "cam.yaml"),
               "cam.yaml:6:11: camera_from_world: target: expected the frame 'camera', got 'detector'");

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
 
@@ -13,7 +14,7 @@ using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
 
 marrow::Image read(const std::filesystem::path& path) {
-  return image({path});
+  return image({path, 0});
 }
 
 template <class T>
@@ -64,7 +65,7 @@ TEST(ReadImage, RefusesOtherThanOneGreyImage) {
   write_itk(folder / "pages.tif", pages);
   EXPECT_SAYS(read(folder / "pages.tif"), "has 3 pages; an image has one");
   marrow::test::put(folder / "a.bmp", "BM");
-  EXPECT_SAYS(read(folder / "a.bmp"), "not an image that can be read; known are .png and .tif");
+  EXPECT_SAYS(read(folder / "a.bmp"), "not an image that can be read; known are .png, .tif and .dcm");
   EXPECT_SAYS(read(folder / "absent.png"), "there is no such file");
   EXPECT_SAYS(read(folder.path()), "not an image");
   std::filesystem::create_directory(folder / "folder.png");
@@ -105,6 +106,40 @@ TEST(ReadImage, PngThatClaimsAHugeSizeIsRefused) {
   for (int k = 0; k < 4; ++k) bytes[29 + k] = char(checksum >> (24 - 8 * k));
   marrow::test::put(folder / "huge.png", bytes);
   EXPECT_SAYS(read(folder / "huge.png"), "its header claims 60000 x 60000 x 1 samples, but the file has only");
+}
+
+TEST(ReadImage, DicomAsItsCameraSeesIt) {
+  using marrow::test::dicom_file;
+  using marrow::test::fluoroscopy;
+  const TemporaryFolder folder;
+  const auto put = [&](const marrow::test::Elements& elements) { marrow::test::put(folder / "x.dcm", dicom_file(elements)); };
+  auto elements = fluoroscopy();
+  put(elements);
+  cv::Mat pixels = read(folder / "x.dcm").pixels;
+  ASSERT_EQ(pixels.type(), CV_16U);
+  ASSERT_EQ(pixels.size(), cv::Size(6, 4));
+  EXPECT_EQ(pixels.at<std::uint16_t>(3, 1), 301);
+  elements[0x00200020] = "CS:L\\F";  // as one facing the patient sees it
+  put(elements);
+  EXPECT_EQ(read(folder / "x.dcm").pixels.at<std::uint16_t>(3, 1), 304) << "mirrored back";
+  elements = fluoroscopy();
+  elements[0x00281041] = "SS:-1";  // higher values are less radiation
+  put(elements);
+  EXPECT_EQ(read(folder / "x.dcm").pixels.at<std::uint16_t>(3, 1), 305 - 301);
+}
+
+TEST(ReadImage, DicomFrames) {
+  const TemporaryFolder folder;
+  auto elements = marrow::test::fluoroscopy();
+  elements[0x00280008] = "IS:2";
+  std::string second = elements[0x7FE00010].substr(3);
+  for (std::size_t i = 0; i < second.size(); i += 2) second[i] = char(second[i] ^ 1);
+  elements[0x7FE00010] += second;
+  marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
+  EXPECT_SAYS(read(folder / "x.dcm"), "x.dcm: has 2 frames; name one with frame (from 1)");
+  EXPECT_EQ(image({folder / "x.dcm", 1}).pixels.at<std::uint16_t>(0, 2), 2);
+  EXPECT_EQ(image({folder / "x.dcm", 2}).pixels.at<std::uint16_t>(0, 2), 3);
+  EXPECT_SAYS(image({folder / "x.dcm", 3}), "has 2 frames; there is no frame 3");
 }
 
 }  // namespace

@@ -15,16 +15,16 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   marrow::test::put(folder / "a.txt",
                     "image size\n4,6\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
                     "translation\n0\n0\n600\n");
-  const marrow::View from_file = view(nullptr, {"frontal", folder / "a.png", folder / "a.txt"});
+  const marrow::View from_file = view(nullptr, {"frontal", folder / "a.png", folder / "a.txt", {}, 0});
   EXPECT_EQ(from_file.name, "frontal");
   EXPECT_EQ(from_file.camera.width_px, 6);
   marrow::Camera camera = from_file.camera;
   camera.camera_from_world.translation_mm.z() = 700;
-  EXPECT_EQ(view(&camera, {"frontal", folder / "a.png", {}}).camera.camera_from_world.translation_mm.z(), 700);
-  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", folder / "a.txt"}), "give its camera either as the option");
-  EXPECT_SAYS(view(nullptr, {"frontal", folder / "a.png", {}}), "give its camera either as the option");
+  EXPECT_EQ(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}).camera.camera_from_world.translation_mm.z(), 700);
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", folder / "a.txt", {}, 0}), "give its camera either as the option");
+  EXPECT_SAYS(view(nullptr, {"frontal", folder / "a.png", {}, {}, 0}), "give its camera either as the option");
   camera.width_px = 7;
-  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}}),
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}),
               "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
 }
 

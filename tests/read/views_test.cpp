@@ -22,7 +22,9 @@ class ReadViews : public testing::Test {
       put(folder / name,
           "image size\n4,6\n\ncamera "
           "matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
-    options = {{"one", "two"}, {folder / "a.png", folder / "b.png"}, {folder / "a.txt", folder / "b.txt"}};
+    options.names = {"one", "two"};
+    options.images = {folder / "a.png", folder / "b.png"};
+    options.cameras = {folder / "a.txt", folder / "b.txt"};
   }
   TemporaryFolder folder;
   Options options;

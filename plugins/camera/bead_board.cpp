@@ -1,0 +1,222 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibration of an X-ray device from images of a board with beads on both sides (Tsai 1987, as the chapter uses it).
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "correspondence.hpp"
+#include "plugins/render/canvas.hpp"
+#include "plugins/write/yaml_text.hpp"
+#include "plugins/write/atomic_write.hpp"
+
+namespace {
+
+using namespace marrow;
+using camera::CalibrationModel;
+using camera::CalibrationResult;
+using camera::ViewPoints;
+
+struct BeadBoardOptions {
+  std::filesystem::path board;
+  int radial_terms = 2;
+  bool square_pixels = false;
+  double largest_bead_px = 0;
+  double least_contrast = 0.2;
+  double outlier_deviations = 5;
+  double residual_scale = 50;
+  int size_px = 800;
+};
+
+struct BeadBoardResult {
+  List<Camera> cameras;
+  read::Calibration calibration;
+  Metrics report;
+  List<Metrics> poses;
+  List<Picture> pictures;
+};
+
+struct Outliers {
+  int count = 0;
+  std::vector<std::vector<Eigen::Vector2d>> pixels;  ///< per view
+};
+
+/// Takes out the beads that lie too many deviations of the others off. True when there were any.
+bool take_outliers(std::vector<ViewPoints>& views, const CalibrationResult& fit, double deviations, Outliers& outliers) {
+  std::vector<double> sizes;
+  for (const auto& view : fit.views)
+    for (const auto& residual : view.residuals_px) sizes.push_back(residual.norm());
+  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
+  // The median length of a normal residual in two directions is 1.177 deviations.
+  const double limit = deviations * std::max(sizes[sizes.size() / 2] / 1.17741, 1e-6);
+  bool any = false;
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    ViewPoints kept{views[n].name, {}, {}, {}};
+    for (std::size_t i = 0; i < views[n].pixels.size(); ++i) {
+      if (fit.views[n].residuals_px[i].norm() > limit) {
+        outliers.pixels[n].push_back(views[n].pixels[i]);
+        ++outliers.count;
+        any = true;
+        continue;
+      }
+      kept.board_mm.push_back(views[n].board_mm[i]);
+      kept.pixels.push_back(views[n].pixels[i]);
+      kept.beads.push_back(views[n].beads[i]);
+    }
+    views[n] = std::move(kept);
+  }
+  return any;
+}
+
+CalibrationResult calibrate_without_outliers(std::vector<ViewPoints>& views, int width_px, int height_px,
+                                             const BeadBoardOptions& options, Outliers& outliers) {
+  const CalibrationModel model{options.radial_terms, options.square_pixels, true};
+  outliers.pixels.resize(views.size());
+  CalibrationResult fit = camera::calibrate(views, width_px, height_px, model);
+  for (int round = 0; round < 3 && take_outliers(views, fit, options.outlier_deviations, outliers); ++round)
+    fit = camera::calibrate(views, width_px, height_px, model);
+  return fit;
+}
+
+double root_mean_square(const std::vector<Eigen::Vector2d>& residuals) {
+  double squares = 0;
+  for (const auto& residual : residuals) squares += residual.squaredNorm();
+  return std::sqrt(squares / (2 * double(residuals.size())));
+}
+
+Metrics report_of(const CalibrationResult& fit, const Outliers& outliers) {
+  const read::Calibration& c = fit.calibration;
+  Metrics report;
+  const auto add = [&](const std::string& name, double value, const std::string& unit) {
+    report.items.push_back({name, value, unit});
+  };
+  double beads = 0, worst = 0;
+  for (const auto& view : fit.views) {
+    beads += double(view.residuals_px.size());
+    for (const auto& residual : view.residuals_px) worst = std::max(worst, residual.norm());
+  }
+  add("residual", c.residual_px, "px");
+  add("worst_residual", worst, "px");
+  add("beads", beads, "");
+  add("outliers", outliers.count, "");
+  const char* axes[] = {"u", "v"};
+  for (int i : {0, 1}) {
+    add(std::string("focal_") + axes[i], c.intrinsics(i, i), "px");
+    add(std::string("focal_") + axes[i] + "_deviation", c.focal_deviation_px[i], "px");
+    add(std::string("principal_") + axes[i], c.intrinsics(i, 2), "px");
+    add(std::string("principal_") + axes[i] + "_deviation", c.principal_deviation_px[i], "px");
+  }
+  for (std::size_t i = 0; i < 3; ++i) {
+    add("k" + std::to_string(i + 1), c.distortion.k[i], "");
+    add("k" + std::to_string(i + 1) + "_deviation", c.distortion_deviation[i], "");
+  }
+  return report;
+}
+
+Metrics pose_report(const camera::CalibratedView& view) {
+  Metrics report{{{"beads", double(view.residuals_px.size()), ""}, {"residual", root_mean_square(view.residuals_px), "px"}}};
+  const char* directions[] = {"x", "y", "z"};
+  for (int i = 0; i < 3; ++i)
+    report.items.push_back({std::string("rotation_") + directions[i] + "_deviation", degrees(view.deviation[i]), "deg"});
+  for (int i = 0; i < 3; ++i)
+    report.items.push_back({std::string("translation_") + directions[i] + "_deviation", view.deviation[3 + i], "mm"});
+  return report;
+}
+
+/// The image with what was taken for beads, how far each is off, and what was left out.
+Picture picture_of(const Image& image, const ViewPoints& points, const camera::CalibratedView& view,
+                   const std::vector<Eigen::Vector2d>& outliers, const BeadBoardOptions& options) {
+  using namespace render;
+  View shown{points.name, image, {}, {}};
+  shown.camera.width_px = image.width();
+  shown.camera.height_px = image.height();
+  Panel panel = make_panel(shown, whole_image(shown), options.size_px, Contrast::logarithmic);
+  for (std::size_t i = 0; i < points.pixels.size(); ++i) {
+    const Eigen::Vector2d at = points.pixels[i], end = at + options.residual_scale * view.residuals_px[i];
+    draw_line(panel.pixels, panel.at(at.x(), at.y()), panel.at(end.x(), end.y()), kVermilion, 2);
+    draw_dot(panel.pixels, panel.at(at.x(), at.y()), 2, kGreen);
+  }
+  for (const auto& at : outliers) draw_dot(panel.pixels, panel.at(at.x(), at.y()), 4, kYellow);
+  draw_title(panel, points.name);
+  char scale[32];
+  std::snprintf(scale, sizeof scale, "residual x %g", options.residual_scale);
+  return {with_legend(panel.pixels, {{"bead", kGreen}, {scale, kVermilion}, {"left out", kYellow}})};
+}
+
+void check_images(const List<Image>& images) {
+  if (images.size() < 3)
+    throw Error(std::to_string(images.size()) +
+                " images of the board are given; at least 3 are needed, and 8 are better, with the board tilted differently in each");
+  for (std::size_t i = 1; i < images.size(); ++i)
+    if (images[i].pixels.size() != images[0].pixels.size())
+      throw Error("image '" + images.name(i) + "' has " + std::to_string(images[i].width()) + " x " +
+                  std::to_string(images[i].height()) + " pixels, '" + images.name(0) + "' " + std::to_string(images[0].width()) +
+                  " x " + std::to_string(images[0].height()) + "; one calibration is for one size");
+}
+
+BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& options, Context& context) {
+  check_images(images);
+  const camera::Board board = camera::read_board_file(options.board);
+  const int width = images[0].width(), height = images[0].height();
+  std::vector<ViewPoints> views;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    context.check_cancelled();
+    const auto discs = camera::find_beads(images[i], {options.largest_bead_px, options.least_contrast});
+    views.push_back(camera::match_board(board, discs, width, height, images.name(i)));
+    context.progress(double(i + 1) / double(images.size()), "views");
+  }
+  Outliers outliers;
+  const CalibrationResult fit = calibrate_without_outliers(views, width, height, options, outliers);
+  BeadBoardResult result;
+  result.calibration = fit.calibration;
+  read::check_distortion(fit.calibration.intrinsics, fit.calibration.distortion, width, height, "the calibration");
+  result.report = report_of(fit, outliers);
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    result.cameras.add(views[n].name, {width, height, fit.calibration.intrinsics, fit.views[n].camera_from_world});
+    result.poses.add(views[n].name, pose_report(fit.views[n]));
+    result.pictures.add(views[n].name, picture_of(images[n], views[n], fit.views[n], outliers.pixels[n], options));
+  }
+  return result;
+}
+
+std::string list_of(const std::array<double, 3>& values) {
+  return write::vector(Eigen::Vector3d(values[0], values[1], values[2]));
+}
+
+void write_calibration(const read::Calibration& c, const std::string& path) {
+  write::write_text(path, "marrow-calibration: 1\nwidth_px: " + std::to_string(c.width_px) + "\nheight_px: " +
+                              std::to_string(c.height_px) + "\nintrinsics:\n" + write::matrix(c.intrinsics, "  ") +
+                              "radial_distortion: " + list_of(c.distortion.k) +
+                              "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
+                              "deviation:  # one standard deviation\n  focal_px: " + write::vector(c.focal_deviation_px) +
+                              "\n  principal_px: " + write::vector(c.principal_deviation_px) +
+                              "\n  radial_distortion: " + list_of(c.distortion_deviation) +
+                              "\nresidual_px: " + write::number(c.residual_px) + "\n");
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("camera.bead_board", bead_board)
+      .summary("Calibration from images of a board with beads on both sides (Tsai 1987), with radial distortion and uncertainties")
+      .in("images", "images of the board as taken, in at least 3 poses", over("view"))
+      .out("camera", &BeadBoardResult::cameras, "geometry of each view without distortion; the board's frame is the world",
+           over("view"))
+      .out("calibration", &BeadBoardResult::calibration, "camera matrix and distortion of the device, with deviations")
+      .out("report", &BeadBoardResult::report, "camera matrix and distortion with standard deviations, and the residuals")
+      .out("poses", &BeadBoardResult::poses, "per view: beads, residual, and standard deviations of the camera's pose, in its own axes", over("view"))
+      .out("picture", &BeadBoardResult::pictures, "the beads that were found and how far each is off", over("view"))
+      .option("board", &BeadBoardOptions::board, "the board's beads (YAML, docs/case.md)", required())
+      .option("radial_terms", &BeadBoardOptions::radial_terms, "terms of the radial distortion: r^2, r^4, r^6", at_least(0),
+              at_most(3))
+      .option("square_pixels", &BeadBoardOptions::square_pixels, "one focal length for both directions")
+      .option("largest_bead_px", &BeadBoardOptions::largest_bead_px,
+              "diameter of the largest bead in the images; 0: a sixteenth of their width", at_least(0))
+      .option("least_contrast", &BeadBoardOptions::least_contrast, "darkness of the faintest bead, as a fraction of the darkest",
+              at_least(0.01), at_most(1), unit("1"))
+      .option("outlier_deviations", &BeadBoardOptions::outlier_deviations,
+              "beads farther off than this many standard deviations are left out", at_least(3), unit("1"))
+      .option("residual_scale", &BeadBoardOptions::residual_scale, "how many times longer residuals are drawn", at_least(1),
+              unit("1"))
+      .option("size_px", &BeadBoardOptions::size_px, "longer side of the pictures", at_least(100), at_most(4096));
+  plugin.writer<read::Calibration>(".yaml", write_calibration, "camera matrix and distortion with their deviations");
+}

@@ -1,0 +1,237 @@
+// SPDX-License-Identifier: Apache-2.0
+// Are the cameras right? A known object is drawn into the images, and where its points are seen is compared with where they
+// should be.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <marrow/plugin.hpp>
+
+#include "plausibility.hpp"
+#include "plugins/render/canvas.hpp"
+#include "points_file.hpp"
+
+namespace {
+
+using namespace marrow;
+using camera::KnownPoint;
+using camera::SeenPoints;
+
+struct Options {
+  std::filesystem::path points;
+  double warn_above_px = 2;
+  double source_to_detector_mm = 0;
+  double pixel_mm = 0;
+  double detector_mm = 0;
+  double residual_scale = 20;
+  int size_px = 1000;
+};
+
+struct Checked {
+  Metrics metrics;
+  List<Picture> pictures;
+};
+
+/// A point by all views that show it: the place that the rays come nearest to.
+std::optional<Eigen::Vector3d> triangulated(const KnownPoint& point, const List<View>& views) {
+  Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::Zero();
+  int count = 0;
+  for (const View& view : views) {
+    const auto seen = point.seen_px.find(view.name);
+    if (seen == point.seen_px.end()) continue;
+    const Eigen::Vector3d direction = ray_direction(view.camera, seen->second);
+    const Eigen::Matrix3d across = Eigen::Matrix3d::Identity() - direction * direction.transpose();
+    normal += across;
+    right += across * source_position_mm(view.camera);
+    ++count;
+  }
+  if (count < 2 || normal.determinant() < 1e-6) return std::nullopt;
+  return normal.ldlt().solve(right);
+}
+
+void check_names(const std::vector<KnownPoint>& points, const List<View>& views) {
+  for (const KnownPoint& point : points)
+    for (const auto& [name, at] : point.seen_px)
+      if (!views.find(name)) {
+        std::string known;
+        for (const std::string& other : views.names()) known += (known.empty() ? "'" : ", '") + other + "'";
+        throw Error("point '" + point.name + "' is seen in '" + name + "', but there is no view of that name; there are " + known);
+      }
+}
+
+/// Where the points should be, known or triangulated, and where this view shows them.
+struct InView {
+  SeenPoints known, all;
+};
+
+InView points_in(const View& view, const std::vector<KnownPoint>& points, const List<View>& views) {
+  InView in_view;
+  for (const KnownPoint& point : points) {
+    const auto seen = point.seen_px.find(view.name);
+    if (seen == point.seen_px.end()) continue;
+    const auto place = point.world_mm ? point.world_mm : triangulated(point, views);
+    if (!place) continue;
+    for (SeenPoints* list : {&in_view.known, &in_view.all}) {
+      if (list == &in_view.known && !point.world_mm) continue;
+      list->world_mm.push_back(*place);
+      list->pixels.push_back(seen->second);
+    }
+  }
+  return in_view;
+}
+
+/// Edges between triangles that face the source and triangles that do not, and the edges of holes.
+std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> outline_edges(const Mesh& mesh, const Camera& camera) {
+  const Eigen::Vector3d source = source_position_mm(camera);
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;  // 1: seen from the front, 2: from behind, 4: more than once
+  for (const auto& triangle : mesh.triangles) {
+    const Eigen::Vector3d &a = mesh.vertices_mm[triangle[0]], &b = mesh.vertices_mm[triangle[1]], &c = mesh.vertices_mm[triangle[2]];
+    const int side = (b - a).cross(c - a).dot(source - a) > 0 ? 1 : 2;
+    for (int k = 0; k < 3; ++k) {
+      const auto [low, high] = std::minmax(triangle[std::size_t(k)], triangle[std::size_t((k + 1) % 3)]);
+      int& mark = sides[{low, high}];
+      mark |= mark ? side | 4 : side;
+    }
+  }
+  std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> edges;
+  for (const auto& [edge, mark] : sides)
+    if (mark == 7 || mark < 4) edges.emplace_back(mesh.vertices_mm[edge.first], mesh.vertices_mm[edge.second]);
+  return edges;
+}
+
+Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const std::string& verdict, const Options& options) {
+  using namespace render;
+  Panel panel = make_panel(view, whole_image(view), options.size_px, Contrast::local);
+  std::vector<LegendItem> legend;
+  if (mesh) {
+    for (const auto& [from, to] : outline_edges(*mesh, view.camera)) {
+      const Eigen::Vector2d a = project(view.camera, from), b = project(view.camera, to);
+      if (a.allFinite() && b.allFinite()) draw_line(panel.pixels, panel.at(a.x(), a.y()), panel.at(b.x(), b.y()), kSkyBlue);
+    }
+    legend.push_back({"object", kSkyBlue});
+  }
+  char scale[32];
+  std::snprintf(scale, sizeof scale, "difference x %g", options.residual_scale);
+  for (std::size_t i = 0; i < points.pixels.size(); ++i) {
+    const Eigen::Vector2d seen = points.pixels[i], expected = project(view.camera, points.world_mm[i]);
+    const cv::Point2d at = panel.at(seen.x(), seen.y());
+    draw_dot(panel.pixels, at, 3, kGreen);
+    if (!expected.allFinite()) continue;
+    const Eigen::Vector2d end = seen + options.residual_scale * (expected - seen);
+    draw_line(panel.pixels, at, panel.at(end.x(), end.y()), kVermilion, 2);
+    draw_dot(panel.pixels, panel.at(expected.x(), expected.y()), 1.5, kYellow);
+  }
+  if (!points.pixels.empty()) {
+    legend.push_back({"seen", kGreen});
+    legend.push_back({"expected", kYellow});
+    legend.push_back({scale, kVermilion});
+  }
+  draw_title(panel, view.name + verdict);
+  return {with_legend(panel.pixels, legend)};
+}
+
+std::string text(double value) {
+  char characters[32];
+  std::snprintf(characters, sizeof characters, "%.3g", value);
+  return characters;
+}
+
+/// What is to be said of one view, the likeliest first.
+std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options, double error) {
+  std::vector<Eigen::Vector3d> object = points.known.world_mm;
+  if (mesh) object.insert(object.end(), mesh->vertices_mm.begin(), mesh->vertices_mm.end());
+  std::vector<std::string> warnings;
+  const auto mistake = camera::explanation(view.camera, points.known);
+  if (mistake) warnings.push_back(*mistake);
+  for (const std::string& sentence : camera::implausible_numbers(
+           view.camera, {options.source_to_detector_mm, options.pixel_mm, options.detector_mm}, object))
+    warnings.push_back(sentence);
+  if (mistake || points.all.pixels.empty() || error <= options.warn_above_px) return warnings;
+  const auto refit = camera::refit_pose(view.camera, points.known);
+  if (refit && refit->error_px < error / 3)
+    warnings.push_back("the points are " + text(error) + " px off, but only " + text(refit->error_px) + " px if the camera is turned by " +
+                       text(refit->turn_deg) + " degrees and moved by " + text(refit->shift_mm) +
+                       " mm: its inner parameters are right, its pose is not, or the object has moved");
+  else
+    warnings.push_back("the points are " + text(error) + " px off" +
+                       (refit ? ", and still " + text(refit->error_px) + " px with the best pose: focal length, principal point, distortion or the "
+                                "points themselves are wrong"
+                              : std::string(", more than the ") + text(options.warn_above_px) + " px of warn_above_px"));
+  return warnings;
+}
+
+void add_metrics(const View& view, const InView& points, double error, Metrics& metrics) {
+  const std::string name = view.name + ".";
+  double worst = 0, millimetres = 0;
+  for (std::size_t i = 0; i < points.all.pixels.size(); ++i) {
+    const double off = (project(view.camera, points.all.world_mm[i]) - points.all.pixels[i]).norm();
+    worst = std::max(worst, off);
+    millimetres += off * pixel_size_at_mm(view.camera, points.all.world_mm[i]) / double(points.all.pixels.size());
+  }
+  metrics.items.push_back({name + "points", double(points.all.pixels.size()), ""});
+  if (points.all.pixels.empty()) return;
+  metrics.items.push_back({name + "error", error, "px"});
+  metrics.items.push_back({name + "worst", worst, "px"});
+  metrics.items.push_back({name + "mean_at_object", millimetres, "mm"});
+  if (const auto refit = camera::refit_pose(view.camera, points.known))
+    metrics.items.push_back({name + "error_with_free_pose", refit->error_px, "px"});
+}
+
+/// Two views in nearly one direction cannot tell how far a point is.
+void check_directions(const List<View>& views, Context& context, int& warnings) {
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k) {
+      const auto axis = [&](std::size_t n) { return Eigen::Vector3d(views[n].camera.camera_from_world.rotation.row(2)); };
+      const double angle = degrees(std::acos(std::min(1.0, std::abs(axis(i).dot(axis(k))))));
+      if (angle > 10) continue;
+      context.warn("views '" + views.name(k) + "' and '" + views.name(i) + "' look along nearly the same line (" + text(angle) +
+                   " degrees apart); is one camera given twice?");
+      ++warnings;
+    }
+}
+
+Checked check(const List<View>& views, const Mesh* mesh, const Options& options, Context& context) {
+  std::vector<KnownPoint> points;
+  if (!options.points.empty()) points = camera::read_points_file(options.points);
+  check_names(points, views);
+  if (mesh) check_mesh(*mesh, "camera.check: mesh");
+  Checked checked;
+  int warnings = 0;
+  double squares = 0, count = 0;
+  for (const View& view : views) {
+    check_view(view);
+    const InView seen = points_in(view, points, views);
+    const double error = camera::reprojection_error_px(view.camera, seen.all);
+    squares += error * error * double(seen.all.pixels.size());
+    count += double(seen.all.pixels.size());
+    add_metrics(view, seen, error, checked.metrics);
+    const auto sentences = warnings_of(view, seen, mesh, options, error);
+    for (const std::string& sentence : sentences) context.warn("view '" + view.name + "': " + sentence);
+    warnings += int(sentences.size());
+    const std::string verdict = seen.all.pixels.empty() ? "" : ": " + text(error) + " px";
+    checked.pictures.add(view.name, draw(view, seen.all, mesh, verdict + (sentences.empty() ? "" : ", see warnings"), options));
+  }
+  check_directions(views, context, warnings);
+  if (count > 0) checked.metrics.items.insert(checked.metrics.items.begin(), {"error", std::sqrt(squares / count), "px"});
+  checked.metrics.items.push_back({"warnings", double(warnings), ""});
+  return checked;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("camera.check", check)
+      .summary("Draws a known object into the images, measures the reprojection error and says in words what is wrong with a camera")
+      .in("views", "images with the cameras to check", over("view"))
+      .in("mesh", "surface of a known object in world coordinates, to draw")
+      .out("metrics", &Checked::metrics, "reprojection errors, and the number of warnings")
+      .out("picture", &Checked::pictures, "the image with what is seen and what is expected", over("view"))
+      .option("points", &Options::points, "points of a known object and where they are seen (YAML, docs/case.md)")
+      .option("warn_above_px", &Options::warn_above_px, "reprojection error that is warned of", at_least(0))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm, "of the device, to compare with; 0 = not known", at_least(0))
+      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, to compare with; 0 = not known", at_least(0))
+      .option("detector_mm", &Options::detector_mm, "longer side of the detector, to compare with; 0 = not known", at_least(0))
+      .option("residual_scale", &Options::residual_scale, "how many times longer differences are drawn", at_least(1), unit("1"))
+      .option("size_px", &Options::size_px, "longer side of the pictures", at_least(100), at_most(4096));
+}

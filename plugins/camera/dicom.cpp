@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// Cameras from the headers of X-ray images: what a C-arm writes of its angles and distances.
+#include <marrow/plugin.hpp>
+
+#include "plugins/read/xray_header.hpp"
+
+namespace {
+
+struct Options {
+  std::vector<std::filesystem::path> paths;
+  std::vector<std::string> names;
+  int frame = 1;
+  double source_to_detector_mm = 0;
+  double source_to_isocentre_mm = 0;
+  double pixel_mm = 0;
+};
+
+marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& context) {
+  if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
+  if (!options.names.empty() && options.names.size() != options.paths.size())
+    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, paths " +
+                        std::to_string(options.paths.size()) + " files; give one name per image, or none");
+  marrow::List<marrow::Camera> cameras;
+  for (std::size_t i = 0; i < options.paths.size(); ++i) {
+    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
+    if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
+    const auto geometry = marrow::read::read_xray_geometry(
+        options.paths[i], options.frame, {options.source_to_detector_mm, options.source_to_isocentre_mm, options.pixel_mm});
+    for (const std::string& warning : geometry.warnings) context.warn(warning);
+    cameras.add(name, geometry.camera);
+  }
+  return cameras;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("camera.dicom", dicom)
+      .summary("Cameras of X-ray images (XA, RF) from the angles and distances in their DICOM headers")
+      .out("camera", "geometry of each view; the isocentre is the world's origin, its axes are the patient's", marrow::over("view"))
+      .option("paths", &Options::paths, "DICOM files, the same that read.views takes as images", marrow::required())
+      .option("names", &Options::names, "one name per view; without names, the files' names without extension")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1", marrow::at_least(1))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm, "instead of DistanceSourceToDetector; 0 = as the header says",
+              marrow::at_least(0))
+      .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm,
+              "instead of DistanceSourceToPatient; 0 = as the header says", marrow::at_least(0))
+      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, instead of ImagerPixelSpacing; 0 = as the header says",
+              marrow::at_least(0));
+}

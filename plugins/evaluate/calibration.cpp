@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far a calibration is from the exact one of a simulated device.
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "plugins/read/calibration.hpp"
+
+namespace {
+
+using marrow::read::Calibration;
+
+marrow::Metrics calibration_error(const Calibration& found, const Calibration& truth) {
+  if (found.width_px != truth.width_px || found.height_px != truth.height_px)
+    throw marrow::Error("the calibration is of images of " + std::to_string(found.width_px) + " x " + std::to_string(found.height_px) +
+                        " pixels, the truth of " + std::to_string(truth.width_px) + " x " + std::to_string(truth.height_px));
+  const auto focal_error = [&](int i) {
+    return 100 * std::abs(found.intrinsics(i, i) - truth.intrinsics(i, i)) / truth.intrinsics(i, i);
+  };
+  const auto principal_error = [&](int i) { return std::abs(found.intrinsics(i, 2) - truth.intrinsics(i, 2)); };
+  // What counts for a measurement is where the two put the same ray. A shift of the principal point is nearly a turn of the
+  // whole device, which the poses of the views take up, so the mean shift over the image is taken out.
+  std::vector<Eigen::Vector2d> shifts;
+  Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+  constexpr int kGrid = 20;
+  for (int row = 0; row <= kGrid; ++row)
+    for (int column = 0; column <= kGrid; ++column) {
+      const Eigen::Vector2d pixel(column * (truth.width_px - 1.0) / kGrid, row * (truth.height_px - 1.0) / kGrid);
+      shifts.push_back(distorted_pixel(found.intrinsics, found.distortion, pixel) -
+                       distorted_pixel(truth.intrinsics, truth.distortion, pixel));
+      mean += shifts.back();
+    }
+  mean /= double(shifts.size());
+  double squares = 0;
+  for (const auto& shift : shifts) squares += (shift - mean).squaredNorm();
+  marrow::Metrics metrics;
+  metrics.items.push_back({"focal_error", std::max(focal_error(0), focal_error(1)), "%"});
+  metrics.items.push_back({"principal_u_error", principal_error(0), "px"});
+  metrics.items.push_back({"principal_v_error", principal_error(1), "px"});
+  metrics.items.push_back({"distortion_error", std::sqrt(squares / double(shifts.size())), "px"});
+  metrics.items.push_back({"residual", found.residual_px, "px"});
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.calibration", calibration_error)
+      .summary("How far a calibration is from the exact one of a simulated device")
+      .in("calibration", "camera matrix and distortion that were found")
+      .in("truth", "the exact ones")
+      .out("metrics", "errors of focal length, principal point and of the distortion over the image");
+}

@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "volume_file.hpp"
+
+namespace {
+
+struct Options {
+  std::vector<std::string> names;
+  std::vector<std::filesystem::path> paths;
+  int frame = 0;
+};
+
+marrow::List<marrow::Image> images(const Options& options) {
+  if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
+  if (!options.names.empty() && options.names.size() != options.paths.size())
+    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, paths " +
+                        std::to_string(options.paths.size()) + " files; give one name per image, or none");
+  marrow::List<marrow::Image> images;
+  for (std::size_t i = 0; i < options.paths.size(); ++i) {
+    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
+    if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
+    images.add(name, marrow::read::read_image_file(options.paths[i], options.frame));
+  }
+  return images;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.images", images)
+      .summary("Grey images whose cameras are not known yet, as a calibration takes them")
+      .out("images", "the grey values as stored", marrow::over("view"))
+      .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
+      .option("names", &Options::names, "one name per image; without names, the files' names without extension")
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
+}

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "xray_header.hpp"
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "dicom_header.hpp"
+#include "marrow/domain/error.hpp"
+#include "plugins/camera/carm_geometry.hpp"
+
+namespace marrow::read {
+namespace {
+
+constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
+constexpr DicomTag kDistanceSourceToDetector{0x0018, 0x1110, "DistanceSourceToDetector"};
+constexpr DicomTag kDistanceSourceToPatient{0x0018, 0x1111, "DistanceSourceToPatient"};
+constexpr DicomTag kDistanceSourceToIsocenter{0x0018, 0x9402, "DistanceSourceToIsocenter"};
+constexpr DicomTag kMagnification{0x0018, 0x1114, "EstimatedRadiographicMagnificationFactor"};
+constexpr DicomTag kImagerPixelSpacing{0x0018, 0x1164, "ImagerPixelSpacing"};
+constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
+constexpr DicomTag kSpacingCalibration{0x0028, 0x0a02, "PixelSpacingCalibrationType"};
+constexpr DicomTag kPrimaryAngle{0x0018, 0x1510, "PositionerPrimaryAngle"};
+constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
+constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
+constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
+constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
+constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign"};
+constexpr DicomTag kRows{0x0028, 0x0010, "Rows"};
+constexpr DicomTag kColumns{0x0028, 0x0011, "Columns"};
+
+/// Collects what is missing, so that one message names all.
+class Wanted {
+ public:
+  explicit Wanted(const DicomHeader& header) : header_(header) {}
+  void missing(const std::string& what, const std::string& advice) {
+    text_ += (text_.empty() ? "" : "; ") + what + (advice.empty() ? "" : " (" + advice + ")");
+  }
+  double number(const DicomTag& tag, const std::string& advice) {
+    const auto value = header_.number(tag);
+    if (!value) missing(tag.text(), advice);
+    return value.value_or(0);
+  }
+  void finish() const {
+    if (!text_.empty()) throw Error(header_.path().string() + ": its header does not say how it was taken; missing: " + text_);
+  }
+
+ private:
+  const DicomHeader& header_;
+  std::string text_;
+};
+
+void check_modality(const DicomHeader& header) {
+  const std::string modality = header.text(kModality).value_or("");
+  if (modality == "XA" || modality == "RF") return;
+  throw Error(header.path().string() + ": is of modality '" + modality +
+              "'; expected XA or RF, whose headers hold a C-arm's angles and distances");
+}
+
+double source_to_isocentre(const DicomHeader& header, double source_to_detector_mm, double given_mm, Wanted& wanted) {
+  if (given_mm > 0) return given_mm;
+  for (const DicomTag& tag : {kDistanceSourceToPatient, kDistanceSourceToIsocenter})
+    if (const auto value = header.number(tag); value && *value > 0) return *value;
+  if (const auto factor = header.number(kMagnification); factor && *factor > 1) return source_to_detector_mm / *factor;
+  wanted.missing(kDistanceSourceToPatient.text() + " or " + kMagnification.text(), "or give source_to_isocentre_mm");
+  return 0;
+}
+
+/// Width and height of a pixel on the detector. Both spacings give the distance of rows first, which is a pixel's height.
+Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnification, double given_mm, Wanted& wanted,
+                                  std::vector<std::string>& warnings) {
+  if (given_mm > 0) return Eigen::Vector2d::Constant(given_mm);
+  if (const auto spacing = header.numbers(kImagerPixelSpacing, 2)) return {(*spacing)[1], (*spacing)[0]};
+  const auto spacing = header.numbers(kPixelSpacing, 2);
+  if (!spacing) {
+    wanted.missing(kImagerPixelSpacing.text(), "or give pixel_mm");
+    return {1, 1};
+  }
+  const Eigen::Vector2d pixel((*spacing)[1], (*spacing)[0]);
+  const std::string what = header.path().string() + ": " + kImagerPixelSpacing.text() + " is missing; ";
+  if (header.text(kSpacingCalibration)) {
+    warnings.push_back(what + kPixelSpacing.text() + " is calibrated to the patient, so it is multiplied by the magnification; check the "
+                       "result with camera.check");
+    return magnification * pixel;
+  }
+  warnings.push_back(what + kPixelSpacing.text() + " is taken for it, but where it was calibrated to the patient the focal length is too long "
+                     "by the magnification; check the result with camera.check, or give pixel_mm");
+  return pixel;
+}
+
+/// The direction in patient coordinates that letters such as "L" or "LA" name, the first one first.
+std::optional<Eigen::Vector3d> direction_of(const std::string& letters) {
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  double weight = 1;
+  for (const char letter : letters) {
+    const std::string known = "LRPAHF";
+    const std::size_t at = known.find(letter);
+    if (at == std::string::npos) return std::nullopt;
+    direction[Eigen::Index(at / 2)] += at % 2 == 0 ? weight : -weight;
+    weight *= 0.5;
+  }
+  if (direction.isZero()) return std::nullopt;
+  return direction.normalized();
+}
+
+/// Axes to the right and down of the image as stored, by PatientOrientation: of the eight ways to turn and mirror what the
+/// camera sees, the one that its letters fit best. None where the header does not say.
+struct Stored {
+  Eigen::Vector3d right, down;
+  bool mirrored = false;
+};
+std::optional<Stored> stored_axes(const DicomHeader& header, const Eigen::Matrix3d& world_from_camera) {
+  const auto text = header.text(kPatientOrientation);
+  if (!text) return std::nullopt;
+  const std::size_t between = text->find('\\');
+  if (between == std::string::npos) return std::nullopt;
+  const auto row = direction_of(text->substr(0, between)), column = direction_of(text->substr(between + 1));
+  if (!row || !column) return std::nullopt;
+  const Eigen::Vector3d u = world_from_camera.col(0), v = world_from_camera.col(1);
+  Stored best;
+  double best_fit = 0;
+  for (const bool swapped : {false, true})
+    for (const double a : {1.0, -1.0})
+      for (const double b : {1.0, -1.0}) {
+        Stored stored{a * (swapped ? v : u), b * (swapped ? u : v), false};
+        stored.mirrored = stored.right.cross(stored.down).dot(world_from_camera.col(2)) < 0;
+        if (const double fit = row->dot(stored.right) + column->dot(stored.down); fit > best_fit) {
+          best_fit = fit;
+          best = stored;
+        }
+      }
+  if (best_fit < 1.2)
+    throw Error(header.path().string() + ": " + kPatientOrientation.text() + " says '" + *text +
+                "', which no view from these angles shows; one of them is wrong");
+  return best;
+}
+
+Eigen::Matrix3d carm_axes(double secondary_deg, double primary_deg) {
+  return camera::world_from_camera_rotation(radians(secondary_deg), radians(primary_deg));
+}
+
+void check_motion(const DicomHeader& header, int frame) {
+  if (frame > 1 && header.text(kPositionerMotion).value_or("") == "DYNAMIC")
+    throw Error(header.path().string() + ": the arm moves during this run, and its angles are those of the first frame; use frame 1, or "
+                "camera.carm with the angles of frame " + std::to_string(frame));
+}
+
+void check_angles(const DicomHeader& header, double primary_deg, double secondary_deg) {
+  if (!(std::abs(primary_deg) <= 180))
+    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + std::to_string(primary_deg) + ", expected -180 to 180");
+  if (!(std::abs(secondary_deg) <= 90))
+    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + std::to_string(secondary_deg) + ", expected -90 to 90");
+}
+
+void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
+  const std::string what = header.path().string() + ": ";
+  if (!(arm.source_to_isocentre_mm < arm.source_to_detector_mm))
+    throw Error(what + "the isocentre (" + std::to_string(arm.source_to_isocentre_mm) + " mm from the source) lies behind the detector (" +
+                std::to_string(arm.source_to_detector_mm) + " mm)");
+  if (!(arm.source_to_detector_mm > 100 && arm.source_to_detector_mm < 5000))
+    throw Error(what + kDistanceSourceToDetector.text() + " is " + std::to_string(arm.source_to_detector_mm) +
+                " mm, which no C-arm has; give source_to_detector_mm");
+  if (!(arm.pixel_mm.minCoeff() > 0.001 && arm.pixel_mm.maxCoeff() < 10))
+    throw Error(what + "a pixel of " + std::to_string(arm.pixel_mm.x()) + " x " + std::to_string(arm.pixel_mm.y()) +
+                " mm is no detector's; give pixel_mm");
+}
+
+}  // namespace
+
+XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
+  const DicomHeader header(path, frame);
+  check_modality(header);
+  check_motion(header, frame);
+  XrayGeometry geometry;
+  Wanted wanted(header);
+  const double primary_deg = wanted.number(kPrimaryAngle, "or use camera.carm");
+  const double secondary_deg = wanted.number(kSecondaryAngle, "or use camera.carm");
+  camera::CArm arm;
+  arm.width_px = int(wanted.number(kColumns, ""));
+  arm.height_px = int(wanted.number(kRows, ""));
+  arm.source_to_detector_mm = overrides.source_to_detector_mm > 0
+                                  ? overrides.source_to_detector_mm
+                                  : wanted.number(kDistanceSourceToDetector, "or give source_to_detector_mm");
+  arm.source_to_isocentre_mm = source_to_isocentre(header, arm.source_to_detector_mm, overrides.source_to_isocentre_mm, wanted);
+  arm.pixel_mm = detector_pixel_mm(header, arm.source_to_detector_mm / arm.source_to_isocentre_mm, overrides.pixel_mm, wanted,
+                                   geometry.warnings);
+  wanted.finish();
+  check_angles(header, primary_deg, secondary_deg);
+  check_lengths(header, arm);
+  Eigen::Matrix3d axes = carm_axes(secondary_deg, primary_deg);
+  if (const auto stored = stored_axes(header, axes)) {
+    axes.col(0) = stored->mirrored ? Eigen::Vector3d(-stored->right) : stored->right;
+    axes.col(1) = stored->down;
+  } else {
+    geometry.warnings.push_back(path.string() + ": " + kPatientOrientation.text() +
+                                " is missing, so the image is taken to have the head up and to be seen from the source (in the frontal view the "
+                                "patient's left is on the left); if it is not, mirror or turn it first");
+  }
+  if (const auto position = header.text(kPatientPosition); position && *position != "HFS")
+    geometry.warnings.push_back(path.string() + ": " + kPatientPosition.text() + " is " + *position +
+                                "; angles are taken relative to the patient, as the standard has it, but not every C-arm writes them so");
+  geometry.camera = camera::carm_camera(arm, axes);
+  check_camera(geometry.camera, path.string());
+  return geometry;
+}
+
+XrayPixels read_xray_pixels(const std::filesystem::path& path) {
+  const DicomHeader header(path, 1);
+  XrayPixels pixels;
+  const auto sign = header.number(kIntensitySign);
+  pixels.inverted = sign && *sign < 0;
+  const auto primary = header.number(kPrimaryAngle), secondary = header.number(kSecondaryAngle);
+  if (primary && secondary)
+    if (const auto stored = stored_axes(header, carm_axes(*secondary, *primary))) pixels.mirrored = stored->mirrored;
+  return pixels;
+}
+
+}  // namespace marrow::read

@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Files that other programs wrote (pydicom's test files, GDCM, nibabel, tifffile, Pillow, VTK) are read as those programs read them, and
+damaged copies of them are refused by name, without a crash and in bounded memory. What is not installed is skipped, and said so."""
+import functools
+import os
+import pathlib
+import random
+import resource
+import shutil
+import subprocess
+import unittest
+import zlib
+
+import marrow_cli
+from marrow_cli import Case, main, marrow
+
+DAMAGED = 10  # copies of each kind of file
+MEMORY = 64 << 20  # what reading a small file may take beyond what reading the good one takes
+
+
+def module(name):
+    try:
+        return __import__(name, fromlist=["_"])
+    except ImportError:
+        return None
+
+
+numpy, pydicom, nibabel, tifffile, PIL, vtk = map(module, ("numpy", "pydicom", "nibabel", "tifffile", "PIL.Image", "vtkmodules.all"))
+DICOM = pathlib.Path(pydicom.__file__).parent / "data" / "test_files" if pydicom else None
+
+
+def needs(*names):
+    missing = [name for name in names if not globals()[name]]
+    return unittest.skipIf(missing, "not installed here: python3 module " + ", ".join(missing))
+
+
+def read_mha(path):
+    """Values (z, y, x), and the header's keys, of a MetaImage of floats as marrow writes it."""
+    data = path.read_bytes()
+    end = data.index(b"\n", data.index(b"ElementDataFile")) + 1
+    keys = dict(line.split(" = ", 1) for line in data[:end].decode().splitlines())
+    body = zlib.decompress(data[end:]) if keys.get("CompressedData") == "True" else data[end:]
+    size = [int(n) for n in keys["DimSize"].split()]
+    return numpy.frombuffer(body, dtype="<f4").reshape(size[::-1]), keys
+
+
+@functools.cache
+def least_memory(pipeline_text, folder):
+    """Bytes of address space in which the program reads a good file."""
+    for megabytes in range(192, 4096, 32):
+        if run_limited(pipeline_text, folder, megabytes << 20).returncode == 0:
+            return megabytes << 20
+    raise AssertionError("no memory is enough")
+
+
+def run_limited(pipeline_text, folder, limit):
+    shutil.rmtree(folder / "out", ignore_errors=True)
+    (folder / "p.yaml").write_text(pipeline_text)
+
+    def restrict():
+        resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    return subprocess.run([str(marrow_cli.MARROW), "run", "p.yaml", "--out", "out", "--quiet"], cwd=folder, capture_output=True, text=True,
+                          errors="replace", timeout=60, preexec_fn=restrict, env=dict(os.environ, MARROW_PLUGIN_PATH=""))
+
+
+class Reading(Case):
+    def run_node(self, node, options, file):
+        pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n" % (node, file, options))
+        out = self.scratch / "out"
+        shutil.rmtree(out, ignore_errors=True)
+        return marrow("run", pipeline, "--out", out, "--quiet"), out / "outputs"
+
+    def image(self, file, options=""):
+        result, out = self.run_node("read.image", options, file)
+        self.assertEqual(result.returncode, 0, "%s: %s" % (file, result.stderr))
+        return numpy.array(PIL.open(out / "it.png"))
+
+    def volume(self, file, options=""):
+        result, out = self.run_node("read.volume", options, file)
+        self.assertEqual(result.returncode, 0, "%s: %s" % (file, result.stderr))
+        return read_mha(out / "it.mha")
+
+    def refused(self, node, file, options=""):
+        result, _ = self.run_node(node, options, file)
+        self.assertEqual(result.returncode, 1, "%s: %s" % (file, result.stderr))
+        self.assertIn(pathlib.Path(file).name, result.stderr)
+        return result.stderr
+
+    def assert_scaled(self, image, expected):
+        """Floats are written as 16 bits between the least and the greatest."""
+        low, high = float(expected.min()), float(expected.max())
+        wanted = (expected.astype(float) - low) * (65535 / (high - low))
+        self.assertEqual(image.shape, expected.shape)
+        self.assertLessEqual(float(numpy.abs(image.astype(float) - wanted).max()), 1)
+
+
+@needs("pydicom", "numpy", "PIL")
+class Dicom(Reading):
+    def values(self, name):
+        data = pydicom.dcmread(DICOM / name)
+        return data.pixel_array * float(data.get("RescaleSlope", 1)) + float(data.get("RescaleIntercept", 0))
+
+    def test_every_way_to_store_the_same_image(self):
+        expected = self.values("MR_small.dcm")
+        for name in ("MR_small", "MR_small_bigendian", "MR_small_expb", "MR_small_implicit", "MR_small_padded", "MR_small_RLE",
+                     "MR_small_jp2klossless", "MR_small_jpeg_ls_lossless"):
+            with self.subTest(name):
+                self.assert_scaled(self.image(DICOM / (name + ".dcm")), expected)
+
+    def test_values_are_scaled_as_the_header_says(self):
+        self.assert_scaled(self.image(DICOM / "CT_small.dcm"), self.values("CT_small.dcm"))
+
+    def test_what_gdcm_writes(self):
+        if not shutil.which("gdcmconv"):
+            self.skipTest("not installed here: gdcmconv (libgdcm-tools)")
+        expected = self.values("MR_small.dcm")
+        for option in ("--raw", "--jpeg", "--jpegls", "--j2k", "--rle", "--implicit", "--explicit"):
+            with self.subTest(option):
+                file = self.scratch / ("x%s.dcm" % option)
+                made = subprocess.run(["gdcmconv", option, str(DICOM / "MR_small.dcm"), str(file)], capture_output=True, text=True)
+                if made.returncode != 0 or not file.exists():
+                    self.skipTest("gdcmconv %s: %s" % (option, made.stderr))
+                self.assert_scaled(self.image(file), expected)
+
+    def test_a_series(self):
+        for folder in ("98892001/CT5N", "77654033/CT2"):
+            with self.subTest(folder):
+                slices = [pydicom.dcmread(path) for path in (DICOM / "dicomdirtests" / folder).iterdir()]
+                slices.sort(key=lambda s: numpy.dot(s.ImagePositionPatient, numpy.cross(s.ImageOrientationPatient[:3], s.ImageOrientationPatient[3:])))
+                expected = numpy.stack([s.pixel_array * float(s.RescaleSlope) + float(s.RescaleIntercept) for s in slices])
+                result, out = self.run_node("read.volume", "", DICOM / "dicomdirtests" / folder)
+                print("\n   ", folder, result.stderr.strip().replace(str(DICOM), ""))
+                if result.returncode == 0:
+                    values, keys = read_mha(out / "it.mha")
+                    self.assertLess(float(numpy.abs(values - expected).max()), 1e-3)
+                    self.assertEqual([float(x) for x in keys["ElementSpacing"].split()[:2]], [float(x) for x in slices[0].PixelSpacing[::-1]])
+                    self.assertLess(max(abs(float(a) - float(b)) for a, b in zip(keys["Offset"].split(), slices[0].ImagePositionPatient)), 1e-4)
+                else:
+                    self.assertRegex(result.stderr, "a slice is missing or the series is unevenly spaced|lie at the same place")
+
+    def test_every_other_file_is_read_or_refused_by_name(self):
+        read, refused = [], []
+        for path in sorted(DICOM.rglob("*")):
+            if not path.is_file() or path.suffix not in (".dcm", "") or path.name.startswith(("README", "DICOMDIR")):
+                continue
+            copy = self.scratch / (path.name + ("" if path.suffix else ".dcm"))
+            shutil.copy(path, copy)
+            result, _ = self.run_node("read.image", "", copy)
+            self.assertIn(result.returncode, (0, 1), "%s: %s" % (path, result.stderr))
+            if result.returncode == 0:
+                read.append(path.name)
+            else:
+                refused.append(path.name)
+                self.assertIn(copy.name, result.stderr)
+            copy.unlink()
+        print("\n    read: %d, refused: %d (%s)" % (len(read), len(refused), ", ".join(refused[:8])))
+        self.assertIn("MR_truncated.dcm", refused)
+        self.assertIn("rtplan.dcm", refused)
+        self.assertIn("SC_rgb_rle.dcm", refused)
+        self.assertIn("693_J2KI.dcm", read)
+
+
+@needs("nibabel", "numpy")
+class Nifti(Reading):
+    def test_values_and_affine(self):
+        random_values = numpy.random.default_rng(1).integers(-1000, 2000, (7, 6, 5))
+        turn = numpy.array([[0.8, -0.6, 0], [0.6, 0.8, 0], [0, 0, 1]])
+        affine = numpy.eye(4)
+        affine[:3, :3] = turn @ numpy.diag([0.5, 0.75, 2])
+        affine[:3, 3] = [11, -22, 33]
+        for kind in ("int16", "float32", "uint16", "float64", "int32"):
+            for extension in (".nii", ".nii.gz"):
+                with self.subTest(kind + extension):
+                    values = (random_values + 1000 * (kind == "uint16")).astype(kind)
+                    file = self.scratch / ("a" + extension)
+                    nibabel.save(nibabel.Nifti1Image(values, affine), file)
+                    got, keys = self.volume(file)
+                    self.assertTrue((got.transpose(2, 1, 0) == values.astype("f4")).all())
+                    self.check_grid(keys, affine)
+
+    def check_grid(self, keys, affine):
+        """NIfTI's world is RAS, MetaImage's is LPS."""
+        lps = numpy.diag([-1, -1, 1, 1]) @ affine
+        self.assertLess(numpy.abs(numpy.array(keys["Offset"].split(), float) - lps[:3, 3]).max(), 1e-4)
+        spacing = numpy.array(keys["ElementSpacing"].split(), float)
+        axes = numpy.array(keys["TransformMatrix"].split(), float).reshape(3, 3).T  # one axis after the other
+        self.assertLess(numpy.abs(axes * spacing - lps[:3, :3]).max(), 1e-4)
+
+    def test_scaled_values(self):
+        image = nibabel.Nifti1Image(numpy.arange(60, dtype="int16").reshape(5, 4, 3), numpy.eye(4))
+        image.header.set_slope_inter(2.5, -1024)
+        nibabel.save(image, self.scratch / "a.nii")
+        expected = nibabel.load(self.scratch / "a.nii").get_fdata()
+        self.assertLess(numpy.abs(self.volume(self.scratch / "a.nii")[0].transpose(2, 1, 0) - expected).max(), 1e-3)
+
+
+@needs("tifffile", "numpy")
+class Tiff(Reading):
+    def test_stacks(self):
+        values = numpy.random.default_rng(2).integers(0, 4096, (5, 24, 32)).astype("uint16")
+        for name, options in (("plain", {}), ("zlib", {"compression": "zlib"}), ("big", {"bigtiff": True}), ("motorola", {"byteorder": ">"}),
+                              ("tiled", {"tile": (16, 16)}), ("strips", {"rowsperstrip": 5})):
+            for kind in ("uint16", "float32", "uint8"):
+                with self.subTest("%s %s" % (name, kind)):
+                    file = self.scratch / "a.tif"
+                    pages = (values // 16 if kind == "uint8" else values).astype(kind)
+                    tifffile.imwrite(file, pages, photometric="minisblack", metadata=None, **options)
+                    result, out = self.run_node("read.volume", ", voxel_size_mm: [1, 2, 3]", file)
+                    self.assertEqual(result.returncode, 0, result.stderr)
+                    self.assertTrue((read_mha(out / "it.mha")[0] == pages).all())
+
+
+@needs("PIL", "numpy")
+class Images(Reading):
+    def test_pillow(self):
+        values = numpy.random.default_rng(3).integers(0, 65536, (20, 30)).astype("uint16")
+        for name, options in (("a.png", {}), ("b.png", {"optimize": True}), ("a.tif", {}), ("lzw.tif", {"compression": "tiff_lzw"}),
+                              ("deflate.tif", {"compression": "tiff_adobe_deflate"}), ("packbits.tif", {"compression": "packbits"})):
+            for kind in ("uint16", "uint8"):
+                with self.subTest("%s %s" % (name, kind)):
+                    pixels = values if kind == "uint16" else (values >> 8).astype("uint8")
+                    PIL.fromarray(pixels).save(self.scratch / name, **options)
+                    self.assertTrue((self.image(self.scratch / name) == pixels).all())
+
+    def test_colours_and_palettes(self):
+        colours = PIL.fromarray(numpy.random.default_rng(4).integers(0, 256, (9, 8, 3)).astype("uint8"))
+        colours.save(self.scratch / "rgb.png")
+        self.assertIn("has 3 channels; an X-ray image has one", self.refused("read.image", self.scratch / "rgb.png"))
+        colours.quantize(16).save(self.scratch / "palette.png")
+        self.assertIn("an X-ray image has one", self.refused("read.image", self.scratch / "palette.png"))
+
+
+@needs("vtk", "numpy", "PIL")
+class Vtk(Reading):
+    def grid(self, dimensions, kind):
+        image = vtk.vtkImageData()
+        image.SetDimensions(*dimensions)
+        image.SetSpacing(0.5, 0.75, 2)
+        image.SetOrigin(3, -4, 5)
+        image.AllocateScalars(kind, 1)
+        from vtkmodules.util.numpy_support import vtk_to_numpy
+        values = vtk_to_numpy(image.GetPointData().GetScalars())
+        values[:] = numpy.arange(values.size) * 37 % 251
+        return image, values.reshape(dimensions[::-1])
+
+    def save(self, writer, file, source):
+        writer.SetFileName(str(file))
+        writer.SetInputData(source)
+        writer.Write()
+
+    def test_volumes(self):
+        image, values = self.grid((7, 6, 5), vtk.VTK_SHORT)
+        for name, compressed in (("a.mha", False), ("packed.mha", True)):
+            with self.subTest(name):
+                writer = vtk.vtkMetaImageWriter()
+                writer.SetCompression(compressed)
+                self.save(writer, self.scratch / name, image)
+                got, keys = self.volume(self.scratch / name)
+                self.assertTrue((got == values).all())
+                self.assertEqual(keys["ElementSpacing"].split(), ["0.5", "0.75", "2"])
+                self.assertEqual(keys["Offset"].split(), ["3", "-4", "5"])
+        folder = self.scratch / "detached"
+        folder.mkdir()
+        self.save(vtk.vtkMetaImageWriter(), folder / "a.mhd", image)
+        self.assertTrue((self.volume(folder)[0] == values).all())
+        self.save(vtk.vtkNIFTIImageWriter(), self.scratch / "a.nii", image)
+        self.assertEqual(sorted(self.volume(self.scratch / "a.nii")[0].ravel()), sorted(values.ravel()))
+
+    def test_images(self):
+        image, values = self.grid((9, 7, 1), vtk.VTK_UNSIGNED_SHORT)
+        for writer, name in ((vtk.vtkPNGWriter(), "a.png"), (vtk.vtkTIFFWriter(), "a.tif")):
+            with self.subTest(name):
+                self.save(writer, self.scratch / name, image)
+                self.assertTrue((self.image(self.scratch / name) == values[0, ::-1]).all(), "VTK's rows run from below")
+
+    def test_meshes(self):
+        sphere = vtk.vtkSphereSource()
+        sphere.SetRadius(20)
+        sphere.Update()
+        source = sphere.GetOutput()
+        for writer, name in ((vtk.vtkSTLWriter(), "a.stl"), (vtk.vtkSTLWriter(), "text.stl"), (vtk.vtkPLYWriter(), "a.ply"), (vtk.vtkPLYWriter(), "text.ply")):
+            with self.subTest(name):
+                (writer.SetFileTypeToASCII if name.startswith("text") else writer.SetFileTypeToBinary)()
+                self.save(writer, self.scratch / name, source)
+                result, out = self.run_node("read.mesh", "", self.scratch / name)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                reader = vtk.vtkPLYReader()
+                reader.SetFileName(str(out / "it.ply"))
+                reader.Update()
+                self.assertEqual(reader.GetOutput().GetNumberOfCells(), source.GetNumberOfCells())
+                self.assertEqual(reader.GetOutput().GetNumberOfPoints(), source.GetNumberOfPoints())
+                self.assertLess(max(abs(a - b) for a, b in zip(reader.GetOutput().GetBounds(), source.GetBounds())), 1e-4)
+
+
+class Damaged(Reading):
+    """Ten damaged copies of each kind of file, through the program as a person runs it."""
+
+    def check(self, node, options, good):
+        text = "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n"
+        limit = least_memory(text % (node, good, options), self.scratch) + MEMORY
+        data, source = good.read_bytes(), random.Random(len(good.read_bytes()))
+        header = min(len(data), 400)
+        bad = self.scratch / ("bad" + "".join(good.suffixes))
+        read = 0
+        for number in range(DAMAGED):
+            if number % 3 == 0:
+                copy = data[:source.randrange(len(data) - 1)]
+            elif number % 3 == 1:
+                copy = data[:source.randrange(header)]
+            else:
+                copy = bytearray(data)
+                for _ in range(3):
+                    copy[source.randrange(header)] ^= source.randrange(1, 256)
+            bad.write_bytes(copy)
+            result = run_limited(text % (node, bad, options), self.scratch, limit)
+            what = "%s, copy %d: %s" % (good.name, number, result.stderr)
+            self.assertIn(result.returncode, (0, 1) if number % 3 == 2 else (1,), what)
+            self.assertNotRegex(result.stderr, "bad_alloc|memory|std::|0x[0-9a-f]", what)
+            if result.returncode == 1:
+                self.assertIn(bad.name, result.stderr, what)
+            read += result.returncode == 0
+        print("\n    %-28s %d refused, %d read" % (good.name, DAMAGED - read, read))
+
+    @needs("PIL", "numpy")
+    def test_images(self):
+        values = numpy.random.default_rng(5).integers(0, 65536, (40, 50)).astype("uint16")
+        for name, options in (("a.png", {}), ("lzw.tif", {"compression": "tiff_lzw"}), ("packbits.tif", {"compression": "packbits"})):
+            PIL.fromarray(values).save(self.scratch / name, **options)
+            self.check("read.image", "", self.scratch / name)
+
+    @needs("tifffile", "numpy")
+    def test_tiff_stack(self):
+        values = numpy.random.default_rng(6).integers(0, 4096, (5, 24, 32)).astype("uint16")
+        for name, options in (("zlib.tif", {"compression": "zlib"}), ("big.tif", {"bigtiff": True})):
+            tifffile.imwrite(self.scratch / name, values, photometric="minisblack", metadata=None, **options)
+            self.check("read.volume", ", voxel_size_mm: [1, 1, 1]", self.scratch / name)
+
+    @needs("nibabel", "numpy")
+    def test_nifti(self):
+        image = nibabel.Nifti1Image(numpy.random.default_rng(7).integers(0, 3000, (9, 8, 7)).astype("int16"), numpy.eye(4))
+        for name in ("a.nii", "a.nii.gz"):
+            nibabel.save(image, self.scratch / name)
+            self.check("read.volume", "", self.scratch / name)
+
+    @needs("pydicom")
+    def test_dicom(self):
+        for name in ("MR_small.dcm", "MR_small_implicit.dcm", "MR_small_bigendian.dcm", "MR_small_RLE.dcm", "MR_small_jp2klossless.dcm",
+                     "MR_small_jpeg_ls_lossless.dcm", "JPGExtended.dcm"):
+            shutil.copy(DICOM / name, self.scratch / name)
+            self.check("read.image", "", self.scratch / name)
+
+    @needs("vtk")
+    def test_vtk(self):
+        image = vtk.vtkImageData()
+        image.SetDimensions(7, 6, 5)
+        image.AllocateScalars(vtk.VTK_SHORT, 1)
+        image.GetPointData().GetScalars().FillComponent(0, 7)
+        sphere = vtk.vtkSphereSource()
+        sphere.Update()
+        for writer, name, node, source in ((vtk.vtkMetaImageWriter(), "a.mha", "read.volume", image), (vtk.vtkSTLWriter(), "a.stl", "read.mesh", sphere.GetOutput()),
+                                           (vtk.vtkPLYWriter(), "a.ply", "read.mesh", sphere.GetOutput())):
+            writer.SetFileName(str(self.scratch / name))
+            writer.SetInputData(source)
+            if hasattr(writer, "SetFileTypeToBinary"):
+                writer.SetFileTypeToBinary()
+            writer.Write()
+            self.check(node, "", self.scratch / name)
+
+
+if __name__ == "__main__":
+    main()

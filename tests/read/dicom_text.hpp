@@ -1,0 +1,60 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// X-ray files as a C-arm writes them, made element by element, so that each may be left out or wrong.
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace marrow::test {
+
+/// Elements of explicit little endian DICOM by tag. A value's kind stands before it: "DS:1000".
+using Elements = std::map<std::uint32_t, std::string>;
+
+inline std::string little(std::uint32_t value, int width) {
+  std::string bytes;
+  for (int i = 0; i < width; ++i) bytes += char(value >> (8 * i));
+  return bytes;
+}
+
+inline std::string dicom_element(std::uint32_t tag, const std::string& kind, std::string value) {
+  if (value.size() % 2) value += kind == "UI" ? '\0' : ' ';
+  const bool is_long = kind == "OW" || kind == "OB" || kind == "SQ";
+  return little(tag >> 16, 2) + little(tag & 0xFFFF, 2) + kind + (is_long ? little(0, 2) + little(std::uint32_t(value.size()), 4)
+                                                                          : little(std::uint32_t(value.size()), 2)) + value;
+}
+
+inline std::string dicom_elements(const Elements& elements) {
+  std::string bytes;
+  for (const auto& [tag, text] : elements) {
+    const std::string kind = text.substr(0, 2), value = text.substr(3);
+    bytes += dicom_element(tag, kind, kind == "US" || kind == "SS" ? little(std::uint32_t(std::stoi(value)), 2) : value);
+  }
+  return bytes;
+}
+
+/// A sequence of one item, as the value of an element: "SQ:" before it.
+inline std::string dicom_item(const Elements& elements) {
+  const std::string content = dicom_elements(elements);
+  return "SQ:" + little(0xE000FFFEu, 4) + little(std::uint32_t(content.size()), 4) + content;
+}
+
+inline std::string dicom_file(const Elements& elements) {
+  const std::string meta = dicom_element(0x00020001, "OB", std::string("\0\1", 2)) + dicom_element(0x00020010, "UI", "1.2.840.10008.1.2.1");
+  return std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta +
+         dicom_elements(elements);
+}
+
+/// A frontal fluoroscopy: 6 columns, 4 rows, grey values 100 v + u.
+inline Elements fluoroscopy() {
+  std::string pixels;
+  for (int v = 0; v < 4; ++v)
+    for (int u = 0; u < 6; ++u) pixels += little(std::uint32_t(100 * v + u), 2);
+  return {{0x00080016, "UI:1.2.840.10008.5.1.4.1.1.12.1"}, {0x00080060, "CS:XA"},
+          {0x00181110, "DS:1000"}, {0x00181111, "DS:600"}, {0x00181164, "DS:0.4\\0.3"}, {0x00181500, "CS:STATIC"},
+          {0x00181510, "DS:0"}, {0x00181511, "DS:0"}, {0x00185100, "CS:HFS"}, {0x00200020, "CS:R\\F"},
+          {0x00280002, "US:1"}, {0x00280004, "CS:MONOCHROME2"}, {0x00280010, "US:4"}, {0x00280011, "US:6"},
+          {0x00280100, "US:16"}, {0x00280101, "US:16"}, {0x00280102, "US:15"}, {0x00280103, "US:0"}, {0x7FE00010, "OW:" + pixels}};
+}
+
+}  // namespace marrow::test
