@@ -235,7 +235,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     }
     record["outputs"].push_back(std::move(output));
   }
-  write_file(folder_ / "run.json", record.dump(1) + "\n");
+  write_file(folder_ / "run.json", record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 fs::path RunFolder::free_name(const fs::path& base) {

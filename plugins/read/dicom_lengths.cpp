@@ -169,11 +169,14 @@ class Walk {
                                                       : nullptr;
     if (place && element.length >= 2) *place = number(2, syntax.big_endian);
     if (element.tag == 0x00280008 && element.length <= 12) frames_ = std::max(1.0, std::strtod(take(element.length).c_str(), nullptr));
+    if (element.tag == 0x00080016 && element.length <= 64) is_dose_ = take(element.length).starts_with("1.2.840.10008.5.1.4.1.1.481.2");
     if (element.tag == kPixels) pixel_bytes_ = element.length;
     at_ = after;
   }
 
   void check_pixel_count() const {
+    // GDCM would look for the planes of a dose, and stop the program where they are missing.
+    if (is_dose_) throw Error(path_.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
     if (!has_pixels_) damaged("it has no pixels");
     if (!(rows_ > 0 && columns_ > 0)) damaged("its header does not say how large the image is");
     if (!(samples_ >= 1 && samples_ <= 4)) damaged("its header tells of " + std::to_string(int(samples_)) + " values per pixel");
@@ -188,7 +191,7 @@ class Walk {
   std::filesystem::path path_;
   std::ifstream stream_;
   std::uint64_t size_ = 0, at_ = 0, elements_ = 0;
-  bool is_deflated_ = false, has_pixels_ = false;
+  bool is_deflated_ = false, has_pixels_ = false, is_dose_ = false;
   double rows_ = 0, columns_ = 0, samples_ = 1, bits_ = 16, frames_ = 1, pixel_bytes_ = -1;
 };
 

@@ -70,6 +70,7 @@ std::vector<std::uint64_t> numbers_of(const Bytes& bytes, const Layout& layout, 
 /// What all pages of a stack have in common.
 struct Page {
   std::uint64_t width = 0, height = 0, bits = 1, samples = 1;
+  bool is_tiled = false;
   bool operator==(const Page&) const = default;
 };
 
@@ -89,6 +90,7 @@ Page check_page(const Bytes& bytes, const Layout& layout, std::uint64_t first_en
     if (tag == 256) page.width = numbers[0];
     if (tag == 257) page.height = numbers[0];
     if (tag == 258) page.bits = numbers[0];
+    if (tag == 322) page.is_tiled = true;
     if (tag == 277) page.samples = numbers[0];
     if (tag == 259) is_packed = numbers[0] != 1;
   }
@@ -122,6 +124,9 @@ void check_tiff_pages(const std::filesystem::path& path) {
       const std::uint64_t first_entry = at + std::uint64_t(layout.count_width);
       const Page page = check_page(bytes, layout, first_entry, entries);
       if (pages == 0) first = page;
+      // ITK would read tiles as colours of 8 bits.
+      if (page.is_tiled)
+        throw Error(path.string() + ": is stored in tiles; expected strips: save it as a plain TIFF (tiffcp -s does it)");
       if (page != first)
         throw Error(path.string() + ": page " + std::to_string(pages + 1) + " has another size or kind of pixels than page 1; save pages "
                     "that belong together in a file of their own");

@@ -108,7 +108,9 @@ inline std::vector<Damaged> damaged_copies(const Sample& sample, int cuts, int f
     EXPECT_NE(at, std::string::npos) << sample.name << " has no " << from;
     if (at == std::string::npos) continue;
     std::string bytes = sample.bytes;
-    copies.push_back({"a lie: " + to, bytes.replace(at, from.size(), to), true});
+    Damaged copy{"a lie: ", bytes.replace(at, from.size(), to), true};
+    copy.how += to;
+    copies.push_back(std::move(copy));
   }
   return copies;
 }

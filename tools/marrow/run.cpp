@@ -86,7 +86,7 @@ class Progress {
     if (!event.text.empty()) j["text"] = event.text;
     if (event.kind == Kind::progress) j["fraction"] = event.fraction;
     if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
-    std::printf("%s\n", j.dump().c_str());
+    std::printf("%s\n", j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
     std::fflush(stdout);
   }
 
@@ -126,7 +126,7 @@ void print_json_summary(const RunResult& result, const std::vector<RunFolder::Wr
   for (const RunFolder::Written& output : written) files[output.output] = output.files;
   const json end = {{"event", "ended"}, {"status", result.cancelled() ? "cancelled" : result.failed() ? "failed" : "done"},
                     {"seconds", result.seconds}, {"folder", folder.path().string()}, {"files", files}};
-  std::printf("%s\n", end.dump().c_str());
+  std::printf("%s\n", end.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
 }  // namespace
