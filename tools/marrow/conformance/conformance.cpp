@@ -19,6 +19,7 @@ namespace {
 
 using conformance::Check;
 using conformance::Suite;
+using OptionValues = std::map<std::string, OptionValue>;
 
 /// Seconds that one check may take.
 int time_limit_s() {
@@ -28,19 +29,19 @@ int time_limit_s() {
 }
 
 struct Outcome {
-  bool passed = false;
+  char verdict = '-';  ///< '+' passed, '-' failed, '~' does not apply
   std::string text;
 };
 
-/// In the child: the outcome as "+text" or "-text".
-std::string measured(const NodeDefinition& node, const Check& check) {
+/// In the child: the verdict and the text after it.
+std::string measured(const NodeDefinition& node, const OptionValues& options, const Check& check) {
   try {
-    const double figure = check.measure(conformance::Subject(node));
+    const double figure = check.measure(conformance::Subject(node, options));
     if (check.unit.empty()) return "+";
     const std::string text = conformance::digits(figure) + " " + check.unit + ", limit " + conformance::digits(check.limit);
     return (figure <= check.limit ? "+" : "-") + text;
   } catch (const conformance::NotApplicable& missing) {
-    return std::string("+does not apply: ") + missing.what();
+    return std::string("~does not apply: ") + missing.what();
   } catch (const std::exception& error) {
     return std::string("-") + error.what();
   }
@@ -58,7 +59,7 @@ bool read_all(int descriptor, std::string& text) {
   }
 }
 
-Outcome run_check(const Catalogue& catalogue, const std::string& node, const Check& check) {
+Outcome run_check(const Catalogue& catalogue, const std::string& node, const OptionValues& options, const Check& check) {
   int ends[2];
   if (pipe(ends) != 0) throw Error(std::string("cannot make a pipe: ") + std::strerror(errno));
   const pid_t child = fork();
@@ -67,7 +68,7 @@ Outcome run_check(const Catalogue& catalogue, const std::string& node, const Che
     close(ends[0]);
     std::string text;
     try {
-      text = measured(catalogue.load(node), check);
+      text = measured(catalogue.load(node), options, check);
     } catch (const std::exception& error) {
       text = std::string("-") + error.what();
     }
@@ -81,10 +82,10 @@ Outcome run_check(const Catalogue& catalogue, const std::string& node, const Che
   if (!in_time) kill(child, SIGKILL);
   int status = 0;
   waitpid(child, &status, 0);
-  if (!in_time) return {false, "it took longer than " + std::to_string(time_limit_s()) + " s"};
-  if (WIFSIGNALED(status)) return {false, std::string("it crashed: ") + strsignal(WTERMSIG(status))};
-  if (text.empty()) return {false, "it ended the process with exit code " + std::to_string(WEXITSTATUS(status))};
-  return {text[0] == '+', text.substr(1)};
+  if (!in_time) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
+  if (WIFSIGNALED(status)) return {'-', std::string("it crashed: ") + strsignal(WTERMSIG(status))};
+  if (text.empty()) return {'-', "it ended the process with exit code " + std::to_string(WEXITSTATUS(status))};
+  return {text[0], text.substr(1)};
 }
 
 /// The names of the nodes meant by a node's name, a kind or a library's file.
@@ -114,7 +115,7 @@ void print_limits(const NodeInfo& node) {
 
 int run_conformance(const std::vector<std::string>& subjects) {
   const Catalogue catalogue;
-  int failed = 0, passed = 0;
+  std::map<char, int> count;
   for (const std::string& subject : subjects)
     for (const std::string& name : nodes_of(catalogue, subject)) {
       const Suite* suite = conformance::suite_of(catalogue.find(name)->kind());
@@ -123,15 +124,16 @@ int run_conformance(const std::vector<std::string>& subjects) {
         continue;
       }
       std::printf("%s\n", name.c_str());
+      const OptionValues options = suite->options ? suite->options() : OptionValues{};
       for (const Check& check : conformance::checks_of(*suite)) {
-        const Outcome outcome = run_check(catalogue, name, check);
-        (outcome.passed ? passed : failed) += 1;
-        std::printf("  %s %-26s %s\n", outcome.passed ? "pass" : "FAIL", check.name.c_str(), outcome.text.c_str());
+        const Outcome outcome = run_check(catalogue, name, options, check);
+        ++count[outcome.verdict];
+        std::printf("  %s %-26s %s\n", outcome.verdict == '+' ? "pass" : outcome.verdict == '~' ? "n/a " : "FAIL", check.name.c_str(), outcome.text.c_str());
         std::fflush(stdout);
       }
     }
-  std::printf("%d passed, %d failed\n", passed, failed);
-  return failed ? 1 : 0;
+  std::printf("%d passed, %d do not apply, %d failed\n", count['+'], count['~'], count['-']);
+  return count['-'] ? 1 : 0;
 }
 
 }  // namespace marrow::cli

@@ -67,7 +67,12 @@ Result Subject::call(const Inputs& inputs, int threads) const {
     }
   }
   const std::shared_ptr<void> options = node_.make_options();
-  for (std::size_t i = 0; i < node_.info.options.size(); ++i) node_.set_option[i](options.get(), node_.info.options[i].default_value);
+  for (std::size_t i = 0; i < node_.info.options.size(); ++i) {
+    const OptionInfo& option = node_.info.options[i];
+    const auto given = options_.find(option.name);
+    if (given == options_.end() && option.required) throw NotApplicable("it needs the option '" + option.name + "'");
+    node_.set_option[i](options.get(), given == options_.end() ? option.default_value : given->second);
+  }
   const int count = threads > 0 ? threads : int(std::thread::hardware_concurrency());
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(count));
   tbb::task_arena arena(count);
@@ -83,6 +88,12 @@ Result Subject::call(const Inputs& inputs, int threads) const {
   return result;
 }
 
+Subject Subject::with(const std::string& option, OptionValue value) const {
+  Subject other = *this;
+  other.options_[option] = std::move(value);
+  return other;
+}
+
 Value Subject::output(const Inputs& inputs, const std::string& port) const {
   const Result result = call(inputs);
   if (result.refusal) throw Failure("it refuses: " + *result.refusal);
@@ -95,7 +106,7 @@ Value Subject::output(const Inputs& inputs, const std::string& port) const {
 }
 
 const Suite* suite_of(const std::string& kind) {
-  static const std::vector<Suite> kSuites{edges_suite(), mesh_suite(), segment_suite()};
+  static const std::vector<Suite> kSuites{camera_suite(), edges_suite(), mesh_suite(), segment_suite()};
   for (const Suite& suite : kSuites)
     if (suite.kind == kind) return &suite;
   return nullptr;

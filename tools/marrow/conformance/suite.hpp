@@ -26,19 +26,23 @@ struct Result {
   std::optional<std::string> refusal;
 };
 
-/// The node that is looked at, with its options as they are by default.
+/// The node that is looked at, with its options as they are by default, but for those that its suite gives a value.
 class Subject {
  public:
-  explicit Subject(const NodeDefinition& node) : node_(node) {}
+  explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {}) : node_(node), options_(std::move(options)) {}
   const NodeInfo& info() const { return node_.info; }
   /// Calls the node. An Error that it throws is a refusal; any other exception passes through. Throws NotApplicable for an
-  /// input that the node needs and this check has not.
+  /// input or an option that the node needs and this check has not.
   Result call(const Inputs& inputs, int threads = 0) const;
   /// The output of that name of a call that must not refuse. Throws Failure.
   Value output(const Inputs& inputs, const std::string& port) const;
 
+  /// The same node with another value of an option.
+  Subject with(const std::string& option, OptionValue value) const;
+
  private:
   const NodeDefinition& node_;
+  std::map<std::string, OptionValue> options_;
 };
 
 /// Thrown by a check that fails; the text says what was found and what was expected.
@@ -80,6 +84,7 @@ struct Suite {
   std::function<void(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>&)> validate;  ///< throws Failure for outputs that break the contract
   std::vector<Trial> trials;
   std::vector<Check> accuracy;
+  std::function<std::map<std::string, OptionValue>()> options = nullptr;  ///< values for options by their names, where a node has them
 };
 
 /// The suite of a kind, or nullptr.
@@ -88,6 +93,7 @@ const Suite* suite_of(const std::string& kind);
 std::vector<Check> checks_of(const Suite& suite);
 
 // The suites, a file each.
+Suite camera_suite();
 Suite edges_suite();
 Suite mesh_suite();
 Suite segment_suite();
