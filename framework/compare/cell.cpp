@@ -99,9 +99,14 @@ Pipeline CellRunner::simulation_of(std::size_t index) const {
   return pipeline;
 }
 
+std::uint64_t CellRunner::seed_of(std::size_t index) const {
+  const ExperimentCase& one = experiment_.cases[index];
+  return one.is_simulated || !one.folder.empty() ? 1 : one.seed;
+}
+
 fs::path CellRunner::case_place(std::size_t index) const {
   const ExperimentCase& one = experiment_.cases[index];
-  if (!one.folder.empty()) return one.folder;
+  if (!one.is_simulated) return one.folder;
   Hasher hasher;
   add_pipeline(hasher, simulation_of(index), catalogue_);
   hasher.add(one.seed);
@@ -110,7 +115,7 @@ fs::path CellRunner::case_place(std::size_t index) const {
 
 fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
-  if (!one.folder.empty()) return one.folder;
+  if (!one.is_simulated) return one.folder;
   fs::path& place = case_folders_[index];
   if (!place.empty()) return place;
   const fs::path outputs = case_place(index), folder = outputs.parent_path().parent_path();
@@ -157,9 +162,10 @@ std::string CellRunner::key_of(const CellIndex& cell) {
   Hasher hasher;
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   add_pipeline(hasher, pipeline, catalogue_);
-  hasher.add(std::uint64_t(1));  // the seed of the run
+  hasher.add(seed_of(cell.case_index));
   std::string& content = case_keys_[cell.case_index];
-  if (content.empty()) content = path_digest(case_folder(cell.case_index)).hex();
+  const ExperimentCase& one = experiment_.cases[cell.case_index];
+  if (content.empty() && (one.is_simulated || !one.folder.empty())) content = path_digest(case_folder(cell.case_index)).hex();
   hasher.add(content);
   for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
   hasher.add(experiment_.initial_error);
@@ -185,6 +191,7 @@ RunResult CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline,
   RunFolder written(folder, pipeline);
   RunSettings settings;
   settings.threads = threads_;
+  settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
   settings.observer = observer;
@@ -257,6 +264,7 @@ double CellRunner::time(const CellIndex& cell) {
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   RunSettings settings;
   settings.threads = threads_;
+  settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
   settings.made_anew = own_nodes(cell, pipeline);

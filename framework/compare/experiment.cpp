@@ -36,7 +36,8 @@ std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string
 PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const fs::path& case_folder) {
   PipelineArguments arguments;
   arguments.inputs = experiment.inputs;
-  arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
+  const ExperimentCase& one = experiment.cases[cell.case_index];
+  if (one.is_simulated || !one.folder.empty()) arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
   arguments.overrides = experiment.common;
   const std::vector<Override>& own = experiment.variants[cell.variant].overrides;
   arguments.overrides.insert(arguments.overrides.end(), own.begin(), own.end());

@@ -25,13 +25,15 @@ class CaseReader {
       : yaml_(yaml), folder_(folder), written_(written), experiment_(written.experiment) {}
 
   void read(const YamlEntry& section) {
-    static const std::vector<std::string> kKeys{"input", "folders", "simulate"};
+    static const std::vector<std::string> kKeys{"input", "folders", "seeds", "simulate"};
     experiment_.case_input = "case";
     experiment_.cases_place = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'cases'", &kKeys)) {
       if (entry.key == "input") experiment_.case_input = yaml_.text(entry.value, entry.place, "input").value_or("");
       if (entry.key == "folders")
         for (const auto& [pattern, place] : texts_of(yaml_, entry)) add_folders(pattern, place);
+      if (entry.key == "seeds")
+        for (const std::uint64_t seed : read_seeds(entry)) add({"seed-" + std::to_string(seed), {}, false, seed, {}}, entry.place);
       if (entry.key == "simulate") read_simulation(entry);
     }
   }
@@ -57,7 +59,7 @@ class CaseReader {
       std::error_code error;
       if (!fs::is_directory(folder, error)) continue;  // what else lies among the cases
       any = true;
-      add({folder.filename().string(), folder, 1, {}}, place);
+      add({folder.filename().string(), folder, false, 1, {}}, place);
     }
     globfree(&found);
     if (!any) yaml_.fault(place, "there is no folder at '" + pattern + "'", "the path starts at the experiment's file");
@@ -91,7 +93,7 @@ class CaseReader {
   }
 
   void add_simulated(const Simulation& simulation, std::uint64_t seed, const Place& place) {
-    ExperimentCase one{"seed-" + std::to_string(seed), {}, seed, simulation.inputs};
+    ExperimentCase one{"seed-" + std::to_string(seed), {}, true, seed, simulation.inputs};
     for (InputValue& input : draw_inputs(simulation.drawn, seed)) one.inputs.push_back(std::move(input));
     for (const auto& [name, where] : simulation.seed_inputs) one.inputs.push_back({name, std::to_string(seed), where});
     add(std::move(one), place);

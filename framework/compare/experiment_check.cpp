@@ -22,7 +22,7 @@ class Checker {
  private:
   void check_simulation() {
     for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
-      if (!experiment_.cases[c].folder.empty()) continue;
+      if (!experiment_.cases[c].is_simulated) continue;
       Diagnostics faults;
       const Pipeline pipeline = read_pipeline(experiment_.simulation, simulation_arguments_of(experiment_, c), catalogue_, faults, true);
       diagnostics_.add_all(faults);

@@ -50,7 +50,7 @@ class Reader {
     };
     need("experiment", "begin the file with  experiment: 1");
     need("pipeline", "name the pipeline file whose variants are compared");
-    need("cases", "say on which data, as  cases: {folders: [...]}  or  cases: {simulate: ...}");
+    need("cases", "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its data itself,  {seeds: 1..20}");
     need("metrics", "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
     if (experiment_.cases.empty() && diagnostics_.empty())
       yaml_.fault(experiment_.cases_place, "there are no cases", "name folders, as  folders: [data/*]  or a simulation");

@@ -14,7 +14,7 @@ std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_
       names_a_path |= type == OptionType::path || type == OptionType::paths;
       std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
     }
-    if (names_a_path) hasher.add(case_name);
+    if (names_a_path || node.info.random) hasher.add(case_name);
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
         hasher.add(node.info.inputs[std::size_t(wire.port)].name);

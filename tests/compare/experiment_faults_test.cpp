@@ -47,7 +47,7 @@ TEST_F(ExperimentFaults, NoYaml) {
 TEST_F(ExperimentFaults, WhatIsMissing) {
   expect_fault(std::string("pipeline: p.yaml\n") + kCases + kAfterCases, 1, "the key 'experiment' is missing", "begin the file with  experiment: 1");
   expect_fault(std::string("experiment: 1\n") + kCases + kAfterCases, 1, "the key 'pipeline' is missing", "name the pipeline file whose variants are compared");
-  expect_fault(kHead + kAfterCases, 1, "the key 'cases' is missing", "say on which data, as  cases: {folders: [...]}  or  cases: {simulate: ...}");
+  expect_fault(kHead + kAfterCases, 1, "the key 'cases' is missing", "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its data itself,  {seeds: 1..20}");
   expect_fault(kStart + kVariants, 1, "the key 'metrics' is missing", "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
   expect_fault(kStart + kMetrics, 1, "there are no variants", "name at least one under  variants:  or options under  matrix:");
 }

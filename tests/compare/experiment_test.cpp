@@ -3,6 +3,7 @@
 #include <set>
 
 #include "experiment_files.hpp"
+#include "marrow/compare/cell.hpp"
 
 namespace {
 
@@ -91,6 +92,16 @@ TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
   EXPECT_EQ(e.cases[2].inputs[1].name + "=" + e.cases[2].inputs[1].value, "shape=5");
   EXPECT_LE(std::abs(std::stod(e.cases[2].inputs[0].value)), 2);
   EXPECT_NE(e.cases[1].inputs[0].value, e.cases[2].inputs[0].value);
+}
+
+TEST_F(ExperimentFiles, SeedsAloneAreThoseOfTheRuns) {
+  const Experiment e = read(std::string(kHead) + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
+  ASSERT_EQ(e.cases.size(), 2u);
+  EXPECT_EQ(e.cases[1].name, "seed-9");
+  EXPECT_FALSE(e.cases[1].is_simulated);
+  EXPECT_EQ(marrow::compare::arguments_of(e, {0, 1, 0}, {}).inputs.size(), 1u) << "no folder is given to an input";
+  const marrow::compare::CellRunner runner(e, test_catalogue(), nullptr, scratch.path, 1);
+  EXPECT_EQ(runner.seed_of(1), 9u);
 }
 
 TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {

@@ -29,9 +29,10 @@ void count_cell(const Experiment& experiment, const CellRunner& runner, const Ce
   const Pipeline pipeline = runner.pipeline_of(cell, place, CellRunner::Depth::figures);
   const std::vector<Digest> keys = compare::histories(pipeline, experiment.cases[cell.case_index].name);
   std::vector<PlannedNode> planned;
-  if (store && fs::exists(place)) {
+  if (store && (place.empty() || fs::exists(place))) {
     RunSettings settings;
     settings.store = store;
+    settings.seed = runner.seed_of(cell.case_index);
     settings.remember = false;
     planned = plan_pipeline(pipeline, catalogue, settings);
   }
@@ -65,7 +66,7 @@ void print_plan(const Experiment& experiment, const Catalogue& catalogue, const 
   std::set<Digest> seen;
   long cases_to_make = 0;
   for (std::size_t c = 0; c < experiment.cases.size(); ++c) {
-    cases_to_make += experiment.cases[c].folder.empty() && !fs::exists(runner.case_place(c));
+    cases_to_make += experiment.cases[c].is_simulated && !fs::exists(runner.case_place(c));
     for (std::size_t s = 0; s < experiment.starts.size(); ++s)
       for (std::size_t v = 0; v < experiment.variants.size(); ++v) count_cell(experiment, runner, {v, c, s}, catalogue, store, seen, counts);
   }

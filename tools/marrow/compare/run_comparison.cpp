@@ -103,7 +103,7 @@ class Comparison {
   bool make_cases() {
     std::vector<Job> jobs;
     for (std::size_t i = 0; i < experiment_.cases.size(); ++i)
-      if (experiment_.cases[i].folder.empty()) jobs.push_back({"case " + std::to_string(i), std::to_string(i)});
+      if (experiment_.cases[i].is_simulated) jobs.push_back({"case " + std::to_string(i), std::to_string(i)});
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {

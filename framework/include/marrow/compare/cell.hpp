@@ -38,7 +38,7 @@ std::string to_json(const CellRow& row);
 CellRow row_from_json(const std::string& text);
 
 /// What each node will come to, as far as that can be said before anything ran: equal for equal nodes of equal histories.
-/// `case_name` stands for all data that paths name.
+/// `case_name` stands for all data that paths name and for the seed of what is random.
 std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name);
 
 /// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record) and FOLDER/cells/ID/cell.json,
@@ -47,7 +47,9 @@ class CellRunner {
  public:
   CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder, int threads);
 
-  /// Where a case lies, or will lie once it was simulated.
+  /// The seed of a case's runs.
+  std::uint64_t seed_of(std::size_t case_index) const;
+  /// Where a case lies, or will lie once it was simulated; empty where the pipeline makes its data itself.
   std::filesystem::path case_place(std::size_t case_index) const;
   /// The folder of a case; a simulated one is made where it is not in the store yet. Throws Error when that fails.
   std::filesystem::path case_folder(std::size_t case_index);

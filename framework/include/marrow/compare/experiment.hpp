@@ -18,11 +18,13 @@ struct Variant {
   std::vector<Override> overrides;
 };
 
-/// Data to try all variants on: a folder that is there, or a simulation that makes one.
+/// Data to try all variants on: a folder that is there, a simulation that makes one, or neither: the pipeline makes its data itself, by
+/// the seed of its run.
 struct ExperimentCase {
   std::string name;
-  std::filesystem::path folder;  ///< empty for a simulated one
-  std::uint64_t seed = 1;        ///< of the simulation
+  std::filesystem::path folder;  ///< empty where there is none yet
+  bool is_simulated = false;
+  std::uint64_t seed = 1;        ///< of the simulation; where there is none, of the runs
   std::vector<InputValue> inputs;  ///< of the simulation's pipeline
 };
 
@@ -60,7 +62,7 @@ struct Experiment {
   std::filesystem::path pipeline;
   std::vector<InputValue> inputs;         ///< of the pipeline, the same in every cell
   std::vector<Override> common;           ///< changes of the pipeline for all variants, before their own
-  std::string case_input;                 ///< the pipeline's input that a case's folder is given to
+  std::string case_input;                 ///< the pipeline's input that a case's folder is given to, where it has one
   Place cases_place;
   std::filesystem::path simulation;       ///< the pipeline that makes cases; empty where there is none
   std::string simulation_output;
