@@ -28,7 +28,10 @@ class CaseReader {
     static const std::vector<std::string> kKeys{"input", "folders", "seeds", "simulate"};
     experiment_.case_input = "case";
     experiment_.cases_place = section.place;
-    for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'cases'", &kKeys)) {
+    const std::vector<YamlEntry> entries = yaml_.map(section.value, section.place, "'cases'", &kKeys);
+    for (const YamlEntry& entry : entries) {
+      if (entry.key == "seeds" && entries.size() > 1)
+        yaml_.fault(entry.place, "'seeds' beside other cases", "by themselves they mean that the pipeline makes its data; those of a simulation stand in 'simulate'");
       if (entry.key == "input") experiment_.case_input = yaml_.text(entry.value, entry.place, "input").value_or("");
       if (entry.key == "folders")
         for (const auto& [pattern, place] : texts_of(yaml_, entry)) add_folders(pattern, place);

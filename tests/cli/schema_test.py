@@ -109,7 +109,7 @@ class ExperimentSchema(Case):
         self.assertIn("24 cells: 4 variants, 3 cases, 2 starts", result.stdout)
         file, schema = yaml.safe_load(EXPERIMENT), self.schema["properties"]
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
-        for keys, known in ((file, schema), (file["cases"], schema["cases"]["properties"]), (file["cases"]["simulate"], simulation), (file["starts"], schema["starts"]["properties"])):
+        for keys, known in ((file, schema), (dict(file["cases"], seeds="by themselves"), schema["cases"]["properties"]), (file["cases"]["simulate"], simulation), (file["starts"], schema["starts"]["properties"])):
             self.assertEqual(set(keys), set(known), "so the program knows all keys that the schema knows")
 
     def test_what_is_wrong_is_refused_by_schema_and_program(self):
@@ -118,6 +118,9 @@ class ExperimentSchema(Case):
             text = EXPERIMENT.replace(right, wrong)
             self.assertNotEqual(self.errors(text), [], wrong)
             self.assertEqual(self.program(text).returncode, 2, wrong)
+        text = EXPERIMENT.replace("cases:\n", "cases:\n  seeds: 1..3\n")
+        self.assertNotEqual(self.errors(text), [])
+        self.assertIn("'seeds' beside other cases", self.program(text).stderr)
 
     def test_names_and_numbers_as_in_yaml(self):
         for change in (("seeds: 1..2", "seeds: [1, 5]"), ("variants:\n  nelder_mead:", "variants:\n  nelder_mead: {}"), ("edges.low: 40", "edges.low: 40.5")):

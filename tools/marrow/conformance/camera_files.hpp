@@ -16,7 +16,7 @@ struct Bead {
 
 /// 24 balls on either side of a board, 80 mm apart, 6 of each side larger.
 const std::vector<Bead>& board_beads();
-/// The board as camera.bead_board reads it. Files lie in a folder of this process, which is removed when it ends.
+/// The board in a file (docs/case.md). Files lie in a folder of this process, which is removed when it ends.
 std::filesystem::path board_file();
 /// Where these views, called a and b, show the board's beads; `mirrored` as an image shows them that is turned left to right.
 std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrored);
