@@ -23,21 +23,41 @@ struct OutlinePoint {
   Eigen::Vector3f model_mm = Eigen::Vector3f::Zero();
 };
 
-/// Draws a model as a view would see it.
+/// Pixels in rows and columns, the first at (u_px, v_px), step_px apart: a region of an image, sub-sampled or not.
+struct PixelGrid {
+  double u_px = 0, v_px = 0, step_px = 1;
+  int columns = 0, rows = 0;
+
+  std::size_t count() const { return columns > 0 && rows > 0 ? std::size_t(columns) * std::size_t(rows) : 0; }
+  Eigen::Vector2d pixel(int column, int row) const { return {u_px + step_px * column, v_px + step_px * row}; }
+};
+
+/// Draws a model as a view would see it: its outline, where it is a surface; radiographs (DRR), where it is a volume. What a
+/// projector cannot draw, it refuses with an Error.
 class Projector {
  public:
   virtual ~Projector();
   /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a fixed
   /// order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
   virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
-                                            double spacing_px) const = 0;
+                                            double spacing_px) const;
+  /// Line integrals of the attenuation along the rays through these pixels, row by row, relative to water: millimetres of
+  /// water that attenuate as much. 0 where a ray misses the model. Only what is asked for is computed.
+  virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                        const PixelGrid& grid) const;
+  /// The same for single pixels (u, v), in their order.
+  virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                        const std::vector<Eigen::Vector2f>& pixels) const;
+  /// Whole pixels outside of which radiograph() is 0, cut to the image; empty where the model is out of view.
+  virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const;
 };
 
 /// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond which
-/// a point counts as unmatched.
+/// a point counts as unmatched; of grey values, every how many pixels they are compared, after smoothing as much.
 struct CostLevel {
   double contour_spacing_px = 1;
   double reach_px = 8;
+  int pixel_step = 1;
 };
 
 /// How badly a pose explains the images; smaller is better.

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "resample_row.hpp"
+
+#include <cmath>
+
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
+namespace marrow::rays {
+namespace {
+
+void mix_plain(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+  const float other = 1 - weight;
+  for (int i = 0; i < count; ++i) mixed[i] = other * float(a[i]) + weight * float(b[i]);
+}
+
+void add_plain(const float* row, float position, float step, int first, int count, float* sum) {
+  for (int i = first; i < count; ++i) {
+    const float x = position + step * float(i);
+    const int n = int(x);
+    const float fraction = x - float(n);
+    sum[i] += row[n] + fraction * (row[n + 1] - row[n]);
+  }
+}
+
+#if defined(__x86_64__)
+
+__attribute__((target("avx2"))) void mix_avx2(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+  const __m256 w = _mm256_set1_ps(weight), v = _mm256_set1_ps(1 - weight);
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    const __m256 x = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + i))));
+    const __m256 y = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(b + i))));
+    _mm256_storeu_ps(mixed + i, _mm256_add_ps(_mm256_mul_ps(v, x), _mm256_mul_ps(w, y)));
+  }
+  mix_plain(a + i, b + i, weight, count - i, mixed + i);
+}
+
+/// Eight positions lie within eight neighbours of the first where |step| is small: they are picked within one register.
+__attribute__((target("avx2"))) int add_avx2(const float* row, float position, float step, int count, float* sum) {
+  const __m256 lanes = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), steps = _mm256_set1_ps(step);
+  const bool is_near = std::abs(step) <= 0.7f;
+  int i = 0;
+  for (; i + 8 <= count; i += 8) {
+    const __m256 x = _mm256_add_ps(_mm256_set1_ps(position), _mm256_mul_ps(steps, _mm256_add_ps(_mm256_set1_ps(float(i)), lanes)));
+    const __m256i n = _mm256_cvttps_epi32(x);
+    const __m256 fraction = _mm256_sub_ps(x, _mm256_cvtepi32_ps(n));
+    __m256 low, high;
+    if (is_near) {
+      const int base = step >= 0 ? _mm256_extract_epi32(n, 0) : _mm256_extract_epi32(n, 7);
+      const __m256 near = _mm256_loadu_ps(row + base);
+      const __m256i at = _mm256_sub_epi32(n, _mm256_set1_epi32(base));
+      low = _mm256_permutevar8x32_ps(near, at);
+      high = _mm256_permutevar8x32_ps(near, _mm256_add_epi32(at, _mm256_set1_epi32(1)));
+    } else {
+      low = _mm256_i32gather_ps(row, n, 4);
+      high = _mm256_i32gather_ps(row + 1, n, 4);
+    }
+    const __m256 value = _mm256_add_ps(low, _mm256_mul_ps(fraction, _mm256_sub_ps(high, low)));
+    _mm256_storeu_ps(sum + i, _mm256_add_ps(_mm256_loadu_ps(sum + i), value));
+  }
+  return i;
+}
+
+__attribute__((target("avx512f"))) int add_avx512(const float* row, float position, float step, int count, float* sum) {
+  const __m512 lanes = _mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15), steps = _mm512_set1_ps(step);
+  const bool is_near = std::abs(step) <= 1.9f;  // 15 steps and one neighbour lie within 32 floats
+  const float back = step >= 0 ? 0 : 15 * step;
+  int i = 0;
+  for (; i + 16 <= count; i += 16) {
+    const __m512 x = _mm512_add_ps(_mm512_set1_ps(position), _mm512_mul_ps(steps, _mm512_add_ps(_mm512_set1_ps(float(i)), lanes)));
+    const __m512i n = _mm512_cvttps_epi32(x);
+    const __m512 fraction = _mm512_sub_ps(x, _mm512_cvtepi32_ps(n));
+    __m512 low, high;
+    if (is_near) {
+      // One voxel early, as the rounding of this sum may differ from that of the lane's own position.
+      const int least = int(position + step * float(i) + back) - 1, base = least > 0 ? least : 0;
+      const __m512 first = _mm512_loadu_ps(row + base), second = _mm512_loadu_ps(row + base + 16);
+      const __m512i at = _mm512_sub_epi32(n, _mm512_set1_epi32(base));
+      low = _mm512_permutex2var_ps(first, at, second);
+      high = _mm512_permutex2var_ps(first, _mm512_add_epi32(at, _mm512_set1_epi32(1)), second);
+    } else {
+      low = _mm512_i32gather_ps(n, row, 4);
+      high = _mm512_i32gather_ps(n, row + 1, 4);
+    }
+    const __m512 value = _mm512_add_ps(low, _mm512_mul_ps(fraction, _mm512_sub_ps(high, low)));
+    _mm512_storeu_ps(sum + i, _mm512_add_ps(_mm512_loadu_ps(sum + i), value));
+  }
+  return i;
+}
+
+const bool kHasAvx2 = __builtin_cpu_supports("avx2"), kHasAvx512 = __builtin_cpu_supports("avx512f");
+
+#endif
+
+}  // namespace
+
+void mix_rows(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+  if (!a || !b) {
+    const std::int16_t* row = a ? a : b;
+    const float factor = a ? 1 - weight : weight;
+    for (int i = 0; i < count; ++i) mixed[i] = row ? factor * float(row[i]) : 0;
+    return;
+  }
+#if defined(__x86_64__)
+  if (kHasAvx2) return mix_avx2(a, b, weight, count, mixed);
+#endif
+  mix_plain(a, b, weight, count, mixed);
+}
+
+void add_resampled(const float* row, float position, float step, int count, float* sum) {
+  int done = 0;
+#if defined(__x86_64__)
+  if (kHasAvx512) done = add_avx512(row, position, step, count, sum);
+  else if (kHasAvx2) done = add_avx2(row, position, step, count, sum);
+#endif
+  add_plain(row, position, step, done, count, sum);
+}
+
+}  // namespace marrow::rays

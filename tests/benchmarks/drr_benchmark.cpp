@@ -1,0 +1,127 @@
+// SPDX-License-Identifier: Apache-2.0
+// drr_benchmark [FOLDER]: how long a radiograph takes, and how far it is from one by fine steps. With a folder, the volume, the
+// geometry and the images are written there, for drr_peers to compare with other programs.
+#include <tbb/global_control.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <random>
+
+#include "marrow/plugin.hpp"
+#include "marrow/runtime/catalogue.hpp"
+#include "plugins/camera/carm_geometry.hpp"
+
+namespace {
+
+using namespace marrow;
+
+/// A thigh: soft tissue that fills the volume, in it a bent hollow bone with a spongy end.
+Volume thigh(bool bone_only) {
+  Volume volume;
+  volume.grid.size = {256, 256, 384};
+  volume.grid.spacing_mm = {0.8, 0.8, 1.0};
+  volume.grid.origin_mm = -Eigen::Vector3d(255 * 0.4, 255 * 0.4, 383 * 0.5);
+  volume.values.resize(volume.grid.count());
+  tbb::parallel_for(0, 384, [&](int z) {
+    std::mt19937 random(std::uint32_t(z) + 1);
+    for (int y = 0; y < 256; ++y)
+      for (int x = 0; x < 256; ++x) {
+        const Eigen::Vector3d p = volume.grid.point_from_index({double(x), double(y), double(z)});
+        const double flare = 14 + 22 / (1 + std::exp((p.z() + 140) / 12));
+        const double radius = std::hypot(p.x() - 0.0004 * p.z() * p.z(), p.y()), noise = 60.0 * (double(random()) / 4294967296.0 - 0.5);
+        double hu = radius < flare ? (radius < flare - 6 ? (p.z() < -130 ? 250 : -20) : 1250) : 40;
+        hu = bone_only && radius >= flare ? -1000 : hu + noise;
+        volume.values[volume.grid.offset(x, y, z)] = float(std::round(hu));
+      }
+  });
+  return volume;
+}
+
+Camera camera_of(int pixels) {
+  // The detector is wholly covered by the volume.
+  const camera::CArm arm{pixels, pixels, Eigen::Vector2d::Constant(230.0 / pixels), 1000, 600, Eigen::Vector3d::Zero()};
+  return camera::carm_camera(arm, camera::world_from_camera_rotation(0, 0));
+}
+
+std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std::string& name, const Volume& volume, double step_mm = 0) {
+  const NodeDefinition& node = catalogue.load(name);
+  std::vector<Value> inputs;
+  for (const PortInfo& port : node.info.inputs) {
+    Value value;
+    value.type = port.type;
+    if (port.name == "volume") value = Value::of<Volume>(std::shared_ptr<const Volume>(&volume, [](const Volume*) {}));
+    inputs.push_back(value);
+  }
+  const std::shared_ptr<void> options = node.make_options();
+  for (std::size_t i = 0; i < node.info.options.size(); ++i)
+    node.set_option[i](options.get(), node.info.options[i].name == "step_mm" && step_mm > 0 ? OptionValue(step_mm) : node.info.options[i].default_value);
+  Context context(1);
+  return std::static_pointer_cast<const Projector>(node.call(inputs, options.get(), context).at(0).data);
+}
+
+double median_ms(const std::function<void()>& work) {
+  std::vector<double> times;
+  for (int i = 0; i < 9; ++i) {
+    const auto start = std::chrono::steady_clock::now();
+    work();
+    times.push_back(std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  }
+  std::nth_element(times.begin(), times.begin() + 4, times.end());
+  return times[4];
+}
+
+void write(const std::filesystem::path& path, const void* data, std::size_t bytes) { std::ofstream(path, std::ios::binary).write(static_cast<const char*>(data), std::streamsize(bytes)); }
+
+void write_volume(const std::filesystem::path& path, const Volume& volume) {
+  const std::vector<std::int16_t> values(volume.values.begin(), volume.values.end());
+  std::ofstream stream(path, std::ios::binary);
+  stream << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = " << volume.grid.origin_mm.transpose()
+         << "\nElementSpacing = 0.8 0.8 1\nDimSize = 256 256 384\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
+  stream.write(reinterpret_cast<const char*>(values.data()), std::streamsize(2 * values.size()));
+}
+
+double rms(const std::vector<float>& a, const std::vector<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::pow(double(a[i]) - double(b[i]), 2);
+  return std::sqrt(sum / double(a.size()));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, 2);
+  const Catalogue catalogue;
+  const RigidTransform world_from_model{"world", "ct"};
+  for (const bool bone_only : {false, true}) {
+    const Volume volume = thigh(bone_only);
+    const std::string what = bone_only ? "bone" : "thigh";
+    if (argc > 1) write_volume(std::filesystem::path(argv[1]) / (what + ".mha"), volume);
+    const auto fine = projector(catalogue, "project.ray_casting", volume, 0.05);
+    for (const std::string name : {"joseph", "ray_casting", "siddon_jacobs"}) {
+      const auto one = projector(catalogue, "project." + name, volume);
+      for (const int pixels : {512, 256}) {
+        const Camera camera = camera_of(pixels);
+        const PixelGrid grid{0, 0, 1, pixels, pixels};
+        std::vector<float> values;
+        const double ms = median_ms([&] { values = one->radiograph(camera, world_from_model, grid); });
+        if (argc > 1) write(std::filesystem::path(argv[1]) / (what + "_" + name + "_" + std::to_string(pixels) + ".f32"), values.data(), 4 * values.size());
+        double error = NAN;
+        if (pixels == 256) {
+          const auto reference = fine->radiograph(camera, world_from_model, grid);
+          error = rms(values, reference);
+          if (argc > 1) write(std::filesystem::path(argv[1]) / (what + "_reference_256.f32"), reference.data(), 4 * reference.size());
+        }
+        std::printf("%-6s %-14s %d x %d: %7.2f ms, root mean square error %.4f mm of water\n", what.c_str(), name.c_str(), pixels, pixels, ms, error);
+      }
+      std::vector<Eigen::Vector2f> sparse;
+      std::mt19937 random(3);
+      for (int i = 0; i < 2000; ++i) sparse.emplace_back(float(random() % 512), float(random() % 512));
+      std::printf("%-6s %-14s 2000 pixels: %.3f ms\n", what.c_str(), name.c_str(), median_ms([&] { one->radiograph(camera_of(512), world_from_model, sparse); }));
+    }
+  }
+}
