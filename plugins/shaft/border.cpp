@@ -68,6 +68,7 @@ Border refit(const EdgeMap& edges, Border border, const Support& support, const 
     const Eigen::Vector2d normal = solver.eigenvectors().col(0);  // of least spread
     border.normal = normal.dot(border.normal) < 0 ? Eigen::Vector2d(-normal) : normal;
     border.rho = border.normal.dot(centre);
+    border.spread_px = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
   }
   return border;
 }

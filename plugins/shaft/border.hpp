@@ -13,7 +13,8 @@ namespace marrow::shaft {
 struct Border {
   Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
   double rho = 0;
-  int pixels = 0;  ///< that support it
+  int pixels = 0;        ///< that support it
+  double spread_px = 0;  ///< standard deviation of their distances from the line
 };
 
 /// Which edge pixels support a border.

@@ -19,6 +19,11 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "mesh.fat": {"sphere_distance", "torus_distance"},
     "mesh.unturned": {"turned_sphere_distance"},
     "mesh.endless": {"nothing_inside"},
+    "shaft.inner": {"right_pair"},
+    "shaft.turned": {"angle"},
+    "shaft.swapped": {"contract"},
+    "shaft.sure": {"width"},
+    "shaft.crashing": {"empty_map", "one_pixel"},
 }
 
 
@@ -58,7 +63,7 @@ class Conformance(unittest.TestCase):
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
-        for node in ("edges.plain", "mesh.plain"):
+        for node in ("edges.plain", "mesh.plain", "shaft.plain"):
             result, nodes = conformance(node)
             self.assertEqual(result.returncode, 0, result.stdout)
 

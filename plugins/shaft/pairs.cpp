@@ -1,0 +1,230 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pairs.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+
+#include "widths.hpp"
+
+namespace marrow::shaft {
+namespace {
+
+constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
+
+/// Two nearly parallel lines of opposite gradient.
+struct Pair {
+  Border left, right;  // as seen along the stretch
+  Stretch stretch;
+  double width_mm = 0, supported_mm = 0;
+  double score = 0;    // log-likelihood of width, taper and evidence
+  std::string reason;  // why it is not the shaft; empty for a candidate
+};
+
+std::string text(const char* format, double a, double b = 0, double c = 0) {
+  char buffer[300];
+  std::snprintf(buffer, sizeof buffer, format, a, b, c);
+  return buffer;
+}
+
+/// Where the two lines run to: downwards, or to the right when they lie flat.
+Eigen::Vector2d direction_of(const Border& one, const Border& other) {
+  const Eigen::Vector2d normal = (one.normal - other.normal).normalized();
+  const Eigen::Vector2d direction(-normal.y(), normal.x());
+  const bool turn = std::abs(direction.y()) > 0.1 ? direction.y() < 0 : direction.x() < 0;
+  return turn ? Eigen::Vector2d(-direction) : direction;
+}
+
+/// Distance of the two lines, across the middle of their stretch, at the depth of the isocentre.
+double width_of(const Pair& pair, double pixel_mm) {
+  const double s = 0.5 * (pair.stretch.from + pair.stretch.to);
+  return (point_at(pair.left, pair.stretch.along, s) - point_at(pair.right, pair.stretch.along, s)).norm() * pixel_mm;
+}
+
+/// Mean brightness of the image inside the pair, and of strips of 3 mm beyond 1 mm outside its borders.
+struct Brightness {
+  double inside = 0, outside_left = 0, outside_right = 0;
+};
+Brightness brightness_of(const cv::Mat& image, const Pair& pair, double pixel_mm) {
+  const auto mean_between = [&](auto from_at, auto to_at) {
+    constexpr int kAlong = 24, kAcross = 12;
+    double sum = 0;
+    int count = 0;
+    for (int i = 0; i < kAlong; ++i) {
+      const double s = pair.stretch.from + (i + 0.5) / kAlong * pair.stretch.length();
+      const Eigen::Vector2d from = from_at(s), to = to_at(s);
+      for (int k = 0; k < kAcross; ++k) {
+        const Eigen::Vector2d at = from + (k + 0.5) / kAcross * (to - from);
+        const cv::Point pixel(int(std::lround(at.x())), int(std::lround(at.y())));
+        if (pixel.x < 0 || pixel.y < 0 || pixel.x >= image.cols || pixel.y >= image.rows) continue;
+        sum += image.depth() == CV_8U    ? image.at<uchar>(pixel)
+               : image.depth() == CV_16U ? image.at<std::uint16_t>(pixel)
+                                         : image.at<float>(pixel);
+        ++count;
+      }
+    }
+    return count ? sum / count : std::numeric_limits<double>::infinity();  // outside the image nothing contradicts
+  };
+  const auto beside = [&](const Border& border, double distance_mm) {
+    return [&pair, &border, shift = distance_mm / pixel_mm](double s) -> Eigen::Vector2d {
+      return point_at(border, pair.stretch.along, s) + shift * border.normal;
+    };
+  };
+  return {mean_between(beside(pair.left, 0), beside(pair.right, 0)),
+          mean_between(beside(pair.left, 1), beside(pair.left, 4)),
+          mean_between(beside(pair.right, 1), beside(pair.right, 4))};
+}
+
+/// What pairs are judged by.
+struct Scene {
+  const EdgeMap& edges;
+  const cv::Mat& image;
+  const Scale& scale;
+  const LineOptions& options;
+  Widths widths;
+};
+
+/// The fit's part, and that of a depth which is not the isocentre's. Neighbouring edge pixels share their errors.
+double width_deviation_of(const Pair& pair, const Scene& scene) {
+  constexpr double kSharing_px = 4;
+  const auto variance_px = [](const Border& border) {
+    return kSharing_px * border.spread_px * border.spread_px / std::max(1, border.pixels);
+  };
+  return std::hypot(scene.scale.pixel_mm * std::sqrt(variance_px(pair.left) + variance_px(pair.right)),
+                    scene.options.magnification_tolerance * pair.width_mm);
+}
+
+/// Fills stretch, width, score, or the reason why the pair is not the shaft.
+void judge(const Scene& scene, Pair& pair) {
+  const auto& [edges, image, scale, options, widths] = scene;
+  const Eigen::Vector2d direction = direction_of(pair.left, pair.right);
+  int supported = 0;
+  pair.stretch = common_stretch(edges, pair.left, pair.right, scale.support, direction, scale.gap_px, supported);
+  pair.supported_mm = supported * scale.pixel_mm;
+  const double middle = 0.5 * (pair.stretch.from + pair.stretch.to);
+  const Eigen::Vector2d to_left(direction.y(), -direction.x());  // v runs down
+  if (to_left.dot(point_at(pair.left, direction, middle) - point_at(pair.right, direction, middle)) < 0)
+    std::swap(pair.left, pair.right);
+  pair.width_mm = width_of(pair, scale.pixel_mm);
+  const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
+  pair.score = kEvidencePer_mm * pair.supported_mm + widths.log_likelihood(pair.width_mm, taper_deg);
+  const double length_mm = pair.stretch.length() * scale.pixel_mm;
+  if (length_mm < options.min_length_mm)
+    pair.reason =
+        text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm, options.min_length_mm);
+  else if (pair.left.normal.dot(to_left) < 0)
+    pair.reason =
+        text("it is darker outside than inside, as a canal or a gap between bones is (%.1f mm wide)", pair.width_mm);
+  else if (!widths.is_possible(pair.width_mm))
+    pair.reason =
+        text("its width of %.1f mm is too ", pair.width_mm) +
+        (pair.width_mm < widths.least_mm() ? "small for a shaft (" : "large for a shaft (") + widths.range() +
+        (pair.width_mm < widths.least_mm() ? "), as a cable's or a single cortex' is" : "), as the limb's is");
+  if (!pair.reason.empty()) return;
+  const Brightness mean = brightness_of(image, pair, scale.pixel_mm);
+  if (mean.inside >= std::min(mean.outside_left, mean.outside_right))
+    pair.reason = text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
+                       mean.inside, mean.outside_left, mean.outside_right);
+}
+
+/// Candidates first, the most likely first.
+void sort_by_score(std::vector<Pair>& pairs) {
+  std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
+    return a.reason.empty() != b.reason.empty() ? a.reason.empty() : a.score > b.score;
+  });
+}
+
+/// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first.
+std::vector<Pair> pairs_of(const Scene& scene, const std::vector<Border>& borders) {
+  std::vector<Pair> pairs;
+  const double cosine = std::cos(radians(scene.options.max_angle_deg));
+  for (std::size_t i = 0; i < borders.size(); ++i)
+    for (std::size_t j = i + 1; j < borders.size(); ++j) {
+      if (-borders[i].normal.dot(borders[j].normal) < cosine) continue;
+      Pair pair;
+      pair.left = borders[i];
+      pair.right = borders[j];
+      judge(scene, pair);
+      if (pair.supported_mm > 0.2 * scene.options.min_length_mm) pairs.push_back(std::move(pair));
+    }
+  sort_by_score(pairs);
+  return pairs;
+}
+
+/// Both borders fitted again over the stretch that they share, until that stretch settles, so that both tell of the
+/// same piece of the bone.
+Pair settled(const Scene& scene, Pair pair) {
+  for (int round = 0; round < 3 && pair.reason.empty(); ++round) {
+    pair.left = refit(scene.edges, pair.left, scene.scale.support, pair.stretch, 0);
+    pair.right = refit(scene.edges, pair.right, scene.scale.support, pair.stretch, 0);
+    if (pair.left.pixels == 0 || pair.right.pixels == 0)
+      pair.reason = "a border loses its edge pixels when it is fitted again";
+    else
+      judge(scene, pair);
+  }
+  return pair;
+}
+
+/// Whether both pairs show the same piece of shaft: their middles run close to each other over most of the shorter one.
+/// A curved border has many lines, whose pairs would crowd out the shaft of another fragment.
+bool same_shaft(const Pair& a, const Pair& b) {
+  const auto middle = [](const Pair& pair, const Eigen::Vector2d& along, double s) -> Eigen::Vector2d {
+    return 0.5 * (point_at(pair.left, along, s) + point_at(pair.right, along, s));
+  };
+  const Eigen::Vector2d& along = a.stretch.along;
+  const double one = along.dot(middle(b, b.stretch.along, b.stretch.from)),
+               other = along.dot(middle(b, b.stretch.along, b.stretch.to));
+  const double from = std::max(a.stretch.from, std::min(one, other)), to = std::min(a.stretch.to, std::max(one, other));
+  if (to - from < 0.5 * std::min(a.stretch.length(), std::abs(other - one))) return false;
+  const double s = 0.5 * (from + to);
+  const double width = (point_at(a.left, along, s) - point_at(a.right, along, s)).norm();
+  return (middle(a, along, s) - middle(b, along, s)).norm() < 0.05 * width;
+}
+
+LineSegment segment_of(const Border& border, const Stretch& stretch) {
+  return {point_at(border, stretch.along, stretch.from), point_at(border, stretch.along, stretch.to)};
+}
+
+[[noreturn]] void refuse(const View& view, const std::vector<Border>& borders, const std::vector<Pair>& pairs) {
+  std::string message = "view '" + view.name + "': no shaft pair found: " + std::to_string(borders.size()) + " lines";
+  if (pairs.empty()) message += ", none of which run side by side";
+  for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 3); ++i)
+    message += (i ? "; the next because " : ", best candidate rejected because ") + pairs[i].reason;
+  throw Error(message + "; look at the edges, and set the edge detector's thresholds or this bone's width_mm");
+}
+
+}  // namespace
+
+ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<Border>& borders, const Scale& scale,
+                     const LineOptions& options) {
+  const Scene scene{edges, view.image.pixels, scale, options,
+                    Widths(options.width_mm, options.width_deviation_mm, options.magnification_tolerance)};
+  std::vector<Pair> pairs = pairs_of(scene, borders);
+  for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 6); ++i)
+    if (pairs[i].reason.empty()) pairs[i] = settled(scene, pairs[i]);
+  sort_by_score(pairs);
+  if (pairs.empty() || !pairs[0].reason.empty()) refuse(view, borders, pairs);
+  ShaftLines lines;
+  lines.left = segment_of(pairs[0].left, pairs[0].stretch);
+  lines.right = segment_of(pairs[0].right, pairs[0].stretch);
+  lines.width_mm = pairs[0].width_mm;
+  lines.width_deviation_mm = width_deviation_of(pairs[0], scene);
+  lines.log_likelihood = pairs[0].score;
+  std::vector<const Pair*> shafts{&pairs[0]};
+  for (std::size_t i = 1; i < pairs.size() && lines.rejected.size() < 20; ++i) {
+    if (pairs[i].reason.empty()) {
+      if (std::any_of(shafts.begin(), shafts.end(), [&](const Pair* better) { return same_shaft(*better, pairs[i]); }))
+        continue;
+      shafts.push_back(&pairs[i]);
+      pairs[i].reason = text("its log-likelihood of %.1f is below the best one's %.1f (%.1f mm wide)", pairs[i].score,
+                             pairs[0].score, pairs[i].width_mm);
+    }
+    lines.rejected.push_back(
+        {segment_of(pairs[i].left, pairs[i].stretch), segment_of(pairs[i].right, pairs[i].stretch), pairs[i].reason});
+  }
+  return lines;
+}
+
+}  // namespace marrow::shaft
