@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "brightness.hpp"
 #include "widths.hpp"
 
 namespace marrow::shaft {
@@ -43,40 +44,6 @@ double width_of(const Pair& pair, double pixel_mm) {
   return (point_at(pair.left, pair.stretch.along, s) - point_at(pair.right, pair.stretch.along, s)).norm() * pixel_mm;
 }
 
-/// Mean brightness of the image inside the pair, and of strips of 3 mm beyond 1 mm outside its borders.
-struct Brightness {
-  double inside = 0, outside_left = 0, outside_right = 0;
-};
-Brightness brightness_of(const cv::Mat& image, const Pair& pair, double pixel_mm) {
-  const auto mean_between = [&](auto from_at, auto to_at) {
-    constexpr int kAlong = 24, kAcross = 12;
-    double sum = 0;
-    int count = 0;
-    for (int i = 0; i < kAlong; ++i) {
-      const double s = pair.stretch.from + (i + 0.5) / kAlong * pair.stretch.length();
-      const Eigen::Vector2d from = from_at(s), to = to_at(s);
-      for (int k = 0; k < kAcross; ++k) {
-        const Eigen::Vector2d at = from + (k + 0.5) / kAcross * (to - from);
-        const cv::Point pixel(int(std::lround(at.x())), int(std::lround(at.y())));
-        if (pixel.x < 0 || pixel.y < 0 || pixel.x >= image.cols || pixel.y >= image.rows) continue;
-        sum += image.depth() == CV_8U    ? image.at<uchar>(pixel)
-               : image.depth() == CV_16U ? image.at<std::uint16_t>(pixel)
-                                         : image.at<float>(pixel);
-        ++count;
-      }
-    }
-    return count ? sum / count : std::numeric_limits<double>::infinity();  // outside the image nothing contradicts
-  };
-  const auto beside = [&](const Border& border, double distance_mm) {
-    return [&pair, &border, shift = distance_mm / pixel_mm](double s) -> Eigen::Vector2d {
-      return point_at(border, pair.stretch.along, s) + shift * border.normal;
-    };
-  };
-  return {mean_between(beside(pair.left, 0), beside(pair.right, 0)),
-          mean_between(beside(pair.left, 1), beside(pair.left, 4)),
-          mean_between(beside(pair.right, 1), beside(pair.right, 4))};
-}
-
 /// What pairs are judged by.
 struct Scene {
   const EdgeMap& edges;
@@ -96,37 +63,64 @@ double width_deviation_of(const Pair& pair, const Scene& scene) {
                     scene.options.magnification_tolerance * pair.width_mm);
 }
 
+void score(const Scene& scene, Pair& pair) {
+  pair.width_mm = width_of(pair, scene.scale.pixel_mm);
+  const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
+  pair.score = kEvidencePer_mm * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
+}
+
+/// Why a pair is not the shaft by its edges alone; empty when it may be.
+std::string reason_by_edges(const Scene& scene, const Pair& pair, const Eigen::Vector2d& to_left) {
+  const double length_mm = pair.stretch.length() * scene.scale.pixel_mm;
+  if (length_mm < scene.options.min_length_mm)
+    return text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm,
+                scene.options.min_length_mm);
+  if (pair.left.normal.dot(to_left) < 0)
+    return text("it is darker outside than inside, as a canal or a gap between bones is (%.1f mm wide)", pair.width_mm);
+  if (scene.widths.is_possible(pair.width_mm)) return "";
+  const bool small = pair.width_mm < scene.widths.least_mm();
+  return text("its width of %.1f mm is too ", pair.width_mm) + (small ? "small" : "large") + " for a shaft (" +
+         scene.widths.range() + "), as " + (small ? "a cable's or a single cortex' is" : "the limb's is");
+}
+
+/// Why it is not the shaft by its brightness; cuts the stretch to where both borders are steps of brightness.
+std::string reason_by_image(const Scene& scene, Pair& pair) {
+  const double whole = pair.stretch.length();
+  pair.stretch =
+      stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm, scene.scale.gap_px);
+  pair.supported_mm *= pair.stretch.length() / whole;
+  const double length_mm = pair.stretch.length() * scene.scale.pixel_mm;
+  if (length_mm < scene.options.min_length_mm)
+    return text(
+        "the image darkens across both its borders alike for %.0f mm only, of %.0f mm wanted, as where one is the "
+        "border of "
+        "muscle or fat (%.1f mm wide)",
+        length_mm, scene.options.min_length_mm, pair.width_mm);
+  const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm);
+  if (mean.inside < std::min(mean.outside_left, mean.outside_right)) return "";
+  return text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
+              mean.inside, mean.outside_left, mean.outside_right);
+}
+
 /// Fills stretch, width, score, or the reason why the pair is not the shaft.
 void judge(const Scene& scene, Pair& pair) {
-  const auto& [edges, image, scale, options, widths] = scene;
-  const Eigen::Vector2d direction = direction_of(pair.left, pair.right);
+  const Eigen::Vector2d direction = direction_of(pair.left, pair.right),
+                        to_left(direction.y(), -direction.x());  // v runs down
   int supported = 0;
-  pair.stretch = common_stretch(edges, pair.left, pair.right, scale.support, direction, scale.gap_px, supported);
-  pair.supported_mm = supported * scale.pixel_mm;
+  pair.stretch =
+      common_stretch(scene.edges, pair.left, pair.right, scene.scale.support, direction, scene.scale.gap_px, supported);
+  pair.supported_mm = supported * scene.scale.pixel_mm;
   const double middle = 0.5 * (pair.stretch.from + pair.stretch.to);
-  const Eigen::Vector2d to_left(direction.y(), -direction.x());  // v runs down
   if (to_left.dot(point_at(pair.left, direction, middle) - point_at(pair.right, direction, middle)) < 0)
     std::swap(pair.left, pair.right);
-  pair.width_mm = width_of(pair, scale.pixel_mm);
-  const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
-  pair.score = kEvidencePer_mm * pair.supported_mm + widths.log_likelihood(pair.width_mm, taper_deg);
-  const double length_mm = pair.stretch.length() * scale.pixel_mm;
-  if (length_mm < options.min_length_mm)
-    pair.reason =
-        text("its borders run side by side for %.0f mm only, of %.0f mm wanted", length_mm, options.min_length_mm);
-  else if (pair.left.normal.dot(to_left) < 0)
-    pair.reason =
-        text("it is darker outside than inside, as a canal or a gap between bones is (%.1f mm wide)", pair.width_mm);
-  else if (!widths.is_possible(pair.width_mm))
-    pair.reason =
-        text("its width of %.1f mm is too ", pair.width_mm) +
-        (pair.width_mm < widths.least_mm() ? "small for a shaft (" : "large for a shaft (") + widths.range() +
-        (pair.width_mm < widths.least_mm() ? "), as a cable's or a single cortex' is" : "), as the limb's is");
+  score(scene, pair);
+  pair.reason = reason_by_edges(scene, pair, to_left);
   if (!pair.reason.empty()) return;
-  const Brightness mean = brightness_of(image, pair, scale.pixel_mm);
-  if (mean.inside >= std::min(mean.outside_left, mean.outside_right))
-    pair.reason = text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
-                       mean.inside, mean.outside_left, mean.outside_right);
+  Pair cut = pair;
+  pair.reason = reason_by_image(scene, cut);
+  if (!pair.reason.empty()) return;  // and its stretch is shown as the edges have it
+  score(scene, cut);
+  pair = cut;
 }
 
 /// Candidates first, the most likely first.
