@@ -94,9 +94,7 @@ CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue,
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
 Pipeline CellRunner::simulation_of(std::size_t index) const {
-  PipelineArguments arguments;
-  arguments.inputs = experiment_.cases[index].inputs;
-  Pipeline pipeline = checked(experiment_.simulation, arguments, catalogue_);
+  Pipeline pipeline = checked(experiment_.simulation, simulation_arguments_of(experiment_, index), catalogue_);
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
   return pipeline;
 }
@@ -216,7 +214,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
     for (const MetricChoice& metric : experiment_.metrics) {
       if (!row.failed.empty()) break;
       const Metric found = figure(pipeline, result, metric.path);
-      row.values.push_back(found.value);
+      row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
       row.units.push_back(found.unit);
     }
     if (row.failed.empty() && !experiment_.initial_error.empty()) row.initial_error = figure(pipeline, result, experiment_.initial_error).value;
@@ -241,29 +239,35 @@ bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunE
   return true;
 }
 
-double CellRunner::time(const CellIndex& cell) {
-  const fs::path data = case_folder(cell.case_index);
+std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipeline& pipeline) {
   const std::string& case_name = experiment_.cases[cell.case_index].name;
-  const Pipeline pipeline = pipeline_of(cell, data, Depth::figures);
-  Hasher hasher;
-  hasher.add(std::string("seconds"));
-  hasher.add(key_of(cell));
-  hasher.add(std::int64_t(threads_));
-  const Digest key = hasher.digest();
-  if (const auto known = store_ ? store_->find(key) : std::nullopt) return known->outputs.at(0).as<Metrics>().items.at(0).value;
-
   std::map<Digest, std::size_t> variants_with;
   for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
-    const auto others = histories(pipeline_of({v, cell.case_index, cell.start}, data, Depth::figures), case_name);
+    const auto others = histories(pipeline_of({v, cell.case_index, cell.start}, case_folder(cell.case_index), Depth::figures), case_name);
     for (const Digest& one : std::set<Digest>(others.begin(), others.end())) ++variants_with[one];
   }
+  const std::vector<Digest> own = histories(pipeline, case_name);
+  std::set<std::string> ids;
+  for (std::size_t i = 0; i < own.size(); ++i)
+    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size()) ids.insert(pipeline.nodes[i].id);
+  return ids;
+}
+
+double CellRunner::time(const CellIndex& cell) {
+  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   RunSettings settings;
   settings.threads = threads_;
   settings.store = store_;
   settings.remember = false;
-  const std::vector<Digest> own = histories(pipeline, case_name);
-  for (std::size_t i = 0; i < own.size(); ++i)
-    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size()) settings.made_anew.insert(pipeline.nodes[i].id);
+  settings.made_anew = own_nodes(cell, pipeline);
+  Hasher hasher;
+  hasher.add(std::string("seconds"));
+  hasher.add(key_of(cell));
+  hasher.add(std::int64_t(threads_));
+  for (const std::string& id : settings.made_anew) hasher.add(id);  // another experiment's variants may share more or less
+  const Digest key = hasher.digest();
+  if (const auto known = store_ ? store_->find(key) : std::nullopt) return known->outputs.at(0).as<Metrics>().items.at(0).value;
+
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error(reason_of(pipeline, result));
   Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", result.seconds, "s"}}}));

@@ -17,7 +17,8 @@ std::optional<double> number(const json& j) { return j.is_number() ? std::option
 bool CellRow::is_success(const Experiment& experiment) const {
   if (!failed.empty()) return false;
   for (std::size_t i = 0; i < experiment.metrics.size() && i < values.size(); ++i)
-    if (experiment.metrics[i].success_below && !(values[i] && *values[i] < *experiment.metrics[i].success_below)) return false;
+    if (const MetricChoice& metric = experiment.metrics[i]; metric.limit)
+      if (!values[i] || !(metric.higher_is_better() ? *values[i] > *metric.limit : *values[i] < *metric.limit)) return false;
   return true;
 }
 

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "marrow/domain/error.hpp"
+#include "random.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -48,27 +49,6 @@ double quantile(const std::vector<double>& sorted, double fraction) {
   const std::size_t above = std::min(below + 1, sorted.size() - 1);
   return sorted[below] + (position - static_cast<double>(below)) * (sorted[above] - sorted[below]);
 }
-
-/// SplitMix64 (Steele, Lea and Flood 2014, Fig 17).
-class Generator {
- public:
-  explicit Generator(std::uint64_t seed) : state_(seed) {}
-
-  /// Uniform in 0 ... count - 1. The upper 32 bits are scaled: the chances differ by less than count / 2^32 of
-  /// themselves.
-  std::size_t index(std::size_t count) { return static_cast<std::size_t>(((next() >> 32) * count) >> 32); }
-
- private:
-  std::uint64_t next() {
-    state_ += 0x9e3779b97f4a7c15u;
-    std::uint64_t bits = state_;
-    bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9u;
-    bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebu;
-    return bits ^ (bits >> 31);
-  }
-
-  std::uint64_t state_;
-};
 
 double median_of_sorted(const std::vector<double>& sorted) {
   const std::size_t half = sorted.size() / 2;
@@ -140,7 +120,7 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double confi
   return {successes == 0 ? 0.0 : centre - half, successes == trials ? 1.0 : centre + half, confidence};
 }
 
-Summary summarise(const std::vector<double>& values) {
+Summary summarise(const std::vector<double>& values, bool higher_is_better) {
   check_finite(values, "value");
   std::vector<double> sorted = values;
   std::sort(sorted.begin(), sorted.end());
@@ -150,8 +130,8 @@ Summary summarise(const std::vector<double>& values) {
   summary.median = median_of_sorted(sorted);
   summary.lower_quartile = quantile(sorted, 0.25);
   summary.upper_quartile = quantile(sorted, 0.75);
-  summary.percentile_95 = quantile(sorted, 0.95);
-  summary.worst = sorted.back();
+  summary.percentile_95 = quantile(sorted, higher_is_better ? 0.05 : 0.95);
+  summary.worst = higher_is_better ? sorted.front() : sorted.back();
   return summary;
 }
 
@@ -185,11 +165,11 @@ Interval median_interval(const std::vector<double>& differences, std::uint64_t s
                 " resamples; the bounds need at least 1000 (10000 is the default)");
   std::vector<double> sorted = differences;
   std::sort(sorted.begin(), sorted.end());
-  Generator generator(seed);
+  Random random(seed);
   std::vector<double> drawn(sorted.size());
   std::vector<double> medians(resamples);
   for (double& median : medians) {
-    for (double& value : drawn) value = sorted[generator.index(sorted.size())];
+    for (double& value : drawn) value = sorted[random.index(sorted.size())];
     std::sort(drawn.begin(), drawn.end());
     median = median_of_sorted(drawn);
   }

@@ -297,7 +297,6 @@ class Executor {
 
   /// Builds the node's outputs from its calls and starts what waited for it.
   void finish_node(std::size_t index) {
-    const PipelineNode& node = pipeline_.nodes[index];
     NodeState& state = states_[index];
     NodeRecord& record = result_.nodes[index];
     // A node all of whose calls are deferred is not needed until something that runs asks for what it makes.

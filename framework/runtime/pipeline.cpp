@@ -84,6 +84,10 @@ class Resolver {
     pipeline_.nodes.push_back(std::move(node));
   }
 
+  StrictYaml yaml_of(const WrittenValue& value) {
+    return value.is_override ? StrictYaml(value.place, diagnostics_) : StrictYaml(value.place.file, diagnostics_);
+  }
+
   void resolve_options(const WrittenNode& written, PipelineNode& node) {
     const std::vector<std::string> known = names_of(node.info.options);
     for (const auto& [name, value] : written.options)
@@ -94,7 +98,7 @@ class Resolver {
       const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
       if (given != written.options.end()) {
         const WrittenValue& value = given->second;
-        StrictYaml yaml(value.place.file, diagnostics_);
+        StrictYaml yaml = yaml_of(value);
         const auto substitute = [&](const std::string& text, const Place& place) { return substituted(text, place.line ? place : value.place); };
         const auto converted = yaml.option(value.value, value.place, option, "option '" + option.name + "' of " + node.info.name, substitute);
         if (converted) result = in_folder(*converted, option.type, value.folder);
@@ -105,13 +109,15 @@ class Resolver {
     }
   }
 
-  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none.
+  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none. $$ is a dollar.
   std::optional<std::string> substituted(const std::string& text, const Place& place) {
     std::string result;
     bool known = true;
     for (std::size_t i = 0; i < text.size(); ++i) {
-      if (text[i] != '$') {
+      const bool doubled = text[i] == '$' && i + 1 < text.size() && text[i + 1] == '$';
+      if (text[i] != '$' || doubled) {
         result += text[i];
+        i += doubled;
         continue;
       }
       std::size_t end = i + 1;
@@ -187,8 +193,8 @@ class Resolver {
       diagnostics_.add(value.place, "input '" + port.name + "' of " + node.info.name + " takes one " + port.type.id + ", not a list");
       return wire;
     }
-    StrictYaml yaml(value.place.file, diagnostics_);
-    for (const YAML::Node& item : value.value) add(item, value.place.line ? yaml.place(item) : value.place);
+    const StrictYaml yaml = yaml_of(value);
+    for (const YAML::Node& item : value.value) add(item, yaml.place(item));
     return wire;
   }
 

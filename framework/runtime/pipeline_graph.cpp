@@ -7,6 +7,20 @@
 #include "marrow/runtime/pipeline.hpp"
 
 namespace marrow {
+namespace {
+
+/// An item of an option as it is written: a dollar in a text is doubled, so that it is not taken for the name of an input.
+template <class T>
+T written(const T& item) {
+  return item;
+}
+std::string written(const std::string& text) {
+  std::string result;
+  for (const char c : text) result += c == '$' ? "$$" : std::string(1, c);
+  return result;
+}
+
+}  // namespace
 
 std::vector<std::string> Pipeline::axes_of(const Reference& source) const {
   const PipelineNode& node = nodes[std::size_t(source.node)];
@@ -51,12 +65,12 @@ std::string resolved_yaml(const Pipeline& pipeline) {
       for (std::size_t i = 0; i < node.options.size(); ++i) {
         out << YAML::Key << node.info.options[i].name << YAML::Value;
         std::visit([&](const auto& value) {
-          if constexpr (requires { value.begin(); value.push_back(value[0]); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
+          if constexpr (requires { value.begin(); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
             out << YAML::Flow << YAML::BeginSeq;
-            for (const auto& item : value) out << item;
+            for (const auto& item : value) out << written(item);
             out << YAML::EndSeq;
           } else {
-            out << value;
+            out << written(value);
           }
         }, node.options[i]);
       }

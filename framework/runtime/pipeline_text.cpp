@@ -95,8 +95,8 @@ class Reader {
         if (*type == "integer") info.type = OptionType::integer;
         if (*type == "boolean") info.type = OptionType::boolean;
       }
-      for (const auto& [name, text] : arguments_.inputs)
-        if (name == input.key) give({name + "=" + text, 0, 0}, YAML::Node(text), fs::current_path());
+      for (const InputValue& one : arguments_.inputs)
+        if (one.name == input.key) give(place_of(one), YAML::Node(one.value), folder_of(one.place));
       set_input(input, info, given ? &value : nullptr);
     }
   }
@@ -116,10 +116,13 @@ class Reader {
   }
 
   void check_given_inputs() {
-    for (const auto& [name, text] : arguments_.inputs)
-      if (std::find(declared_.begin(), declared_.end(), name) == declared_.end())
-        diagnostics_.add({name + "=" + text}, "the pipeline has no input '" + name + "'", suggestion(name, declared_));
+    for (const InputValue& one : arguments_.inputs)
+      if (std::find(declared_.begin(), declared_.end(), one.name) == declared_.end())
+        diagnostics_.add(place_of(one), "the pipeline has no input '" + one.name + "'", suggestion(one.name, declared_));
   }
+
+  static Place place_of(const InputValue& one) { return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place; }
+  static fs::path folder_of(const Place& written) { return written.file.empty() ? fs::current_path() : fs::absolute(written.file).parent_path(); }
 
   void read_node(const YamlEntry& entry) {
     static const std::vector<std::string> kKeys{"uses", "with", "in"};
@@ -161,7 +164,7 @@ class Reader {
       return;
     }
     const std::string what = key.substr(dot + 1);
-    const WrittenValue value{place, yaml.parse(text), fs::current_path()};
+    const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
     if (what == "uses") {
       // `with` was written for the node that is replaced: its options mean nothing to another one.
       if (text != node->uses && !node->options.empty()) {

@@ -15,6 +15,7 @@ struct WrittenValue {
   Place place;
   YAML::Node value;
   std::filesystem::path folder;
+  bool is_override = false;  ///< its text was cut out of where it was written, so that parts of it have no place of their own
 };
 
 struct WrittenNode {

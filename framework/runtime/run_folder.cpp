@@ -7,6 +7,7 @@
 #include <set>
 #include <thread>
 
+#include "keys.hpp"
 #include "manifest.hpp"
 #include "mapping.hpp"
 #include "marrow/domain/error.hpp"
@@ -65,7 +66,61 @@ std::string utc_now() {
   return text;
 }
 
-json json_of(const NodeRecord& record, const PipelineNode& node) {
+/// The keys of the single items of a list, each with its place along the axes, in the order in which files are written.
+void add_items(const Value& value, const std::string& place, json& items) {
+  if (!value.is_list()) {
+    items.push_back({place, value.key.hex()});
+    return;
+  }
+  for (std::size_t i = 0; i < value.items.size(); ++i) add_items(value.items[i], place.empty() ? value.names[i] : place + "/" + value.names[i], items);
+}
+
+json items_of(const Value& value) {
+  json items = json::array();
+  add_items(value, "", items);
+  return items;
+}
+
+/// The keys of what the node's inputs were wired to.
+json inputs_of(const PipelineNode& node, const RunResult& result) {
+  json inputs = json::object();
+  for (const Wire& wire : node.wires) {
+    Hasher hasher;
+    try {
+      for (const Reference& source : wire.sources) hasher.add(key_of(value_of(result, source)));
+    } catch (const Error&) {  // an item that the list does not have: the node failed by it
+    }
+    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+  }
+  return inputs;
+}
+
+/// The contents that the node's options of type path named; null for what is not there.
+json files_of(const PipelineNode& node) {
+  json files = json::object();
+  for (std::size_t i = 0; i < node.options.size(); ++i) {
+    std::vector<std::string> paths;
+    if (node.info.options[i].type == OptionType::path) paths = {std::get<std::string>(node.options[i])};
+    if (node.info.options[i].type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[i]);
+    std::erase(paths, "");
+    if (paths.empty()) continue;
+    Hasher hasher;
+    bool all_there = true;
+    for (const std::string& path : paths) {
+      std::error_code error;
+      all_there = all_there && fs::exists(path, error);
+      hasher.add(path_digest(path));
+    }
+    files[node.info.options[i].name] = all_there ? json(hasher.digest().hex()) : json();
+  }
+  return files;
+}
+
+bool took_part(const NodeRecord& record) {
+  return record.status != NodeRecord::Status::not_needed || !record.outputs.empty();  // a function that nothing called has a key all the same
+}
+
+json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue& catalogue) {
   json j = {{"id", node.id},
             {"uses", node.info.name},
             {"status", status_name(record.status)},
@@ -74,9 +129,22 @@ json json_of(const NodeRecord& record, const PipelineNode& node) {
             {"start_s", record.start_s},
             {"seconds", record.seconds},
             {"peak_process_memory_mb", record.peak_memory_mb},
-            {"keys", json::object()}};
+            {"keys", json::object()},
+            {"items", json::object()},
+            {"functions", json::array()},
+            {"random", node.info.random},
+            {"files", files_of(node)}};
   if (!record.reason.empty()) j["reason"] = record.reason;
-  for (std::size_t i = 0; i < record.outputs.size(); ++i) j["keys"][node.info.outputs[i].name] = key_of(record.outputs[i]).hex();
+  if (const LibraryInfo* library = catalogue.library_of(node.info.name)) {
+    j["library"] = library->file.filename().string();
+    j["build_id"] = library->build_id.hex();
+  }
+  for (std::size_t i = 0; i < record.outputs.size(); ++i) {
+    const std::string& name = node.info.outputs[i].name;
+    j["keys"][name] = key_of(record.outputs[i]).hex();
+    j["items"][name] = items_of(record.outputs[i]);
+    if (node.info.outputs[i].type.is_function) j["functions"].push_back(name);
+  }
   return j;
 }
 
@@ -85,7 +153,7 @@ json plugins_used(const Pipeline& pipeline, const RunResult& result, const Catal
   std::set<fs::path> seen;
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const LibraryInfo* library = catalogue.library_of(pipeline.nodes[i].info.name);
-    if (result.nodes[i].status == NodeRecord::Status::not_needed || !library || !seen.insert(library->file).second) continue;
+    if (!took_part(result.nodes[i]) || !library || !seen.insert(library->file).second) continue;
     json linked = json::array();
     for (const LinkedLibrary& one : library->linked) linked.push_back(fs::path(one.path).filename().string());
     list.push_back({{"file", library->file.filename().string()}, {"build_id", library->build_id.hex()}, {"links", linked}});
@@ -151,13 +219,21 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
                  {"nodes", json::array()},
                  {"plugins", plugins_used(pipeline, result, catalogue)},
                  {"outputs", json::array()}};
-  for (const auto& [name, value] : arguments.inputs) record["inputs"][name] = value;
+  for (const InputValue& one : arguments.inputs) record["inputs"][one.name] = one.value;
   for (const Override& one : arguments.overrides) record["overrides"].push_back(one.key + "=" + one.value);
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-    if (result.nodes[i].status != NodeRecord::Status::not_needed) record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i]));
-  for (const Written& output : written) {
-    record["outputs"].push_back({{"name", output.output}, {"files", output.files}});
-    if (!output.fault.empty()) record["outputs"].back()["fault"] = output.fault;
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    if (!took_part(result.nodes[i])) continue;
+    record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i], catalogue));
+    record["nodes"].back()["inputs"] = inputs_of(pipeline.nodes[i], result);
+  }
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    json output = {{"name", written[i].output}, {"files", written[i].files}, {"items", json::array()}};
+    if (!written[i].fault.empty()) output["fault"] = written[i].fault;
+    try {
+      output["items"] = items_of(value_of(result, pipeline.outputs.at(i).source));
+    } catch (const Error&) {  // an item that its list does not have: that is its fault
+    }
+    record["outputs"].push_back(std::move(output));
   }
   write_file(folder_ / "run.json", record.dump(1) + "\n");
 }

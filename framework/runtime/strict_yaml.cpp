@@ -44,6 +44,7 @@ YAML::Node StrictYaml::parse(const std::string& text) {
 }
 
 Place StrictYaml::place(const YAML::Node& node) const {
+  if (only_) return *only_;
   const YAML::Mark mark = node.Mark();
   return {file_, mark.line + 1, mark.column + 1};
 }

@@ -26,6 +26,8 @@ struct YamlEntry {
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
+  /// For a text that was cut out of a file: all of it counts as written at one place.
+  StrictYaml(const Place& only, Diagnostics& diagnostics) : file_(only.file), diagnostics_(diagnostics), only_(only) {}
 
   /// Parses a text; a syntax error is a diagnostic and gives a null node.
   YAML::Node parse(const std::string& text);
@@ -51,6 +53,7 @@ class StrictYaml {
 
   std::string file_;
   Diagnostics& diagnostics_;
+  std::optional<Place> only_;
 };
 
 }  // namespace marrow

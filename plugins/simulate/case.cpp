@@ -13,6 +13,7 @@ using simulate::Phantom;
 
 struct CaseOptions {
   std::vector<std::string> wanted{"distal"};
+  std::string start = "none";
 };
 
 /// The fragment's seeds that lie in the CT, two voxels from its border at least.
@@ -48,6 +49,11 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
     Seeds seeds{fragment.name, within(ct.grid, fragment.seeds_mm),
                 std::find(options.wanted.begin(), options.wanted.end(), fragment.name) != options.wanted.end()};
     if (seeds.wanted) result.truth.add(fragment.name, Truth{fragment.world_from_ct});
+    if (seeds.wanted && options.start == "exact") {
+      Pose start;
+      start.world_from_model = fragment.world_from_ct;
+      result.start.add(fragment.name, start);
+    }
     if (!seeds.points_mm.empty()) {
       result.seeds.add(fragment.name, std::move(seeds));
     } else if (seeds.wanted) {
@@ -62,10 +68,14 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.case", assemble)
-      .summary("case of a simulated patient: CT, views, seeds and the exact truth, with no pose to start from")
+      .summary("case of a simulated patient: CT, views, seeds and the exact truth")
       .in("volume", "CT of the phantom")
       .in("views", "X-ray images of the phantom", over("view"))
       .in("phantom", "fragments with their seeds and truth")
       .out("case", "CT, views, seeds and truth")
-      .option("register", &CaseOptions::wanted, "fragments whose pose is wanted; the others are only kept apart in the CT");
+      .option("register", &CaseOptions::wanted, "fragments whose pose is wanted; the others are only kept apart in the CT")
+      .option("start", &CaseOptions::start,
+              "none: the case has no pose to start from; exact: it starts at the truth, for experiments that displace "
+              "the start themselves",
+              one_of({"none", "exact"}));
 }

@@ -14,7 +14,7 @@ namespace {
 using marrow::Value;
 
 marrow::Pipeline read(const marrow::Catalogue& catalogue, const std::string& file, const std::string& output,
-                      const std::vector<std::pair<std::string, std::string>>& inputs) {
+                      const std::vector<marrow::InputValue>& inputs) {
   marrow::Diagnostics diagnostics;
   marrow::PipelineArguments arguments;
   arguments.inputs = inputs;

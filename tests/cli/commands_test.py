@@ -106,17 +106,20 @@ class Commands(Case):
 
     def test_two_slow_nodes_overlap(self):
         path = self.write("p.yaml", WORK)
-        busy_before, before, start = busy_seconds(), resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-        self.assertEqual(marrow("run", path, "--out", self.scratch / "out", "--threads", 2, plugins=[TEST_PLUGINS]).returncode, 0)
-        wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
-        cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-        others = max(0, busy_seconds() - busy_before - cpu)
-        print("two slow nodes: CPU %.0f %%, other programs %.0f %%" % (100 * cpu / wall, 100 * others / wall))
-        record = json.loads((self.scratch / "out" / "run.json").read_text())
-        self.assertLess(abs(record["nodes"][0]["start_s"] - record["nodes"][1]["start_s"]), 0.5)
-        self.assertLess(record["seconds"], 3)  # each lasts 2 seconds on the clock: 4 one after the other
-        if os.cpu_count() - others / wall > 1.9:
-            self.assertGreater(cpu / wall, 1.5)
+        for attempt in range(3):  # a busy machine, or the one that it is a guest of, may put both threads on one core
+            out = self.scratch / str(attempt)
+            busy_before, before, start = busy_seconds(), resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+            self.assertEqual(marrow("run", path, "--out", out, "--threads", 2, "--no-cache", plugins=[TEST_PLUGINS]).returncode, 0)
+            wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
+            cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+            others = max(0, busy_seconds() - busy_before - cpu)
+            print("two slow nodes: CPU %.0f %%, other programs %.0f %%" % (100 * cpu / wall, 100 * others / wall))
+            record = json.loads((out / "run.json").read_text())
+            self.assertLess(abs(record["nodes"][0]["start_s"] - record["nodes"][1]["start_s"]), 0.5)
+            self.assertLess(record["seconds"], 3)  # each lasts 2 seconds on the clock: 4 one after the other
+            if cpu / wall > 1.5 or os.cpu_count() - others / wall < 1.9:
+                return
+        self.fail("two nodes never used more than 150 % of a core, on a machine with nothing else to do")
 
     def test_control_c_ends_cleanly(self):
         path = self.write("p.yaml", WORK.replace("2.000001", "60").replace("outputs: {", "  c: {uses: test.constant}\noutputs: {c: c, "))

@@ -45,6 +45,20 @@ class Compare(Case):
         """Of each cell all but times and how often it was tried."""
         return {name: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for name, row in self.rows(out).items()}
 
+    def test_which_values_are_better(self):
+        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
+        for i in range(8):
+            (self.scratch / "cases" / str(i)).mkdir(parents=True)
+        variants = "variants: {one: {m.value: -1}, four: {m.value: 4}}\n"
+        better = {"lower": ("5.0 worse", "1", "0"), "higher": ("5.0 better", "0", "1"), "nearest_zero": ("3.0 worse", "1", "0")}
+        for name, (sentence, one, four) in better.items():
+            with self.subTest(name):
+                head = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [{figure: number.value, label: sum, better: %s}]\nsuccess: {number.value: 2}\n" % name
+                result = self.compare(self.write("e.yaml", head + variants), "--out", self.scratch / name)
+                self.assertIn("four, sum: %s" % sentence, result.stdout)
+                rows = self.rows(name)
+                self.assertEqual((rows["one/0/0"]["success"], rows["four/0/0"]["success"]), (one, four))
+
     def test_what_goes_wrong_in_a_cell_stays_there(self):
         path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
                                 "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)
@@ -107,6 +121,18 @@ class Compare(Case):
                                  stdout=subprocess.DEVNULL) for name in ("one", "two")]
         self.assertEqual([process.wait() for process in both], [0, 0])
         self.assertEqual(self.results("one"), self.results("two"))
+
+    def test_a_time_counts_what_the_variants_of_its_own_experiment_do_not_share(self):
+        self.experiment({"a": "{}"}, cases=1)
+        self.write("p.yaml", PIPELINE.replace("0.05", "0.3"))
+        seconds = {}
+        for name, variants in (("one", "  a: {}\n  b: {m.value: 5}\n"), ("two", "  a: {}\n  b: {shared.value: 0.1}\n")):
+            path = self.write(name + ".yaml", HEAD + "variants:\n" + variants)
+            result = self.compare(path, "--out", self.scratch / name)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            seconds[name] = float(self.rows(name)["a/0/0"]["seconds"])
+        self.assertLess(seconds["one"], 0.3, "both share it")
+        self.assertGreater(seconds["two"], 0.3, "the same cell, and the other variant makes another one")
 
     def test_one_cell_by_itself(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})

@@ -19,6 +19,11 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "mesh.fat": {"sphere_distance", "torus_distance"},
     "mesh.unturned": {"turned_sphere_distance"},
     "mesh.endless": {"nothing_inside"},
+    "segment.fat": {"wall_bias"},
+    "segment.swapped": {"dice"},
+    "segment.merged": {"overlap"},
+    "segment.changing": {"determinism", "threads"},
+    "segment.careless": {"no_points"},
     "shaft.inner": {"right_pair"},
     "shaft.turned": {"angle"},
     "shaft.swapped": {"contract"},
@@ -27,9 +32,9 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
 }
 
 
-def conformance(*subjects):
+def conformance(*subjects, seconds=3):
     """Exit code, and {node: {check: (passed, text)}}."""
-    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS="3")
+    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS=str(seconds))
     result = subprocess.run([str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment)
     nodes, checks = {}, {}
     for line in result.stdout.splitlines():
@@ -63,8 +68,8 @@ class Conformance(unittest.TestCase):
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
-        for node in ("edges.plain", "mesh.plain", "shaft.plain"):
-            result, nodes = conformance(node)
+        for node in ("edges.plain", "mesh.plain", "segment.plain", "shaft.plain"):
+            result, nodes = conformance(node, seconds=60)
             self.assertEqual(result.returncode, 0, result.stdout)
 
     def test_unknown(self):

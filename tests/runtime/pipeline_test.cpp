@@ -51,6 +51,34 @@ TEST_F(PipelineTest, ResolvedYamlGivesTheSamePipeline) {
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }
 
+TEST_F(PipelineTest, ResolvedYamlKeepsEveryTextAndNumber) {
+  const std::vector<std::string> texts{"3", "0x10", "010", "1e3", "true", "no", "~", "null", "", " ", " a ", "a: b", "a:b", "#a", "a #b", "- a", "[a", "]", "{a: b}",
+                                       "a, b", "'a'", "\"", "\\", "@a", "!a", "&a", "*a", "%a", "|", ">", "?", "? a", "-", "---", "...", "<<", "$", "$$", "$a$b", "a\nb\n",
+                                       "\ta", "\x7f", "\x01", "\u00e9\u6f22", "=", ","};
+  const Pipeline plain = read("marrow: 1\nnodes:\n  c: {uses: test.constant}\n  s: {uses: test.sides}\noutputs: {c: c, s: s.left}\n");
+  for (const std::string& text : texts) {
+    Pipeline p = plain;
+    p.nodes[0].options[0] = 1.0 / 3;
+    p.nodes[0].options[1] = std::int64_t(1) << 53;
+    p.nodes[0].options[4] = std::vector<double>{0.1, -0.0, 1e-300, 1.7976931348623157e308, 5e-324};
+    p.nodes[0].options[6] = text.empty() ? text : "/folder " + text;
+    p.nodes[1].options[0] = std::vector<std::string>{text, "b", text};
+    p.name = text;
+    const Pipeline again = read(marrow::resolved_yaml(p));
+    ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+    for (std::size_t i = 0; i < p.nodes.size(); ++i) EXPECT_EQ(again.nodes[i].options, p.nodes[i].options) << marrow::resolved_yaml(p);
+    if (!text.empty()) {
+      EXPECT_EQ(again.name, text);
+    }
+  }
+}
+
+TEST_F(PipelineTest, TwoDollarsAreOneAndNoNameOfAnInput) {
+  const Pipeline p = read("marrow: 1\ninputs: {a: {type: text, default: x$a}}\nnodes:\n  s: {uses: test.sides, with: {names: [$$a, $a, $a$$, $$$a]}}\noutputs: {s: s.left}\n");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_EQ(std::get<std::vector<std::string>>(p.nodes[0].options[0]), (std::vector<std::string>{"$a", "x$a", "x$a$", "$x$a"}));
+}
+
 TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
   read("marrow: 1\nnodes:\n  lefft: {uses: test.constant}\n  n: {uses: test.add, in: {a: left, b: left}}\noutputs: {o: n}\n");
   const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();

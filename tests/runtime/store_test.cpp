@@ -41,7 +41,7 @@ Value many(std::size_t count) {
 fs::path only_file(const fs::path& folder) {
   fs::path found;
   for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file() && entry.path().parent_path().filename() != "last") found = entry.path();
+    if (entry.is_regular_file() && entry.path().filename() != "claims" && entry.path().parent_path().filename() != "last") found = entry.path();
   return found;
 }
 

@@ -62,6 +62,18 @@ TEST(SimulateCase, BothFragmentsCanBeWanted) {
   EXPECT_TRUE(result.seeds.find("proximal")->wanted);
 }
 
+TEST(SimulateCase, StartsAtTheTruthOnlyWhenAsked) {
+  CaseOptions options;
+  EXPECT_TRUE(assemble(chain().ct, chain().views, chain().phantom, options).start.empty());
+  options.start = "exact";
+  const Case result = assemble(chain().ct, chain().views, chain().phantom, options);
+  ASSERT_EQ(result.start.names(), std::vector<std::string>{"distal"}) << "only fragments that are registered have one";
+  const RigidTransform &start = result.start[0].world_from_model, &truth = result.truth[0].world_from_model;
+  EXPECT_EQ(start.rotation, truth.rotation);
+  EXPECT_EQ(start.translation_mm, truth.translation_mm);
+  EXPECT_EQ(start.target + start.source, "worldct");
+}
+
 TEST(SimulateCase, ImagesShowDarkBoneWithinTheField) {
   for (const View& view : chain().views) {
     check_view(view);

@@ -8,6 +8,7 @@
 
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/pipeline.hpp"
+#include "marrow/runtime/run_folder.hpp"
 
 namespace marrow::cli {
 
@@ -27,7 +28,18 @@ struct RunRequest {
   bool json = false;
 };
 
+struct RerunRequest {
+  std::filesystem::path run;     ///< folder of the run that is repeated
+  std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number where that is taken
+  bool quiet = false;
+  bool json = false;
+};
+
 int run(const RunRequest& request);
+/// 0: the same pipeline and seed gave the same results; 1: they did not, or a node failed.
+int rerun(const RerunRequest& request);
+/// 0: the runs came out the same; 1: they did not.
+int diff(const std::filesystem::path& before, const std::filesystem::path& now, bool as_json);
 int plan(const PipelineRequest& request, std::uint64_t seed);
 int cache_info();
 int cache_why(const std::string& key);
@@ -48,6 +60,15 @@ int describe(const std::filesystem::path& library, bool write);
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline; prints all its faults and returns false when there are any.
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json = false);
+
+struct RunOutcome {
+  RunResult result;
+  std::vector<RunFolder::Written> written;
+  bool is_faulty = false;  ///< a node failed, or an output was not written
+};
+/// Runs a pipeline into a folder, showing what goes on as the request wishes; its threads and seed count, not its pipeline.
+RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
+                   RunFolder& folder);
 
 /// "edge_map", "list of view over view".
 std::string port_text(const PortInfo& port);

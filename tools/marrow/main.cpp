@@ -67,6 +67,22 @@ int main(int argc, char** argv) {
   add_compare_arguments(worker_command, worker_request);
   worker_command->callback([&] { code = worker(worker_request); });
 
+  RerunRequest rerun_request;
+  auto* rerun_command = app.add_subcommand("rerun", "repeat a run from its folder, computing everything anew, and say whether the results are the same");
+  rerun_command->add_option("run", rerun_request.run, "folder of the run, or of a cell of a comparison")->required();
+  rerun_command->add_option("--out", rerun_request.folder, "folder to write; new or empty (default: runs/NAME-rerun)");
+  rerun_command->add_flag("--quiet", rerun_request.quiet, "no progress");
+  rerun_command->add_flag("--json", rerun_request.json, "print the differences as JSON");
+  rerun_command->callback([&] { code = rerun(rerun_request); });
+
+  std::filesystem::path first_run, second_run;
+  bool diff_json = false;
+  auto* diff_command = app.add_subcommand("diff", "say where two runs part, by how much and why");
+  diff_command->add_option("first", first_run, "folder of a run, or of a cell of a comparison")->required();
+  diff_command->add_option("second", second_run, "folder of the run to compare it with")->required();
+  diff_command->add_flag("--json", diff_json, "as JSON");
+  diff_command->callback([&] { code = diff(first_run, second_run, diff_json); });
+
   std::filesystem::path shown_run, shown_file;
   auto* show_command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
   show_command->add_option("run", shown_run, "folder of the run")->required();

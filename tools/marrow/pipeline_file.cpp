@@ -28,7 +28,8 @@ void print_json(const Diagnostics& diagnostics) {
 }  // namespace
 
 PipelineArguments arguments_of(const PipelineRequest& request) {
-  PipelineArguments arguments{pairs(request.inputs, "name=value"), {}};
+  PipelineArguments arguments;
+  for (auto& [name, value] : pairs(request.inputs, "name=value")) arguments.inputs.push_back({name, value});
   for (auto& [key, value] : pairs(request.overrides, "node.option=value")) arguments.overrides.push_back({key, value});
   return arguments;
 }

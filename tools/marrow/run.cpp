@@ -131,18 +131,13 @@ void print_json_summary(const RunResult& result, const std::vector<RunFolder::Wr
 
 }  // namespace
 
-int run(const RunRequest& request) {
-  const Catalogue catalogue;
-  Pipeline pipeline;
-  if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
-  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / pipeline.name) : request.folder, pipeline);
+RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
+                   RunFolder& folder) {
   std::signal(SIGINT, on_interrupt);
   std::signal(SIGTERM, on_interrupt);
-
   Progress progress(request, folder);
-  const Store store;
   RunSettings settings;
-  if (!request.no_cache) settings.store = &store;
+  settings.store = store;
   settings.seed = request.seed;
   settings.threads = request.threads;
   settings.cancelled = &interrupted;
@@ -151,25 +146,32 @@ int run(const RunRequest& request) {
     folder.append_log("note: " + note);
     if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", note.c_str());
   }
-  const RunResult result = run_pipeline(pipeline, catalogue, settings);
+  RunOutcome outcome;
+  outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
-  const std::vector<RunFolder::Written> written = folder.write_outputs(pipeline, result, catalogue);
-  folder.write_record(pipeline, result, settings, catalogue, arguments_of(request.pipeline), written);
+  outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue);
+  folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
   if (settings.store) settings.store->tidy();
-
-  bool faulty = result.failed();
-  for (const RunFolder::Written& output : written) {
+  outcome.is_faulty = outcome.result.failed();
+  for (const RunFolder::Written& output : outcome.written) {
     if (output.fault.empty()) continue;
     if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), output.fault.c_str());
-    faulty = true;
+    outcome.is_faulty = true;
   }
-  if (request.json) print_json_summary(result, written, folder);
-  else if (!request.quiet) print_summary(pipeline, result, written, folder);
-  if (result.cancelled()) {
-    std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", folder.path().c_str());
-    return 130;
-  }
-  return faulty ? 1 : 0;
+  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", folder.path().c_str());
+  return outcome;
+}
+
+int run(const RunRequest& request) {
+  const Catalogue catalogue;
+  Pipeline pipeline;
+  if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
+  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / pipeline.name) : request.folder, pipeline);
+  const Store store;
+  const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline), request.no_cache ? nullptr : &store, folder);
+  if (request.json) print_json_summary(outcome.result, outcome.written, folder);
+  else if (!request.quiet) print_summary(pipeline, outcome.result, outcome.written, folder);
+  return outcome.result.cancelled() ? 130 : outcome.is_faulty ? 1 : 0;
 }
 
 }  // namespace marrow::cli

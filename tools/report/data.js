@@ -8,7 +8,7 @@
 //     starts_protocol, success_rule, time_rule}                       sentences
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
-//   metrics: [{name, label, unit, success_below: number | null}]      lower is better; the first is the main one
+//   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it, success_above; the first is the main one
 //   cases: ["case-01", ...], starts: ["0", ...]
 //   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
 //     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median}}]
@@ -81,6 +81,12 @@ const Data = (() => {
     return cell.success === false ? "missed" : "done";
   }
 
+  // The limit of success: below it, or above it where higher is better.
+  const limit = (metric) => [metric.success_above, metric.success_below].find(Number.isFinite) ?? null;
+  const limitText = (metric) => (metric.higher_is_better ? "above " : "below ") + Dom.withUnit(limit(metric), metric.unit);
+
+  const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
+
   // Wilson's 95 % interval of a proportion.
   function wilson(count, of) {
     if (!of) return { count, of, rate: null, low: null, high: null };
@@ -113,5 +119,5 @@ const Data = (() => {
   const pairName = (data, pair) => data.cases[pair.case] + ", start " + data.starts[pair.start];
   const cellName = (data, cell) => data.variants[cell.variant].name + ", " + pairName(data, cell);
 
-  return { load, outcome, wilson, quantile, valuesOf, pairedValues, hasMaterial, pairName, cellName };
+  return { load, outcome, limit, limitText, isBetter, wilson, quantile, valuesOf, pairedValues, hasMaterial, pairName, cellName };
 })();

@@ -12,7 +12,7 @@ const Detail = (() => {
   function values(data, cell) {
     return rows([
       ["Outcome", Cells.badge(cell)],
-      ...data.metrics.map((metric, i) => [metric.label, [withUnit(cell.values[i], metric.unit), Number.isFinite(metric.success_below) && el("small", {}, "  success below " + withUnit(metric.success_below, metric.unit))].filter(Boolean)]),
+      ...data.metrics.map((metric, i) => [metric.label, [withUnit(cell.values[i], metric.unit), Data.limit(metric) !== null && el("small", {}, "  success " + Data.limitText(metric))].filter(Boolean)]),
       ["mTRE of the start", Number.isFinite(cell.initial_mtre_mm) ? withUnit(cell.initial_mtre_mm, "mm") : null],
       ["Time", Number.isFinite(cell.seconds) ? withUnit(cell.seconds, "s") : null],
       ["Evaluations", Number.isFinite(cell.evaluations) ? number(cell.evaluations) : null],

@@ -34,10 +34,12 @@ const Figures = (() => {
     const metric = data.metrics[metricIndex];
     const rows = data.variants.map((_, variant) => Data.valuesOf(data, variant, metricIndex).sort((a, b) => a.value - b.value));
     const all = rows.flatMap((row) => row.map((item) => item.value));
+    // A limit far from all values would press them into a corner of a linear scale.
+    const limit = Data.limit(metric), drawn = limit !== null && (kind === "log" || limit <= 3 * Math.max(...all));
     const { root, box: area, x } = Plots.frame({ width, height: ROW_HEIGHT * rows.length + 62, label: "Distribution of " + metric.label + ", a row a variant; the numbers are in the table of the result",
-      x: { kind, domain: Plots.domain(all.concat(metric.success_below ?? []), kind, true), title: axisTitle(metric) } });
-    if (Number.isFinite(metric.success_below)) {
-      root.append(svg("line", { class: "threshold", x1: x(metric.success_below), x2: x(metric.success_below), y1: area.top, y2: area.bottom, "data-tip": "Success: below " + withUnit(metric.success_below, metric.unit) }));
+      x: { kind, domain: Plots.domain(all.concat(drawn ? limit : []), kind, true), title: axisTitle(metric) } });
+    if (drawn) {
+      root.append(svg("line", { class: "threshold", x1: x(limit), x2: x(limit), y1: area.top, y2: area.bottom, "data-tip": "Success: " + Data.limitText(metric) }));
     }
     rows.forEach((row, variant) => {
       const top = area.top + variant * ROW_HEIGHT, middle = top + 40, failed = data.cells.filter((cell) => cell.variant === variant && cell.status === "failed").length;
@@ -66,7 +68,7 @@ const Figures = (() => {
     root.append(svg("line", { class: "zero", x1: x(0), x2: x(0), y1: area.top, y2: area.bottom }));
     rows.forEach((row, i) => {
       const variant = variants[i], top = area.top + i * ROW_HEIGHT, middle = top + 40;
-      rowTitle(root, data, variant, top, row.length + " pairs, better in " + row.filter((item) => item.difference < 0).length);
+      rowTitle(root, data, variant, top, row.length + " pairs, better in " + row.filter((item) => Data.isBetter(metric, item.value, item.base)).length);
       thinned(row.sort((a, b) => a.difference - b.difference)).forEach((item, k) => root.append(Plots.marker(variant, x(item.difference), middle + 13 * Plots.spread(k), 3.2,
         point(item.cell, Data.pairName(data, data.pairOf(item.cell)) + "\nbaseline " + number(item.base) + ", " + data.variants[variant].name + " " + withUnit(item.value, metric.unit)))));
       const { low, high, difference, sentence } = found[i] || {};
@@ -86,7 +88,7 @@ const Figures = (() => {
       const { root, x, y } = Plots.frame({ width: Math.max(230, width / columns - 12), height: 300, label: "Pairs of baseline and " + data.variants[variant].name,
         x: { domain: [-0.35, 1.35], title: "", format: (tick) => (tick === 0 ? "baseline" : tick === 1 ? data.variants[variant].name.slice(0, 22) : "") }, y: { kind, domain, title: axisTitle(metric) } });
       for (const item of all[i]) {
-        const better = item.value < item.base;
+        const better = Data.isBetter(metric, item.value, item.base);
         root.append(svg("line", { class: better ? "better" : "worse", x1: x(0), x2: x(1), y1: y(item.base), y2: y(item.value), "data-cell": item.cell.id,
           "data-tip": Data.pairName(data, data.pairOf(item.cell)) + "\n" + number(item.base) + " → " + withUnit(item.value, metric.unit) }));
       }

@@ -35,7 +35,7 @@ const Page = (() => {
   function paired(data) {
     if (data.baseline < 0 || data.variants.length < 2) return null;
     const draw = (state, width) => (state.extra === "pairs" ? Figures.drawPairs(data, state.metric, state.kind === "signed" ? "log" : "linear", width) : Figures.drawDifferences(data, state.metric, state.kind, width));
-    return section("paired", "Against the baseline", "Each case and start, run with a variant and with " + data.variants[data.baseline].name + ". Left of zero the variant is better. The black bar is the estimated difference with its 95 % interval.",
+    return section("paired", "Against the baseline", "Each case and start, run with a variant and with " + data.variants[data.baseline].name + ". Left of zero the variant is better; right of zero for figures of which higher is better. The black bar is the estimated difference with its 95 % interval.",
       metricFigure(data, [["linear", "linear"], ["signed", "log"]], { label: "Show", options: [["differences", "Differences"], ["pairs", "Pairs"]] }, draw), Summary.comparisonTable(data));
   }
 

@@ -14,10 +14,10 @@ using compare::Experiment;
 
 constexpr std::uint64_t kBootstrapSeed = 1;
 
-VariantFigure figure_of(const std::vector<double>& values) {
+VariantFigure figure_of(const std::vector<double>& values, bool higher_is_better = false) {
   VariantFigure figure;
   figure.count = values.size();
-  if (!values.empty()) figure.summary = compare::summarise(values);
+  if (!values.empty()) figure.summary = compare::summarise(values, higher_is_better);
   return figure;
 }
 
@@ -39,7 +39,7 @@ VariantSummary summary_of(const Experiment& experiment, const std::string& varia
     evaluations.push_back(row.evaluations);
   }
   if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);
-  for (const auto& figure : values) summary.figures.push_back(figure_of(figure));
+  for (std::size_t i = 0; i < values.size(); ++i) summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
   summary.seconds = figure_of(seconds);
   summary.evaluations = figure_of(evaluations);
   return summary;
@@ -71,6 +71,7 @@ std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
   for (const compare::Variant& variant : experiment.variants) answer.variants.push_back(summary_of(experiment, variant.name, rows));
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
@@ -85,7 +86,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     Finding& finding = answer.findings[i];
     finding.p_holm = corrected[i];
     finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
-                                         {experiment.metrics[finding.metric].path, unit_of(rows, finding.metric), false}, finding.comparison, finding.p_holm);
+                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric], experiment.metrics[finding.metric].higher_is_better()}, finding.comparison, finding.p_holm);
   }
   return answer;
 }
@@ -108,7 +109,9 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
     out << line;
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", experiment.metrics[m].path.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
+    const compare::MetricChoice& metric = experiment.metrics[m];
+    const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") + (metric.label == metric.path ? "" : ", " + metric.path);
+    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", title.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
     out << line;
     for (std::size_t v = 0; v < answer.variants.size(); ++v) {
       const VariantFigure& figure = answer.variants[v].figures[m];

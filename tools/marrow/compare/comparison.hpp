@@ -58,6 +58,7 @@ struct Finding {
 struct Answer {
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
+  std::vector<std::string> units;  ///< of the metrics; empty where no cell is done
 };
 
 /// `rows` may be of unfinished comparisons. Failed cells have no figures; the pairs of a finding are the cells that both did.

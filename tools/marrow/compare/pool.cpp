@@ -15,8 +15,9 @@
 #include <fstream>
 #include <map>
 #include <memory>
-#include <utility>
 #include <optional>
+#include <set>
+#include <utility>
 
 #include "marrow/domain/error.hpp"
 
@@ -164,23 +165,29 @@ class Pool {
         if (workers_.size() >= most) return;
         free = workers_.emplace_back(std::make_unique<Worker>(settings_.command)).get();
       }
-      free->start(next_for(*free, source));
+      std::optional<Job> next = next_for(*free, source);
+      if (!next) return;
+      free->start(std::move(*next));
     }
   }
 
-  /// A job of the group that the worker was at; else of one that no other worker is at; else any.
-  Job next_for(Worker& worker, std::deque<Job>& source) {
+  /// A job of the group that the worker was at; else of one that no other worker is at; else of one whose first job is done:
+  /// until then the others would only make once more what the group has in common.
+  std::optional<Job> next_for(Worker& worker, std::deque<Job>& source) {
     std::string& mine = groups_[&worker];
-    auto chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return job.group == mine; });
-    if (chosen == source.end())
-      chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) {
-        return std::none_of(workers_.begin(), workers_.end(), [&](const auto& other) { return other->job && other->job->group == job.group; });
-      });
-    if (chosen == source.end()) chosen = source.begin();
+    auto chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return job.group == mine && may_start(job); });
+    if (chosen == source.end()) chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return !is_at_work(job.group); });
+    if (chosen == source.end()) chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return may_start(job); });
+    if (chosen == source.end()) return std::nullopt;
     Job job = std::move(*chosen);
     source.erase(chosen);
     mine = job.group;
     return job;
+  }
+
+  bool may_start(const Job& job) const { return begun_.contains(job.group) || !is_at_work(job.group); }
+  bool is_at_work(const std::string& group) const {
+    return std::any_of(workers_.begin(), workers_.end(), [&](const auto& worker) { return worker->job && worker->job->group == group; });
   }
 
   void look_after(Worker& worker, bool can_read) {
@@ -205,6 +212,7 @@ class Pool {
     Job job = std::move(*worker.job);
     worker.job.reset();
     end.tries = job.tries;
+    begun_.insert(job.group);
     if (!end.failed.empty() && job.tries < 2) again_.push_back(std::move(job));
     else ended_(job, end);
   }
@@ -214,6 +222,7 @@ class Pool {
   const std::function<void(const Job&, const JobEnd&)>& ended_;
   std::vector<std::unique_ptr<Worker>> workers_;
   std::map<const Worker*, std::string> groups_;
+  std::set<std::string> begun_;  ///< groups of which a job has ended
 };
 
 }  // namespace

@@ -35,7 +35,9 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (rows[i].failed.empty() && rows[i].values.at(0)) by_value[i % variants].push_back(i);
   for (auto& order : by_value)
-    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return *rows[a].values[0] < *rows[b].values[0]; });
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+      return experiment.metrics[0].higher_is_better() ? *rows[a].values[0] > *rows[b].values[0] : *rows[a].values[0] < *rows[b].values[0];
+    });
 
   Chooser chooser(most);
   for (const double rank : {1.0, 0.5, 0.0})  // worst, median, best

@@ -91,7 +91,7 @@ Value Subject::output(const Inputs& inputs, const std::string& port) const {
 }
 
 const Suite* suite_of(const std::string& kind) {
-  static const std::vector<Suite> kSuites{edges_suite(), mesh_suite(), shaft_suite()};
+  static const std::vector<Suite> kSuites{edges_suite(), mesh_suite(), segment_suite(), shaft_suite()};
   for (const Suite& suite : kSuites)
     if (suite.kind == kind) return &suite;
   return nullptr;

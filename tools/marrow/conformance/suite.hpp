@@ -88,6 +88,7 @@ std::vector<Check> checks_of(const Suite& suite);
 // The suites, a file each.
 Suite edges_suite();
 Suite mesh_suite();
+Suite segment_suite();
 Suite shaft_suite();
 
 }  // namespace marrow::conformance

@@ -32,13 +32,13 @@ std::string starts_sentence(const Experiment& experiment) {
   return text;
 }
 
-std::string success_sentence(const Experiment& experiment) {
+std::string success_sentence(const Experiment& experiment, const std::vector<std::string>& units) {
   std::string limits;
-  for (const compare::MetricChoice& metric : experiment.metrics)
-    if (metric.success_below) {
-      char text[300];
-      std::snprintf(text, sizeof text, "%s%s below %g", limits.empty() ? "" : " and ", metric.path.c_str(), *metric.success_below);
-      limits += text;
+  for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
+    if (const compare::MetricChoice& metric = experiment.metrics[m]; metric.limit) {
+      char limit[40];
+      std::snprintf(limit, sizeof limit, metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
+      limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
   return limits.empty() ? "A run that ends without a fault is a success." : "A run is a success with " + limits + "; a failed run is none.";
 }
@@ -62,14 +62,11 @@ json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, 
   return cell;
 }
 
-json metrics_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
+json metrics_of(const Experiment& experiment, const std::vector<std::string>& units) {
   json metrics = json::array();
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
-    std::string unit;
-    for (const CellRow& row : rows)
-      if (unit.empty() && m < row.units.size()) unit = row.units[m];
     const compare::MetricChoice& metric = experiment.metrics[m];
-    metrics.push_back({{"name", metric.path}, {"label", metric.label.empty() ? metric.path : metric.label}, {"unit", unit}, {"success_below", of(metric.success_below)}});
+    metrics.push_back({{"name", metric.path}, {"label", metric.label}, {"unit", units[m]}, {metric.higher_is_better() ? "success_above" : "success_below", of(metric.limit)}, {"higher_is_better", metric.higher_is_better()}});
   }
   return metrics;
 }
@@ -93,10 +90,10 @@ std::string command_of(const Experiment& experiment, const CompareRequest& reque
 
 void write_report(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const compare::CellRunner& runner,
                   const std::vector<compare::CellIndex>& shown, const CompareRequest& request, const fs::path& folder) {
-  json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", metrics_of(experiment, rows)}};
+  json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", metrics_of(experiment, answer.units)}};
   data["experiment"] = {{"name", experiment.name}, {"help", experiment.help}, {"file", experiment.file.string()}, {"text", experiment.text},
                         {"pipeline_text", text_of_file(experiment.pipeline)}, {"seed", 1}, {"command", command_of(experiment, request)},
-                        {"folder", folder.string()}, {"starts_protocol", starts_sentence(experiment)}, {"success_rule", success_sentence(experiment)},
+                        {"folder", folder.string()}, {"starts_protocol", starts_sentence(experiment)}, {"success_rule", success_sentence(experiment, answer.units)},
                         {"time_rule", time_sentence(experiment)}};
   for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
     json options = json::object();

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -73,6 +74,8 @@ class CellRunner {
  private:
   RunResult run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell, const std::function<void(const RunEvent&)>& observer);
   Pipeline simulation_of(std::size_t case_index) const;
+  /// The nodes of the cell that not all variants have in common.
+  std::set<std::string> own_nodes(const CellIndex& cell, const Pipeline& pipeline);
   void simulate(std::size_t case_index, const std::filesystem::path& folder) const;
 
   const Experiment& experiment_;

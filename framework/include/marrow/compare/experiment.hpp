@@ -23,7 +23,7 @@ struct ExperimentCase {
   std::string name;
   std::filesystem::path folder;  ///< empty for a simulated one
   std::uint64_t seed = 1;        ///< of the simulation
-  std::vector<std::pair<std::string, std::string>> inputs;  ///< of the simulation's pipeline
+  std::vector<InputValue> inputs;  ///< of the simulation's pipeline
 };
 
 /// A displacement of the start, about and along the fragment's frontal, lateral and long axes through its centroid.
@@ -45,8 +45,12 @@ struct StartProtocol {
 /// A figure of merit: output.item....figure, as in errors.distal.final.mtre_mm.
 struct MetricChoice {
   std::string path;
-  std::string label;
-  std::optional<double> success_below;
+  std::string label;  ///< for people; the path where the experiment gives none
+  enum class Better { lower, higher, nearest_zero };  ///< of nearest_zero, the magnitude is compared
+  Better better = Better::lower;
+  std::optional<double> limit;  ///< of success: below it, or above it where higher is better
+
+  bool higher_is_better() const { return better == Better::higher; }
 };
 
 struct Experiment {
@@ -54,10 +58,13 @@ struct Experiment {
   std::filesystem::path file;
   std::string text;  ///< of the file
   std::filesystem::path pipeline;
-  std::vector<std::pair<std::string, std::string>> inputs;  ///< of the pipeline, the same in every cell
-  std::string case_input;                                   ///< the pipeline's input that a case's folder is given to
-  std::filesystem::path simulation;                         ///< the pipeline that makes cases; empty where there is none
+  std::vector<InputValue> inputs;         ///< of the pipeline, the same in every cell
+  std::vector<Override> common;           ///< changes of the pipeline for all variants, before their own
+  std::string case_input;                 ///< the pipeline's input that a case's folder is given to
+  Place cases_place;
+  std::filesystem::path simulation;       ///< the pipeline that makes cases; empty where there is none
   std::string simulation_output;
+  std::vector<Override> simulation_changes;  ///< of the simulation's pipeline, for all cases
   std::vector<ExperimentCase> cases;
   std::vector<Variant> variants;
   std::size_t baseline = 0;
@@ -84,6 +91,9 @@ std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string
 
 /// The pipeline of a cell; `case_folder` is where its case lies.
 PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const std::filesystem::path& case_folder);
+
+/// The simulation's pipeline, where it makes this case.
+PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index);
 
 /// Reads and checks an experiment and the pipelines that it names, with each variant's changes. All faults go to
 /// `diagnostics`, at their lines; the result may be used only when there are none.

@@ -30,12 +30,12 @@ struct Summary {
   double median = 0;
   double lower_quartile = 0;
   double upper_quartile = 0;
-  double percentile_95 = 0;
-  double worst = 0;  ///< the largest value: the metrics are errors
+  double percentile_95 = 0;  ///< the value that 95 % are as good as; the 5th percentile where higher is better
+  double worst = 0;
 };
 
 /// Throws Error for no values, or one that is not finite.
-Summary summarise(const std::vector<double>& values);
+Summary summarise(const std::vector<double>& values, bool higher_is_better = false);
 
 /// A metric of two variants that ran on the same case from the same start (or seed). A case may have several pairs.
 struct Pair {

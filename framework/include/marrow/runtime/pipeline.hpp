@@ -57,14 +57,20 @@ struct Pipeline {
   std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
 
+/// A value of one of the pipeline's inputs.
+struct InputValue {
+  std::string name, value;
+  Place place = {};  ///< in the file that it was written in, whose folder relative paths start from; none: the command line
+};
+
 /// node.option=value, node.uses=kind.name or node.in.port=reference.
 struct Override {
   std::string key, value;
-  Place place = {};  ///< in the file that it was written in; without one it came from the command line
+  Place place = {};  ///< as that of an input's value
 };
 
 struct PipelineArguments {
-  std::vector<std::pair<std::string, std::string>> inputs;  ///< name=value
+  std::vector<InputValue> inputs;
   std::vector<Override> overrides;
 };
 

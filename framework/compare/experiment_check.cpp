@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_check.hpp"
+
+namespace marrow::compare {
+namespace {
+
+class Checker {
+ public:
+  Checker(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics)
+      : written_(written), experiment_(written.experiment), catalogue_(catalogue), diagnostics_(diagnostics) {}
+
+  void check() {
+    check_simulation();
+    for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
+      Diagnostics faults;
+      const Pipeline pipeline = read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
+      diagnostics_.add_all(faults);  // what is wrong in every variant is said once
+      if (v == 0 && faults.empty()) check_names(pipeline);
+    }
+  }
+
+ private:
+  void check_simulation() {
+    for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
+      if (!experiment_.cases[c].folder.empty()) continue;
+      Diagnostics faults;
+      const Pipeline pipeline = read_pipeline(experiment_.simulation, simulation_arguments_of(experiment_, c), catalogue_, faults, true);
+      diagnostics_.add_all(faults);
+      if (faults.empty()) find_output(pipeline, experiment_.simulation_output, written_.simulation_place);
+      return;  // the others differ in numbers alone
+    }
+  }
+
+  void check_names(const Pipeline& pipeline) {
+    for (std::size_t i = 0; i < experiment_.metrics.size(); ++i) check_figure(pipeline, experiment_.metrics[i].path, written_.metric_places[i]);
+    if (!experiment_.initial_error.empty()) check_figure(pipeline, experiment_.initial_error, written_.initial_error_place);
+    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
+  }
+
+  void check_figure(const Pipeline& pipeline, const std::string& path, const Place& place) {
+    const std::string output = path.substr(0, path.find('.'));
+    const PipelineOutput* found = find_output(pipeline, output, place);
+    if (!found) return;
+    const PortInfo& port = pipeline.nodes[std::size_t(found->source.node)].info.outputs[std::size_t(found->source.output)];
+    if (port.type.id != "metrics")
+      diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
+    else if (path.find('.') == std::string::npos)
+      diagnostics_.add(place, "'" + path + "' does not say which figure", "write it as  " + path + ".mtre_mm, with the items of its lists between");
+  }
+
+  const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place) {
+    std::vector<std::string> names;
+    for (const PipelineOutput& output : pipeline.outputs) {
+      names.push_back(output.name);
+      if (output.name == name) return &output;
+    }
+    diagnostics_.add(place, "the pipeline " + pipeline.name + " has no output '" + name + "'", suggestion(name, names));
+    return nullptr;
+  }
+
+  const WrittenExperiment& written_;
+  const Experiment& experiment_;
+  const Catalogue& catalogue_;
+  Diagnostics& diagnostics_;
+};
+
+}  // namespace
+
+void check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics) {
+  Checker(written, catalogue, diagnostics).check();
+}
+
+}  // namespace marrow::compare

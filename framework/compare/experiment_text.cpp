@@ -1,0 +1,258 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_text.hpp"
+
+#include <algorithm>
+#include <fstream>
+#include <set>
+#include <sstream>
+
+#include "draw.hpp"
+
+namespace marrow::compare {
+namespace {
+
+namespace fs = std::filesystem;
+
+class Reader {
+ public:
+  Reader(const fs::path& file, Diagnostics& diagnostics) : diagnostics_(diagnostics), yaml_(file.string(), diagnostics) {
+    experiment_.file = file;
+    folder_ = fs::absolute(file).parent_path();
+  }
+
+  WrittenExperiment read() {
+    const fs::path& file = experiment_.file;
+    std::ifstream stream(file, std::ios::binary);
+    if (!stream || fs::is_directory(file)) {
+      diagnostics_.add({file.string()}, "the experiment file cannot be read", "check the path");
+      return written_;
+    }
+    std::ostringstream text;
+    text << stream.rdbuf();
+    experiment_.text = text.str();
+    diagnostics_.remember(file.string(), experiment_.text);
+    const YAML::Node root = yaml_.parse(experiment_.text);
+    if (diagnostics_.empty()) read_root(root);
+    return written_;
+  }
+
+ private:
+  void read_root(const YAML::Node& root) {
+    static const std::vector<std::string> kKeys{"experiment", "name", "help", "pipeline", "inputs", "set", "cases", "variants", "matrix",
+                                                "starts", "metrics", "success", "initial_error", "baseline", "pictures", "timed_cells"};
+    const Place start{experiment_.file.string(), 1, 1};
+    const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
+    if (!root.IsMap()) return;
+    experiment_.name = experiment_.file.stem().string();
+    for (const YamlEntry& entry : entries) read_entry(entry);
+    const auto need = [&](const std::string& key, const std::string& hint) {
+      if (std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) { return e.key == key; })) yaml_.fault(start, "the key '" + key + "' is missing", hint);
+    };
+    need("experiment", "begin the file with  experiment: 1");
+    need("pipeline", "name the pipeline file whose variants are compared");
+    need("cases", "say on which data, as  cases: {folders: [...]}  or  cases: {simulate: ...}");
+    need("metrics", "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
+    if (experiment_.cases.empty() && diagnostics_.empty())
+      yaml_.fault(experiment_.cases_place, "there are no cases", "name folders, as  folders: [data/*]  or a simulation");
+    apply_matrix();
+    if (experiment_.variants.empty() && diagnostics_.empty())
+      yaml_.fault(start, "there are no variants", "name at least one under  variants:  or options under  matrix:");
+    for (const auto& [path, value, place] : success_) set_success(path, value, place);
+    set_baseline();
+    if (experiment_.protocol) experiment_.starts = draw_starts(*experiment_.protocol);
+    else experiment_.starts.push_back({"0", {}, {}});
+  }
+
+  void read_entry(const YamlEntry& entry) {
+    const auto text = [&] { return yaml_.text(entry.value, entry.place, entry.key).value_or(""); };
+    if (entry.key == "experiment") {
+      const auto version = yaml_.integer(entry.value, entry.place, "experiment");
+      if (version && *version != 1)
+        yaml_.fault(entry.place, "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+    }
+    if (entry.key == "name") {
+      experiment_.name = text();
+      if (entry.value.IsScalar()) check_name(yaml_, experiment_.name, entry.place, "an experiment's name");
+    }
+    if (entry.key == "help") experiment_.help = text();
+    if (entry.key == "pipeline") experiment_.pipeline = file_of(yaml_, entry, folder_);
+    if (entry.key == "inputs") experiment_.inputs = inputs_of(yaml_, entry);
+    if (entry.key == "set") experiment_.common = patches_of(yaml_, entry, "'set'");
+    if (entry.key == "cases") read_cases(yaml_, entry, folder_, written_);
+    if (entry.key == "variants") read_variants(entry);
+    if (entry.key == "matrix") read_matrix(entry);
+    if (entry.key == "starts") read_starts(entry);
+    if (entry.key == "metrics") read_metrics(entry);
+    if (entry.key == "success")
+      for (const YamlEntry& limit : yaml_.map(entry.value, entry.place, "'success'"))
+        if (const auto value = yaml_.number(limit.value, limit.place, limit.key)) success_.emplace_back(limit.key, *value, limit.place);
+    if (entry.key == "initial_error") {
+      experiment_.initial_error = text();
+      written_.initial_error_place = entry.place;
+    }
+    if (entry.key == "baseline") {
+      baseline_ = text();
+      baseline_place_ = entry.place;
+    }
+    if (entry.key == "pictures")
+      for (const auto& [name, place] : texts_of(yaml_, entry)) {
+        experiment_.pictures.push_back(name);
+        written_.picture_places.push_back(place);
+      }
+    if (entry.key == "timed_cells") experiment_.timed_cells = count_of(yaml_, entry, 0, 1000);
+  }
+
+  void read_variants(const YamlEntry& section) {
+    for (const YamlEntry& variant : yaml_.map(section.value, section.place, "'variants'")) {
+      check_name(yaml_, variant.key, variant.place, "a variant's name");
+      experiment_.variants.push_back({variant.key, variant.place, patches_of(yaml_, variant, "variant '" + variant.key + "'")});
+    }
+  }
+
+  void read_matrix(const YamlEntry& section) {
+    for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'matrix'")) {
+      if (!entry.value.IsSequence() || entry.value.size() == 0) {
+        yaml_.fault(entry.place, "'" + entry.key + "' in the matrix must be a list of values", "write it as  " + entry.key + ": [a, b]");
+        continue;
+      }
+      std::vector<Override> column;
+      for (const YAML::Node& value : entry.value) column.push_back({entry.key, patch_value(value), yaml_.place(value)});
+      matrix_.push_back(std::move(column));
+    }
+  }
+
+  /// Every variant in every combination of the matrix.
+  void apply_matrix() {
+    if (matrix_.empty()) return;
+    std::vector<Variant> combined = experiment_.variants;
+    if (combined.empty()) combined.push_back({"", matrix_[0][0].place, {}});
+    for (const std::vector<Override>& column : matrix_) {
+      std::vector<Variant> next;
+      for (const Variant& variant : combined)
+        for (const Override& one : column) {
+          Variant more = variant;
+          if (!more.name.empty()) more.name += '+';
+          more.name += short_value(one.value);
+          more.overrides.push_back(one);
+          put_uses_first(more.overrides);
+          next.push_back(std::move(more));
+        }
+      combined = std::move(next);
+    }
+    std::set<std::string> seen;
+    for (Variant& variant : combined) {
+      while (!seen.insert(variant.name).second) variant.name += "_";
+      check_name(yaml_, variant.name, variant.place, "a variant's name");
+    }
+    experiment_.variants = std::move(combined);
+  }
+
+  /// The part of a value that names it best: of a node, what follows its kind.
+  static std::string short_value(std::string value) {
+    const std::size_t dot = value.find('.');
+    if (dot != std::string::npos && dot + 1 < value.size() && std::isalpha(static_cast<unsigned char>(value[dot + 1]))) value = value.substr(dot + 1);
+    for (char& c : value)
+      if (std::string("/\\ \t\n").find(c) != std::string::npos) c = '_';
+    return value;
+  }
+
+  void read_starts(const YamlEntry& section) {
+    static const std::vector<std::string> kKeys{"node", "count", "seed", "rotation_deg", "translation_mm"};
+    StartProtocol protocol;
+    protocol.place = section.place;
+    bool has_node = false, has_count = false;
+    for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'starts'", &kKeys)) {
+      has_node |= entry.key == "node";
+      has_count |= entry.key == "count";
+      if (entry.key == "node") protocol.node = yaml_.text(entry.value, entry.place, "node").value_or("");
+      if (entry.key == "count") protocol.count = count_of(yaml_, entry, 1, 100000);
+      if (entry.key == "seed") protocol.seed = count_of(yaml_, entry, 0, std::int64_t(1) << 62);
+      if (entry.key == "rotation_deg") protocol.rotation_deg = limit_of(yaml_, entry, 180);
+      if (entry.key == "translation_mm") protocol.translation_mm = limit_of(yaml_, entry, 1000);
+    }
+    if (!section.value.IsMap()) return;
+    if (!has_node) yaml_.fault(section.place, "'starts' does not say which node is displaced", "add  node: start");
+    if (!has_count) yaml_.fault(section.place, "'starts' does not say how many", "add  count: 20");
+    experiment_.protocol = protocol;
+  }
+
+  void read_metrics(const YamlEntry& entry) {
+    const std::string hint = "write it as  metrics: [errors.distal.final.mtre_mm]";
+    if (!entry.value.IsSequence()) return yaml_.fault(entry.place, "'metrics' must be a list", hint);
+    if (entry.value.size() == 0) return yaml_.fault(entry.place, "'metrics' names no figure", hint);
+    for (const YAML::Node& item : entry.value) {
+      const Place place = yaml_.place(item);
+      const MetricChoice metric = read_metric(item, place);
+      const auto is_same = [&](const MetricChoice& other) { return other.path == metric.path; };
+      if (metric.path.empty()) continue;
+      if (std::any_of(experiment_.metrics.begin(), experiment_.metrics.end(), is_same)) yaml_.fault(place, "'" + metric.path + "' is given twice in 'metrics'");
+      experiment_.metrics.push_back(metric);
+      written_.metric_places.push_back(place);
+    }
+  }
+
+  /// A path, or a path with a name for people.
+  MetricChoice read_metric(const YAML::Node& item, const Place& place) {
+    static const std::vector<std::string> kKeys{"figure", "label", "better"};
+    MetricChoice metric;
+    if (item.IsMap()) {
+      bool has_figure = false;
+      for (const YamlEntry& part : yaml_.map(item, place, "a metric", &kKeys)) {
+        has_figure |= part.key == "figure";
+        const std::string text = yaml_.text(part.value, part.place, part.key).value_or("");
+        if (part.key == "better") metric.better = read_better(text, part.place);
+        else (part.key == "figure" ? metric.path : metric.label) = text;
+      }
+      if (!has_figure) yaml_.fault(place, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
+    } else {
+      metric.path = yaml_.text(item, place, "an item of 'metrics'").value_or("");
+    }
+    if (metric.label.empty()) metric.label = metric.path;
+    return metric;
+  }
+
+  MetricChoice::Better read_better(const std::string& text, const Place& place) {
+    static const std::vector<std::string> kNames{"lower", "higher", "nearest_zero"};
+    const auto found = std::find(kNames.begin(), kNames.end(), text);
+    if (found == kNames.end()) yaml_.fault(place, "'" + text + "' is no way to be better", suggestion(text, kNames));
+    return found == kNames.end() ? MetricChoice::Better::lower : MetricChoice::Better(found - kNames.begin());
+  }
+
+  void set_success(const std::string& path, double value, const Place& place) {
+    std::vector<std::string> paths;
+    for (MetricChoice& metric : experiment_.metrics) {
+      paths.push_back(metric.path);
+      if (metric.path != path) continue;
+      metric.limit = value;
+      return;
+    }
+    yaml_.fault(place, "'" + path + "' is not among the metrics", suggestion(path, paths));
+  }
+
+  void set_baseline() {
+    if (baseline_.empty()) return;
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < experiment_.variants.size(); ++i) {
+      names.push_back(experiment_.variants[i].name);
+      if (names.back() == baseline_) experiment_.baseline = i;
+    }
+    if (std::find(names.begin(), names.end(), baseline_) == names.end())
+      yaml_.fault(baseline_place_, "there is no variant '" + baseline_ + "'", suggestion(baseline_, names));
+  }
+
+  Diagnostics& diagnostics_;
+  StrictYaml yaml_;
+  WrittenExperiment written_;
+  Experiment& experiment_ = written_.experiment;
+  fs::path folder_;
+  std::vector<std::vector<Override>> matrix_;
+  std::vector<std::tuple<std::string, double, Place>> success_;
+  std::string baseline_;
+  Place baseline_place_;
+};
+
+}  // namespace
+
+WrittenExperiment read_written_experiment(const fs::path& file, Diagnostics& diagnostics) { return Reader(file, diagnostics).read(); }
+
+}  // namespace marrow::compare

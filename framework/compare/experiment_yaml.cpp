@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "experiment_yaml.hpp"
+
+#include <algorithm>
+
+#include "draw.hpp"
+
+namespace marrow::compare {
+
+namespace fs = std::filesystem;
+
+PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry) {
+  PlacedTexts result;
+  if (!entry.value.IsSequence()) {
+    yaml.fault(entry.place, "'" + entry.key + "' must be a list", "write it as  " + entry.key + ": [a, b]");
+    return result;
+  }
+  for (const YAML::Node& item : entry.value)
+    if (const auto text = yaml.text(item, yaml.place(item), "an item of '" + entry.key + "'")) result.emplace_back(*text, yaml.place(item));
+  return result;
+}
+
+std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section) {
+  std::vector<InputValue> result;
+  for (const YamlEntry& entry : yaml.map(section.value, section.place, "'" + section.key + "'")) {
+    if (entry.value.IsScalar()) result.push_back({entry.key, entry.value.Scalar(), entry.place});
+    else yaml.fault(entry.place, "'" + entry.key + "' must be one value");
+  }
+  return result;
+}
+
+std::string patch_value(const YAML::Node& value) {
+  YAML::Emitter out;
+  out << YAML::Flow << value;
+  return out.c_str();
+}
+
+void put_uses_first(std::vector<Override>& patches) {
+  std::stable_partition(patches.begin(), patches.end(), [](const Override& one) { return one.key.ends_with(".uses"); });
+}
+
+std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what) {
+  std::vector<Override> result;
+  if (section.value.IsNull()) return result;
+  for (const YamlEntry& entry : yaml.map(section.value, section.place, what)) result.push_back({entry.key, patch_value(entry.value), entry.place});
+  put_uses_first(result);
+  return result;
+}
+
+std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t least, std::int64_t most) {
+  const auto value = yaml.integer(entry.value, entry.place, entry.key);
+  if (!value) return std::uint64_t(least);
+  if (*value >= least && *value <= most) return std::uint64_t(*value);
+  yaml.fault(entry.place, "'" + entry.key + "' must be " + std::to_string(least) + " to " + std::to_string(most) + ", got " + std::to_string(*value));
+  return std::uint64_t(least);
+}
+
+double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most) {
+  const auto value = yaml.number(entry.value, entry.place, entry.key);
+  if (!value) return 0;
+  if (*value >= 0 && *value <= most) return *value;
+  yaml.fault(entry.place, "'" + entry.key + "' must be 0 to " + number_text(most) + ", got " + number_text(*value));
+  return 0;
+}
+
+void check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what) {
+  if (name.empty() || name[0] == '.' || name.find_first_of("/\\ \t\n") != std::string::npos)
+    yaml.fault(place, what + " becomes a file name: '" + name + "' cannot be one", "use letters, digits, '-' and '_'");
+}
+
+fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
+  const auto text = yaml.text(entry.value, entry.place, entry.key);
+  if (!text) return {};
+  const fs::path file = (folder / *text).lexically_normal();
+  std::error_code error;
+  if (fs::is_regular_file(file, error)) return file;
+  yaml.fault(entry.place, "there is no file '" + *text + "'", "the path starts at the experiment's file");
+  return {};
+}
+
+}  // namespace marrow::compare

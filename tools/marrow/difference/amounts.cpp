@@ -1,0 +1,293 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "difference/amounts.hpp"
+
+#include <algorithm>
+#include <cstdarg>
+#include <cstdio>
+#include <map>
+
+#include "difference/numbers.hpp"
+#include "marrow/runtime/types.hpp"
+
+namespace marrow::cli {
+namespace {
+
+__attribute__((format(printf, 1, 2))) std::string text(const char* format, ...) {
+  char buffer[512];
+  va_list arguments;
+  va_start(arguments, format);
+  std::vsnprintf(buffer, sizeof buffer, format, arguments);
+  va_end(arguments);
+  return buffer;
+}
+
+double percent(std::size_t part, std::size_t all) { return all ? 100.0 * double(part) / double(all) : 0; }
+
+template <class T>
+void compare(const T& a, const T& b, Amount& amount);
+
+/// A part of a value, under its own name.
+template <class T>
+void compare_part(const std::string& name, const T& a, const T& b, Amount& amount) {
+  if (hash_of(a) == hash_of(b)) return;
+  Amount part;
+  compare(a, b, part);
+  for (const std::string& line : part.lines) amount.lines.push_back(name + ": " + line);
+  amount.facts[name] = part.facts;
+}
+
+template <class T>
+void compare_lists(const std::string& what, const List<T>& a, const List<T>& b, Amount& amount) {
+  for (const std::string& name : a.names())
+    if (const T* other = b.find(name)) compare_part(what + " " + name, *a.find(name), *other, amount);
+    else amount.lines.push_back(what + " " + name + ": it is not there, was there");
+  for (const std::string& name : b.names())
+    if (!a.find(name)) amount.lines.push_back(what + " " + name + ": it was not there");
+}
+
+/// Any type, number by number.
+template <class T>
+void compare_numbers(const T& a, const T& b, Amount& amount) {
+  NumberDifference numbers;
+  numbers.add(a, b);
+  amount.facts = {{"numbers", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}, {"texts_differ", numbers.texts}, {"same_shape", numbers.same_shape}};
+  if (numbers.differ) amount.lines.push_back(text("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
+  if (numbers.texts) amount.lines.push_back(text("%zu texts differ", numbers.texts));
+  if (!numbers.same_shape) amount.lines.push_back("lists in it are of other lengths");
+}
+
+void compare_placement(const RigidTransform& a, const RigidTransform& b, const FragmentFrame* frame, Amount& amount) {
+  if (a.target != b.target || a.source != b.source) {
+    amount.lines.push_back("it leads from '" + b.source + "' to '" + b.target + "', led from '" + a.source + "' to '" + a.target + "'");
+    return;
+  }
+  const Eigen::Vector3d point = frame ? frame->origin_mm : Eigen::Vector3d::Zero();
+  const double angle_deg = degrees(geodesic_angle_rad(a.rotation, b.rotation)), distance_mm = (b * point - a * point).norm();
+  amount.facts = {{"rotation_deg", angle_deg}, {"displacement_mm", distance_mm}};
+  const std::string where = frame ? "the fragment's centroid" : "the origin of '" + a.source + "'";
+  std::string line = text("%.4g deg and %.4g mm apart at %s", angle_deg, distance_mm, where.c_str());
+  if (frame) {
+    const Vector6d motion = motion_between(a, b, *frame);
+    amount.facts["axial_rotation_deg"] = degrees(motion[2]);
+    amount.facts["axial_displacement_mm"] = motion[5];
+    line += text(" (%+.4g deg about and %+.4g mm along its long axis)", degrees(motion[2]), motion[5]);
+  }
+  amount.lines.push_back(angle_deg == 0 && distance_mm == 0 ? "at the same place" : line);
+}
+
+void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
+  const bool has_frame = !a.frame.origin_mm.isZero();
+  compare_placement(a.world_from_model, b.world_from_model, has_frame ? &a.frame : nullptr, amount);
+  if (a.cost != b.cost || a.evaluations != b.evaluations)
+    amount.lines.push_back(text("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
+  else if (hash_of(a.world_from_model) == hash_of(b.world_from_model) && a.warnings == b.warnings)
+    amount.lines.push_back("its predicted deviations or the way of the search differ");
+  amount.facts["cost"] = {a.cost, b.cost};
+  amount.facts["evaluations"] = {a.evaluations, b.evaluations};
+  if (a.covariance.has_value() != b.covariance.has_value())
+    amount.lines.push_back(b.covariance ? "its deviations are predicted, were not" : "its deviations are not predicted, were");
+  for (const std::string& warning : b.warnings)
+    if (std::find(a.warnings.begin(), a.warnings.end(), warning) == a.warnings.end()) amount.lines.push_back("it warns now: " + warning);
+  for (const std::string& warning : a.warnings)
+    if (std::find(b.warnings.begin(), b.warnings.end(), warning) == b.warnings.end()) amount.lines.push_back("it warned before: " + warning);
+}
+
+void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
+  std::size_t same = 0;
+  const auto find = [](const Metrics& metrics, const std::string& name) {
+    const auto found = std::find_if(metrics.items.begin(), metrics.items.end(), [&](const Metric& metric) { return metric.name == name; });
+    return found == metrics.items.end() ? nullptr : &*found;
+  };
+  for (const Metric& now : b.items) {
+    const Metric* before = find(a, now.name);
+    const std::string unit = now.unit.empty() ? "" : " " + now.unit;
+    if (!before) {
+      amount.lines.push_back(text("%-24s %.5g%s, was not there", now.name.c_str(), now.value, unit.c_str()));
+    } else if (now.value == before->value || (std::isnan(now.value) && std::isnan(before->value))) {
+      ++same;
+      continue;
+    } else {
+      amount.lines.push_back(text("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(), before->value, now.value - before->value));
+    }
+    amount.facts[now.name] = {{"before", before ? nlohmann::json(before->value) : nlohmann::json()}, {"now", now.value}, {"unit", now.unit}};
+    if (before) amount.facts[now.name]["difference"] = now.value - before->value;
+  }
+  for (const Metric& before : a.items) {
+    if (find(b, before.name)) continue;
+    amount.lines.push_back(text("%-24s is not there, was %.5g%s", before.name.c_str(), before.value, (before.unit.empty() ? "" : " " + before.unit).c_str()));
+    amount.facts[before.name] = {{"before", before.value}, {"now", nullptr}, {"unit", before.unit}};
+  }
+  if (same) amount.lines.push_back(text("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
+}
+
+void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
+  const std::size_t before = a.vertices_mm.size(), now = b.vertices_mm.size();
+  amount.facts = {{"vertices", {before, now}}, {"triangles", {a.triangles.size(), b.triangles.size()}}};
+  if (before != now || a.triangles.size() != b.triangles.size()) {
+    const double area_before = surface_area_mm2(a), area_now = surface_area_mm2(b);
+    amount.facts["area_mm2"] = {area_before, area_now};
+    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now, before, b.triangles.size(),
+                                a.triangles.size(), area_now, area_before));
+  }
+  if (before != now) return;
+  double largest_mm = 0;
+  std::size_t moved = 0;
+  for (std::size_t i = 0; i < now; ++i) {
+    const double distance_mm = (b.vertices_mm[i] - a.vertices_mm[i]).norm();
+    moved += distance_mm != 0;
+    largest_mm = std::max(largest_mm, distance_mm);
+  }
+  amount.facts["moved"] = moved;
+  amount.facts["largest_displacement_mm"] = largest_mm;
+  amount.lines.push_back(text("%zu of %zu vertices lie elsewhere, by at most %.4g mm", moved, now, largest_mm));
+  if (a.triangles.size() == b.triangles.size() && a.triangles != b.triangles) amount.lines.push_back("its triangles join other vertices");
+}
+
+void add_samples(const NumberDifference& numbers, const char* what, const char* unit, Amount& amount) {
+  amount.facts.update({{"samples", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}});
+  amount.lines.push_back(text("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count, what, percent(numbers.differ, numbers.count),
+                              numbers.largest, unit));
+}
+
+/// Samples on grids; where those differ in size, samples cannot be matched.
+void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& values_a, const std::vector<float>& values_b, const char* unit, Amount& amount) {
+  amount.facts["size"] = {a.size, b.size};
+  if (a.size != b.size || values_a.size() != values_b.size()) {
+    amount.lines.push_back(text("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2], a.size[0], a.size[1], a.size[2]));
+    return;
+  }
+  if (hash_of(a) != hash_of(b)) amount.lines.push_back("its grid lies elsewhere or has another spacing");
+  NumberDifference numbers;
+  numbers.add(values_a, values_b);
+  add_samples(numbers, "voxels", unit, amount);
+}
+
+void compare_fields(const SignedField& a, const SignedField& b, Amount& amount) {
+  compare_grids(a.grid, b.grid, a.values_mm, b.values_mm, "mm", amount);
+  if (a.values_mm.size() != b.values_mm.size()) return;
+  std::size_t in = 0, out = 0;
+  for (std::size_t i = 0; i < a.values_mm.size(); ++i) {
+    in += a.values_mm[i] >= 0 && b.values_mm[i] < 0;
+    out += a.values_mm[i] < 0 && b.values_mm[i] >= 0;
+  }
+  amount.facts["voxels_now_inside"] = in;
+  amount.facts["voxels_now_outside"] = out;
+  amount.lines.push_back(text("%zu voxels are inside now, %zu are outside now", in, out));
+}
+
+void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
+  amount.facts["size"] = {{a.cols, a.rows}, {b.cols, b.rows}};
+  if (a.size() != b.size() || a.type() != b.type()) {
+    amount.lines.push_back(text("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows, 8 * int(b.elemSize()), a.cols, a.rows, 8 * int(a.elemSize())));
+    return;
+  }
+  NumberDifference numbers;
+  numbers.add(a, b);
+  numbers.count = a.total();
+  numbers.differ = 0;  // pixels, not channels
+  for (int row = 0; row < a.rows; ++row)
+    for (int column = 0; column < a.cols; ++column) numbers.differ += std::memcmp(a.ptr(row, column), b.ptr(row, column), a.elemSize()) != 0;
+  add_samples(numbers, "pixels", "grey values", amount);
+}
+
+void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
+  std::map<std::pair<long, long>, const EdgePixel*> before;
+  for (const EdgePixel& pixel : a.pixels) before[{std::lround(pixel.v_px), std::lround(pixel.u_px)}] = &pixel;
+  std::size_t common = 0, changed = 0;
+  double largest_px = 0;
+  for (const EdgePixel& pixel : b.pixels) {
+    const auto found = before.find({std::lround(pixel.v_px), std::lround(pixel.u_px)});
+    if (found == before.end()) continue;
+    const EdgePixel& old = *found->second;
+    ++common;
+    changed += hash_of(pixel) != hash_of(old);
+    largest_px = std::max(largest_px, std::hypot(double(pixel.u_px) - old.u_px, double(pixel.v_px) - old.v_px));
+    before.erase(found);
+  }
+  const std::size_t gone = before.size(), added = b.pixels.size() - common;
+  amount.facts = {{"pixels", {a.pixels.size(), b.pixels.size()}}, {"gone", gone}, {"new", added}, {"changed", changed}, {"largest_px", largest_px}};
+  amount.lines.push_back(text("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
+  if (changed) amount.lines.push_back(text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
+}
+
+/// How far the line's ends are from the other line, and the angle between them.
+void compare_lines(const std::string& name, const LineSegment& a, const LineSegment& b, Amount& amount) {
+  const Eigen::Vector2d along = (a.to_px - a.from_px).normalized(), now_along = (b.to_px - b.from_px).normalized();
+  const auto cross = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) { return p.x() * q.y() - p.y() * q.x(); };
+  const double distance_px = std::max(std::abs(cross(along, b.from_px - a.from_px)), std::abs(cross(along, b.to_px - a.from_px)));
+  const double angle_deg = degrees(std::atan2(std::abs(cross(along, now_along)), along.dot(now_along)));
+  amount.facts[name] = {{"distance_px", distance_px}, {"angle_deg", angle_deg}};
+  if (hash_of(a) != hash_of(b)) amount.lines.push_back(text("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
+}
+
+void compare_shafts(const ShaftLines& a, const ShaftLines& b, Amount& amount) {
+  compare_lines("left", a.left, b.left, amount);
+  compare_lines("right", a.right, b.right, amount);
+  amount.facts["width_mm"] = {a.width_mm, b.width_mm};
+  if (a.width_mm != b.width_mm) amount.lines.push_back(text("width %.6g mm, was %.6g", b.width_mm, a.width_mm));
+  if (a.log_likelihood != b.log_likelihood) amount.lines.push_back(text("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
+  if (amount.lines.empty()) amount.lines.push_back("the same borders; the rejected candidates differ");
+}
+
+template <class T>
+void compare(const T& a, const T& b, Amount& amount) {
+  if constexpr (std::is_same_v<T, Pose>) {
+    compare_poses(a, b, amount);
+  } else if constexpr (std::is_same_v<T, Truth>) {
+    compare_placement(a.world_from_model, b.world_from_model, nullptr, amount);
+  } else if constexpr (std::is_same_v<T, Metrics>) {
+    compare_metrics(a, b, amount);
+  } else if constexpr (std::is_same_v<T, Mesh>) {
+    compare_meshes(a, b, amount);
+  } else if constexpr (std::is_same_v<T, Volume>) {
+    compare_grids(a.grid, b.grid, a.values, b.values, "HU", amount);
+  } else if constexpr (std::is_same_v<T, SignedField>) {
+    compare_fields(a, b, amount);
+  } else if constexpr (std::is_same_v<T, Image> || std::is_same_v<T, Picture>) {
+    compare_pixels(a.pixels, b.pixels, amount);
+  } else if constexpr (std::is_same_v<T, EdgeMap>) {
+    compare_edges(a, b, amount);
+  } else if constexpr (std::is_same_v<T, ShaftLines>) {
+    compare_shafts(a, b, amount);
+  } else if constexpr (std::is_same_v<T, View>) {
+    compare_part("image", a.image, b.image, amount);
+    compare_part("camera", a.camera, b.camera, amount);
+    compare_part("mask", Image{a.mask}, Image{b.mask}, amount);
+  } else if constexpr (std::is_same_v<T, Case>) {
+    compare_part("ct", a.ct, b.ct, amount);
+    compare_lists("seeds", a.seeds, b.seeds, amount);
+    compare_lists("view", a.views, b.views, amount);
+    compare_lists("start", a.start, b.start, amount);
+    compare_lists("truth", a.truth, b.truth, amount);
+  } else {
+    compare_numbers(a, b, amount);
+  }
+}
+
+/// Compares as the one of the types that the values are of.
+template <class... T>
+void compare_as_any_of(const Value& before, const Value& now, Amount& amount) {
+  ((before.type == TypeInfo::of<T>() && (compare(before.as<T>(), now.as<T>(), amount), true)) || ...);
+}
+
+}  // namespace
+
+Amount amount_of(const Value& before, const Value& now) {
+  Amount amount;
+  if (before.type == now.type)
+    compare_as_any_of<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Pose, Truth, Metrics, Scene, Landscape, Case>(before, now, amount);
+  return amount;
+}
+
+Amount amount_of_bytes(const std::string& before, const std::string& now, const std::string& what) {
+  Amount amount;
+  const std::size_t common = std::min(before.size(), now.size());
+  std::size_t differ = 0;
+  for (std::size_t i = 0; i < common; ++i) differ += before[i] != now[i];
+  amount.facts = {{"bytes", {before.size(), now.size()}}, {"bytes_differ", differ}};
+  if (before.size() == now.size()) amount.lines.push_back(text("%zu of %zu bytes of %s differ", differ, common, what.c_str()));
+  else amount.lines.push_back(text("%s of %zu bytes, were %zu", what.c_str(), now.size(), before.size()));
+  return amount;
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "difference/changes.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <set>
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A number in the shortest form that means the same; resolved pipelines hold them with 17 digits.
+std::string shortened(const std::string& text) {
+  if (text.starts_with("[") && text.ends_with("]")) {
+    std::string result;
+    for (std::size_t begin = 1; begin < text.size();) {
+      const std::size_t end = std::min(text.find(", ", begin), text.size() - 1);
+      result += (begin > 1 ? ", " : "") + shortened(text.substr(begin, end - begin));
+      begin = end + (end == text.size() - 1 ? 1 : 2);
+    }
+    return "[" + result + "]";
+  }
+  double value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return text;
+  char shortest[32];
+  return std::string(shortest, std::to_chars(shortest, shortest + sizeof shortest, value).ptr);
+}
+
+std::string is_was(const std::string& what, const std::string* before, const std::string* now) {
+  if (!now) return what + " is not there, was " + *before;
+  return what + " is " + *now + (before ? ", was " + *before : ", was not there");
+}
+
+template <class Map>
+std::set<std::string> names_in(const Map& a, const Map& b) {
+  std::set<std::string> names;
+  for (const auto& [name, value] : a) names.insert(name);
+  for (const auto& [name, value] : b) names.insert(name);
+  return names;
+}
+
+template <class Map>
+const typename Map::mapped_type* find_in(const Map& map, const std::string& name) {
+  const auto found = map.find(name);
+  return found == map.end() ? nullptr : &found->second;
+}
+
+std::string file_or_folder(const std::string& path) {
+  std::error_code error;
+  return (fs::is_directory(path, error) ? "the folder " : fs::exists(path, error) ? "the file " : "") + path;
+}
+
+class Comparer {
+ public:
+  Comparer(const RunRecord& before, const RunRecord& now) : before_(before), now_(now) {
+    for (const RecordedNode& node : before.nodes)
+      if (const RecordedNode* other = now.find(node.id); other && came_out_otherwise(node, *other)) differing_.insert(node.id);
+  }
+
+  RunDifference compare() {
+    RunDifference result;
+    std::set<std::string> explained;
+    for (const RecordedNode& node : before_.nodes) {
+      const RecordedNode* other = now_.find(node.id);
+      if (!other) {
+        result.only_before.push_back(node.id);
+      } else if (!differing_.contains(node.id)) {
+        result.same += node.makes_data() || !functions_differ(node, *other);
+      } else if (follows(node, *other)) {
+        result.in_consequence.push_back(node.id);
+      } else {
+        result.roots.push_back({&node, other, reasons_of(node, *other)});
+        explained.insert(node.id);
+        for (const Change& change : result.roots.back().why) explained.insert(change.node);
+      }
+    }
+    for (const RecordedNode& node : now_.nodes)
+      if (!before_.find(node.id)) result.only_now.push_back(node.id);
+    add_others(explained, result);
+    add_rebuilt(result);
+    return result;
+  }
+
+ private:
+  /// Functions have no content that could be compared: what they lead to counts.
+  static bool came_out_otherwise(const RecordedNode& before, const RecordedNode& now) {
+    if (before.went_well() != now.went_well() || (!now.went_well() && before.status != now.status)) return true;
+    if (now.status == "failed" && before.reason != now.reason) return true;
+    const auto a = before.data(), b = now.data();
+    const bool went_well = before.went_well();
+    if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // whatever their names
+    return !std::equal(a.begin(), a.end(), b.begin(), b.end(),
+                       [&](const RecordedOutput* x, const RecordedOutput* y) { return x->name == y->name && !is_other(*x, *y, went_well); });
+  }
+
+  /// Of nodes that failed, or were never run, what they made nevertheless counts.
+  static bool is_other(const RecordedOutput& before, const RecordedOutput& now, bool went_well) {
+    if (went_well || before.key == now.key) return before.key != now.key;
+    const auto present = [](const RecordedOutput& output) {
+      std::map<std::string, std::string> items;
+      for (const RecordedItem& item : output.items)
+        if (!item.is_absent()) items[item.place] = item.key;
+      return items;
+    };
+    return present(before) != present(now);
+  }
+
+  static bool functions_differ(const RecordedNode& before, const RecordedNode& now) {
+    return !std::equal(before.outputs.begin(), before.outputs.end(), now.outputs.begin(), now.outputs.end(),
+                       [](const RecordedOutput& a, const RecordedOutput& b) { return a.key == b.key; });
+  }
+
+  /// Whether an input that is wired alike in both runs brought other values.
+  bool input_differs(const RecordedNode& before, const RecordedNode& now, const std::string& port) const {
+    const std::string *a = find_in(before.input_keys, port), *b = find_in(now.input_keys, port);
+    return a && b && *a != *b;
+  }
+
+  /// Calls visit(port, source before, source now) for each input that is wired alike and brought other values.
+  template <class Visit>
+  void for_changed_inputs(const RecordedNode& before, const RecordedNode& now, const Visit& visit) const {
+    for (const auto& [port, wire] : now.wires) {
+      const RecordedWire* old = find_in(before.wires, port);
+      if (!old || old->text != wire.text || !input_differs(before, now, port)) continue;
+      for (const std::string& id : wire.from)
+        if (const RecordedNode *a = before_.find(id), *b = now_.find(id); a && b) visit(port, *a, *b);
+    }
+  }
+
+  /// Whether data that the node takes, itself or through functions that it calls, differ.
+  bool follows(const RecordedNode& before, const RecordedNode& now) const {
+    bool result = false;
+    for_changed_inputs(before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
+      result = result || differing_.contains(from_now.id) || (!from_now.makes_data() && follows(from_before, from_now));
+    });
+    return result;
+  }
+
+  std::vector<Change> reasons_of(const RecordedNode& before, const RecordedNode& now) const {
+    std::vector<Change> why;
+    add_reasons(before, now, "", why);
+    if (why.empty()) why.push_back(unknown(now.id));
+    return why;
+  }
+
+  void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through, std::vector<Change>& why) const {
+    const auto add = [&](Change change) {
+      change.text = through + change.text;
+      why.push_back(std::move(change));
+    };
+    for (Change& change : own_changes(before, now, true)) add(std::move(change));
+    for (Change& change : other_wires(before, now, true)) add(std::move(change));
+    for_changed_inputs(before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
+      const auto is_named = std::any_of(why.begin(), why.end(), [&](const Change& change) { return change.node == from_now.id; });
+      if (!from_now.makes_data() && !is_named) add_reasons(from_before, from_now, "the function of node '" + from_now.id + "', which it calls: ", why);
+    });
+  }
+
+  std::vector<Change> own_changes(const RecordedNode& before, const RecordedNode& now, bool with_builds) const {
+    if (before.uses != now.uses) return {{"uses", now.id, "", before.uses, now.uses, "it uses " + now.uses + ", used " + before.uses}};
+    std::vector<Change> changes;
+    if (with_builds && before.build_id != now.build_id && !before.build_id.empty() && !now.build_id.empty()) changes.push_back(other_build(before, now));
+    for (const std::string& name : names_in(before.options, now.options)) {
+      const std::string text = option_change(before, now, name);
+      const std::string *a = find_in(before.options, name), *b = find_in(now.options, name);
+      if (!text.empty()) changes.push_back({now.files.contains(name) ? "content" : "option", now.id, name, a ? *a : "", b ? *b : "", text});
+    }
+    if (with_builds && now.random && before_.seed != now_.seed)
+      changes.push_back(seed_change(now.id, "it draws random numbers, and the seed is "));
+    return changes;
+  }
+
+  Change seed_change(const std::string& node, const std::string& text) const {
+    const std::string before = std::to_string(before_.seed), now = std::to_string(now_.seed);
+    return {"seed", node, "", before, now, text + now + ", was " + before};
+  }
+
+  Change other_build(const RecordedNode& before, const RecordedNode& now) const {
+    Change change{"plugin", now.id, now.library, before.build_id, now.build_id, ""};
+    const std::string ids = build_ids(before.build_id, now.build_id);
+    if (before.library != now.library) change.text = "it comes from " + now.library + ", came from " + before.library + ids;
+    else change.text = "its plugin " + now.library + " is another build" + ids;
+    if (before_.framework != now_.framework) change.text += "; marrow's own library is another build too, which gives every plugin another build id";
+    return change;
+  }
+
+  /// Why an option may make a difference; empty where it does not. Paths count by the content of what they name.
+  static std::string option_change(const RecordedNode& before, const RecordedNode& now, const std::string& name) {
+    const std::string *old_text = find_in(before.options, name), *text = find_in(now.options, name), option = "option '" + name + "'";
+    const auto *old_content = find_in(before.files, name), *content = find_in(now.files, name);
+    if (old_text && text && old_content && content) {
+      if (*old_content == *content) return "";
+      if (!*content) return *text + " (" + option + ") is not there" + (*old_text == *text ? " any more" : ", was " + *old_text);
+      if (!*old_content) return *old_text + " (" + option + ") was not there" + (*old_text == *text ? " yet" : ", is " + *text);
+      if (*old_text == *text) return "the content of " + file_or_folder(*text) + " (" + option + ") differs";
+      return option + " is " + *text + ", was " + *old_text + ", and the contents differ";
+    }
+    const std::string old_short = old_text ? shortened(*old_text) : "", now_short = text ? shortened(*text) : "";
+    if (old_text && text && old_short == now_short) return "";
+    return is_was(option, old_text ? &old_short : nullptr, text ? &now_short : nullptr);
+  }
+
+  /// Inputs that are wired to something else; with `by_value` only those that brought other values.
+  std::vector<Change> other_wires(const RecordedNode& before, const RecordedNode& now, bool by_value) const {
+    std::vector<Change> changes;
+    for (const std::string& port : names_in(before.wires, now.wires)) {
+      const RecordedWire *a = find_in(before.wires, port), *b = find_in(now.wires, port);
+      if (a && b && a->text == b->text) continue;
+      const std::string *old_key = find_in(before.input_keys, port), *key = find_in(now.input_keys, port);
+      if (by_value && old_key && key && *old_key == *key) continue;
+      Change change{"wire", now.id, port, a ? a->text : "", b ? b->text : "", "input '" + port + "' is "};
+      change.text += b ? "wired to " + b->text + did_not_run(*b, before_) : std::string("not wired");
+      change.text += a ? ", was wired to " + a->text + did_not_run(*a, now_) : std::string(", was not wired");
+      changes.push_back(std::move(change));
+    }
+    return changes;
+  }
+
+  std::string did_not_run(const RecordedWire& wire, const RunRecord& in) const {
+    for (const std::string& id : wire.from)
+      if (!in.find(id)) return std::string(" (") + (&in == &before_ ? "there was" : "there is") + " no node '" + id + "')";
+    return "";
+  }
+
+  Change unknown(const std::string& node) const {
+    Change change{"unknown", node, "", "", "", ""};
+    change.text = "nothing that it was made from differs (plugin, options, contents of files, inputs, seed): it does not give the same result each time";
+    if (before_.cpu_level != now_.cpu_level) change.text += "; the processor is of another level (" + now_.cpu_level + ", was " + before_.cpu_level + ")";
+    if (before_.threads != now_.threads) change.text += "; it ran on " + std::to_string(now_.threads) + " threads, ran on " + std::to_string(before_.threads);
+    return change;
+  }
+
+  void add_others(const std::set<std::string>& explained, RunDifference& result) const {
+    for (const RecordedNode& node : before_.nodes) {
+      const RecordedNode* other = now_.find(node.id);
+      if (!other || explained.contains(node.id)) continue;
+      for (Change& change : own_changes(node, *other, false)) result.others.push_back(std::move(change));
+      for (Change& change : other_wires(node, *other, false)) result.others.push_back(std::move(change));
+    }
+    const auto is_seed = [](const Change& change) { return change.what == "seed"; };
+    const bool is_told = std::any_of(result.roots.begin(), result.roots.end(), [&](const Root& root) { return std::any_of(root.why.begin(), root.why.end(), is_seed); });
+    if (before_.seed != now_.seed && !is_told)
+      result.others.push_back(seed_change("", "the seed is "));
+  }
+
+  void add_rebuilt(RunDifference& result) const {
+    for (const auto& [file, build_id] : now_.plugins) {
+      const std::string* old = find_in(before_.plugins, file);
+      if (old && *old != build_id) result.rebuilt.push_back({"plugin", "", file, *old, build_id, file + build_ids(*old, build_id)});
+    }
+  }
+
+  static std::string build_ids(const std::string& before, const std::string& now) { return " (build id " + now.substr(0, 8) + ", was " + before.substr(0, 8) + ")"; }
+
+  const RunRecord& before_;
+  const RunRecord& now_;
+  std::set<std::string> differing_;  ///< nodes in both runs whose data or fate differ
+};
+
+}  // namespace
+
+RunDifference difference_of(const RunRecord& before, const RunRecord& now) { return Comparer(before, now).compare(); }
+
+}  // namespace marrow::cli

@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is said of two runs to people.
+#include <algorithm>
+#include <cstdio>
+#include <set>
+
+#include "difference/findings.hpp"
+
+namespace marrow::cli {
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+void print_fate(const char* which, const RecordedNode& node) {
+  if (node.went_well()) std::printf("  %s it was done\n", which);
+  else std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(), node.reason.empty() ? "" : ": ", node.reason.c_str());
+}
+
+void print_amount(const std::string& label, std::size_t width, const std::vector<std::string>& lines) {
+  if (lines.size() == 1) {
+    std::printf("  %-*s  %s\n", int(width), label.c_str(), lines[0].c_str());
+    return;
+  }
+  std::printf("  %s\n", label.c_str());
+  for (const std::string& line : lines) std::printf("      %s\n", line.c_str());
+}
+
+std::string label_of(const OutputDifference& output, const ItemDifference& item) { return item.place.empty() ? output.name : output.name + " " + item.place; }
+
+/// What became of a node, where that is another thing than in the other run.
+std::string fate_of(const Findings& findings, const std::string& id) {
+  const RecordedNode &before = *findings.before.find(id), &now = *findings.now.find(id);
+  if (!now.went_well() && now.status != before.status) return now.status;
+  if (now.went_well() && !before.went_well()) return before.status + " in the first run";
+  return "differ";
+}
+
+void print_consequences(const Findings& findings) {
+  std::vector<std::pair<std::string, std::vector<std::string>>> groups{{"differ", {}}};
+  for (const std::string& id : findings.difference.in_consequence) {
+    const std::string fate = fate_of(findings, id);
+    const auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& one) { return one.first == fate; });
+    if (group == groups.end()) groups.push_back({fate, {id}});
+    else group->second.push_back(id);
+  }
+  for (const auto& [fate, names] : groups)
+    if (!names.empty()) std::printf("In consequence %s: %s\n", fate.c_str(), joined(names).c_str());
+}
+
+/// Whether all that one run has of it is missing in the other, whose nodes say why.
+bool is_only_missing(const OutputDifference& output, const char* text) {
+  return !output.same && !output.items.empty() &&
+         std::all_of(output.items.begin(), output.items.end(), [&](const ItemDifference& item) { return item.amount.lines == std::vector<std::string>{text}; });
+}
+
+/// Of a node that failed: without the outputs that one run does not have at all.
+std::vector<OutputDifference> partly_there(std::vector<OutputDifference> outputs) {
+  std::erase_if(outputs, [](const OutputDifference& output) { return is_only_missing(output, kIsNotThere) || is_only_missing(output, kWasNotThere); });
+  return outputs;
+}
+
+/// Items whose values were shown already are only named.
+void print_outputs(const std::vector<OutputDifference>& outputs, std::set<std::pair<std::string, std::string>>& shown) {
+  std::size_t width = 0;
+  for (const OutputDifference& output : outputs)
+    for (const ItemDifference& item : output.items) width = std::max(width, label_of(output, item).size());
+  for (const OutputDifference& output : outputs) {
+    for (const std::string& note : output.notes) print_amount(output.name, width, {note});
+    for (const ItemDifference& item : output.items) {
+      const bool is_new = item.amount.lines.empty() || item.key_before.empty() || item.key_now.empty() || shown.insert({item.key_before, item.key_now}).second;
+      print_amount(label_of(output, item), width, is_new ? item.amount.lines : std::vector<std::string>{"as above"});
+    }
+  }
+}
+
+void print_roots(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
+  bool is_first = true;
+  for (const Root& root : findings.difference.roots) {
+    std::printf(is_first ? "First difference: node '%s' (%s)\n" : "Node '%s' (%s) differs by itself, too\n", root.now->id.c_str(), root.now->uses.c_str());
+    if (!root.before->went_well() || !root.now->went_well()) {
+      print_fate("in the first run", *root.before);
+      print_fate("in the second run", *root.now);
+    }
+    for (const Change& change : root.why) std::printf("  why: %s\n", change.text.c_str());
+    if (is_first) print_outputs(root.before->went_well() && root.now->went_well() ? findings.first : partly_there(findings.first), shown);
+    is_first = false;
+  }
+}
+
+void print_other_changes(const Findings& findings) {
+  const RunDifference& difference = findings.difference;
+  if (!difference.only_before.empty()) std::printf("Only in the first run: %s\n", joined(difference.only_before).c_str());
+  if (!difference.only_now.empty()) std::printf("Only in the second run: %s\n", joined(difference.only_now).c_str());
+  for (const Change& change : difference.others) {
+    const RecordedNode* node = findings.now.find(change.node);
+    const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) != difference.in_consequence.end();
+    std::printf("Also changed: %s%s%s\n", node ? ("node '" + change.node + "': ").c_str() : "", change.text.c_str(),
+                node && node->makes_data() && !differs ? " (with the same result)" : "");
+  }
+  if (difference.rebuilt.empty()) return;
+  const bool is_all = findings.before.framework != findings.now.framework;
+  std::vector<std::string> texts;
+  for (const Change& change : difference.rebuilt) texts.push_back(is_all ? change.name : change.text);
+  std::printf("Of another build: %s%s\n", is_all ? "marrow's own library, and with it the build ids of " : "", joined(texts).c_str());
+}
+
+void print_results(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
+  std::vector<OutputDifference> differing;
+  std::vector<std::string> same, neither, only_before, only_now;
+  for (const OutputDifference& output : findings.results)
+    if (output.is_none()) (output.same ? same : neither).push_back(output.name);
+    else if (is_only_missing(output, kIsNotThere)) only_before.push_back(output.name);
+    else if (is_only_missing(output, kWasNotThere)) only_now.push_back(output.name);
+    else differing.push_back(output);
+  std::printf("\n");
+  if (!differing.empty()) std::printf("Outputs that differ\n");
+  print_outputs(differing, shown);
+  if (!only_before.empty()) std::printf("Outputs that only the first run has: %s\n", joined(only_before).c_str());
+  if (!only_now.empty()) std::printf("Outputs that only the second run has: %s\n", joined(only_now).c_str());
+  if (!neither.empty()) std::printf("Outputs that neither run has: %s\n", joined(neither).c_str());
+  if (!same.empty()) std::printf("Outputs that are the same: %s\n", joined(same).c_str());
+}
+
+bool has_unknown_amount(const std::vector<OutputDifference>& outputs) {
+  for (const OutputDifference& output : outputs)
+    for (const ItemDifference& item : output.items)
+      if (item.amount.facts.value("source", "") == "none") return true;
+  return false;
+}
+
+}  // namespace
+
+void print(const Findings& findings) {
+  const RunDifference& difference = findings.difference;
+  const std::string nodes = std::to_string(difference.same) + " node" + (difference.same == 1 ? "" : "s");
+  std::printf("first run (was): %s\nsecond run (is): %s\n\n", findings.before.folder.c_str(), findings.now.folder.c_str());
+  if (findings.identical()) {
+    std::printf("identical: %s came out the same\n", difference.same == 1 ? "the only node" : ("all " + nodes).c_str());
+    for (const RecordedNode& node : findings.now.nodes)
+      if (!node.went_well() && node.status != "skipped") std::printf("node '%s' %s in both: %s\n", node.id.c_str(), node.status.c_str(), node.reason.c_str());
+    print_other_changes(findings);
+    return;
+  }
+  std::set<std::pair<std::string, std::string>> shown;
+  if (difference.roots.empty()) std::printf("What took part in both runs came out the same: %s\n", nodes.c_str());
+  print_roots(findings, shown);
+  print_consequences(findings);
+  if (!difference.roots.empty()) std::printf("The same in both runs: %s\n", nodes.c_str());
+  print_other_changes(findings);
+  print_results(findings, shown);
+  if (has_unknown_amount(findings.first) || has_unknown_amount(findings.results))
+    std::printf("\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  marrow run %s --seed %llu\n",
+                (findings.before.folder / "pipeline.yaml").c_str(), static_cast<unsigned long long>(findings.before.seed));
+}
+
+}  // namespace marrow::cli

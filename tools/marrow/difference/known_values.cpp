@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "difference/known_values.hpp"
+
+#include <png.h>
+#include <yaml-cpp/yaml.h>
+
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "marrow/runtime/types.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+std::string text_of_file(const fs::path& file) {
+  std::ostringstream text;
+  text << std::ifstream(file, std::ios::binary).rdbuf();
+  return text.str();
+}
+
+Metrics metrics_of(const json& file) {
+  Metrics metrics;
+  for (const json& metric : file.at("metrics"))
+    metrics.items.push_back({metric.at("name"), metric.at("value").is_null() ? std::nan("") : metric.at("value").get<double>(), metric.at("unit")});
+  return metrics;
+}
+
+/// What a pose's file says of its place; not its predicted deviations.
+Pose pose_of(const YAML::Node& file) {
+  Pose pose;
+  pose.world_from_model.target = file["target"].as<std::string>();
+  pose.world_from_model.source = file["source"].as<std::string>();
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) {
+      pose.world_from_model.rotation(row, column) = file["matrix"][row][column].as<double>();
+      pose.frame.axes(row, column) = file["fragment_frame"]["axes"][row][column].as<double>();
+    }
+    pose.world_from_model.translation_mm[row] = file["matrix"][row][3].as<double>();
+    pose.frame.origin_mm[row] = file["fragment_frame"]["origin_mm"][row].as<double>();
+  }
+  pose.cost = file["cost"].as<double>(std::nan(""));
+  pose.evaluations = file["evaluations"].as<int>();
+  for (const YAML::Node& warning : file["warnings"]) pose.warnings.push_back(warning.as<std::string>());
+  return pose;
+}
+
+/// Of 8 bits; nothing for a PNG of 16.
+std::optional<Picture> picture_of(const fs::path& file) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  if (!png_image_begin_read_from_file(&image, file.c_str())) return std::nullopt;
+  const bool is_wide = image.format & PNG_FORMAT_FLAG_LINEAR;
+  image.format = PNG_FORMAT_RGB;
+  Picture picture{cv::Mat(int(image.height), int(image.width), CV_8UC3)};
+  if (is_wide || !png_image_finish_read(&image, nullptr, picture.pixels.data, 0, nullptr)) {
+    png_image_free(&image);
+    return std::nullopt;
+  }
+  return picture;
+}
+
+/// The value that a file of outputs/ holds, where this program can read it.
+std::optional<Value> value_of_file(const fs::path& file) {
+  const std::string extension = file.extension().string();
+  try {
+    if (extension == ".json") return Value::of(std::make_shared<const Metrics>(metrics_of(json::parse(text_of_file(file)))));
+    if (extension == ".yaml") {
+      const YAML::Node yaml = YAML::LoadFile(file.string());
+      if (yaml["marrow-pose"]) return Value::of(std::make_shared<const Pose>(pose_of(yaml)));
+    }
+    if (extension == ".png")
+      if (auto picture = picture_of(file)) return Value::of(std::make_shared<const Picture>(std::move(*picture)));
+  } catch (const json::exception&) {  // of another kind, or damaged: its bytes are compared
+  } catch (const YAML::Exception&) {
+  }
+  return std::nullopt;
+}
+
+bool is_file(const fs::path& path) {
+  std::error_code error;
+  return !path.empty() && fs::is_regular_file(path, error);
+}
+
+/// Takes the items of lists apart.
+template <class Visit>
+void for_items(const Value& value, const Visit& visit) {
+  if (!value.is_list()) return visit(value);
+  for (const Value& item : value.items) for_items(item, visit);
+}
+
+Amount with_source(Amount amount, const char* source) {
+  amount.facts["source"] = source;
+  if (std::string(source) == "files" && !amount.lines.empty()) amount.lines.back() += " (by the files in outputs/)";
+  return amount;
+}
+
+}  // namespace
+
+void KnownValues::add(const Value& value) {
+  for_items(value, [&](const Value& item) {
+    if (item.data && !item.type.is_function) held_[item.key.hex()] = item;
+  });
+}
+
+std::optional<Value> KnownValues::find(const std::string& key) {
+  if (const auto held = held_.find(key); held != held_.end()) return held->second;
+  if (!entries_) {
+    entries_.emplace();
+    for (const Store::Entry& entry : store_.entries())
+      for (const Digest& output : entry.outputs) (*entries_)[output.hex()] = entry.key;
+  }
+  const auto entry = entries_->find(key);
+  if (entry == entries_->end()) return std::nullopt;
+  std::optional<Value> found;
+  if (const auto stored = store_.find(entry->second))
+    for (const Value& output : stored->outputs)
+      for_items(output, [&](const Value& item) {
+        if (item.source && item.key.hex() == key) found = item;
+      });
+  return found;
+}
+
+/// The bytes of a value of a plugin's own type, which only that plugin can read.
+std::optional<std::string> KnownValues::packed(const Value& value, const std::string& uses) {
+  if (!catalogue_) catalogue_ = std::make_unique<Catalogue>();
+  if (!catalogue_->find(uses)) return std::nullopt;
+  for (const PortInfo& output : catalogue_->load(uses).info.outputs) {
+    if (output.type != value.type || !output.type.content) continue;
+    Packer packer;
+    output.type.content->pack((value.data ? value.data : value.source->data(output.type)).get(), packer);
+    return packer.packed;
+  }
+  return std::nullopt;
+}
+
+std::optional<Amount> KnownValues::amount_of_values(const Value& before, const Value& now, const ValueOfRun& made_before, const ValueOfRun& made_now) {
+  try {
+    const Amount amount = amount_of(before, now);
+    if (!amount.lines.empty()) return amount;
+    if (before.type.id != now.type.id) return Amount{{"it is a " + now.type.id + ", was a " + before.type.id}, {{"types", {before.type.id, now.type.id}}}};
+    const auto bytes_before = packed(before, made_before.uses), bytes_now = packed(now, made_now.uses);
+    if (bytes_before && bytes_now) return amount_of_bytes(*bytes_before, *bytes_now, "the " + now.type.id);
+  } catch (const Error&) {  // damaged, just removed, or of another layout
+  }
+  return std::nullopt;
+}
+
+Amount KnownValues::amount(const ValueOfRun& before, const ValueOfRun& now) {
+  const auto value_before = find(before.key), value_now = find(now.key);
+  if (value_before && value_now)
+    if (auto amount = amount_of_values(*value_before, *value_now, before, now)) return with_source(std::move(*amount), "values");
+  const auto read_before = value_before ? value_before : value_of_file(before.file), read_now = value_now ? value_now : value_of_file(now.file);
+  if (read_before && read_now)
+    if (auto amount = amount_of_values(*read_before, *read_now, before, now)) return with_source(std::move(*amount), "files");
+  if (is_file(before.file) && is_file(now.file))
+    return with_source(amount_of_bytes(text_of_file(before.file), text_of_file(now.file), "the file"), "files");
+  Amount unknown;
+  const char* whose = !value_before && !value_now ? "of both runs" : value_before ? "of the second run" : "of the first run";
+  unknown.lines = {std::string("by how much is not known: the store no longer has the value ") + whose};
+  return with_source(std::move(unknown), "none");
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cstdio>
+
+#include "commands.hpp"
+#include "difference/findings.hpp"
+
+namespace marrow::cli {
+
+int rerun(const RerunRequest& request) {
+  RunRecord before = read_run(request.run);
+  const Catalogue catalogue;
+  Pipeline pipeline;
+  if (!load({request.run / "pipeline.yaml", {}, {}}, catalogue, pipeline, true)) return 2;
+  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / (pipeline.name + "-rerun")) : request.folder, pipeline);
+  RunRequest how;
+  how.seed = before.seed;
+  how.threads = before.threads;
+  how.quiet = request.quiet || request.json;
+  // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the first one.
+  const RunOutcome outcome = execute(pipeline, catalogue, how, before.arguments, nullptr, folder);
+  if (outcome.result.cancelled()) return 130;
+  KnownValues values;
+  for (const NodeRecord& node : outcome.result.nodes)
+    for (const Value& output : node.outputs) values.add(output);
+  const Findings findings = find_differences(std::move(before), read_run(folder.path()), values);
+  if (request.json) std::printf("%s\n", json_of(findings).dump(1).c_str());
+  else print(findings);
+  return findings.identical() && !outcome.is_faulty ? 0 : 1;
+}
+
+}  // namespace marrow::cli
