@@ -34,6 +34,11 @@ void draw_number(Panel& panel, const marrow::LineSegment& line, std::size_t numb
   draw_text(panel.pixels, std::to_string(number), place, colour);
 }
 
+/// Midway between the borders.
+marrow::LineSegment mid_line(const marrow::ShaftLines& lines) {
+  return {0.5 * (lines.left.from_px + lines.right.from_px), 0.5 * (lines.left.to_px + lines.right.to_px)};
+}
+
 marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view, const marrow::EdgeMap* edges,
                       const Options& options) {
   Panel panel = make_panel(view, whole_image(view), options.size_px, contrast_of(options.contrast));
@@ -52,6 +57,7 @@ marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view,
     legend.push_back({std::to_string(lines.rejected.size() - count) + " more rejected pairs are not drawn", kGrey});
   draw_segment(panel, lines.left, kSkyBlue, 2);
   draw_segment(panel, lines.right, kSkyBlue, 2);
+  draw_segment(panel, mid_line(lines), kSkyBlue, 1);
   draw_title(panel, view.name);
   return {with_legend(panel.pixels, legend)};
 }

@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <optional>
 
 namespace marrow::shaft {
@@ -78,6 +79,18 @@ Brightness brightness_of(const cv::Mat& image, const Border& left, const Border&
   };
   return {mean_between(beside(left, 0), beside(right, 0)), mean_between(beside(left, 1), beside(left, 4)),
           mean_between(beside(right, 1), beside(right, 4))};
+}
+
+double balance_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
+                  double pixel_mm) {
+  const int count = std::clamp(int(stretch.length() * pixel_mm / kAlong_mm), 8, 400);
+  const auto mean = [&](const Border& border) {
+    const std::vector<double> steps = steps_of(image, border, stretch, pixel_mm, count);
+    return std::accumulate(steps.begin(), steps.end(), 0.0) / count;
+  };
+  const double at_left = mean(left), at_right = mean(right);
+  const auto [least, most] = std::minmax(at_left, at_right);
+  return least > 0 ? least / most : 0;
 }
 
 Stretch stretch_with_steps(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,

@@ -15,6 +15,10 @@ struct Brightness {
 Brightness brightness_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
                          double pixel_mm);
 
+/// The fainter border's mean step of brightness as a fraction of the other's, in a stretch; 0 where one has none.
+double balance_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
+                  double pixel_mm);
+
 /// The longest part of a stretch in which the image darkens across both borders, on either side by at least a part of
 /// what the pair's borders show mostly. A border of muscle and fat is too faint beside one of bone; and where a bowed
 /// bone leaves the line, there is no step at all. Shorter interruptions than `gap_px` do not count. Of zero length

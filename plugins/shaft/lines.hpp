@@ -16,6 +16,7 @@ struct LineOptions {
   double tolerance_mm = 1.0;
   double gap_mm = 8;
   int lines = 60;
+  bool outline = true;
 };
 
 /// The options' lengths in pixels of a view, at the depth of the isocentre (the world's origin).

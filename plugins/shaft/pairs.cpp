@@ -8,19 +8,22 @@
 #include <limits>
 
 #include "brightness.hpp"
+#include "outline.hpp"
 #include "widths.hpp"
 
 namespace marrow::shaft {
 namespace {
 
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
+constexpr double kRidge_mm = 4;  // how far outside a border the bone's outline may be, at a ridge or another fragment
 
 /// Two nearly parallel lines of opposite gradient.
 struct Pair {
   Border left, right;  // as seen along the stretch
   Stretch stretch;
   double width_mm = 0, supported_mm = 0;
-  double score = 0;    // log-likelihood of width, taper and evidence
+  double balance = 1;  // the fainter border's step of brightness as a fraction of the other's
+  double score = 0;    // log-likelihood of width, taper and evidence, which a faint border weakens
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
 
@@ -66,7 +69,7 @@ double width_deviation_of(const Pair& pair, const Scene& scene) {
 void score(const Scene& scene, Pair& pair) {
   pair.width_mm = width_of(pair, scene.scale.pixel_mm);
   const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
-  pair.score = kEvidencePer_mm * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
+  pair.score = kEvidencePer_mm * pair.balance * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
 }
 
 /// Why a pair is not the shaft by its edges alone; empty when it may be.
@@ -83,21 +86,29 @@ std::string reason_by_edges(const Scene& scene, const Pair& pair, const Eigen::V
          scene.widths.range() + "), as " + (small ? "a cable's or a single cortex' is" : "the limb's is");
 }
 
+/// Shortens a pair, and its evidence with it.
+void cut(Pair& pair, const Stretch& part) {
+  pair.supported_mm *= part.length() / pair.stretch.length();
+  pair.stretch = part;
+}
+
 /// Why it is not the shaft by its brightness; cuts the stretch to where both borders are steps of brightness.
 std::string reason_by_image(const Scene& scene, Pair& pair) {
-  const double whole = pair.stretch.length();
-  pair.stretch =
-      stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm, scene.scale.gap_px);
-  pair.supported_mm *= pair.stretch.length() / whole;
-  const double length_mm = pair.stretch.length() * scene.scale.pixel_mm;
+  const double pixel_mm = scene.scale.pixel_mm;
+  const Stretch outer = stretch_at_outline(scene.edges, pair.left, pair.right, scene.scale.support, pair.stretch,
+                                           kRidge_mm / pixel_mm, scene.scale.gap_px);
+  if (outer.length() >= scene.scale.min_length_px) cut(pair, outer);
+  cut(pair, stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, pixel_mm, scene.scale.gap_px));
+  const double length_mm = pair.stretch.length() * pixel_mm;
   if (length_mm < scene.options.min_length_mm)
-    return text(
-        "the image darkens across both its borders alike for %.0f mm only, of %.0f mm wanted, as where one is the "
-        "border of "
-        "muscle or fat (%.1f mm wide)",
-        length_mm, scene.options.min_length_mm, pair.width_mm);
-  const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm);
-  if (mean.inside < std::min(mean.outside_left, mean.outside_right)) return "";
+    return text("the image darkens across both its borders alike for %.0f mm only, of %.0f mm wanted, as where one is "
+                "the border of muscle or fat (%.1f mm wide)",
+                length_mm, scene.options.min_length_mm, pair.width_mm);
+  const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
+  if (mean.inside < std::min(mean.outside_left, mean.outside_right)) {
+    pair.balance = balance_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
+    return "";
+  }
   return text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
               mean.inside, mean.outside_left, mean.outside_right);
 }
@@ -110,17 +121,18 @@ void judge(const Scene& scene, Pair& pair) {
   pair.stretch =
       common_stretch(scene.edges, pair.left, pair.right, scene.scale.support, direction, scene.scale.gap_px, supported);
   pair.supported_mm = supported * scene.scale.pixel_mm;
+  pair.balance = 1;
   const double middle = 0.5 * (pair.stretch.from + pair.stretch.to);
   if (to_left.dot(point_at(pair.left, direction, middle) - point_at(pair.right, direction, middle)) < 0)
     std::swap(pair.left, pair.right);
   score(scene, pair);
   pair.reason = reason_by_edges(scene, pair, to_left);
   if (!pair.reason.empty()) return;
-  Pair cut = pair;
-  pair.reason = reason_by_image(scene, cut);
+  Pair part = pair;
+  pair.reason = reason_by_image(scene, part);
   if (!pair.reason.empty()) return;  // and its stretch is shown as the edges have it
-  score(scene, cut);
-  pair = cut;
+  score(scene, part);
+  pair = part;
 }
 
 /// Candidates first, the most likely first.
@@ -177,6 +189,15 @@ bool same_shaft(const Pair& a, const Pair& b) {
   return (middle(a, along, s) - middle(b, along, s)).norm() < 0.05 * width;
 }
 
+/// The borders moved from the edges to the outline, each by itself.
+void move_to_outline(const Scene& scene, Pair& pair) {
+  const double width_px = pair.width_mm / scene.scale.pixel_mm;
+  for (Border* border : {&pair.left, &pair.right})
+    border->rho += outline_beyond_edges_px(scene.image, scene.edges, *border, scene.scale.support, pair.stretch,
+                                           width_px, scene.scale.pixel_mm);
+  pair.width_mm = width_of(pair, scene.scale.pixel_mm);
+}
+
 LineSegment segment_of(const Border& border, const Stretch& stretch) {
   return {point_at(border, stretch.along, stretch.from), point_at(border, stretch.along, stretch.to)};
 }
@@ -200,6 +221,7 @@ ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<B
     if (pairs[i].reason.empty()) pairs[i] = settled(scene, pairs[i]);
   sort_by_score(pairs);
   if (pairs.empty() || !pairs[0].reason.empty()) refuse(view, borders, pairs);
+  if (options.outline) move_to_outline(scene, pairs[0]);
   ShaftLines lines;
   lines.left = segment_of(pairs[0].left, pairs[0].stretch);
   lines.right = segment_of(pairs[0].right, pairs[0].stretch);

@@ -5,12 +5,19 @@
 
 namespace {
 
+/// Lines that are drawn exactly are not those of a round bone.
+ShaftLines find_drawn(const marrow::EdgeMap& edges, const marrow::View& view) {
+  LineOptions options;
+  options.outline = false;
+  return find_shaft(edges, view, options);
+}
+
 TEST(Shaft, EndsWhereOneBorderEnds) {
   marrow::EdgeMap edges = no_edges();  // 85 px are 29.9 mm; condyles bend away below v = 300 on one side
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 300}, kRight);
   draw(edges, {286, 301}, {380, 380}, kRight);
-  const ShaftLines lines = find_shaft(edges, dark_between(200, 285));
+  const ShaftLines lines = find_drawn(edges, dark_between(200, 285));
   EXPECT_NEAR(lines.left.from_px.y(), 20, 2);
   EXPECT_NEAR(lines.left.to_px.y(), 300, 6);
   EXPECT_NEAR(lines.left.from_px.x(), 285, 0.01);
@@ -23,7 +30,13 @@ TEST(Shaft, AllowsATaperAndPrefersTheLikelierWidth) {
   draw(edges, {200, 20}, {195, 400}, kLeft);
   draw(edges, {283, 20}, {290, 400}, kRight);
   draw(edges, {300, 20}, {307, 400}, kRight);  // 36 mm: allowed, but less likely
-  const ShaftLines lines = find_shaft(edges, dark_between(200, 285));
+  marrow::View view = empty_view();
+  for (int v = 0; v < 512; ++v) {
+    const double part = (v - 20) / 380.0;
+    for (int u = int(200 - 5 * part); u < 300 + 7 * part; ++u)
+      view.image.pixels.at<std::uint16_t>(v, u) = u < 283 + 7 * part ? 500 : 700;
+  }
+  const ShaftLines lines = find_drawn(edges, view);
   EXPECT_NEAR(lines.width_mm, 89 * 0.6 * 300 / 512, 0.2);
   ASSERT_FALSE(lines.rejected.empty());
   EXPECT_NE(lines.rejected[0].reason.find("its log-likelihood of "), std::string::npos);
@@ -39,7 +52,7 @@ TEST(Shaft, ListsTheShaftOfASecondFragment) {
       draw(edges, {u + bow(v), v}, {u + bow(v + 10), v + 10}, side);
   draw(edges, {203, 360}, {196, 470}, kLeft);
   draw(edges, {282, 360}, {289, 470}, kRight);
-  const ShaftLines lines = find_shaft(edges, dark_between(200, 285));
+  const ShaftLines lines = find_drawn(edges, dark_between(200, 285));
   EXPECT_LT(lines.left.to_px.y(), 310);
   int candidates = 0, in_second = 0;
   for (const auto& pair : lines.rejected) {
@@ -58,7 +71,7 @@ TEST(Shaft, ToleratesGapsUpToTheLimit) {
     draw(edges, {200, v}, {200, v + 40}, kLeft);
     draw(edges, {285, v}, {285, v + 40}, kRight);
   }
-  EXPECT_NEAR(find_shaft(edges, dark_between(200, 285)).left.to_px.y(), 420, 3);
+  EXPECT_NEAR(find_drawn(edges, dark_between(200, 285)).left.to_px.y(), 420, 3);
 }
 
 TEST(Shaft, SaysWhyThereIsNoPair) {
@@ -82,9 +95,16 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
   EXPECT_EQ(error_of([&] { find_shaft(edges, dark_between(270, 330)); }),
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because the image darkens across both "
+            "its borders alike for 0 mm only, of 25 mm wanted, as where one is the border of muscle or fat (29.9 mm wide)" +
+                advice);
+  marrow::View rims = empty_view();  // two dark things with something bright between them
+  rims.image.pixels.colRange(200, 212) = 800;
+  rims.image.pixels.colRange(212, 273) = 1500;
+  rims.image.pixels.colRange(273, 285) = 800;
+  EXPECT_EQ(error_of([&] { find_shaft(edges, rims); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what "
-            "lies beside it (mean grey "
-            "value 917 inside, 500 and 1000 outside)" +
+            "lies beside it (mean grey value 1267 inside, 1000 and 1000 outside)" +
                 advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
