@@ -95,15 +95,17 @@ Eigen::VectorXd without_slope(Eigen::VectorXd profile) {
 
 }  // namespace
 
-double outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const Border& border, const Support& support,
-                               const Stretch& stretch, double width_px, double pixel_mm) {
+std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const Border& border,
+                                              const Support& support, const Stretch& stretch, double width_px,
+                                              double pixel_mm) {
   const int reach = std::max(4, int(kReach_mm / pixel_mm / kStep_px));
   const std::vector<double> profile = profile_of(image, edges, border, support, stretch, pixel_mm, reach);
-  if (profile.empty()) return 0;
+  if (profile.empty()) return std::nullopt;
   const Eigen::VectorXd measured =
       without_slope(Eigen::Map<const Eigen::VectorXd>(profile.data(), Eigen::Index(profile.size())));
   const int inwards = int(kInwards_mm / pixel_mm / kStep_px), outwards = int(kOutwards_mm / pixel_mm / kStep_px);
-  double best_gain = 0, best_px = 0;
+  double best_gain = 0;
+  int best = outwards;
   for (double blur_px = kLeastBlur_px; blur_px < kMostBlur_px; blur_px *= 1.1) {
     std::vector<double> chords;  // at distances from the outline of -reach - outwards to reach + inwards, in steps
     for (int i = -reach - outwards; i <= reach + inwards; ++i)
@@ -114,10 +116,11 @@ double outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const
       const double along = chord.dot(measured);
       if (along <= 0) continue;
       const double gain = along * along / chord.squaredNorm();
-      if (gain > best_gain) best_gain = gain, best_px = shift * kStep_px;
+      if (gain > best_gain) best_gain = gain, best = shift;
     }
   }
-  return best_px;
+  if (best == outwards || best == -inwards) return std::nullopt;
+  return best * kStep_px;
 }
 
 }  // namespace marrow::shaft

@@ -189,12 +189,16 @@ bool same_shaft(const Pair& a, const Pair& b) {
   return (middle(a, along, s) - middle(b, along, s)).norm() < 0.05 * width;
 }
 
-/// The borders moved from the edges to the outline, each by itself.
+/// The borders moved from the edges to the outline. Where only one of them tells how far, both move as far: the blur is
+/// the same.
 void move_to_outline(const Scene& scene, Pair& pair) {
-  const double width_px = pair.width_mm / scene.scale.pixel_mm;
-  for (Border* border : {&pair.left, &pair.right})
-    border->rho += outline_beyond_edges_px(scene.image, scene.edges, *border, scene.scale.support, pair.stretch,
-                                           width_px, scene.scale.pixel_mm);
+  const auto beyond_px = [&](const Border& border) {
+    return outline_beyond_edges_px(scene.image, scene.edges, border, scene.scale.support, pair.stretch,
+                                   pair.width_mm / scene.scale.pixel_mm, scene.scale.pixel_mm);
+  };
+  const std::optional<double> left = beyond_px(pair.left), right = beyond_px(pair.right);
+  pair.left.rho += left.value_or(right.value_or(0));
+  pair.right.rho += right.value_or(left.value_or(0));
   pair.width_mm = width_of(pair, scene.scale.pixel_mm);
 }
 

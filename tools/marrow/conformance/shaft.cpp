@@ -262,6 +262,17 @@ std::vector<Trial> trials() {
              scatter(15000, random, pixels);
              edges = map_of(std::move(pixels));
            })},
+          {"constant_image", [] {
+             View view = view_of(bones()[0]);
+             view.image.pixels = 1000;
+             return Inputs{{"edges", item(edges_of(bones()[0]))}, {"view", item(view)}};
+           }},
+          {"nan_image", [] {
+             View view = view_of(bones()[0]);
+             view.image.pixels.convertTo(view.image.pixels, CV_32F);
+             view.image.pixels.rowRange(200, 260) = std::nanf("");
+             return Inputs{{"edges", item(edges_of(bones()[0]))}, {"view", item(view)}};
+           }},
           {"empty_image", [] {
              View view{"frontal", {}, {}, {}};
              return Inputs{{"edges", item(EdgeMap())}, {"view", item(view)}};
