@@ -86,7 +86,8 @@ std::optional<marrow::Metrics> shaft_lines(const ShaftLines& lines, const View& 
                    {"axis_offset_mm", pixel_mm * std::abs(found.middle.middle_px), "mm"},
                    {"width_error_mm", pixel_mm * (found.right.middle_px - found.left.middle_px), "mm"},
                    {"true_width_mm", pixel_mm * found.width_px, "mm"},
-                   {"length_mm", pixel_mm * (lines.left.to_px - lines.left.from_px).norm(), "mm"}};
+                   {"length_mm", pixel_mm * (lines.left.to_px - lines.left.from_px).norm(), "mm"},
+                   {"log_likelihood", lines.log_likelihood, ""}};
   return metrics;
 }
 
@@ -104,7 +105,7 @@ MARROW_PLUGIN(plugin) {
            "it in the middle of the "
            "stretch; the largest distance at its ends (beyond a few mm it is another pair); the same for the line "
            "midway; the pair's width "
-           "less the true one, which is negative where edges lie inside the outline; true width, length")
+           "less the true one, which is negative where edges lie inside the outline; true width, length; the log-likelihood that the shaft node gives")
       .option("tolerance_mm", &Options::tolerance_mm,
               "largest distance, at the isocentre, of a silhouette point from the outline's line",
               marrow::at_least(0.01));

@@ -11,7 +11,7 @@
 namespace marrow::shaft {
 namespace {
 
-constexpr double kLeastStep = 0.3;            // of what most of the pair's borders show
+constexpr double kLeastStep = 0.3;            // of that of this image's bone
 constexpr double kAlong_mm = 1, kSmooth = 2;  // steps are measured every mm, over 2 mm to either side
 constexpr std::array<double, 4> kAcross_mm{0.7, 1.4, 2.1, 2.8};
 
@@ -58,6 +58,10 @@ std::vector<double> steps_of(const cv::Mat& image, const Border& border, const S
   return steps;
 }
 
+int pieces_of(const Stretch& stretch, double pixel_mm) {
+  return std::clamp(int(stretch.length() * pixel_mm / kAlong_mm), 8, 400);
+}
+
 }  // namespace
 
 Brightness brightness_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
@@ -81,30 +85,23 @@ Brightness brightness_of(const cv::Mat& image, const Border& left, const Border&
           mean_between(beside(right, 1), beside(right, 4))};
 }
 
-double balance_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
-                  double pixel_mm) {
-  const int count = std::clamp(int(stretch.length() * pixel_mm / kAlong_mm), 8, 400);
+double step_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch, double pixel_mm) {
+  const int count = pieces_of(stretch, pixel_mm);
   const auto mean = [&](const Border& border) {
     const std::vector<double> steps = steps_of(image, border, stretch, pixel_mm, count);
-    return std::accumulate(steps.begin(), steps.end(), 0.0) / count;
+    return std::max(0.0, std::accumulate(steps.begin(), steps.end(), 0.0) / count);
   };
-  const double at_left = mean(left), at_right = mean(right);
-  const auto [least, most] = std::minmax(at_left, at_right);
-  return least > 0 ? least / most : 0;
+  return std::sqrt(mean(left) * mean(right));
 }
 
 Stretch stretch_with_steps(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
-                           double pixel_mm, double gap_px) {
-  const int count = std::clamp(int(stretch.length() * pixel_mm / kAlong_mm), 8, 400);
+                           double bone_step, double pixel_mm, double gap_px) {
+  const int count = pieces_of(stretch, pixel_mm);
   const std::vector<double> at_left = steps_of(image, left, stretch, pixel_mm, count),
                             at_right = steps_of(image, right, stretch, pixel_mm, count);
-  std::vector<double> all = at_left;
-  all.insert(all.end(), at_right.begin(), at_right.end());
-  std::nth_element(all.begin(), all.begin() + std::ptrdiff_t(3 * all.size() / 4), all.end());
-  const double least = kLeastStep * all[3 * all.size() / 4];
   std::vector<double> positions;
   for (std::size_t i = 0; i < at_left.size(); ++i)
-    if (least > 0 && std::min(at_left[i], at_right[i]) >= least)
+    if (bone_step > 0 && std::min(at_left[i], at_right[i]) >= kLeastStep * bone_step)
       positions.push_back(stretch.from + (double(i) + 0.5) / count * stretch.length());
   Stretch part = stretch;
   std::tie(part.from, part.to) = longest_run(positions, gap_px + stretch.length() / count);

@@ -15,15 +15,15 @@ struct Brightness {
 Brightness brightness_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
                          double pixel_mm);
 
-/// The fainter border's mean step of brightness as a fraction of the other's, in a stretch; 0 where one has none.
-double balance_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
-                  double pixel_mm);
+/// How much brighter it is outside the two borders than inside: of each border the mean step along the stretch, relative
+/// to the sum of both sides; of the two the geometric mean, 0 where one is no step.
+double step_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch, double pixel_mm);
 
 /// The longest part of a stretch in which the image darkens across both borders, on either side by at least a part of
-/// what the pair's borders show mostly. A border of muscle and fat is too faint beside one of bone; and where a bowed
-/// bone leaves the line, there is no step at all. Shorter interruptions than `gap_px` do not count. Of zero length
-/// where there is none.
+/// the step that this image's bone shows. A border of muscle and fat is too faint beside it; and where a bowed bone
+/// leaves the line, there is no step at all. Shorter interruptions than `gap_px` do not count. Of zero length where
+/// there is none.
 Stretch stretch_with_steps(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
-                           double pixel_mm, double gap_px);
+                           double bone_step, double pixel_mm, double gap_px);
 
 }  // namespace marrow::shaft

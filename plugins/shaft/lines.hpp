@@ -16,6 +16,7 @@ struct LineOptions {
   double tolerance_mm = 1.0;
   double gap_mm = 8;
   int lines = 60;
+  double least_log_likelihood = 2;
   bool outline = true;
 };
 

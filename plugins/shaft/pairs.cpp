@@ -15,6 +15,7 @@ namespace marrow::shaft {
 namespace {
 
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
+constexpr double kPlainStep = 0.6;       // of brightness, of the largest; fainter pairs are weaker evidence
 constexpr double kRidge_mm = 4;  // how far outside a border the bone's outline may be, at a ridge or another fragment
 
 /// Two nearly parallel lines of opposite gradient.
@@ -22,8 +23,8 @@ struct Pair {
   Border left, right;  // as seen along the stretch
   Stretch stretch;
   double width_mm = 0, supported_mm = 0;
-  double balance = 1;  // the fainter border's step of brightness as a fraction of the other's
-  double score = 0;    // log-likelihood of width, taper and evidence, which a faint border weakens
+  double weight = 1;   // of the evidence: less than one where the borders are faint for bone
+  double score = 0;    // log-likelihood of width, taper and evidence
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
 
@@ -54,6 +55,7 @@ struct Scene {
   const Scale& scale;
   const LineOptions& options;
   Widths widths;
+  double bone_step = 0;  // of brightness; the largest that a possible pair shows
 };
 
 /// The fit's part, and that of a depth which is not the isocentre's. Neighbouring edge pixels share their errors.
@@ -69,7 +71,7 @@ double width_deviation_of(const Pair& pair, const Scene& scene) {
 void score(const Scene& scene, Pair& pair) {
   pair.width_mm = width_of(pair, scene.scale.pixel_mm);
   const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
-  pair.score = kEvidencePer_mm * pair.balance * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
+  pair.score = kEvidencePer_mm * pair.weight * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
 }
 
 /// Why a pair is not the shaft by its edges alone; empty when it may be.
@@ -98,41 +100,49 @@ std::string reason_by_image(const Scene& scene, Pair& pair) {
   const Stretch outer = stretch_at_outline(scene.edges, pair.left, pair.right, scene.scale.support, pair.stretch,
                                            kRidge_mm / pixel_mm, scene.scale.gap_px);
   if (outer.length() >= scene.scale.min_length_px) cut(pair, outer);
-  cut(pair, stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, pixel_mm, scene.scale.gap_px));
+  cut(pair, stretch_with_steps(scene.image, pair.left, pair.right, pair.stretch, scene.bone_step, pixel_mm,
+                               scene.scale.gap_px));
   const double length_mm = pair.stretch.length() * pixel_mm;
   if (length_mm < scene.options.min_length_mm)
-    return text("the image darkens across both its borders alike for %.0f mm only, of %.0f mm wanted, as where one is "
-                "the border of muscle or fat (%.1f mm wide)",
-                length_mm, scene.options.min_length_mm, pair.width_mm);
+    return text("a border is too faint for bone but for %.0f mm, of %.0f mm wanted, as muscle's is (%.1f mm wide)", length_mm,
+                scene.options.min_length_mm, pair.width_mm);
   const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
   if (mean.inside < std::min(mean.outside_left, mean.outside_right)) {
-    pair.balance = balance_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
+    const double step = step_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
+    pair.weight = std::min(1.0, step / (kPlainStep * scene.bone_step));
     return "";
   }
   return text("it is not darker than what lies beside it (mean grey value %.0f inside, %.0f and %.0f outside)",
               mean.inside, mean.outside_left, mean.outside_right);
 }
 
-/// Fills stretch, width, score, or the reason why the pair is not the shaft.
-void judge(const Scene& scene, Pair& pair) {
+/// Fills stretch, width and score, or the reason why the pair is not the shaft, by its edges.
+void judge_edges(const Scene& scene, Pair& pair) {
   const Eigen::Vector2d direction = direction_of(pair.left, pair.right),
                         to_left(direction.y(), -direction.x());  // v runs down
   int supported = 0;
   pair.stretch =
       common_stretch(scene.edges, pair.left, pair.right, scene.scale.support, direction, scene.scale.gap_px, supported);
   pair.supported_mm = supported * scene.scale.pixel_mm;
-  pair.balance = 1;
+  pair.weight = 1;
   const double middle = 0.5 * (pair.stretch.from + pair.stretch.to);
   if (to_left.dot(point_at(pair.left, direction, middle) - point_at(pair.right, direction, middle)) < 0)
     std::swap(pair.left, pair.right);
   score(scene, pair);
   pair.reason = reason_by_edges(scene, pair, to_left);
+}
+
+/// The same by the image, for a pair that its edges let pass.
+void judge_image(const Scene& scene, Pair& pair) {
   if (!pair.reason.empty()) return;
   Pair part = pair;
   pair.reason = reason_by_image(scene, part);
   if (!pair.reason.empty()) return;  // and its stretch is shown as the edges have it
   score(scene, part);
   pair = part;
+  if (pair.score < scene.options.least_log_likelihood)
+    pair.reason = text("its log-likelihood of %.1f is below %.1f, the least that is taken (%.1f mm wide)", pair.score,
+                       scene.options.least_log_likelihood, pair.width_mm);
 }
 
 /// Candidates first, the most likely first.
@@ -142,8 +152,8 @@ void sort_by_score(std::vector<Pair>& pairs) {
   });
 }
 
-/// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first.
-std::vector<Pair> pairs_of(const Scene& scene, const std::vector<Border>& borders) {
+/// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first. Sets bone_step.
+std::vector<Pair> pairs_of(Scene& scene, const std::vector<Border>& borders) {
   std::vector<Pair> pairs;
   const double cosine = std::cos(radians(scene.options.max_angle_deg));
   for (std::size_t i = 0; i < borders.size(); ++i)
@@ -152,9 +162,14 @@ std::vector<Pair> pairs_of(const Scene& scene, const std::vector<Border>& border
       Pair pair;
       pair.left = borders[i];
       pair.right = borders[j];
-      judge(scene, pair);
+      judge_edges(scene, pair);
       if (pair.supported_mm > 0.2 * scene.options.min_length_mm) pairs.push_back(std::move(pair));
     }
+  for (const Pair& pair : pairs)
+    if (pair.reason.empty())
+      scene.bone_step = std::max(
+          scene.bone_step, step_of(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm));
+  for (Pair& pair : pairs) judge_image(scene, pair);
   sort_by_score(pairs);
   return pairs;
 }
@@ -168,7 +183,7 @@ Pair settled(const Scene& scene, Pair pair) {
     if (pair.left.pixels == 0 || pair.right.pixels == 0)
       pair.reason = "a border loses its edge pixels when it is fitted again";
     else
-      judge(scene, pair);
+      judge_edges(scene, pair), judge_image(scene, pair);
   }
   return pair;
 }
@@ -218,8 +233,8 @@ LineSegment segment_of(const Border& border, const Stretch& stretch) {
 
 ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<Border>& borders, const Scale& scale,
                      const LineOptions& options) {
-  const Scene scene{edges, view.image.pixels, scale, options,
-                    Widths(options.width_mm, options.width_deviation_mm, options.magnification_tolerance)};
+  Scene scene{edges, view.image.pixels, scale, options,
+                    Widths(options.width_mm, options.width_deviation_mm, options.magnification_tolerance), 0};
   std::vector<Pair> pairs = pairs_of(scene, borders);
   for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 6); ++i)
     if (pairs[i].reason.empty()) pairs[i] = settled(scene, pairs[i]);

@@ -31,6 +31,8 @@ void declare_line_options(Builder&& node) {
               "largest distance, at the isocentre, of an edge pixel from its line", at_least(0.01))
       .option("gap_mm", &LineOptions::gap_mm, "widest gap, at the isocentre, that a border may have", at_least(0))
       .option("lines", &LineOptions::lines, "largest number of lines that are tried", at_least(2), at_most(1000))
+      .option("least_log_likelihood", &LineOptions::least_log_likelihood,
+              "of a pair that is taken: 0.1 for each mm of clear borders, less what its width and taper cost")
       .option("outline", &LineOptions::outline,
               "move the borders from the edges, which blur draws inwards, to the outline of the round bone");
 }

@@ -95,8 +95,8 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
   EXPECT_EQ(error_of([&] { find_shaft(edges, dark_between(270, 330)); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because the image darkens across both "
-            "its borders alike for 0 mm only, of 25 mm wanted, as where one is the border of muscle or fat (29.9 mm wide)" +
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because a border is too faint for bone "
+            "but for 0 mm, of 25 mm wanted, as muscle's is (29.9 mm wide)" +
                 advice);
   marrow::View rims = empty_view();  // two dark things with something bright between them
   rims.image.pixels.colRange(200, 212) = 800;
@@ -105,6 +105,13 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   EXPECT_EQ(error_of([&] { find_shaft(edges, rims); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what "
             "lies beside it (mean grey value 1267 inside, 1000 and 1000 outside)" +
+                advice);
+  edges = no_edges();  // short, and narrow for a femur
+  draw(edges, {200, 20}, {200, 110}, kLeft);
+  draw(edges, {262, 20}, {262, 110}, kRight);
+  EXPECT_EQ(error_of([&] { find_shaft(edges, dark_between(200, 262)); }),
+            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 is "
+            "below 2.0, the least that is taken (21.8 mm wide)" +
                 advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
