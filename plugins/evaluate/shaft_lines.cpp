@@ -105,7 +105,8 @@ MARROW_PLUGIN(plugin) {
            "it in the middle of the "
            "stretch; the largest distance at its ends (beyond a few mm it is another pair); the same for the line "
            "midway; the pair's width "
-           "less the true one, which is negative where edges lie inside the outline; true width, length; the log-likelihood that the shaft node gives")
+           "less the true one, which is negative where edges lie inside the outline; true width, length; the "
+           "log-likelihood that the shaft node gives")
       .option("tolerance_mm", &Options::tolerance_mm,
               "largest distance, at the isocentre, of a silhouette point from the outline's line",
               marrow::at_least(0.01));

@@ -21,8 +21,7 @@ Eigen::Vector2d middle_of(const LineSegment& segment) {
 
 /// The point of the axis that is nearest to the ray through the middle of a pair.
 Eigen::Vector3d point_in_middle(const Axis& axis, const marrow::Camera& camera, const ShaftLines& lines) {
-  const Eigen::Vector3d ray =
-      marrow::ray_direction(camera, 0.5 * (middle_of(lines.left) + middle_of(lines.right)));
+  const Eigen::Vector3d ray = marrow::ray_direction(camera, 0.5 * (middle_of(lines.left) + middle_of(lines.right)));
   const Eigen::Vector3d across = ray - axis.direction * axis.direction.dot(ray),
                         from = marrow::source_position_mm(camera) - axis.point_mm;
   const double along_ray = -across.dot(from) / across.squaredNorm();
@@ -34,8 +33,8 @@ double diameter_mm(const Axis& axis, const marrow::Camera& camera, const ShaftLi
   const Eigen::Vector3d point = point_in_middle(axis, camera, lines);
   double sum = 0;
   for (const LineSegment* border : {&lines.left, &lines.right}) {
-    const marrow::Plane plane = marrow::back_project_line(
-        camera, border->from_px.homogeneous().cross(border->to_px.homogeneous()));
+    const marrow::Plane plane =
+        marrow::back_project_line(camera, border->from_px.homogeneous().cross(border->to_px.homogeneous()));
     sum += std::abs(plane.normal.dot(point) - plane.offset_mm);
   }
   return sum;
@@ -56,8 +55,9 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
     planes.push_back(marrow::initial::bisecting_plane(view->camera, lines[i].left, lines[i].right));
   }
   if (planes.size() < 2) {
-    context.warn("there are shaft lines of one view alone: where the bone lies between source and detector, and so its "
-                 "diameter, is not known");
+    context.warn(
+        "there are shaft lines of one view alone: where the bone lies between source and detector, and so its "
+        "diameter, is not known");
     return std::nullopt;
   }
   const Axis axis = marrow::initial::axis_of_planes(planes);
@@ -78,7 +78,9 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.shaft_width", shaft_width)
-      .summary("Outer diameter of the shaft by the planes that touch it in two views or more, without a guess of the magnification")
+      .summary(
+          "Outer diameter of the shaft by the planes that touch it in two views or more, without a guess of the "
+          "magnification")
       .in("lines", "borders of the shaft in each view", marrow::over("view"))
       .in("views", "X-ray views, for their cameras", marrow::over("view"))
       .out("metrics",

@@ -100,7 +100,8 @@ Stretch stretch_at_outline(const EdgeMap& edges, const Border& one, const Border
   for (const Border* border : {&one, &other})
     for (const EdgePixel& edge : edges.pixels) {
       const Eigen::Vector2d position(edge.u_px, edge.v_px);
-      const double distance = border->normal.dot(position) - border->rho, s = stretch.along.dot(position) - stretch.from;
+      const double distance = border->normal.dot(position) - border->rho,
+                   s = stretch.along.dot(position) - stretch.from;
       if (distance < 1.5 * support.tolerance_px || distance > reach_px || s < 0 || s >= count) continue;
       if (border->normal.dot(Eigen::Vector2d(edge.direction_u, edge.direction_v)) < support.direction_cosine) continue;
       for (int i = std::max(0, int(s) - 1); i <= std::min(count - 1, int(s) + 1); ++i) inside[std::size_t(i)] = 1;

@@ -56,8 +56,8 @@ Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& ot
                        const Eigen::Vector2d& along, double gap_px, int& supported);
 
 /// The longest part of a stretch in which neither border has edge pixels of its direction outside of it, between 1.5
-/// tolerances and `reach_px` away: where there are, the border has run on inside the outline, from a ridge's foot or from
-/// another fragment. Shorter runs of them than gap_px do not count.
+/// tolerances and `reach_px` away: where there are, the border has run on inside the outline, from a ridge's foot or
+/// from another fragment. Shorter runs of them than gap_px do not count.
 Stretch stretch_at_outline(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
                            const Stretch& stretch, double reach_px, double gap_px);
 

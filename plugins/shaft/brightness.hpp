@@ -15,8 +15,8 @@ struct Brightness {
 Brightness brightness_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch,
                          double pixel_mm);
 
-/// How much brighter it is outside the two borders than inside: of each border the mean step along the stretch, relative
-/// to the sum of both sides; of the two the geometric mean, 0 where one is no step.
+/// How much brighter it is outside the two borders than inside: of each border the mean step along the stretch,
+/// relative to the sum of both sides; of the two the geometric mean, 0 where one is no step.
 double step_of(const cv::Mat& image, const Border& left, const Border& right, const Stretch& stretch, double pixel_mm);
 
 /// The longest part of a stretch in which the image darkens across both borders, on either side by at least a part of

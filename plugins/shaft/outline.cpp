@@ -9,9 +9,9 @@ namespace marrow::shaft {
 namespace {
 
 constexpr double kStep_px = 0.125;
-constexpr double kReach_mm = 3;                    // of the profile, to either side
+constexpr double kReach_mm = 3;                          // of the profile, to either side
 constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // where the outline is sought
-constexpr double kPiece_mm = 4;  // along the border; a bowed one is followed piece by piece
+constexpr double kPiece_mm = 4;                          // along the border; a bowed one is followed piece by piece
 constexpr double kLeastBlur_px = 0.3, kMostBlur_px = 5;
 
 std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& at) {
@@ -23,8 +23,8 @@ std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& 
     return image.at<float>(row, column);
   };
   const double a = at.x() - u, b = at.y() - v;
-  const double value = (1 - b) * ((1 - a) * grey(v, u) + a * grey(v, u + 1)) +
-                       b * ((1 - a) * grey(v + 1, u) + a * grey(v + 1, u + 1));
+  const double value =
+      (1 - b) * ((1 - a) * grey(v, u) + a * grey(v, u + 1)) + b * ((1 - a) * grey(v + 1, u) + a * grey(v + 1, u + 1));
   if (!(value > 0)) return std::nullopt;
   return std::log(value);
 }
@@ -57,7 +57,8 @@ std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const
   std::vector<double> sums(std::size_t(2 * reach + 1), 0.0);
   int rows = 0;
   for (double s = stretch.from; s < stretch.to; s += 1) {
-    const auto& distance = distances[std::min(distances.size() - 1, std::size_t((s - stretch.from) / stretch.length() * pieces))];
+    const auto& distance =
+        distances[std::min(distances.size() - 1, std::size_t((s - stretch.from) / stretch.length() * pieces))];
     if (!distance) continue;
     const Eigen::Vector2d on_line = point_at(border, stretch.along, s);
     std::vector<double> row;

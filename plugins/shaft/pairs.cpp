@@ -71,7 +71,8 @@ double width_deviation_of(const Pair& pair, const Scene& scene) {
 void score(const Scene& scene, Pair& pair) {
   pair.width_mm = width_of(pair, scene.scale.pixel_mm);
   const double taper_deg = degrees(std::acos(std::clamp(-pair.left.normal.dot(pair.right.normal), 0.0, 1.0)));
-  pair.score = kEvidencePer_mm * pair.weight * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
+  pair.score =
+      kEvidencePer_mm * pair.weight * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
 }
 
 /// Why a pair is not the shaft by its edges alone; empty when it may be.
@@ -104,8 +105,8 @@ std::string reason_by_image(const Scene& scene, Pair& pair) {
                                scene.scale.gap_px));
   const double length_mm = pair.stretch.length() * pixel_mm;
   if (length_mm < scene.options.min_length_mm)
-    return text("a border is too faint for bone but for %.0f mm, of %.0f mm wanted, as muscle's is (%.1f mm wide)", length_mm,
-                scene.options.min_length_mm, pair.width_mm);
+    return text("a border is too faint for bone but for %.0f mm, of %.0f mm wanted, as muscle's is (%.1f mm wide)",
+                length_mm, scene.options.min_length_mm, pair.width_mm);
   const Brightness mean = brightness_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
   if (mean.inside < std::min(mean.outside_left, mean.outside_right)) {
     const double step = step_of(scene.image, pair.left, pair.right, pair.stretch, pixel_mm);
@@ -167,8 +168,8 @@ std::vector<Pair> pairs_of(Scene& scene, const std::vector<Border>& borders) {
     }
   for (const Pair& pair : pairs)
     if (pair.reason.empty())
-      scene.bone_step = std::max(
-          scene.bone_step, step_of(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm));
+      scene.bone_step =
+          std::max(scene.bone_step, step_of(scene.image, pair.left, pair.right, pair.stretch, scene.scale.pixel_mm));
   for (Pair& pair : pairs) judge_image(scene, pair);
   sort_by_score(pairs);
   return pairs;
@@ -233,8 +234,12 @@ LineSegment segment_of(const Border& border, const Stretch& stretch) {
 
 ShaftLines best_pair(const EdgeMap& edges, const View& view, const std::vector<Border>& borders, const Scale& scale,
                      const LineOptions& options) {
-  Scene scene{edges, view.image.pixels, scale, options,
-                    Widths(options.width_mm, options.width_deviation_mm, options.magnification_tolerance), 0};
+  Scene scene{edges,
+              view.image.pixels,
+              scale,
+              options,
+              Widths(options.width_mm, options.width_deviation_mm, options.magnification_tolerance),
+              0};
   std::vector<Pair> pairs = pairs_of(scene, borders);
   for (std::size_t i = 0; i < std::min<std::size_t>(pairs.size(), 6); ++i)
     if (pairs[i].reason.empty()) pairs[i] = settled(scene, pairs[i]);

@@ -11,10 +11,9 @@ namespace {
 /// Keeps what a node warns of.
 struct Listener {
   std::vector<std::string> warnings;
-  marrow::Context context{marrow::Context::Hooks{
-      0, nullptr, {}, [this](std::string_view message, bool warning) {
-        if (warning) warnings.emplace_back(message);
-      }}};
+  marrow::Context context{marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, bool warning) {
+                                                   if (warning) warnings.emplace_back(message);
+                                                 }}};
 };
 
 constexpr double kRadius_mm = 14;
@@ -86,9 +85,10 @@ TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
   Listener listener;
   EXPECT_FALSE(shaft_lines(borders(frontal()), frontal(), {}, {}, {}, listener.context));
   ASSERT_EQ(listener.warnings.size(), 1u);
-  EXPECT_EQ(listener.warnings[0],
-            "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing to "
-            "compare it with");
+  EXPECT_EQ(
+      listener.warnings[0],
+      "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing to "
+      "compare it with");
 }
 
 }  // namespace

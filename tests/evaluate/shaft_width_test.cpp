@@ -11,10 +11,9 @@ namespace {
 /// Keeps what a node warns of.
 struct Listener {
   std::vector<std::string> warnings;
-  marrow::Context context{marrow::Context::Hooks{
-      0, nullptr, {}, [this](std::string_view message, bool warning) {
-        if (warning) warnings.emplace_back(message);
-      }}};
+  marrow::Context context{marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, bool warning) {
+                                                   if (warning) warnings.emplace_back(message);
+                                                 }}};
 };
 
 marrow::View view_at(const std::string& name, double angle_deg) {
@@ -68,9 +67,10 @@ TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
   Listener listener;
   shaft_width(scene.lines, scene.views, {}, listener.context);
   ASSERT_EQ(listener.warnings.size(), 2u);
-  EXPECT_EQ(listener.warnings[0],
-            "view 'frontal': the borders are 80 mm apart at the depth where the views have the axis, which is no shaft's "
-            "width (18.0 to 48.7 mm); one view's pair is another thing than the other's");
+  EXPECT_EQ(
+      listener.warnings[0],
+      "view 'frontal': the borders are 80 mm apart at the depth where the views have the axis, which is no shaft's "
+      "width (18.0 to 48.7 mm); one view's pair is another thing than the other's");
 }
 
 TEST(ShaftWidth, SaysWhatItNeeds) {
@@ -78,16 +78,18 @@ TEST(ShaftWidth, SaysWhatItNeeds) {
   const Scene one = scene_of(14, {0});
   EXPECT_FALSE(shaft_width(one.lines, one.views, {}, listener.context));
   ASSERT_EQ(listener.warnings.size(), 1u);
-  EXPECT_EQ(listener.warnings[0],
-            "there are shaft lines of one view alone: where the bone lies between source and detector, and so its diameter, "
-            "is not known");
+  EXPECT_EQ(
+      listener.warnings[0],
+      "there are shaft lines of one view alone: where the bone lies between source and detector, and so its diameter, "
+      "is not known");
   const Scene two = scene_of(14);
   try {
     shaft_width(two.lines, one.views, {}, listener.context);
     ADD_FAILURE() << "no error";
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "there are shaft lines of a view 'lateral', but no such view; wire the views that the lines were found in");
+    EXPECT_STREQ(
+        error.what(),
+        "there are shaft lines of a view 'lateral', but no such view; wire the views that the lines were found in");
   }
 }
 

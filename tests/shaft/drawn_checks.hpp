@@ -74,6 +74,17 @@ TEST(Shaft, ToleratesGapsUpToTheLimit) {
   EXPECT_NEAR(find_drawn(edges, dark_between(200, 285)).left.to_px.y(), 420, 3);
 }
 
+// A ridge of the bone lies outside the border of what is behind it.
+TEST(Shaft, EndsWhereItRunsOnInsideARidge) {
+  marrow::EdgeMap edges = no_edges();
+  draw(edges, {200, 20}, {200, 480}, kLeft);
+  draw(edges, {285, 20}, {285, 480}, kRight);
+  draw(edges, {295, 20}, {295, 200}, kRight);
+  const ShaftLines lines = find_drawn(edges, dark_between(200, 285));
+  EXPECT_NEAR(lines.left.from_px.y(), 200, 4);
+  EXPECT_NEAR(lines.left.to_px.y(), 480, 4);
+}
+
 TEST(Shaft, SaysWhyThereIsNoPair) {
   const std::string advice = "; look at the edges, and set the edge detector's thresholds or this bone's width_mm";
   marrow::EdgeMap edges = no_edges();
@@ -94,10 +105,11 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, dark_between(270, 330)); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because a border is too faint for bone "
-            "but for 0 mm, of 25 mm wanted, as muscle's is (29.9 mm wide)" +
-                advice);
+  EXPECT_EQ(
+      error_of([&] { find_shaft(edges, dark_between(270, 330)); }),
+      "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because a border is too faint for bone "
+      "but for 0 mm, of 25 mm wanted, as muscle's is (29.9 mm wide)" +
+          advice);
   marrow::View rims = empty_view();  // two dark things with something bright between them
   rims.image.pixels.colRange(200, 212) = 800;
   rims.image.pixels.colRange(212, 273) = 1500;
@@ -109,10 +121,11 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   edges = no_edges();  // short, and narrow for a femur
   draw(edges, {200, 20}, {200, 110}, kLeft);
   draw(edges, {262, 20}, {262, 110}, kRight);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, dark_between(200, 262)); }),
-            "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 is "
-            "below 2.0, the least that is taken (21.8 mm wide)" +
-                advice);
+  EXPECT_EQ(
+      error_of([&] { find_shaft(edges, dark_between(200, 262)); }),
+      "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 is "
+      "below 2.0, the least that is taken (21.8 mm wide)" +
+          advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);

@@ -11,7 +11,7 @@ TEST(Widths, OfAFemurGoWithItsTaper) {
   const Widths femur({}, {}, 0);
   EXPECT_NEAR(femur.log_likelihood(28, 0), 0, 0.01);      // the middle
   EXPECT_NEAR(femur.log_likelihood(36.7, 8.9), 0, 0.01);  // a fifth of the length above the condyles, from the front
-  EXPECT_LT(femur.log_likelihood(36.7, 0), -1);         // as wide, but a cylinder
+  EXPECT_LT(femur.log_likelihood(36.7, 0), -1);           // as wide, but a cylinder
   EXPECT_LT(femur.log_likelihood(28, 9), -1);             // as a cone is not in the middle
   EXPECT_LT(femur.log_likelihood(12, 0), -10);            // a canal
 }
