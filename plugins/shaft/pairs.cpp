@@ -15,7 +15,7 @@ namespace marrow::shaft {
 namespace {
 
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
-constexpr double kPlainStep = 0.6;       // of brightness, of the largest; fainter pairs are weaker evidence
+constexpr double kPlainStep = 0.8;       // of brightness, of the largest; fainter pairs are weaker evidence
 constexpr double kRidge_mm = 4;  // how far outside a border the bone's outline may be, at a ridge or another fragment
 
 /// Two nearly parallel lines of opposite gradient.
