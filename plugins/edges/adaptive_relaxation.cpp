@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <marrow/plugin.hpp>
 
 #include "gradient.hpp"
@@ -36,7 +37,7 @@ struct Thresholds {
 };
 
 Thresholds local_thresholds(const Prepared& image, const Gradient& gradient, const Options& options) {
-  const cv::Mat noise = block_noise(image, gradient, options.sigma_px);
+  const cv::Mat noise = block_noise(image, gradient);
   const auto [median, low, high] =
       window_percentiles(gradient, image.usable, options.window_px, {50, options.low, options.high});
   return {cv::max(low, median + options.noise_low * noise), cv::max(high, median + options.noise_high * noise)};
@@ -55,7 +56,8 @@ cv::Mat classified(const Prepared& image, const Gradient& gradient, const Thresh
     const uchar* use = image.usable.ptr<uchar>(v);
     uchar* label = labels.ptr<uchar>(v);
     for (int u = 1; u < columns - 1; ++u) {
-      if (!use[u] || !(magnitude[u] > low[u]) || (thin && !on_ridge(gradient, u, v))) continue;
+      if (!use[u] || !(magnitude[u] > low[u]) || (thin && !passes(gradient, way_to_ridge(gradient, u, v), u, v)))
+        continue;
       label[u] = magnitude[u] > high[u] ? kEdge : kIntermediate;
     }
   });
@@ -70,14 +72,25 @@ void for_neighbours(const cv::Point& pixel, Function function) {
       if (u != pixel.x || v != pixel.y) function(u, v);
 }
 
+/// Calls function(u, v) for the pixels labelled as edges, also where it changes labels further on.
+template <class Function>
+void for_edges(const cv::Mat& labels, Function function) {
+  for (int v = 0; v < labels.rows; ++v) {
+    const uchar* row = labels.ptr<uchar>(v);
+    const void* found = row;
+    while ((found = std::memchr(found, kEdge, std::size_t(row + labels.cols - static_cast<const uchar*>(found))))) {
+      function(int(static_cast<const uchar*>(found) - row), v);
+      found = static_cast<const uchar*>(found) + 1;
+    }
+  }
+}
+
 /// Recursive relabelling of intermediate pixels beside an edge pixel of similar magnitude and direction. What is
 /// reached does not depend on the order.
 void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
   const float cosine = float(std::cos(marrow::radians(options.direction_tolerance_deg)));
   std::vector<cv::Point> edge;
-  for (int v = 0; v < labels.rows; ++v)
-    for (int u = 0; u < labels.cols; ++u)
-      if (labels.at<uchar>(v, u) == kEdge) edge.emplace_back(u, v);
+  for_edges(labels, [&](int u, int v) { edge.emplace_back(u, v); });
   while (!edge.empty()) {
     const cv::Point pixel = edge.back();
     edge.pop_back();
@@ -99,22 +112,20 @@ void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
 cv::Mat large_components(cv::Mat& labels, int min_pixels) {
   cv::Mat kept(labels.size(), CV_8U, cv::Scalar(0));
   std::vector<cv::Point> component;
-  for (int v = 0; v < labels.rows; ++v)
-    for (int u = 0; u < labels.cols; ++u) {
-      if (labels.at<uchar>(v, u) != kEdge) continue;
-      component.assign(1, {u, v});
-      labels.at<uchar>(v, u) = kNone;
-      for (std::size_t i = 0; i < component.size(); ++i) {
-        const cv::Point pixel = component[i];
-        for_neighbours(pixel, [&](int next_u, int next_v) {
-          if (labels.at<uchar>(next_v, next_u) != kEdge) return;
-          labels.at<uchar>(next_v, next_u) = kNone;
-          component.emplace_back(next_u, next_v);
-        });
-      }
-      if (int(component.size()) >= min_pixels)
-        for (const cv::Point& pixel : component) kept.at<uchar>(pixel) = 255;
+  for_edges(labels, [&](int u, int v) {
+    component.assign(1, {u, v});
+    labels.at<uchar>(v, u) = kNone;
+    for (std::size_t i = 0; i < component.size(); ++i) {
+      const cv::Point pixel = component[i];
+      for_neighbours(pixel, [&](int next_u, int next_v) {
+        if (labels.at<uchar>(next_v, next_u) != kEdge) return;
+        labels.at<uchar>(next_v, next_u) = kNone;
+        component.emplace_back(next_u, next_v);
+      });
     }
+    if (int(component.size()) >= min_pixels)
+      for (const cv::Point& pixel : component) kept.at<uchar>(pixel) = 255;
+  });
   return kept;
 }
 

@@ -31,7 +31,7 @@ marrow::EdgeMap canny(const marrow::View& view, const Options& options) {
                         std::to_string(options.high));
   const Prepared image = prepare(view, options.sigma_px, options.logarithm);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
-  const cv::Mat noise = block_noise(image, gradient, options.sigma_px);
+  const cv::Mat noise = block_noise(image, gradient);
   const cv::Mat median = window_percentiles(gradient, image.usable, options.window_px, {50, 50, 50})[0];
   double steepest = 0;
   cv::minMaxLoc(gradient.magnitude, nullptr, &steepest);

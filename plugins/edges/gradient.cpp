@@ -4,56 +4,26 @@
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <marrow/domain/error.hpp>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
+
+#include "usable.hpp"
 
 namespace marrow::edges {
 namespace {
 
 constexpr int kBandRows = 64;  // fixed, so that the result does not depend on the number of threads
 constexpr int kBlock = 16;
+constexpr int kMostBlocks = 1024;  // that the noise is measured in
 
 /// Calls function(first row, end row) for bands of rows, in parallel.
 template <class Function>
 void for_bands(int rows, Function function) {
   tbb::parallel_for(0, (rows + kBandRows - 1) / kBandRows,
                     [&](int band) { function(band * kBandRows, std::min(rows, (band + 1) * kBandRows)); });
-}
-
-/// Black areas that reach the corners, where a round collimator left the detector dark; empty when there are none.
-cv::Mat collimated(const cv::Mat& grey, double smallest, double largest) {
-  if (smallest > 0.1 * largest) return {};
-  const cv::Mat black = grey <= smallest + 0.02 * (largest - smallest);
-  const std::array<cv::Point, 4> corners{cv::Point(0, 0), cv::Point(grey.cols - 1, 0), cv::Point(0, grey.rows - 1),
-                                         cv::Point(grey.cols - 1, grey.rows - 1)};
-  const auto is_black = [&](const cv::Point& corner) { return black.at<uchar>(corner) != 0; };
-  if (std::count_if(corners.begin(), corners.end(), is_black) < 3) return {};
-  cv::Mat labels;
-  cv::connectedComponents(black, labels, 4, CV_32S);
-  cv::Mat dark(grey.size(), CV_8U, cv::Scalar(0));
-  for (const cv::Point& corner : corners)
-    if (is_black(corner)) dark |= labels == labels.at<int>(corner);
-  return dark;
-}
-
-cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, double largest, double sigma_px) {
-  cv::Mat usable(grey.size(), CV_8U, cv::Scalar(255));
-  const cv::Mat dark = collimated(grey, smallest, largest);
-  if (!dark.empty()) usable.setTo(0, dark);
-  if (!view.mask.empty()) usable.setTo(0, view.mask == 0);
-  if (!dark.empty() || !view.mask.empty()) {
-    const int reach = int(std::ceil(3 * sigma_px));
-    cv::erode(usable, usable, cv::getStructuringElement(cv::MORPH_RECT, {2 * reach + 1, 2 * reach + 1}));
-  }
-  const int margin = int(std::ceil(3 * sigma_px));  // nothing is made up of reflected pixels
-  if (2 * margin >= std::min(grey.rows, grey.cols)) return cv::Mat(grey.size(), CV_8U, cv::Scalar(0));
-  for (cv::Mat strip : {usable.rowRange(0, margin), usable.rowRange(grey.rows - margin, grey.rows),
-                        usable.colRange(0, margin), usable.colRange(grey.cols - margin, grey.cols)})
-    strip.setTo(0);
-  return usable;
 }
 
 float median(std::vector<float>& values, double fraction = 0.5) {
@@ -79,7 +49,8 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
     throw Error(what + ": the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   cv::Mat grey;
   view.image.pixels.convertTo(grey, CV_32F);
-  if (!cv::checkRange(grey)) throw Error(what + ": the image holds pixels that are not finite (NaN or infinity)");
+  if (type == CV_32FC1 && !cv::checkRange(grey))
+    throw Error(what + ": the image holds pixels that are not finite (NaN or infinity)");
   double smallest = 0, largest = 0;
   cv::minMaxLoc(grey, &smallest, &largest);
   if (smallest == largest) {
@@ -88,7 +59,7 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
     throw Error(text.str());
   }
   Prepared prepared;
-  prepared.usable = usable_pixels(view, grey, smallest, largest, sigma_px);
+  prepared.usable = usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
   if (cv::countNonZero(prepared.usable) == 0)
     throw Error(what + ": no pixel is left to search for edges (mask, image border and smoothing take all of " +
                 std::to_string(grey.cols) + " x " + std::to_string(grey.rows) + ")");
@@ -104,39 +75,65 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
   return prepared;
 }
 
-Gradient gaussian_gradient(const cv::Mat& values, double sigma_px) {
-  const int radius = int(std::ceil(3 * sigma_px));
-  cv::Mat smooth(1, 2 * radius + 1, CV_32F), derive(1, 2 * radius + 1, CV_32F);
+Kernel gaussian_kernel(double sigma_px, double reach) {
+  const int radius = int(std::ceil(reach * sigma_px));
+  Kernel kernel;
   double sum = 0, slope = 0;
   for (int i = -radius; i <= radius; ++i) {
     const double weight = std::exp(-0.5 * i * i / (sigma_px * sigma_px));
-    smooth.at<float>(i + radius) = float(weight);
-    derive.at<float>(i + radius) = float(i * weight);
+    kernel.smooth.push_back(float(weight));
+    kernel.derive.push_back(float(i * weight));
     sum += weight;
     slope += i * i * weight;
   }
-  smooth /= sum;    // a constant stays what it is
-  derive /= slope;  // a ramp of slope 1 gives 1
+  for (float& weight : kernel.smooth) weight /= float(sum);    // a constant stays what it is
+  for (float& weight : kernel.derive) weight /= float(slope);  // a ramp of slope 1 gives 1
+  return kernel;
+}
 
+Kernel smoothed_mask(const Kernel& mask, double sigma_px) {
+  if (sigma_px == 0) return mask;
+  const std::vector<float> gauss = gaussian_kernel(sigma_px).smooth;
+  const auto convolved = [&](const std::vector<float>& weights) {
+    std::vector<float> result(weights.size() + gauss.size() - 1, 0.0f);
+    for (std::size_t i = 0; i < weights.size(); ++i)
+      for (std::size_t k = 0; k < gauss.size(); ++k) result[i + k] += weights[i] * gauss[k];
+    return result;
+  };
+  return {convolved(mask.smooth), convolved(mask.derive)};
+}
+
+Gradient gradient_of(const cv::Mat& values, const Kernel& kernel) {
+  const auto norm = [](const std::vector<float>& weights) {
+    return std::sqrt(std::inner_product(weights.begin(), weights.end(), weights.begin(), 0.0));
+  };
   Gradient gradient;
+  gradient.noise_gain = norm(kernel.smooth) * norm(kernel.derive);
+  gradient.offset_px = kernel.smooth.size() % 2 ? 0.0f : 0.5f;
   for (cv::Mat* part : {&gradient.du, &gradient.dv, &gradient.magnitude}) part->create(values.size(), CV_32F);
+  const cv::Point anchor(int(kernel.smooth.size() - 1) / 2, int(kernel.smooth.size() - 1) / 2);
   for_bands(values.rows, [&](int first, int end) {
     const cv::Mat band = values.rowRange(first, end);  // the filter reads the rows beside the band, too
     cv::Mat du = gradient.du.rowRange(first, end), dv = gradient.dv.rowRange(first, end);
     cv::Mat magnitude = gradient.magnitude.rowRange(first, end);
-    cv::sepFilter2D(band, du, CV_32F, derive, smooth);
-    cv::sepFilter2D(band, dv, CV_32F, smooth, derive);
+    cv::sepFilter2D(band, du, CV_32F, kernel.derive, kernel.smooth, anchor);
+    cv::sepFilter2D(band, dv, CV_32F, kernel.smooth, kernel.derive, anchor);
     cv::magnitude(du, dv, magnitude);
   });
   return gradient;
 }
 
-NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient, double sigma_px) {
+Gradient gaussian_gradient(const cv::Mat& values, double sigma_px) {
+  return gradient_of(values, gaussian_kernel(sigma_px));
+}
+
+NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient) {
   const int columns = image.values.cols / kBlock, rows = image.values.rows / kBlock;
+  const int step = columns * rows / kMostBlocks + 1;
   std::vector<std::pair<float, float>> blocks(std::size_t(columns) * rows, {0.0f, -1.0f});  // value, noise
   tbb::parallel_for(0, rows, [&](int row) {
     std::vector<float> du, dv;
-    for (int column = 0; column < columns; ++column) {
+    for (int column = 5 * row % step; column < columns; column += step) {
       du.clear(), dv.clear();
       double sum = 0;
       for (int v = row * kBlock; v < (row + 1) * kBlock; v += 2)  // every other pixel: neighbours share their noise
@@ -153,9 +150,9 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient, double s
   std::erase_if(blocks, [](const auto& block) { return block.second < 0; });
   std::sort(blocks.begin(), blocks.end());
 
-  // Rounding to whole grey values has the deviation 1 / sqrt(12); a Gaussian derivative leaves 1 / (sqrt(8 pi) sigma^2)
-  // of white noise. Images of floats get a hundred thousandth of their range instead.
-  const double rounding = (image.whole_numbers ? 0.29 : 1e-5 * image.range) * 0.2 / (sigma_px * sigma_px);
+  // Rounding to whole grey values has the deviation 1 / sqrt(12). Images of floats get a hundred thousandth of their
+  // range instead.
+  const double rounding = (image.whole_numbers ? 0.29 : 1e-5 * image.range) * gradient.noise_gain;
   const std::size_t groups = std::clamp<std::size_t>(blocks.size() / 32, 1, 8);
   for (std::size_t group = 0; group < groups && !blocks.empty(); ++group) {
     std::vector<float> values, noises;

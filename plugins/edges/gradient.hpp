@@ -22,15 +22,26 @@ struct Prepared {
   float slope(float value) const { return logarithm ? std::exp(-value) : 1.0f; }
 };
 
-/// Checks the view and prepares it. Not usable are what View::mask excludes, black corners left by a round collimator
-/// (found where at least three corners are black), each with a margin of 3 sigma, and the outermost 3 sigma of the
-/// image. Throws Error for an image that is constant, holds NaN or infinity, or has no usable pixel.
+/// Checks the view and prepares it; usable.hpp says which pixels are usable. Throws Error for an image that is
+/// constant, holds NaN or infinity, or has no usable pixel.
 Prepared prepare(const View& view, double sigma_px, bool logarithm);
 
-/// Derivatives of the image smoothed by a Gaussian, per pixel; CV_32F.
+/// A separable derivative: along one axis it derives, along the other it smooths. Both have the same number of weights;
+/// of an even number the derivative lies half a pixel right of and below its pixel.
+struct Kernel {
+  std::vector<float> smooth, derive;
+};
+Kernel gaussian_kernel(double sigma_px, double reach = 3);  // ends at so many sigma
+/// A mask of few pixels on the image smoothed by a Gaussian; sigma 0: the mask itself.
+Kernel smoothed_mask(const Kernel& mask, double sigma_px);
+
+/// Derivatives of the image, per pixel; CV_32F.
 struct Gradient {
   cv::Mat du, dv, magnitude;
+  double noise_gain = 1;  ///< deviation of a component for white noise of deviation 1 in the image
+  float offset_px = 0;    ///< from a pixel's centre to where its derivative lies, both ways
 };
+Gradient gradient_of(const cv::Mat& values, const Kernel& kernel);
 Gradient gaussian_gradient(const cv::Mat& values, double sigma_px);
 
 /// The standard deviation that noise alone gives to a component of the gradient, as a function of the value: X-ray
@@ -38,7 +49,7 @@ Gradient gaussian_gradient(const cv::Mat& values, double sigma_px);
 /// of equal brightness that vary least are believed.
 class NoiseLevel {
  public:
-  NoiseLevel(const Prepared& image, const Gradient& gradient, double sigma_px);
+  NoiseLevel(const Prepared& image, const Gradient& gradient);
   float at(float value) const;
 
  private:

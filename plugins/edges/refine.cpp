@@ -10,31 +10,23 @@
 namespace marrow::edges {
 namespace {
 
-float bilinear(const cv::Mat& values, float u, float v) {
-  const int left = std::clamp(int(std::floor(u)), 0, values.cols - 2),
-            top = std::clamp(int(std::floor(v)), 0, values.rows - 2);
-  const float right_part = u - float(left), lower_part = v - float(top);
-  const float* upper = values.ptr<float>(top) + left;
-  const float* lower = values.ptr<float>(top + 1) + left;
-  return (1 - lower_part) * ((1 - right_part) * upper[0] + right_part * upper[1]) +
-         lower_part * ((1 - right_part) * lower[0] + right_part * lower[1]);
-}
-
 struct Found {
   int pixel;       ///< row-major index of the pixel in which the edge lies
   float distance;  ///< from the pixel at which it was found
   EdgePixel edge;
 };
 
-Found refine(const Prepared& image, const Gradient& gradient, int u, int v) {
+Found refine(const Prepared& image, const Gradient& gradient, int u, int v, float way) {
   const float du = gradient.du.at<float>(v, u), dv = gradient.dv.at<float>(v, u), length = std::hypot(du, dv);
-  const float way = std::clamp(way_to_ridge(gradient, u, v).value_or(0.0f), -1.0f, 1.0f);
+  way = std::clamp(way, -1.0f, 1.0f);
   Found found;
   found.distance = std::abs(way);
   EdgePixel& edge = found.edge;
-  edge.u_px = float(u) + way * du / length;
-  edge.v_px = float(v) + way * dv / length;
-  float du_there = bilinear(gradient.du, edge.u_px, edge.v_px), dv_there = bilinear(gradient.dv, edge.u_px, edge.v_px);
+  const float in_gradient_u = float(u) + way * du / length, in_gradient_v = float(v) + way * dv / length;
+  edge.u_px = in_gradient_u + gradient.offset_px;
+  edge.v_px = in_gradient_v + gradient.offset_px;
+  float du_there = bilinear(gradient.du, in_gradient_u, in_gradient_v),
+        dv_there = bilinear(gradient.dv, in_gradient_u, in_gradient_v);
   if (du_there == 0 && dv_there == 0) du_there = du, dv_there = dv;
   const float magnitude = std::hypot(du_there, dv_there);
   edge.direction_u = du_there / magnitude;
@@ -66,20 +58,31 @@ std::optional<float> way_to_ridge(const Gradient& gradient, int u, int v) {
   return -(z_u * n_u + z_v * n_v) / curvature;
 }
 
-bool on_ridge(const Gradient& gradient, int u, int v) {
-  const std::optional<float> way = way_to_ridge(gradient, u, v);
+bool passes(const Gradient& gradient, std::optional<float> way, int u, int v) {
   if (!way) return false;
   const float steepest = std::max(std::abs(gradient.du.at<float>(v, u)), std::abs(gradient.dv.at<float>(v, u)));
   return std::abs(*way) * steepest <= 0.6f * gradient.magnitude.at<float>(v, u);
 }
 
-EdgeMap refined(const Prepared& image, const Gradient& gradient, const cv::Mat& marked) {
+float bilinear(const cv::Mat& values, float u, float v) {
+  const int left = std::clamp(int(std::floor(u)), 0, values.cols - 2),
+            top = std::clamp(int(std::floor(v)), 0, values.rows - 2);
+  const float right_part = u - float(left), lower_part = v - float(top);
+  const float* upper = values.ptr<float>(top) + left;
+  const float* lower = values.ptr<float>(top + 1) + left;
+  return (1 - lower_part) * ((1 - right_part) * upper[0] + right_part * upper[1]) +
+         lower_part * ((1 - right_part) * lower[0] + right_part * lower[1]);
+}
+
+EdgeMap refined(const Prepared& image, const Gradient& gradient, const cv::Mat& marked, const WayToEdge& way) {
   const int rows = marked.rows;
+  const auto way_at = [&](int u, int v) { return (way ? way(u, v) : way_to_ridge(gradient, u, v)).value_or(0.0f); };
   std::vector<std::vector<Found>> found_in_row(rows);
   tbb::parallel_for(0, rows, [&](int v) {
     const uchar* marks = marked.ptr<uchar>(v);
     for (int u = 0; u < marked.cols; ++u)
-      if (marks[u] && gradient.magnitude.at<float>(v, u) > 0) found_in_row[v].push_back(refine(image, gradient, u, v));
+      if (marks[u] && gradient.magnitude.at<float>(v, u) > 0)
+        found_in_row[v].push_back(refine(image, gradient, u, v, way_at(u, v)));
   });
   std::vector<Found> found;
   for (const auto& row : found_in_row) found.insert(found.end(), row.begin(), row.end());

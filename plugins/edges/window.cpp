@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <numeric>
 
 namespace marrow::edges {
 namespace {
@@ -33,26 +34,36 @@ class BlockHistograms {
     });
   }
 
-  /// Counts of a square of blocks, `reach` blocks each way.
-  std::vector<std::uint32_t> window(int row, int column, int reach) const {
-    std::vector<std::uint32_t> sum(kBins, 0);
-    for (int r = std::max(0, row - reach); r <= std::min(rows - 1, row + reach); ++r)
-      for (int c = std::max(0, column - reach); c <= std::min(columns - 1, column + reach); ++c) {
-        const std::uint16_t* block = counts_.data() + (std::size_t(r) * columns + c) * kBins;
-        for (int i = 0; i < kBins; ++i) sum[i] += block[i];
-      }
-    return sum;
+  /// Calls function(column, counts) with the counts of a square of blocks about each block of a row, `reach` blocks
+  /// each way. The square moves along: a column of blocks enters it, another one leaves.
+  template <class Function>
+  void for_windows(int row, int reach, Function function) const {
+    std::vector<std::uint32_t> sums(std::size_t(columns) * kBins, 0), window(kBins, 0);
+    for (int r = std::max(0, row - reach); r <= std::min(rows - 1, row + reach); ++r) {
+      const std::uint16_t* blocks = counts_.data() + std::size_t(r) * columns * kBins;
+      for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += blocks[i];
+    }
+    const auto change = [&](int column, std::uint32_t sign) {
+      if (column < 0 || column >= columns) return;
+      for (int i = 0; i < kBins; ++i) window[i] += sign * sums[std::size_t(column) * kBins + i];
+    };
+    for (int column = 0; column < reach; ++column) change(column, 1);
+    for (int column = 0; column < columns; ++column) {
+      change(column + reach, 1);
+      change(column - reach - 1, std::uint32_t(-1));  // modulo 2^32, a subtraction
+      function(column, window);
+    }
   }
 
-  float percentile(const std::vector<std::uint32_t>& window, double percent) const {
-    std::uint32_t total = 0;
-    for (std::uint32_t count : window) total += count;
-    double left = percent / 100 * total;
-    for (int i = 0; i < kBins && total > 0; ++i) {
-      if (left <= window[i] && window[i] > 0) return edge(i) + float(left / window[i]) * (edge(i + 1) - edge(i));
-      left -= window[i];
-    }
-    return 0;
+  /// The magnitude below which a part of the counts lies; `sums[i]` is the number of counts in bins 0 to i.
+  float quantile(const std::vector<std::uint32_t>& sums, double part) const {
+    if (sums.back() == 0) return 0;
+    const double wanted = part * sums.back();
+    auto bin = std::lower_bound(sums.begin(), sums.end(), wanted,
+                                [](std::uint32_t sum, double least) { return sum < least || sum == 0; });
+    const int i = int(bin - sums.begin());
+    const double before = i > 0 ? sums[std::size_t(i - 1)] : 0, inside = (wanted - before) / (*bin - before);
+    return edge(i) + float(inside) * (edge(i + 1) - edge(i));
   }
 
   const int columns, rows;
@@ -79,17 +90,18 @@ std::array<cv::Mat, 3> window_percentiles(const Gradient& gradient, const cv::Ma
   std::array<cv::Mat, 3> percentiles;
   for (cv::Mat& values : percentiles) values.create(histograms.rows, histograms.columns, CV_32F);
   tbb::parallel_for(0, histograms.rows, [&](int row) {
-    for (int column = 0; column < histograms.columns; ++column) {
-      const auto window = histograms.window(row, column, reach);
+    std::vector<std::uint32_t> sums(kBins);
+    histograms.for_windows(row, reach, [&](int column, const std::vector<std::uint32_t>& window) {
+      std::partial_sum(window.begin(), window.end(), sums.begin());
       for (std::size_t i = 0; i < percents.size(); ++i)
-        percentiles[i].at<float>(row, column) = histograms.percentile(window, percents[i]);
-    }
+        percentiles[i].at<float>(row, column) = histograms.quantile(sums, percents[i] / 100);
+    });
   });
   return percentiles;
 }
 
-cv::Mat block_noise(const Prepared& image, const Gradient& gradient, double sigma_px) {
-  const NoiseLevel noise(image, gradient, sigma_px);
+cv::Mat block_noise(const Prepared& image, const Gradient& gradient) {
+  const NoiseLevel noise(image, gradient);
   const cv::Size size = image.values.size();
   cv::Mat levels((size.height + kBlock - 1) / kBlock, (size.width + kBlock - 1) / kBlock, CV_32F);
   for (int row = 0; row < levels.rows; ++row)
@@ -101,19 +113,21 @@ cv::Mat block_noise(const Prepared& image, const Gradient& gradient, double sigm
 }
 
 void interpolate_row(const cv::Mat& blocks, int v, std::vector<float>& row) {
-  const auto place = [](int pixel, int count) {
-    const float at = std::clamp((float(pixel) + 0.5f) / kBlock - 0.5f, 0.0f, float(count - 1));
-    const int first = std::min(int(at), std::max(0, count - 2));
-    return std::pair(first, at - float(first));
-  };
-  const auto [top, lower_part] = place(v, blocks.rows);
+  const float place = std::clamp((float(v) + 0.5f) / kBlock - 0.5f, 0.0f, float(blocks.rows - 1));
+  const int top = std::min(int(place), std::max(0, blocks.rows - 2));
+  const float lower_part = place - float(top);
   const float* upper = blocks.ptr<float>(top);
   const float* lower = blocks.ptr<float>(std::min(top + 1, blocks.rows - 1));
-  for (std::size_t u = 0; u < row.size(); ++u) {
-    const auto [left, right_part] = place(int(u), blocks.cols);
-    const int right = std::min(left + 1, blocks.cols - 1);
-    row[u] = (1 - lower_part) * (upper[left] + right_part * (upper[right] - upper[left])) +
-             lower_part * (lower[left] + right_part * (lower[right] - lower[left]));
+  const auto at = [&](int column) { return upper[column] + lower_part * (lower[column] - upper[column]); };
+  const std::size_t width = row.size();
+  std::fill_n(row.begin(), std::min<std::size_t>(kBlock / 2, width), at(0));
+  for (int column = 0; column < blocks.cols; ++column) {  // from this block's centre to the next one's
+    const std::size_t first = std::size_t(column) * kBlock + kBlock / 2;
+    const float here = at(column), change = at(std::min(column + 1, blocks.cols - 1)) - here;
+    std::array<float, kBlock> between;
+    for (int i = 0; i < kBlock; ++i) between[std::size_t(i)] = here + (float(i) + 0.5f) / kBlock * change;
+    if (first < width)
+      std::copy_n(between.begin(), std::min<std::size_t>(kBlock, width - first), row.begin() + std::ptrdiff_t(first));
   }
 }
 

@@ -14,7 +14,7 @@ std::array<cv::Mat, 3> window_percentiles(const Gradient& gradient, const cv::Ma
                                           const std::array<double, 3>& percents);
 
 /// The noise of a component of the gradient (NoiseLevel), one CV_32F value a block.
-cv::Mat block_noise(const Prepared& image, const Gradient& gradient, double sigma_px);
+cv::Mat block_noise(const Prepared& image, const Gradient& gradient);
 
 /// Bilinear interpolation between the centres of blocks, along one row of pixels.
 void interpolate_row(const cv::Mat& blocks, int v, std::vector<float>& row);

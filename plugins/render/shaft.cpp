@@ -19,7 +19,8 @@ struct Options {
 
 std::string describe(const marrow::ShaftLines& lines) {
   char text[80];
-  std::snprintf(text, sizeof text, "chosen: %.1f mm wide, log likelihood %.2f", lines.width_mm, lines.log_likelihood);
+  std::snprintf(text, sizeof text, "chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm, lines.width_deviation_mm,
+                lines.log_likelihood);
   return text;
 }
 
@@ -31,6 +32,11 @@ void draw_number(Panel& panel, const marrow::LineSegment& line, std::size_t numb
   const cv::Point place(std::clamp(int(at.x) + 4, 0, std::max(0, panel.pixels.cols - 20)),
                         std::clamp(int(at.y) + 16, 16, std::max(16, panel.pixels.rows - 4)));
   draw_text(panel.pixels, std::to_string(number), place, colour);
+}
+
+/// Midway between the borders.
+marrow::LineSegment mid_line(const marrow::ShaftLines& lines) {
+  return {0.5 * (lines.left.from_px + lines.right.from_px), 0.5 * (lines.left.to_px + lines.right.to_px)};
 }
 
 marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view, const marrow::EdgeMap* edges,
@@ -51,6 +57,7 @@ marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view,
     legend.push_back({std::to_string(lines.rejected.size() - count) + " more rejected pairs are not drawn", kGrey});
   draw_segment(panel, lines.left, kSkyBlue, 2);
   draw_segment(panel, lines.right, kSkyBlue, 2);
+  draw_segment(panel, mid_line(lines), kSkyBlue, 1);
   draw_title(panel, view.name);
   return {with_legend(panel.pixels, legend)};
 }

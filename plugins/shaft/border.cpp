@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 namespace marrow::shaft {
 namespace {
@@ -68,6 +69,7 @@ Border refit(const EdgeMap& edges, Border border, const Support& support, const 
     const Eigen::Vector2d normal = solver.eigenvectors().col(0);  // of least spread
     border.normal = normal.dot(border.normal) < 0 ? Eigen::Vector2d(-normal) : normal;
     border.rho = border.normal.dot(centre);
+    border.spread_px = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
   }
   return border;
 }
@@ -89,6 +91,27 @@ Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& ot
   supported =
       int(std::count_if(both.begin(), both.end(), [&](double s) { return s >= stretch.from && s <= stretch.to; }));
   return stretch;
+}
+
+Stretch stretch_at_outline(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
+                           const Stretch& stretch, double reach_px, double gap_px) {
+  const int count = std::max(1, int(std::ceil(stretch.length())));
+  std::vector<char> inside(std::size_t(count), 0);
+  for (const Border* border : {&one, &other})
+    for (const EdgePixel& edge : edges.pixels) {
+      const Eigen::Vector2d position(edge.u_px, edge.v_px);
+      const double distance = border->normal.dot(position) - border->rho,
+                   s = stretch.along.dot(position) - stretch.from;
+      if (distance < 1.5 * support.tolerance_px || distance > reach_px || s < 0 || s >= count) continue;
+      if (border->normal.dot(Eigen::Vector2d(edge.direction_u, edge.direction_v)) < support.direction_cosine) continue;
+      for (int i = std::max(0, int(s) - 1); i <= std::min(count - 1, int(s) + 1); ++i) inside[std::size_t(i)] = 1;
+    }
+  std::vector<double> positions;
+  for (int i = 0; i < count; ++i)
+    if (!inside[std::size_t(i)]) positions.push_back(std::min(stretch.to, stretch.from + i));
+  Stretch part = stretch;
+  std::tie(part.from, part.to) = longest_run(positions, gap_px);
+  return part;
 }
 
 }  // namespace marrow::shaft

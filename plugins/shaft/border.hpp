@@ -13,7 +13,8 @@ namespace marrow::shaft {
 struct Border {
   Eigen::Vector2d normal = Eigen::Vector2d::UnitX();
   double rho = 0;
-  int pixels = 0;  ///< that support it
+  int pixels = 0;        ///< that support it
+  double spread_px = 0;  ///< standard deviation of their distances from the line
 };
 
 /// Which edge pixels support a border.
@@ -53,5 +54,11 @@ Border refit(const EdgeMap& edges, Border border, const Support& support, const 
 /// both have one.
 Stretch common_stretch(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
                        const Eigen::Vector2d& along, double gap_px, int& supported);
+
+/// The longest part of a stretch in which neither border has edge pixels of its direction outside of it, between 1.5
+/// tolerances and `reach_px` away: where there are, the border has run on inside the outline, from a ridge's foot or
+/// from another fragment. Shorter runs of them than gap_px do not count.
+Stretch stretch_at_outline(const EdgeMap& edges, const Border& one, const Border& other, const Support& support,
+                           const Stretch& stretch, double reach_px, double gap_px);
 
 }  // namespace marrow::shaft

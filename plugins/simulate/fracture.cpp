@@ -214,7 +214,8 @@ Phantom fracture(const Bone& bone, const FractureOptions& options) {
     fragment.name = distal ? "distal" : "proximal";
     fragment.side = distal ? -1 : 1;
     if (distal) fragment.ct_from_bone.translation_mm = Eigen::Vector3d(options.ct_gap_mm.data());
-    fragment.frame = fragment_frame(side_of(bone, relief, fragment));
+    fragment.outer = side_of(bone, relief, fragment);
+    fragment.frame = fragment_frame(fragment.outer);
     fragment.world_from_ct = moved(fragment.world_from_ct, fragment.frame,
                                    distal ? motion(options.rotation_deg, options.translation_mm)
                                           : motion(options.proximal_rotation_deg, options.proximal_translation_mm));

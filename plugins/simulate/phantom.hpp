@@ -39,11 +39,12 @@ struct Fragment {
   RigidTransform world_from_ct{"world", "ct"};  ///< the exact truth
   FragmentFrame frame;                          ///< the axes of its motion, in CT coordinates
   std::vector<Eigen::Vector3d> seeds_mm;        ///< points inside its bone, in CT coordinates
+  Mesh outer;                                   ///< its part of the bone's outer surface, in CT coordinates; open where it broke
 
   RigidTransform world_from_bone() const { return world_from_ct * ct_from_bone; }
   static constexpr auto fields() {
     return std::make_tuple(&Fragment::name, &Fragment::side, &Fragment::ct_from_bone, &Fragment::world_from_ct,
-                           &Fragment::frame, &Fragment::seeds_mm);
+                           &Fragment::frame, &Fragment::seeds_mm, &Fragment::outer);
   }
 };
 
@@ -78,4 +79,4 @@ class Fill {
 }  // namespace marrow::simulate
 
 MARROW_VALUE_TYPE(marrow::simulate::Bone, "simulated_bone", 1)
-MARROW_VALUE_TYPE(marrow::simulate::Phantom, "phantom", 1)
+MARROW_VALUE_TYPE(marrow::simulate::Phantom, "phantom", 2)

@@ -32,6 +32,11 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "segment.merged": {"overlap"},
     "segment.changing": {"determinism", "threads"},
     "segment.careless": {"no_points"},
+    "shaft.inner": {"right_pair"},
+    "shaft.turned": {"angle"},
+    "shaft.swapped": {"contract"},
+    "shaft.sure": {"width"},
+    "shaft.crashing": {"empty_map", "one_pixel"},
 }
 
 
@@ -72,7 +77,7 @@ class Conformance(unittest.TestCase):
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
-        for node in ("camera.plain", "edges.plain", "mesh.plain", "segment.plain"):
+        for node in ("camera.plain", "edges.plain", "mesh.plain", "segment.plain", "shaft.plain"):
             result, nodes = conformance(node, seconds=60)
             self.assertEqual(result.returncode, 0, result.stdout)
 

@@ -8,9 +8,11 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <filesystem>
 #include <limits>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/features.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <random>
 
 #include "edges/radiograph.hpp"
@@ -83,8 +85,8 @@ TEST(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
     const double du = edge.u_px - 101.3, dv = edge.v_px - 98.6, radius = std::hypot(du, dv);
     EXPECT_GT((du * edge.direction_u + dv * edge.direction_v) / radius, 0.999);
     EXPECT_NEAR(std::hypot(edge.direction_u, edge.direction_v), 1, 1e-5);
-    EXPECT_NEAR(edge.magnitude, 1500 / (std::sqrt(2 * marrow::kPi) * 1.5),
-                40);  // grey values per pixel, before the square pixel
+    const double sharp = 1500 / (std::sqrt(2 * marrow::kPi) * 1.5);  // before the blur of pixel and mask
+    EXPECT_NEAR(edge.magnitude, 0.93 * sharp, 0.08 * sharp);
     sum += radius - 60.4;
     largest = std::max(largest, std::abs(radius - 60.4));
     const int pixel = int(std::lround(edge.v_px)) * 200 + int(std::lround(edge.u_px));
@@ -115,8 +117,8 @@ TEST(Edges,
     if (std::abs(edge.v_px - 108) < 1) upper[std::size_t(edge.u_px)] = 1;
     if (std::abs(edge.v_px - 148) < 1) lower[std::size_t(edge.u_px)] = 1;
   }
-  EXPECT_GT(std::accumulate(upper.begin(), upper.end(), 0), 228);
-  EXPECT_GT(std::accumulate(lower.begin(), lower.end(), 0), 228);
+  EXPECT_GT(std::accumulate(upper.begin(), upper.end(), 0), 224);
+  EXPECT_GT(std::accumulate(lower.begin(), lower.end(), 0), 224);
 }
 
 /// The largest run of rows in which no edge lies within 2 px of a border of the shaft.
@@ -156,11 +158,43 @@ TEST(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
                                             : disc(u, v) < 40 ? 10000.0
                                                               : 30000.0; }, 20);
   for (const marrow::EdgePixel& edge : find_edges(view).pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 100);
+  const auto scattered = drawn(  // as behind a real collimator: not black, and blurred
+      256,
+      [&](double u, double v) {
+        const double inside = 1 / (1 + std::exp(disc(u, v) - 120));
+        return (1 - inside) * 2500 * (1 + std::sin(0.1 * u) * std::cos(0.08 * v)) +
+               inside * (std::abs(u - 128) < 30 ? 8000 : 30000);
+      },
+      20);
+  const marrow::EdgeMap in_scatter = find_edges(scattered);
+  EXPECT_GT(in_scatter.pixels.size(), 350u);
+  for (const marrow::EdgePixel& edge : in_scatter.pixels) EXPECT_LT(disc(edge.u_px, edge.v_px), 115);
   view.mask = cv::Mat(256, 256, CV_8U, cv::Scalar(0));
   view.mask.colRange(0, 128) = 255;
   const marrow::EdgeMap edges = find_edges(view);
   EXPECT_GT(edges.pixels.size(), 80u);
   for (const marrow::EdgePixel& edge : edges.pixels) EXPECT_LT(edge.u_px, 128 - 4);
+}
+
+// Real frames of a knee (Brown University, see the data folder's README): an intensifier's round field with scatter
+// beyond it, in the first one cut by the collimator.
+TEST(Edges, KeepInsideTheFieldOfRealFrames) {
+  const std::string folder = MARROW_SOURCE_DIR "/../shared/data/knee/images/";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the real knee is not here: " << folder;
+  for (const auto& [name, u, v] : {std::tuple<std::string, double, double>{"L_Hop_Cam1_001_UND.0138.tif", 852, 868},
+                                   {"L_Hop_Cam2_001_UND.0138.tif", 865, 898}}) {
+    marrow::View view;
+    view.name = name;
+    view.image.pixels = cv::imread(folder + name, cv::IMREAD_GRAYSCALE);
+    view.camera = radiograph::camera(0, view.image.width());
+    const marrow::EdgeMap edges = find_edges(view);
+    const auto near_rim = std::count_if(edges.pixels.begin(), edges.pixels.end(), [&](const marrow::EdgePixel& edge) {
+      return std::hypot(edge.u_px - u, edge.v_px - v) > 883 - 16;
+    });
+    std::printf("%s: %zu edges, %td within 16 px of the rim or beyond\n", name.c_str(), edges.pixels.size(), near_rim);
+    EXPECT_GT(edges.pixels.size(), 5000u);
+    EXPECT_EQ(near_rim, 0);
+  }
 }
 
 TEST(Edges, AreTheSameBytesWithOneAndTwoThreads) {

@@ -18,6 +18,7 @@ marrow::ShaftLines lines() {
   lines.left = {{30, 10}, {30, 90}};
   lines.right = {{60, 10}, {60, 90}};
   lines.width_mm = 27.3;
+  lines.width_deviation_mm = 1.4;
   lines.log_likelihood = -1.25;
   lines.rejected = {{{{40, 10}, {40, 90}}, {{50, 10}, {50, 90}}, "10.0 mm wide: the marrow canal"},
                     {{{80, 10}, {80, 90}}, {{85, 10}, {85, 90}}, "5.0 mm wide: too narrow"}};
@@ -45,6 +46,10 @@ TEST(RenderShaft, ChosenAndRejectedPairsHaveTheirColours) {
   EXPECT_TRUE(has(picture, {427, 250}, kOrange));
 }
 
+TEST(RenderShaft, TheLineMidwayIsDrawn) {
+  EXPECT_TRUE(has(shaft(lines(), view(), nullptr, five_times()).pixels, {227, 250}, kSkyBlue));
+}
+
 TEST(RenderShaft, DrawsNoMoreRejectedPairsThanAsked) {
   Options options = five_times();
   options.rejected = 1;
@@ -56,7 +61,7 @@ TEST(RenderShaft, DrawsNoMoreRejectedPairsThanAsked) {
 }
 
 TEST(RenderShaft, TellsWidthAndScore) {
-  EXPECT_EQ(describe(lines()), "chosen: 27.3 mm wide, log likelihood -1.25");
+  EXPECT_EQ(describe(lines()), "chosen: 27.3 +- 1.4 mm wide, log likelihood -1.25");
 }
 
 TEST(RenderShaft, LinesThatAreNotFiniteDrawNothing) {

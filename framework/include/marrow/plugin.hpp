@@ -227,9 +227,10 @@ class NodeBuilder {
   NodeBuilder& in(std::string name, std::string help, Over axis = {}) {
     if (named_inputs_ < ports_) {
       PortInfo& port = node_.info.inputs[named_inputs_];
-      if (axis.axis.empty() != port.axis.empty())
-        node_.faults.push_back("input '" + name + "': " + (axis.axis.empty() ? "a List needs over(\"axis\")"
-                                                                            : "over() is for List inputs"));
+      if (axis.axis.empty() != port.axis.empty()) {
+        std::string fault = "input '" + name;
+        node_.faults.push_back(fault.append(axis.axis.empty() ? "': a List needs over(\"axis\")" : "': over() is for List inputs"));
+      }
       port.name = std::move(name);
       port.help = std::move(help);
       port.axis = std::move(axis.axis);

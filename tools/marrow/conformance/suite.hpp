@@ -97,5 +97,6 @@ Suite camera_suite();
 Suite edges_suite();
 Suite mesh_suite();
 Suite segment_suite();
+Suite shaft_suite();
 
 }  // namespace marrow::conformance

@@ -39,8 +39,10 @@ struct LineSegment {
 struct ShaftLines {
   LineSegment left;
   LineSegment right;
-  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), and its score.
+  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), its standard deviation (of the
+  /// fit, and because the shaft may lie nearer or farther), and the pair's score.
   double width_mm = 0;
+  double width_deviation_mm = 0;
   double log_likelihood = 0;
   /// Rejected candidates, each with its reason in words, the best first.
   struct Rejected {
@@ -52,8 +54,8 @@ struct ShaftLines {
   };
   std::vector<Rejected> rejected;
   static constexpr auto fields() {
-    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::log_likelihood,
-                           &ShaftLines::rejected);
+    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::width_deviation_mm,
+                           &ShaftLines::log_likelihood, &ShaftLines::rejected);
   }
 };
 

@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+// Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth, Proc. R. Soc. Lond. B 1980), at sub-pixel
+// positions. Noise makes zero crossings everywhere, so only those count where the slope of the image is significant.
+// The Laplacian must fall along the gradient: where it rises, the gradient is least, not greatest (Clark, IEEE TPAMI
+// 1989).
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "threshold.hpp"
+
+namespace {
+
+using namespace marrow::edges;
+
+constexpr double kReach =
+    5;  // sigma at which kernels end: what is cut off sooner makes zero crossings beside a steep edge
+
+/// Weights of the second derivative of a Gaussian: nothing of a constant or a ramp, 2 of a parabola x^2.
+std::vector<float> second_derivative(double sigma_px, int radius) {
+  const auto weight = [&](int i) {
+    return std::exp(-0.5 * i * i / (sigma_px * sigma_px)) * (i * i - sigma_px * sigma_px);
+  };
+  double sum = 0, moment = 0;
+  for (int i = -radius; i <= radius; ++i) sum += weight(i);
+  std::vector<float> weights;
+  for (int i = -radius; i <= radius; ++i) {
+    weights.push_back(float(weight(i) - sum / (2 * radius + 1)));
+    moment += i * i * double(weights.back());
+  }
+  for (float& one : weights) one *= float(2 / moment);
+  return weights;
+}
+
+cv::Mat laplacian(const cv::Mat& values, double sigma_px) {
+  const std::vector<float> smooth = gaussian_kernel(sigma_px, kReach).smooth;
+  const std::vector<float> second = second_derivative(sigma_px, int(smooth.size() / 2));
+  cv::Mat across, along;
+  cv::sepFilter2D(values, across, CV_32F, second, smooth);
+  cv::sepFilter2D(values, along, CV_32F, smooth, second);
+  return across + along;
+}
+
+/// The way along the gradient to where the Laplacian falls through zero, within a pixel.
+std::optional<float> way_to_zero(const cv::Mat& laplacian, const Gradient& gradient, int u, int v) {
+  const float du = gradient.du.at<float>(v, u), dv = gradient.dv.at<float>(v, u), length = std::hypot(du, dv);
+  if (!(length > 0)) return std::nullopt;
+  const float here = laplacian.at<float>(v, u), side = here > 0 ? 1.0f : -1.0f;
+  const float there = bilinear(laplacian, float(u) + side * du / length, float(v) + side * dv / length);
+  if (here * there > 0 || here == there) return std::nullopt;
+  return side * here / (here - there);
+}
+
+marrow::EdgeMap laplacian_of_gaussian(const marrow::View& view, const ThresholdOptions& options) {
+  const Prepared image = prepare(view, options.sigma_px, options.logarithm);
+  const Gradient gradient = gradient_of(image.values, gaussian_kernel(options.sigma_px, kReach));
+  const cv::Mat values = laplacian(image.values, options.sigma_px);
+  return edges_above_noise(image, gradient, options, [&](int u, int v) { return way_to_zero(values, gradient, u, v); });
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare_threshold_options(plugin.node("edges.laplacian_of_gaussian", laplacian_of_gaussian)
+                                .summary("Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth 1980) where "
+                                         "the image's slope is significant")
+                                .in("view", "X-ray view")
+                                .out("edges", "edge pixels at sub-pixel positions")
+                                .option("sigma_px", &ThresholdOptions::sigma_px, "width of the Gaussian",
+                                        marrow::at_least(1), marrow::at_most(10)));
+}

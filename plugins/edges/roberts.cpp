@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Roberts' cross (in: Optical and Electro-Optical Information Processing, 1965). The differences along the two
+// diagonals of 2 x 2 pixels, turned by 45 degrees, are the differences of the means of its sides.
+#include "threshold.hpp"
+
+namespace {
+
+using namespace marrow::edges;
+
+marrow::EdgeMap roberts(const marrow::View& view, const ThresholdOptions& options) {
+  static const Kernel kMask{{0.5f, 0.5f}, {-1, 1}};
+  return mask_edges(view, options, kMask);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare_threshold_options(
+      plugin.node("edges.roberts", roberts)
+          .summary("Roberts' mask of 2 x 2 pixels (1965), thinned, one threshold in multiples of the image's noise")
+          .in("view", "X-ray view")
+          .out("edges", "edge pixels at sub-pixel positions")
+          .option("sigma_px", &ThresholdOptions::sigma_px,
+                  "width of the Gaussian that smooths the image before; 0: none", marrow::at_least(0),
+                  marrow::at_most(10)));
+}

@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sobel's mask (Stanford Artificial Intelligence Project, 1968): differences of 3 x 3 pixels, the middle row counted
+// twice.
+#include "threshold.hpp"
+
+namespace {
+
+using namespace marrow::edges;
+
+marrow::EdgeMap sobel(const marrow::View& view, const ThresholdOptions& options) {
+  static const Kernel kMask{{0.25f, 0.5f, 0.25f}, {-0.5f, 0, 0.5f}};
+  return mask_edges(view, options, kMask);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare_threshold_options(
+      plugin.node("edges.sobel", sobel)
+          .summary("Sobel's mask of 3 x 3 pixels (1968), thinned, one threshold in multiples of the image's noise")
+          .in("view", "X-ray view")
+          .out("edges", "edge pixels at sub-pixel positions")
+          .option("sigma_px", &ThresholdOptions::sigma_px,
+                  "width of the Gaussian that smooths the image before; 0: none", marrow::at_least(0),
+                  marrow::at_most(10)));
+}

@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lines by the segment detector of Grompone von Gioi, Jakubowicz, Morel and Randall (IEEE TPAMI 2010), as OpenCV has
+// it: it grows regions of equal gradient direction in the image and keeps those that noise would not make. The segments
+// say where to look; the borders are fitted to the edge pixels beside them, so their accuracy is that of the edges.
+// Then they are paired as in shaft.hough_pairs.
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "pairs.hpp"
+
+namespace {
+
+using namespace marrow::shaft;
+using marrow::EdgeMap;
+
+struct Options : LineOptions {
+  double resolution_mm = 0.8;
+};
+
+constexpr double kSurroundings_mm = 15;
+constexpr double kShortest = 0.15;  // segment, of the length that borders must share: noise cuts lines to pieces
+
+/// The logarithm of the image less its mean in the surroundings, as 8 bits. Steps of attenuation are then equally high
+/// everywhere, and the slope of the limb, which points as the bone's border does, is gone.
+cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
+  cv::Mat grey;
+  view.image.pixels.convertTo(grey, CV_32F);
+  if (!cv::checkRange(grey))
+    throw marrow::Error("view '" + view.name + "': the image holds pixels that are not finite (NaN or infinity)");
+  double largest = 0;
+  cv::minMaxLoc(grey, nullptr, &largest);
+  if (!(largest > 0))
+    throw marrow::Error("view '" + view.name +
+                        "': the image has no positive grey value, so its logarithm cannot be taken");
+  grey = cv::max(grey, 0.005 * largest);
+  cv::log(grey, grey);
+  const int side = 2 * int(std::lround(0.5 * kSurroundings_mm / pixel_mm)) + 1;
+  cv::Mat mean, scaled;
+  cv::blur(grey, mean, {side, side});
+  cv::normalize(grey - mean, scaled, 0, 255, cv::NORM_MINMAX, CV_8U);
+  return scaled;
+}
+
+/// Moves a line to where the edge pixels beside a segment are densest: the middle of a region of equal gradient
+/// direction is not where the gradient is greatest. False where there are none.
+bool snap(const EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Support& support,
+          Border& line) {
+  constexpr double kReach = 4;  // tolerances
+  const Eigen::Vector2d way = (to - from).normalized();
+  std::vector<double> distances;
+  for (const marrow::EdgePixel& edge : edges.pixels) {
+    const Eigen::Vector2d position(edge.u_px, edge.v_px);
+    const double distance = line.normal.dot(position) - line.rho, s = way.dot(position - from);
+    if (std::abs(distance) > kReach * support.tolerance_px || s < 0 || s > (to - from).norm()) continue;
+    if (line.normal.dot(Eigen::Vector2d(edge.direction_u, edge.direction_v)) > support.direction_cosine)
+      distances.push_back(distance);
+  }
+  std::sort(distances.begin(), distances.end());
+  std::size_t most = 0;
+  double best = 0;
+  for (std::size_t first = 0, end = 0; first < distances.size(); ++first) {
+    while (end < distances.size() && distances[end] < distances[first] + support.tolerance_px) ++end;
+    if (end - first > most) most = end - first, best = 0.5 * (distances[first] + distances[end - 1]);
+  }
+  line.rho += best;
+  return most > 0;
+}
+
+/// The lines of the segments, the longest first, each with the one or the other side brighter as the edge pixels say.
+std::vector<Border> segment_lines(const EdgeMap& edges, const marrow::View& view, const Scale& scale,
+                                  const Options& options) {
+  const double shrink = std::min(1.0, scale.pixel_mm / options.resolution_mm);
+  const auto detector = cv::createLineSegmentDetector(cv::LSD_REFINE_STD, shrink);
+  std::vector<cv::Vec4f> segments;
+  detector->detect(eight_bits(view, scale.pixel_mm), segments);
+  const auto length = [](const cv::Vec4f& s) { return std::hypot(s[2] - s[0], s[3] - s[1]); };
+  std::stable_sort(segments.begin(), segments.end(),
+                   [&](const auto& a, const auto& b) { return length(a) > length(b); });
+  std::vector<Border> lines;
+  for (const cv::Vec4f& segment : segments) {
+    if (length(segment) < kShortest * scale.min_length_px) break;
+    const Eigen::Vector2d from(segment[0], segment[1]), to(segment[2], segment[3]);
+    for (const double side : {1.0, -1.0}) {
+      Border line;
+      line.normal = side * Eigen::Vector2d(from.y() - to.y(), to.x() - from.x()).normalized();
+      line.rho = line.normal.dot(0.5 * (from + to));
+      if (snap(edges, from, to, scale.support, line)) lines.push_back(line);
+    }
+  }
+  return lines;
+}
+
+marrow::ShaftLines line_segments(const EdgeMap& edges, const marrow::View& view, const Options& options) {
+  const Scale scale = checked_scale(edges, view, options);
+  return best_pair(edges, view, supported_lines(edges, segment_lines(edges, view, scale, options), scale, options),
+                   scale, options);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare_line_options(
+      plugin.node("shaft.line_segments", line_segments)
+          .summary(
+              "Shaft borders: segments of the image (LSD; OpenCV), paired by the likelihood of their outer diameter")
+          .in("edges", "edge pixels of the view")
+          .in("view", "X-ray view, for its image and camera")
+          .out("lines", "the two outer borders of the shaft, and what was turned away")
+          .option("resolution_mm", &Options::resolution_mm,
+                  "pixel, at the isocentre, to which the image is shrunk for the segments", marrow::at_least(0.05),
+                  marrow::at_most(10)));
+}

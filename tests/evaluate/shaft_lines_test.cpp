@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/evaluate/shaft_lines.cpp"
+
+#include <gtest/gtest.h>
+
+#include "edges/radiograph.hpp"
+#include "initial/tube.hpp"
+
+namespace {
+
+/// Keeps what a node warns of.
+struct Listener {
+  std::vector<std::string> warnings;
+  marrow::Context context{marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, bool warning) {
+                                                   if (warning) warnings.emplace_back(message);
+                                                 }}};
+};
+
+constexpr double kRadius_mm = 14;
+
+View frontal() {
+  View view;
+  view.name = "frontal";
+  view.camera = radiograph::camera(0);
+  return view;
+}
+
+struct Bone {
+  List<Mesh> models;
+  List<Truth> truths;
+};
+
+/// A cylinder along the world's z axis, at its true place.
+Bone bone() {
+  Bone bone;
+  bone.models.add("distal", tube::cylinder(kRadius_mm, 200));
+  Truth truth;
+  truth.world_from_model = {"world", "model"};
+  bone.truths.add("distal", truth);
+  return bone;
+}
+
+ShaftLines borders(const View& view, double radius_mm = kRadius_mm) {
+  return tube::borders(view.camera, {0, 0, 0}, Eigen::Vector3d::UnitZ(), radius_mm, 100, 400);
+}
+
+double figure(const ShaftLines& lines, const std::string& name) {
+  Listener listener;
+  const Bone truth = bone();
+  const auto metrics = shaft_lines(lines, frontal(), truth.models, truth.truths, {}, listener.context);
+  if (metrics)
+    for (const auto& item : metrics->items)
+      if (item.name == name) return item.value;
+  ADD_FAILURE() << "no figure " << name;
+  return 0;
+}
+
+TEST(EvaluateShaftLines, ExactBordersHaveNoError) {
+  const ShaftLines lines = borders(frontal());
+  EXPECT_LT(figure(lines, "border_angle_deg"), 0.01);
+  EXPECT_LT(figure(lines, "border_offset_mm"), 0.01);
+  EXPECT_LT(figure(lines, "worst_mm"), 0.02);
+  EXPECT_LT(figure(lines, "axis_offset_mm"), 0.01);
+  EXPECT_NEAR(figure(lines, "width_error_mm"), 0, 0.02);
+}
+
+TEST(EvaluateShaftLines, NarrowerOnesLieInside) {
+  const ShaftLines lines = borders(frontal(), kRadius_mm - 0.5);
+  EXPECT_NEAR(figure(lines, "border_offset_mm"), 0.5, 0.02);
+  EXPECT_NEAR(figure(lines, "width_error_mm"), -1, 0.04);
+  EXPECT_LT(figure(lines, "axis_offset_mm"), 0.01);
+}
+
+TEST(EvaluateShaftLines, OneThatIsTurnedSaysByHowMuch) {
+  ShaftLines lines = borders(frontal());
+  const Eigen::Vector2d middle = 0.5 * (lines.left.from_px + lines.left.to_px);
+  for (Eigen::Vector2d* end : {&lines.left.from_px, &lines.left.to_px})
+    *end = middle + Eigen::Rotation2Dd(marrow::radians(1)) * (*end - middle);
+  EXPECT_NEAR(figure(lines, "border_angle_deg"), 1, 0.02);
+  EXPECT_NEAR(figure(lines, "axis_angle_deg"), 0.5, 0.02);
+  EXPECT_NEAR(figure(lines, "worst_mm"), 150 * std::sin(marrow::radians(1)) * 0.6 * 300 / 512, 0.05);
+}
+
+TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
+  Listener listener;
+  EXPECT_FALSE(shaft_lines(borders(frontal()), frontal(), {}, {}, {}, listener.context));
+  ASSERT_EQ(listener.warnings.size(), 1u);
+  EXPECT_EQ(
+      listener.warnings[0],
+      "view 'frontal': no fragment of known pose lies where the pair of borders was found, so there is nothing to "
+      "compare it with");
+}
+
+}  // namespace

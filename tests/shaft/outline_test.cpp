@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/shaft/outline.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <random>
+
+namespace {
+
+using namespace marrow::shaft;
+
+constexpr double kPixel_mm = 0.35, kWidth_px = 80, kLeft = 150.3;
+
+/// A round bone that stands upright from u = 150.3 to 230.3, blurred, with a noise of 1 %.
+cv::Mat image(double blur_px, double per_px = 0.01) {
+  cv::Mat fine(400, 8 * 400, CV_32F);  // eight samples a pixel
+  for (int u = 0; u < fine.cols; ++u) {
+    const double depth = (u + 0.5) / 8 - 0.5 - kLeft;
+    const double chord = depth > 0 && depth < kWidth_px ? 2 * std::sqrt(depth * (kWidth_px - depth)) : 0;
+    fine.col(u) = 20000 * std::exp(-per_px * chord);
+  }
+  cv::Mat pixels;
+  cv::GaussianBlur(fine, fine, {0, 0}, 8 * blur_px, 0.001);
+  cv::resize(fine, pixels, {400, 400}, 0, 0, cv::INTER_AREA);
+  std::mt19937 random(5);
+  std::normal_distribution<float> noise(0, 200);
+  for (float& value : cv::Mat_<float>(pixels)) value += noise(random);
+  pixels.convertTo(pixels, CV_16U);
+  return pixels;
+}
+
+struct Found {
+  marrow::EdgeMap edges{400, 400, {}};
+  Border border;
+  Stretch stretch{Eigen::Vector2d::UnitY(), 50, 350};
+};
+
+/// Edges of the left border, so far inside its outline.
+Found edges_inside(double inside_px) {
+  Found found;
+  for (int v = 0; v < 400; ++v) found.edges.pixels.push_back({float(kLeft + inside_px), float(v), -1, 0, 100});
+  found.border = {{-1, 0}, -(kLeft + inside_px), 400, 0.1};
+  return found;
+}
+
+std::optional<double> beyond_px(const cv::Mat& image, const Found& found) {
+  return outline_beyond_edges_px(image, found.edges, found.border, {3, 0.97}, found.stretch, kWidth_px, kPixel_mm);
+}
+
+TEST(Outline, IsFoundBeyondEdgesThatBlurDrewInwards) {
+  for (const double blur_px : {0.6, 1.0, 1.6})
+    for (const double inside_px : {0.0, 0.5, 1.2, 2.0}) {
+      const auto found = beyond_px(image(blur_px), edges_inside(inside_px));
+      ASSERT_TRUE(found);
+      std::printf("blurred by %.1f px, edges %.1f px inside: %.2f\n", blur_px, inside_px, *found);
+      EXPECT_NEAR(*found, inside_px, 0.2);
+    }
+}
+
+TEST(Outline, IsNotMadeUp) {
+  const Found found = edges_inside(0);
+  EXPECT_FALSE(beyond_px(cv::Mat(400, 400, CV_16U, cv::Scalar(0)), found));  // no logarithm
+  EXPECT_FALSE(beyond_px(image(1, -0.01), found));                           // brighter inside
+  EXPECT_FALSE(beyond_px(image(1), edges_inside(5)));                        // farther than edges can be off
+  EXPECT_FALSE(outline_beyond_edges_px(image(1), {400, 400, {}}, found.border, {3, 0.97}, found.stretch, kWidth_px,
+                                       kPixel_mm));  // no edges
+}
+
+}  // namespace
