@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/project/ray_casting.cpp"
+
+#include "radiograph_behaviour.hpp"
+
+namespace {
+
+std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) { return ray_casting(volume, field, Options{}); }
+
+}  // namespace
+
+TEST(RayCasting, ChordsOfABall) { radiograph_behaviour::chords_of_a_ball(make, 0.03, 0.6); }
+TEST(RayCasting, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
+TEST(RayCasting, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
+TEST(RayCasting, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 1e-5); }
+TEST(RayCasting, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }
+TEST(RayCasting, SourceWithin) { radiograph_behaviour::source_within(make); }
+TEST(RayCasting, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }

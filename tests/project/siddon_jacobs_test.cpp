@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/project/siddon_jacobs.cpp"
+
+#include "radiograph_behaviour.hpp"
+
+namespace {
+
+std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) { return siddon_jacobs(volume, field, AttenuationOptions{}); }
+
+}  // namespace
+
+TEST(SiddonJacobs, ChordsOfABall) { radiograph_behaviour::chords_of_a_ball(make, 0.12, 2.5); }
+TEST(SiddonJacobs, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
+TEST(SiddonJacobs, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
+TEST(SiddonJacobs, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 1e-5); }
+TEST(SiddonJacobs, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }
+TEST(SiddonJacobs, SourceWithin) { radiograph_behaviour::source_within(make); }
+TEST(SiddonJacobs, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }
