@@ -124,9 +124,13 @@ class Costs {
       const auto& weights = weights_[k];
       filter(smooth, scratch, steps[k], int(weights.size() / 2), 0, [&](float sum, float value, int tap) { return sum + weights[std::size_t(tap)] * value; });
     }
-    std::vector<float> closed = smooth;  // grey closing: what is dark between two bright things is as bright as they are
-    for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], -1e9f, [](float most, float value, int) { return std::max(most, value); });
-    for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], 1e9f, [](float least, float value, int) { return std::min(least, value); });
+    const auto brightest = [](float most, float value, int) { return std::max(most, value); };
+    const auto darkest = [](float least, float value, int) { return std::min(least, value); };
+    std::vector<float> around = smooth, least = smooth;
+    for (int k = 0; k < 3; ++k) filter(around, scratch, steps[k], radius_[k], -1e9f, brightest);
+    for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], radius_[k], 1e9f, darkest);
+    std::vector<float> closed = around;  // grey closing: what is dark between two bright things is as bright as they are
+    for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], 1e9f, darkest);
     std::vector<std::uint8_t>& costs = costs_[block];
     costs.assign(std::size_t(kBlock) * kBlock * kBlock, kStopped);
     for (int z = 0; z < kBlock; ++z)
@@ -134,7 +138,9 @@ class Costs {
         for (int x = 0; x < kBlock; ++x) {
           const std::size_t at = (z + halo_[2]) * steps[2] + (y + halo_[1]) * steps[1] + std::size_t(x + halo_[0]);
           if (smooth[at] < race_.floor_hu) continue;
-          const double part = std::max(0.f, closed[at] - smooth[at]) / std::max(closed[at], 1.f) / race_.cleft_part;
+          // At the rim of the bone the cleft is open to the side: a front that could run along the rim would pass around it.
+          const float walls = least[at] < race_.floor_hu ? around[at] : closed[at];
+          const double part = std::max(0.f, walls - smooth[at]) / std::max(walls, 1.f) / race_.cleft_part;
           costs[local(x, y, z)] = std::uint8_t(std::min(kMostCost, std::round(kFreeCost * std::exp(std::min(part * part, 10.0)))));
         }
   }
