@@ -15,7 +15,7 @@ using marrow::Volume;
 
 constexpr int kBlock = 32;
 constexpr std::uint8_t kStopped = 255;
-constexpr double kFreeCost = 4, kMostCost = 254;
+constexpr double kFreeCost = 2, kMostCost = 254;
 
 /// Cost of crossing each voxel, 1 over the speed, in blocks that are made where a front may come.
 class Costs {
@@ -128,7 +128,7 @@ class Costs {
     const auto darkest = [](float least, float value, int) { return std::min(least, value); };
     std::vector<float> around = smooth, least = smooth;
     for (int k = 0; k < 3; ++k) filter(around, scratch, steps[k], radius_[k], -1e9f, brightest);
-    for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], radius_[k], 1e9f, darkest);
+    for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], 1, 1e9f, darkest);
     std::vector<float> closed = around;  // grey closing: what is dark between two bright things is as bright as they are
     for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], 1e9f, darkest);
     std::vector<std::uint8_t>& costs = costs_[block];

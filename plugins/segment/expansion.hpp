@@ -14,7 +14,7 @@ namespace level_set {
 struct Race {
   double sigma_mm = 0.7;    ///< of the Gaussian that takes the noise away
   double cleft_mm = 3.2;    ///< widest dark cleft that is one (of a wider one the middle is dark by itself)
-  double cleft_part = 0.15; ///< a cleft darker than its walls by this part of them slows a front e times
+  double cleft_part = 0.1; ///< a cleft darker than its walls by this part of them slows a front e times
   double floor_hu = 150;    ///< where the smoothed CT is darker there is no bone
 };
 

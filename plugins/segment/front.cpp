@@ -134,6 +134,7 @@ void Front::provide(std::size_t tile) {
   values_mm_.resize(values_mm_.size() + kVoxels, value);
   values_before_.resize(values_mm_.size(), value);
   speed_.resize(values_mm_.size(), 0.f);
+  shift_mm_.resize(values_mm_.size(), 0.f);
 }
 
 /// The values of a tile and one voxel all around; beyond the grid its border goes on.
@@ -206,6 +207,19 @@ void Front::choose_active() {
   next_values_.resize(active_.size() * kVoxels);
 }
 
+void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+      if (std::abs(*v) > near_mm_) return;
+      const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
+      const float length = g.norm();
+      if (length < 0.1f) return;
+      const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
+      shift_mm_[at] = float(profile.thin_cortex_shift_mm(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index));
+    });
+  });
+}
+
 void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
@@ -219,7 +233,7 @@ void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, c
       const Edge edge = profile.at(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index);
       const double ratio = std::max(0.0, edge.drop_hu) / force.edge_hu, open = 1 / (1 + ratio * ratio);
       const double bone = std::clamp((edge.mean_hu - force.floor_hu) / 50, -1.0, 1.0);
-      const double towards_edge = std::clamp(-edge.offset_mm / grid_.spacing_mm[0], -1.0, 1.0);
+      const double towards_edge = std::clamp(-(edge.offset_mm + shift_mm_[at]) / grid_.spacing_mm[0], -1.0, 1.0);
       const double bend = std::clamp(double(curvature(v, voxels_per_mm_, g)), -2.0, 2.0);
       speed = float(force.advection * bone * open + towards_edge * (1 - open) - force.curvature_mm * bend);
     });

@@ -35,6 +35,8 @@ class Front {
   };
   Front(const marrow::Grid& grid, double band_mm, const Mask& mask);
 
+  /// What thin cortex does to the edges near the surface, for the steps that follow.
+  void find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile);
   /// One time step in two halves, so that fronts can be kept apart between steps.
   void evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force);
   void advance(double step_mm);
@@ -83,7 +85,7 @@ class Front {
   std::array<int, 3> tiles_;
   std::vector<std::int32_t> slots_;  // of each tile: where its voxels lie in the arrays below, or what the tile is
   std::vector<std::uint32_t> tile_in_slot_;
-  std::vector<float> values_mm_, values_before_, speed_;
+  std::vector<float> values_mm_, values_before_, speed_, shift_mm_;
   std::vector<std::uint8_t> is_awake_;  // of each slot
   std::vector<std::uint32_t> active_;   // tiles visited in this step, in order
   std::vector<float> next_values_;      // of the active tiles

@@ -22,12 +22,13 @@ struct Options {
   double band_voxels = 5;
   double sigma_mm = 0.7;
   double cleft_mm = 3.2;
-  double cleft_part = 0.15;
+  double cleft_part = 0.1;
   double floor_hu = 150;
   double advection = 0;
   double edge_hu = 150;
   double edge_sigma_mm = 0.4;
   double blur_mm = 0.7;
+  double cortex_hu = 1200;
   double curvature_mm = 0.1;
   double stop_speed = 0.02;
   int steps = 30;
@@ -104,12 +105,14 @@ void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int 
 /// Moves all fronts together until each of them rests on the walls of its bone: on the steepest descent of the CT along
 /// its normal, or, where there is none (the mouth of a canal), where it began.
 void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts, Context& context) {
-  const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm);
+  const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm, options.cortex_hu);
   const Force force{options.advection, options.curvature_mm, options.edge_hu, options.floor_hu};
   const double step_mm = kStepVoxels * volume.grid.spacing_mm.minCoeff();
   for (int step = 0; step < options.steps; step += kStepsPerCycle) {
     context.check_cancelled();
     context.progress(0.5 + 0.5 * step / options.steps, "moving");
+    if (options.cortex_hu > 0)
+      for (Front& front : fronts) front.find_thin_cortex(volume, profile);
     for (int k = 0; k < kStepsPerCycle; ++k) {
       for (Front& front : fronts) {
         front.evaluate(volume, profile, force);
@@ -180,6 +183,8 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0.1), marrow::at_most(5))
       .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
               marrow::at_most(5))
+      .option("cortex_hu", &Options::cortex_hu, "density of cortical bone, to correct the edge of a thin cortex by; 0: no correction",
+              marrow::at_least(0), marrow::unit("HU"))
       .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature",
               marrow::at_least(0), marrow::at_most(0.5))
       .option("stop_speed", &Options::stop_speed, "a part of a front that is slower (F0 is 1) comes to rest",
