@@ -129,8 +129,10 @@ Volume whole_ct(double length_mm) {
 void whole_ct_case(double length_mm) {
   const Volume volume = whole_ct(length_mm);
   List<Seeds> seeds;
-  seeds.add("proximal", Seeds{"proximal", {{65 + 15, 22, 20}, {65 - 15, 22, 20}}});
-  seeds.add("distal", Seeds{"distal", {{65 + 15, 22, -20}, {65 - 15, 22, -20}}});
+  for (const auto& [name, z] : {std::pair{"proximal", 20.0}, {"distal", -20.0}}) {
+    const double part = 0.5 + z / length_mm, to_wall_mm = 22 - 8 * part - 2.5;
+    seeds.add(name, Seeds{name, {{60 + 10 * part + to_wall_mm, 20 + 5 * part, z}, {60 + 10 * part - to_wall_mm, 20 + 5 * part, z}}});
+  }
   Context context;
   const auto start = std::chrono::steady_clock::now();
   const auto fields = level_set_fields(volume, seeds, {}, context);
@@ -152,6 +154,6 @@ int main(int count, char** arguments) {
   if (is_asked("crop")) measure("segment.level_set, 128 x 128 x 192", [&] { our_level_set(bone, crop(), {}); });
   if (is_asked("itk")) measure("ITK's geodesic active contour, 128 x 128 x 192", [&] { itk_contour(bone, crop(), {}); });
   if (is_asked("whole"))
-    for (const double length_mm : {80.0, 320.0})
+    for (const double length_mm : {80.0, 160.0, 320.0})
       measure(("segment.level_set, 512 x 512 x 400, bone of " + std::to_string(int(length_mm)) + " mm").c_str(), [&] { whole_ct_case(length_mm); });
 }
