@@ -3,6 +3,7 @@
 // The distal end of a femur, broken through its spongy bone with a gap of 1 mm: a scene that no single threshold segments. The shaft's
 // cortex is thick and bright; towards the joint it thins out to less than a voxel over spongy bone of 280 HU, and the fracture's
 // faces have no cortex at all.
+#include "marrow/domain/list.hpp"
 #include "segment/phantom.hpp"
 
 namespace phantom {
