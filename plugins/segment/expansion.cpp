@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "expansion.hpp"
 
+#include "fragments.hpp"
+
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -185,7 +187,7 @@ std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vect
         due[0].push_back({std::uint32_t(grid.offset(voxel[0], voxel[1], voxel[2])), std::uint8_t(f)});
       }
   costs.make_from(starts);
-  std::vector<std::uint8_t> owner(grid.count(), kNobody);
+  std::vector<std::uint8_t> owner(grid.count(), segment::kNobody);
   std::size_t waiting = due[0].size();
   const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
   for (std::size_t time = 0; waiting > 0; ++time) {
@@ -193,13 +195,13 @@ std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vect
     now.swap(due[time % 256]);
     waiting -= now.size();
     for (const auto [at, fragment] : now) {
-      if (owner[at] != kNobody) continue;
+      if (owner[at] != segment::kNobody) continue;
       owner[at] = fragment;
       const int x = int(at % row), y = int(at % slice / row), z = int(at / slice);
       const auto visit = [&](int i, int j, int k) {
         if (!grid.contains(i, j, k)) return;
         const std::size_t next = grid.offset(i, j, k);
-        if (owner[next] != kNobody) return;
+        if (owner[next] != segment::kNobody) return;
         const std::uint8_t cost = costs.at(i, j, k);
         if (cost == kStopped) return;
         due[(time + cost) % 256].push_back({std::uint32_t(next), fragment});

@@ -18,9 +18,7 @@ struct Race {
   double floor_hu = 150;    ///< where the smoothed CT is darker there is no bone
 };
 
-constexpr std::uint8_t kNobody = 255;
-
-/// For each voxel the fragment whose front came first, or kNobody. At most 254 fragments. `seeds`: fractional indices of each fragment.
+/// For each voxel the fragment whose front came first, or segment::kNobody. `seeds`: fractional indices of each fragment.
 std::vector<std::uint8_t> race(const marrow::Volume& volume, const std::vector<std::vector<Eigen::Vector3d>>& seeds, const Race& race);
 
 }  // namespace level_set

@@ -74,7 +74,7 @@ bool beyond_band(const float* v, float band) {
 
 }  // namespace
 
-Front::Front(const marrow::Grid& grid, double band_mm, const Mask& mask)
+Front::Front(const marrow::Grid& grid, double band_mm, const segment::Mask& mask)
     : grid_(grid),
       band_mm_(float(band_mm)),
       near_mm_(float(std::max(grid.spacing_mm.norm() / 2 * 1.2, grid.spacing_mm.maxCoeff()))),

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "edge_profile.hpp"
+#include "fragments.hpp"
 
 namespace level_set {
 
@@ -23,17 +24,8 @@ struct Force {
 
 class Front {
  public:
-  /// The surface of what `is_inside`, a byte for each voxel of the box of the grid that begins at `first`.
-  struct Mask {
-    std::array<int, 3> first{}, size{};
-    std::vector<std::uint8_t> is_inside;
-    bool at(int x, int y, int z) const {
-      x -= first[0], y -= first[1], z -= first[2];
-      return x >= 0 && y >= 0 && z >= 0 && x < size[0] && y < size[1] && z < size[2] &&
-             is_inside[(std::size_t(z) * size[1] + y) * size[0] + x];
-    }
-  };
-  Front(const marrow::Grid& grid, double band_mm, const Mask& mask);
+  /// The surface of a mask.
+  Front(const marrow::Grid& grid, double band_mm, const segment::Mask& mask);
 
   /// What thin cortex does to the edges near the surface, for the steps that follow.
   void find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile);

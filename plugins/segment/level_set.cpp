@@ -3,8 +3,8 @@
 #include <marrow/plugin.hpp>
 
 #include "expansion.hpp"
+#include "fragments.hpp"
 #include "front.hpp"
-#include "interior.hpp"
 #include "seed_points.hpp"
 
 namespace {
@@ -42,42 +42,6 @@ void keep_all_apart(std::vector<Front>& fronts) {
     for (std::size_t b = a + 1; b < fronts.size(); ++b) Front::keep_apart(fronts[a], fronts[b]);
 }
 
-/// The box of what a fragment owns, and what of it is the fragment's, with nothing left out inside.
-Front::Mask solid(const marrow::Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment) {
-  std::array<int, 3> low = grid.size, high{-1, -1, -1};
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y) {
-      const std::uint8_t* row = owner.data() + grid.offset(0, y, z);
-      const auto* end = row + grid.size[0];
-      const auto* first = std::find(row, end, fragment);
-      if (first == end) continue;
-      const auto* last = end - 1;
-      while (*last != fragment) --last;
-      const std::array<int, 3> from{int(first - row), y, z}, to{int(last - row), y, z};
-      for (int k = 0; k < 3; ++k) {
-        low[k] = std::min(low[k], from[k]);
-        high[k] = std::max(high[k], to[k]);
-      }
-    }
-  Front::Mask mask;
-  if (high[0] < 0) return mask;
-  marrow::Grid box = grid;
-  for (int k = 0; k < 3; ++k) box.size[k] = high[k] - low[k] + 1;
-  mask.first = low;
-  mask.size = box.size;
-  mask.is_inside.resize(box.count());
-  std::vector<std::uint8_t> is_other(box.count());
-  for (int z = 0; z < box.size[2]; ++z)
-    for (int y = 0; y < box.size[1]; ++y)
-      for (int x = 0; x < box.size[0]; ++x) {
-        const std::uint8_t here = owner[grid.offset(low[0] + x, low[1] + y, low[2] + z)];
-        mask.is_inside[box.offset(x, y, z)] = here == fragment;
-        is_other[box.offset(x, y, z)] = here != fragment && here != level_set::kNobody;
-      }
-  segment::fill_interior(box, mask.is_inside, is_other);
-  return mask;
-}
-
 std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
   const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
   context.progress(0, "racing");
@@ -86,8 +50,8 @@ std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const O
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(0.3 + 0.2 * double(f) / double(seeds.size()), "filling");
-    const Front::Mask mask = solid(volume.grid, owner, std::uint8_t(f));
-    if (mask.is_inside.empty()) throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    const segment::Mask mask = segment::solid(volume.grid, owner, std::uint8_t(f));
+    if (mask.empty()) throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
     fronts.emplace_back(volume.grid, options.band_voxels * volume.grid.spacing_mm[0], mask);
   }
   return fronts;

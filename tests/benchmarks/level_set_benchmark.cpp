@@ -11,6 +11,7 @@
 #include <cstring>
 
 #include "itk_geodesic.hpp"
+#include "plugins/segment/interior.hpp"
 #include "plugins/segment/level_set.cpp"
 #include "segment/distal_end.hpp"
 
