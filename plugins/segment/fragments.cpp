@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "interior.hpp"
+#include "marrow/domain/error.hpp"
 
 namespace segment {
 namespace {
@@ -109,6 +110,23 @@ SignedField field_at_threshold(const Volume& volume, const Mask& mask, double su
   });
   march_distances(grid_of(grid, mask), values, band_mm);
   return paste(grid, mask, values, float(band_mm));
+}
+
+marrow::List<SignedField> list_of(const marrow::List<marrow::Seeds>& seeds, std::vector<SignedField> fields) {
+  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
+  for (std::size_t a = 0; a < fields.size(); ++a)
+    for (std::size_t b = a + 1; b < fields.size(); ++b)
+      for (std::size_t at = 0; at < fields[a].values_mm.size(); ++at) {
+        float &of_a = fields[a].values_mm[at], &of_b = fields[b].values_mm[at];
+        const float overlap = std::min(0.f, 0.5f * (of_a + of_b));
+        of_a -= overlap;
+        of_b -= overlap;
+      }
+  marrow::List<SignedField> list;
+  std::size_t next = 0;
+  for (std::size_t f = 0; f < seeds.size(); ++f)
+    if (seeds[f].wanted) list.add(seeds.name(f), std::move(fields.at(next++)));
+  return list;
 }
 
 }  // namespace segment

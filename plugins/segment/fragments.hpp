@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "marrow/domain/list.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace segment {
@@ -46,5 +47,9 @@ marrow::SignedField paste(const marrow::Grid& grid, const Mask& mask, const std:
 /// threshold tells apart, it is where the CT, interpolated, crosses it; elsewhere (against another fragment, across a
 /// canal's mouth) halfway between the voxels.
 marrow::SignedField field_at_threshold(const marrow::Volume& volume, const Mask& mask, double surface_hu, double band_mm);
+
+/// The fields of the wanted fragments, which come in the seeds' order; where two overlap each gives up half. Throws Error
+/// for none.
+marrow::List<marrow::SignedField> list_of(const marrow::List<marrow::Seeds>& seeds, std::vector<marrow::SignedField> fields);
 
 }  // namespace segment

@@ -96,7 +96,7 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
             if (volume.grid.contains(x + i, y + j, z + k)) growth.claim(volume.grid.offset(x + i, y + j, z + k), std::uint8_t(f));
     }
   growth.run(context);
-  List<SignedField> fields;
+  std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
@@ -105,10 +105,9 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
                           " HU, or it belongs to another fragment; add a point in brighter bone, or lower least_hu");
     if (!seeds[f].wanted) continue;
     const segment::Mask mask = segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
-    fields.add(seeds.name(f), segment::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
+    fields.push_back(segment::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
   }
-  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
-  return fields;
+  return segment::list_of(seeds, std::move(fields));
 }
 
 }  // namespace

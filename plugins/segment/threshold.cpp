@@ -112,12 +112,13 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   if (!any)
     throw marrow::Error("volume: no voxel reaches the threshold of " + std::to_string(int(options.threshold_hu)) +
                         " HU, so there is no bone; lower threshold_hu, and check that the CT is in Hounsfield units");
-  List<SignedField> fields;
   if (!seeds) {
     claim_largest(volume.grid, owner);
-    fields.add("bone", field_of(volume, options, owner, 0));
-    return fields;
+    List<SignedField> bone;
+    bone.add("bone", field_of(volume, options, owner, 0));
+    return bone;
   }
+  std::vector<SignedField> fields;
   // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
   const double least_hu = std::min(options.floor_hu, options.threshold_hu);
   claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, least_hu), owner);
@@ -125,10 +126,9 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   for (std::size_t f = 0; f < seeds->size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds->size()), seeds->name(f));
-    if ((*seeds)[f].wanted) fields.add(seeds->name(f), field_of(volume, options, owner, std::uint8_t(f)));
+    if ((*seeds)[f].wanted) fields.push_back(field_of(volume, options, owner, std::uint8_t(f)));
   }
-  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
-  return fields;
+  return segment::list_of(*seeds, std::move(fields));
 }
 
 }  // namespace
