@@ -110,7 +110,7 @@ Front::Front(const marrow::Grid& grid, double band_mm, const segment::Mask& mask
           values[(z * kTile + y) * kTile + x] = mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
   }
   for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
-  for (int pass = 0; pass * grid.spacing_mm.minCoeff() < band_mm + 1; ++pass) redistance_once(false);
+  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // the band widens with each step of the front
   values_before_ = values_mm_;
 }
 

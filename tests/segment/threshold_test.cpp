@@ -94,13 +94,13 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
   }
 }
 
-// What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm.
+// What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone at all.)
 TEST(Threshold, NoThresholdSegmentsADistalEnd) {
   const phantom::DistalEnd bone;
   const Volume volume = bone.scan_of({128, 128, 192}, 40);
   const auto seeds = bone.seeds();
   double least_mm = 1e9;
-  for (const double threshold_hu : {130.0, 160.0, 200.0, 250.0, 350.0, 500.0}) {
+  for (const double threshold_hu : {160.0, 200.0, 250.0}) {
     Context context;
     const auto fields = threshold(volume, &seeds, {.threshold_hu = threshold_hu}, context);
     double worst_mm = 0;
