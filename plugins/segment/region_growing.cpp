@@ -19,6 +19,7 @@ using marrow::Volume;
 
 struct Options {
   double least_hu = 250;
+  double floor_hu = 150;
   double band_mm = 4;
 };
 
@@ -85,7 +86,8 @@ class Growth {
 
 List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
   marrow::check_volume(volume, "volume");
-  const auto indices = segment::seed_indices(volume, seeds, options.least_hu);
+  // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
+  const auto indices = segment::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
   Growth growth(volume, seeds.size(), options.least_hu);
   for (std::size_t f = 0; f < indices.size(); ++f)
     for (const Eigen::Vector3d& index : indices[f]) {
@@ -119,5 +121,6 @@ MARROW_PLUGIN(plugin) {
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
       .option("least_hu", &Options::least_hu, "nothing darker is bone; the surface is where the CT crosses it", marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker", marrow::unit("HU"))
       .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
 }

@@ -76,7 +76,7 @@ class Siblings(Case):
                 with self.subTest(setting):
                     self.check_errors(self.run_femur(self.case, "--set", setting, out=setting), "distal", setting)
                 replaced.add(other)
-        self.assertLessEqual({"segment.threshold", "mesh.flying_edges", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
+        self.assertLessEqual({"segment.threshold", "segment.region_growing", "segment.distance_regularised", "segment.sparse_field", "mesh.flying_edges", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
                              replaced)
 
     def test_the_truth_changes_no_byte_of_a_pose(self):
