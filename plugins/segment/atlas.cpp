@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Segmentation by an atlas: the surface of a whole bone is moved onto the bone in the CT, by a similarity or an affine map (closest points:
-// Besl and McKay, IEEE Trans. Pattern Anal. Mach. Intell. 14, 1992; similarity: Umeyama, same journal 13, 1991), and taken for it. It
-// knows one unbroken bone: of displaced fragments it can be right for one at most, which the chapter says and a test shows. What belongs
-// to which fragment is decided by the nearest seed alone.
+// Segmentation by an atlas: the surface of a whole bone is moved onto the bone in the CT, by a similarity or an affine
+// map (closest points: Besl and McKay, IEEE Trans. Pattern Anal. Mach. Intell. 14, 1992; similarity: Umeyama, same
+// journal 13, 1991), and taken for it. It knows one unbroken bone: of displaced fragments it can be right for one at
+// most, which the chapter says and a test shows. What belongs to which fragment is decided by the nearest seed alone.
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
@@ -46,25 +46,30 @@ class Target {
     const segment::Mask mask = segment::solid(volume.grid, owner, 0, 4);
     field_.grid = segment::grid_of(volume.grid, mask);
     const float half_voxel_mm = float(volume.grid.spacing_mm.minCoeff() / 2);
-    for (const std::uint8_t inside : mask.is_inside) field_.values_mm.push_back(inside ? -half_voxel_mm : half_voxel_mm);
+    for (const std::uint8_t inside : mask.is_inside)
+      field_.values_mm.push_back(inside ? -half_voxel_mm : half_voxel_mm);
     for (int z = 0; z < mask.size[2]; ++z)
       for (int y = 0; y < mask.size[1]; ++y)
         for (int x = 0; x < mask.size[0]; ++x)
-          if (mask.is_inside[field_.grid.offset(x, y, z)]) points_mm_.push_back(field_.grid.point_from_index(Vector3d(x, y, z)));
+          if (mask.is_inside[field_.grid.offset(x, y, z)])
+            points_mm_.push_back(field_.grid.point_from_index(Vector3d(x, y, z)));
     segment::march_distances(field_.grid, field_.values_mm, kReach_mm);
   }
-  /// The closest point of the bone's surface, as far as the distances reach; `at_edge`: drawn to the steepest descent of the
-  /// CT, as the race ends a little outside the bone.
+  /// The closest point of the bone's surface, as far as the distances reach; `at_edge`: drawn to the steepest descent
+  /// of the CT, as the race ends a little outside the bone.
   Vector3d closest(const Vector3d& point, bool at_edge) const {
     const Grid& grid = field_.grid;
     Vector3d index = grid.index_from_point(point), slope;
     for (int k = 0; k < 3; ++k) index[k] = std::clamp(index[k], 0.0, double(grid.size[k] - 1));
     for (int k = 0; k < 3; ++k) {
       const Vector3d step = Vector3d::Unit(k);
-      slope[k] = (marrow::sample_trilinear(grid, field_.values_mm, index + step) - marrow::sample_trilinear(grid, field_.values_mm, index - step)) / (2 * grid.spacing_mm[k]);
+      slope[k] = (marrow::sample_trilinear(grid, field_.values_mm, index + step) -
+                  marrow::sample_trilinear(grid, field_.values_mm, index - step)) /
+                 (2 * grid.spacing_mm[k]);
     }
     const double distance = marrow::sample_trilinear(grid, field_.values_mm, index);
-    const Vector3d outward = grid.direction * slope.normalized(), closest = grid.point_from_index(index) - distance * outward;
+    const Vector3d outward = grid.direction * slope.normalized(),
+                   closest = grid.point_from_index(index) - distance * outward;
     return at_edge ? steepest(closest, outward) : closest;
   }
   const std::vector<Vector3d>& points_mm() const { return points_mm_; }
@@ -125,7 +130,8 @@ Moments moments_of(const Mesh& mesh) {
   Vector3d first = Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
   for (const auto& corners : mesh.triangles) {
-    const Vector3d &a = mesh.vertices_mm[corners[0]], &b = mesh.vertices_mm[corners[1]], &c = mesh.vertices_mm[corners[2]], sum = a + b + c;
+    const Vector3d &a = mesh.vertices_mm[corners[0]], &b = mesh.vertices_mm[corners[1]],
+                   &c = mesh.vertices_mm[corners[2]], sum = a + b + c;
     const double part = a.dot(b.cross(c)) / 6;
     volume += part;
     first += part / 4 * sum;
@@ -148,7 +154,8 @@ std::vector<Map> starts(const Mesh& whole, const std::vector<Vector3d>& bone) {
 }
 
 /// The pairs of template vertex and closest bone that are best in agreement.
-double pair_up(const Target& target, const std::vector<Vector3d>& vertices, const Map& map, double keep_part, bool at_edge, Eigen::Matrix3Xd& from, Eigen::Matrix3Xd& to) {
+double pair_up(const Target& target, const std::vector<Vector3d>& vertices, const Map& map, double keep_part,
+               bool at_edge, Eigen::Matrix3Xd& from, Eigen::Matrix3Xd& to) {
   std::vector<std::pair<double, std::size_t>> order;
   std::vector<Vector3d> closest;
   for (std::size_t i = 0; i < vertices.size(); ++i) {
@@ -170,7 +177,8 @@ double pair_up(const Target& target, const std::vector<Vector3d>& vertices, cons
 }
 
 /// Moves the map towards the bone; returns the mean distance of the pairs before the last step.
-double fit(const Target& target, const std::vector<Vector3d>& vertices, double keep_part, bool at_edge, bool affine, int iterations, Map& map) {
+double fit(const Target& target, const std::vector<Vector3d>& vertices, double keep_part, bool at_edge, bool affine,
+           int iterations, Map& map) {
   double distance = 0;
   Eigen::Matrix3Xd from, to;
   for (int i = 0; i < iterations; ++i) {
@@ -193,7 +201,9 @@ SignedField part_of(const SignedField& whole, const List<Seeds>& seeds, std::siz
   SignedField part = whole;
   const auto nearest = [&](std::size_t f, const Vector3d& p) {
     const auto& points = seeds[f].points_mm;
-    return *std::min_element(points.begin(), points.end(), [&](const auto& a, const auto& b) { return (a - p).squaredNorm() < (b - p).squaredNorm(); });
+    return *std::min_element(points.begin(), points.end(), [&](const auto& a, const auto& b) {
+      return (a - p).squaredNorm() < (b - p).squaredNorm();
+    });
   };
   for (int z = 0; z < whole.grid.size[2]; ++z)
     for (int y = 0; y < whole.grid.size[1]; ++y)
@@ -203,18 +213,22 @@ SignedField part_of(const SignedField& whole, const List<Seeds>& seeds, std::siz
         for (std::size_t f = 0; f < seeds.size(); ++f) {
           if (f == fragment) continue;
           const Vector3d other = nearest(f, p);  // halfway between both seeds, signed
-          const double beyond = ((p - own).squaredNorm() - (p - other).squaredNorm()) / (2 * std::max((own - other).norm(), 1e-6));
+          const double beyond =
+              ((p - own).squaredNorm() - (p - other).squaredNorm()) / (2 * std::max((own - other).norm(), 1e-6));
           value = std::max(value, float(std::min(beyond, double(std::abs(whole.grid.spacing_mm.maxCoeff()) * 100))));
         }
       }
   return part;
 }
 
-List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Mesh& whole, const Options& options, Context& context) {
+List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Mesh& whole, const Options& options,
+                        Context& context) {
   marrow::check_volume(volume, "volume");
   marrow::check_mesh(whole, "template");
-  if (!marrow::is_closed(whole)) throw marrow::Error("template: a closed surface expected, got one with holes; its inside is not defined");
-  if (std::abs(marrow::enclosed_volume_mm3(whole)) < 1) throw marrow::Error("template: it encloses less than 1 mm^3; is it in mm?");
+  if (!marrow::is_closed(whole))
+    throw marrow::Error("template: a closed surface expected, got one with holes; its inside is not defined");
+  if (std::abs(marrow::enclosed_volume_mm3(whole)) < 1)
+    throw marrow::Error("template: it encloses less than 1 mm^3; is it in mm?");
   const Target target(volume, segment::seed_indices(volume, seeds, options.floor_hu), options.floor_hu);
   std::vector<Vector3d> vertices;
   const std::size_t step = std::max<std::size_t>(1, whole.vertices_mm.size() / 4000);
@@ -228,7 +242,8 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
   }
   least_mm = fit(target, vertices, options.keep_part, true, options.affine, options.iterations, best);
   char line[200];
-  std::snprintf(line, sizeof line, "the template lies %.2f mm from the bone on average, scaled by %.3f", least_mm, std::cbrt(best.linear().determinant()));
+  std::snprintf(line, sizeof line, "the template lies %.2f mm from the bone on average, scaled by %.3f", least_mm,
+                std::cbrt(best.linear().determinant()));
   context.info(line);
   Mesh moved = whole;
   for (Vector3d& vertex : moved.vertices_mm) vertex = best * vertex;
@@ -237,9 +252,12 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     if (!seeds[f].wanted) continue;
     fields.push_back(part_of(field, seeds, f));
-    for (float& value : fields.back().values_mm) value = std::clamp(value, -float(options.band_mm), float(options.band_mm));
-    if (std::none_of(fields.back().values_mm.begin(), fields.back().values_mm.end(), [](float value) { return value < 0; }))
-      throw marrow::Error("fragment '" + seeds.name(f) + "': the template does not reach it; give a template of this bone, or place it closer");
+    for (float& value : fields.back().values_mm)
+      value = std::clamp(value, -float(options.band_mm), float(options.band_mm));
+    if (std::none_of(fields.back().values_mm.begin(), fields.back().values_mm.end(),
+                     [](float value) { return value < 0; }))
+      throw marrow::Error("fragment '" + seeds.name(f) +
+                          "': the template does not reach it; give a template of this bone, or place it closer");
   }
   return segment::list_of(seeds, std::move(fields));
 }
@@ -252,10 +270,13 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .in("template", "closed surface of a whole bone of this kind, in mm, anywhere")
-      .out("field", "signed distance to the moved template, cut halfway between the fragments' seeds", marrow::over("fragment"))
-      .option("floor_hu", &Options::floor_hu, "what is darker is not taken for bone; nor may a seed be", marrow::unit("HU"))
+      .out("field", "signed distance to the moved template, cut halfway between the fragments' seeds",
+           marrow::over("fragment"))
+      .option("floor_hu", &Options::floor_hu, "what is darker is not taken for bone; nor may a seed be",
+              marrow::unit("HU"))
       .option("affine", &Options::affine, "an affine map at last, not only a similarity")
       .option("iterations", &Options::iterations, "of closest points, from each of five starts", marrow::at_least(1))
-      .option("keep_part", &Options::keep_part, "of the template's points, those that agree best", marrow::at_least(0.3), marrow::at_most(1))
+      .option("keep_part", &Options::keep_part, "of the template's points, those that agree best",
+              marrow::at_least(0.3), marrow::at_most(1))
       .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
 }

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A level set that keeps itself a distance: Li, Xu, Gui and Fox, Distance regularized level set evolution and its application to image
-// segmentation, IEEE Trans. Image Process. 19, 2010 (after Li, Xu, Gui and Fox, CVPR 2005). Its evolution (their Eq 30):
+// A level set that keeps itself a distance: Li, Xu, Gui and Fox, Distance regularized level set evolution and its
+// application to image segmentation, IEEE Trans. Image Process. 19, 2010 (after Li, Xu, Gui and Fox, CVPR 2005). Its
+// evolution (their Eq 30):
 //   d phi / dt = mu div(d_p(|grad phi|) grad phi) + lambda delta(phi) div(g grad phi / |grad phi|) + alpha g delta(phi)
-// with d_p from the double-well potential (their Eq 16), g = 1 / (1 + |grad G * I|^2 / K^2) and phi negative inside. No step makes
-// distances anew; it begins, as they do, from a step function: here that of the race from all seeds (expansion.hpp).
+// with d_p from the double-well potential (their Eq 16), g = 1 / (1 + |grad G * I|^2 / K^2) and phi negative inside. No
+// step makes distances anew; it begins, as they do, from a step function: here that of the race from all seeds
+// (expansion.hpp).
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -51,7 +53,8 @@ float dirac(float value) {
 /// phi of one fragment in a box around it, in units of the finest voxel spacing.
 class Evolution {
  public:
-  Evolution(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, const Options& options)
+  Evolution(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
+            std::uint8_t fragment, const Options& options)
       : options_(options), size_(mask.size), phi_(mask.is_inside.size()), is_foreign_(mask.is_inside.size()) {
     const Grid& grid = volume.grid;
     const double finest = grid.spacing_mm.minCoeff();
@@ -84,7 +87,8 @@ class Evolution {
     indicator_.resize(hu.size());
     for_interior([&](std::size_t at) {
       float squared = 0;
-      for (int k = 0; k < 3; ++k) squared += float(std::pow((hu[at + steps_[k]] - hu[at - steps_[k]]) / (2 * spacing_mm[k]), 2));
+      for (int k = 0; k < 3; ++k)
+        squared += float(std::pow((hu[at + steps_[k]] - hu[at - steps_[k]]) / (2 * spacing_mm[k]), 2));
       indicator_[at] = 1 / (1 + squared / float(options_.edge_hu_per_mm * options_.edge_hu_per_mm));
     });
   }
@@ -93,7 +97,8 @@ class Evolution {
     const int reach = int(std::ceil(3 * sigma));
     std::vector<float> weights;
     float sum = 0;
-    for (int k = -reach; k <= reach; ++k) weights.push_back(float(std::exp(-0.5 * k * k / (sigma * sigma)))), sum += weights.back();
+    for (int k = -reach; k <= reach; ++k)
+      weights.push_back(float(std::exp(-0.5 * k * k / (sigma * sigma)))), sum += weights.back();
     const std::vector<float> before = values;
     tbb::parallel_for(0, size_[2], [&](int z) {
       for (int y = 0; y < size_[1]; ++y)
@@ -102,7 +107,9 @@ class Evolution {
           const std::ptrdiff_t at = z * steps_[2] + y * steps_[1] + x;
           float total = 0;
           for (int k = -reach; k <= reach; ++k)
-            total += weights[std::size_t(k + reach)] * before[std::size_t(at + (std::clamp(place[axis] + k, 0, size_[axis] - 1) - place[axis]) * steps_[axis])];
+            total += weights[std::size_t(k + reach)] *
+                     before[std::size_t(at + (std::clamp(place[axis] + k, 0, size_[axis] - 1) - place[axis]) *
+                                                 steps_[axis])];
           values[std::size_t(at)] = total / sum;
         }
     });
@@ -113,7 +120,8 @@ class Evolution {
   void for_interior(const Visit& visit) const {
     tbb::parallel_for(1, std::max(1, size_[2] - 1), [&](int z) {
       for (int y = 1; y < size_[1] - 1; ++y)
-        for (int x = 1; x < size_[0] - 1; ++x) visit(std::size_t(z) * steps_[2] + std::size_t(y) * steps_[1] + std::size_t(x));
+        for (int x = 1; x < size_[0] - 1; ++x)
+          visit(std::size_t(z) * steps_[2] + std::size_t(y) * steps_[1] + std::size_t(x));
     });
   }
 
@@ -122,7 +130,8 @@ class Evolution {
     std::vector<std::uint8_t> is_near(phi_.size(), 0);
     for_interior([&](std::size_t at) {
       for (int k = 0; k < 3; ++k)
-        if ((phi_[at + steps_[k]] < 0) != (phi_[at] < 0) || (phi_[at - steps_[k]] < 0) != (phi_[at] < 0)) is_near[at] = 1;
+        if ((phi_[at + steps_[k]] < 0) != (phi_[at] < 0) || (phi_[at - steps_[k]] < 0) != (phi_[at] < 0))
+          is_near[at] = 1;
     });
     for (int k = 0; k < 3; ++k) {
       const std::vector<std::uint8_t> before = is_near;
@@ -140,7 +149,8 @@ class Evolution {
   }
 
   Eigen::Vector3f gradient(std::size_t at) const {
-    return {(phi_[at + 1] - phi_[at - 1]) * 0.5f * per_step_[0], (phi_[at + steps_[1]] - phi_[at - steps_[1]]) * 0.5f * per_step_[1],
+    return {(phi_[at + 1] - phi_[at - 1]) * 0.5f * per_step_[0],
+            (phi_[at + steps_[1]] - phi_[at - steps_[1]]) * 0.5f * per_step_[1],
             (phi_[at + steps_[2]] - phi_[at - steps_[2]]) * 0.5f * per_step_[2]};
   }
 
@@ -160,12 +170,15 @@ class Evolution {
           const float across = float(side) * (phi_[beside] - phi_[at]) * per_step_[k];
           const float face_length = std::max(0.5f * (length + gradient(at).norm()), 1e-3f);
           regular += float(side) * diffusion(face_length) * across * per_step_[k];
-          if (delta > 0) edge += float(side) * 0.5f * (indicator_[at] + indicator_[beside]) * across / face_length * per_step_[k];
+          if (delta > 0)
+            edge += float(side) * 0.5f * (indicator_[at] + indicator_[beside]) * across / face_length * per_step_[k];
         }
-      const float change = float(options_.regularity) * regular + delta * (float(options_.length) * edge + float(options_.area) * indicator_[at]);
+      const float change = float(options_.regularity) * regular +
+                           delta * (float(options_.length) * edge + float(options_.area) * indicator_[at]);
       next_[i] = std::clamp(phi_[at] + kStep * change, -2 * kStart, 2 * kStart);
     });
-    for (std::size_t i = 0; i < band_.size(); ++i) phi_[band_[i]] = is_foreign_[band_[i]] ? std::max(next_[i], 0.05f) : next_[i];
+    for (std::size_t i = 0; i < band_.size(); ++i)
+      phi_[band_[i]] = is_foreign_[band_[i]] ? std::max(next_[i], 0.05f) : next_[i];
   }
 
   const Options& options_;
@@ -177,22 +190,27 @@ class Evolution {
   std::vector<std::uint32_t> band_;
 };
 
-List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
+List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& seeds, const Options& options,
+                                       Context& context) {
   marrow::check_volume(volume, "volume");
-  const auto owner = level_set::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
+  const auto owner =
+      level_set::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.progress(double(f) / double(seeds.size()), seeds.name(f));
-    const segment::Mask mask = segment::solid(volume.grid, owner, std::uint8_t(f), segment::margin(volume.grid, options.band_mm) + kReach);
+    const segment::Mask mask =
+        segment::solid(volume.grid, owner, std::uint8_t(f), segment::margin(volume.grid, options.band_mm) + kReach);
     if (mask.empty())
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
+                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
     if (!seeds[f].wanted) continue;
     Evolution evolution(volume, mask, owner, std::uint8_t(f), options);
     evolution.run(context);
     std::vector<float> values = evolution.phi();
     for (float& value : values) value *= float(volume.grid.spacing_mm.minCoeff());
     if (std::none_of(values.begin(), values.end(), [](float value) { return value < 0; }))
-      throw marrow::Error("fragment '" + seeds.name(f) + "': its level set vanished; take fewer steps, or a lower area weight");
+      throw marrow::Error("fragment '" + seeds.name(f) +
+                          "': its level set vanished; take fewer steps, or a lower area weight");
     segment::march_distances(segment::grid_of(volume.grid, mask), values, options.band_mm);
     fields.push_back(segment::paste(volume.grid, mask, values, float(options.band_mm)));
   }
@@ -207,12 +225,17 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("floor_hu", &Options::floor_hu, "the race from the seeds does not enter what is darker; nor may a seed be", marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu,
+              "the race from the seeds does not enter what is darker; nor may a seed be", marrow::unit("HU"))
       .option("sigma_mm", &Options::sigma_mm, "Gaussian before the gradient", marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: gradient of the CT that halves g", marrow::at_least(1), marrow::unit("HU/mm"))
-      .option("regularity", &Options::regularity, "mu: weight of the distance's regularity", marrow::at_least(0.01), marrow::at_most(0.16))
-      .option("length", &Options::length, "lambda: weight of the surface's length along edges", marrow::at_least(0), marrow::at_most(5))
-      .option("area", &Options::area, "alpha: shrinks the body where it is positive, expands it where negative", marrow::at_least(-2), marrow::at_most(2))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: gradient of the CT that halves g", marrow::at_least(1),
+              marrow::unit("HU/mm"))
+      .option("regularity", &Options::regularity, "mu: weight of the distance's regularity", marrow::at_least(0.01),
+              marrow::at_most(0.16))
+      .option("length", &Options::length, "lambda: weight of the surface's length along edges", marrow::at_least(0),
+              marrow::at_most(5))
+      .option("area", &Options::area, "alpha: shrinks the body where it is positive, expands it where negative",
+              marrow::at_least(-2), marrow::at_most(2))
       .option("steps", &Options::steps, "time steps", marrow::at_least(0))
       .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
 }

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "expansion.hpp"
 
-#include "fragments.hpp"
-
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include "fragments.hpp"
 
 namespace level_set {
 namespace {
@@ -27,7 +27,8 @@ class Costs {
       const double spacing = volume.grid.spacing_mm[k];
       blocks_[k] = (volume.grid.size[k] + kBlock - 1) / kBlock;
       const int reach = std::clamp(int(std::ceil(2.5 * race.sigma_mm / spacing)), 1, 12);
-      for (int i = -reach; i <= reach; ++i) weights_[k].push_back(float(std::exp(-0.5 * std::pow(i * spacing / race.sigma_mm, 2))));
+      for (int i = -reach; i <= reach; ++i)
+        weights_[k].push_back(float(std::exp(-0.5 * std::pow(i * spacing / race.sigma_mm, 2))));
       float sum = 0;
       for (const float weight : weights_[k]) sum += weight;
       for (float& weight : weights_[k]) weight /= sum;
@@ -55,11 +56,13 @@ class Costs {
     };
     for (const auto& voxel : voxels) choose(voxel[0] / kBlock, voxel[1] / kBlock, voxel[2] / kBlock);
     while (!frontier.empty()) {
-      tbb::parallel_for(std::size_t(0), frontier.size(), [&](std::size_t i) { make(frontier[i]); }, tbb::simple_partitioner());
+      tbb::parallel_for(
+          std::size_t(0), frontier.size(), [&](std::size_t i) { make(frontier[i]); }, tbb::simple_partitioner());
       const std::vector<std::size_t> made = std::move(frontier);
       frontier.clear();
       for (const std::size_t block : made) {
-        const int x = int(block % blocks_[0]), y = int(block / blocks_[0] % blocks_[1]), z = int(block / blocks_[0] / blocks_[1]);
+        const int x = int(block % blocks_[0]), y = int(block / blocks_[0] % blocks_[1]),
+                  z = int(block / blocks_[0] / blocks_[1]);
         for (int k = 0; k < 3; ++k)
           for (const int side : {-1, 1})
             if (is_open(costs_[block], k, side)) choose(x + side * (k == 0), y + side * (k == 1), z + side * (k == 2));
@@ -76,7 +79,10 @@ class Costs {
     for (int a = 0; a < kBlock; ++a)
       for (int b = 0; b < kBlock; ++b) {
         const int at_side = side > 0 ? kBlock - 1 : 0;
-        if (costs[axis == 0 ? local(at_side, a, b) : axis == 1 ? local(a, at_side, b) : local(a, b, at_side)] != kStopped) return true;
+        if (costs[axis == 0   ? local(at_side, a, b)
+                  : axis == 1 ? local(a, at_side, b)
+                              : local(a, b, at_side)] != kStopped)
+          return true;
       }
     return false;
   }
@@ -87,7 +93,8 @@ class Costs {
     float brightest = -1e9f;
     for (int z = 0; z < size[2]; ++z)
       for (int y = 0; y < size[1]; ++y) {
-        const float* row = volume_.values.data() + volume_.grid.offset(0, std::clamp(first[1] + y, 0, whole[1] - 1), std::clamp(first[2] + z, 0, whole[2] - 1));
+        const float* row = volume_.values.data() + volume_.grid.offset(0, std::clamp(first[1] + y, 0, whole[1] - 1),
+                                                                       std::clamp(first[2] + z, 0, whole[2] - 1));
         float* out = values.data() + (std::size_t(z) * size[1] + y) * size[0];
         for (int x = 0; x < size[0]; ++x) {
           out[x] = row[std::clamp(first[0] + x, 0, whole[0] - 1)];
@@ -97,9 +104,11 @@ class Costs {
     return brightest >= race_.floor_hu;
   }
 
-  /// combine(sum so far, value, tap) along one axis. Rows run into each other at the buffer's rim, which the halo is there for.
+  /// combine(sum so far, value, tap) along one axis. Rows run into each other at the buffer's rim, which the halo is
+  /// there for.
   template <class Combine>
-  static void filter(std::vector<float>& values, std::vector<float>& out, std::size_t step, int reach, float start, const Combine& combine) {
+  static void filter(std::vector<float>& values, std::vector<float>& out, std::size_t step, int reach, float start,
+                     const Combine& combine) {
     const std::size_t margin = step * std::size_t(reach), count = values.size();
     out = values;
     if (count <= 2 * margin) return;
@@ -113,7 +122,8 @@ class Costs {
   }
 
   void make(std::size_t block) {
-    const std::array<int, 3> index{int(block % blocks_[0]), int(block / blocks_[0] % blocks_[1]), int(block / blocks_[0] / blocks_[1])};
+    const std::array<int, 3> index{int(block % blocks_[0]), int(block / blocks_[0] % blocks_[1]),
+                                   int(block / blocks_[0] / blocks_[1])};
     std::array<int, 3> first, size;
     for (int k = 0; k < 3; ++k) {
       first[k] = index[k] * kBlock - halo_[k];
@@ -124,14 +134,16 @@ class Costs {
     if (!load(first, size, smooth)) return;
     for (int k = 0; k < 3; ++k) {
       const auto& weights = weights_[k];
-      filter(smooth, scratch, steps[k], int(weights.size() / 2), 0, [&](float sum, float value, int tap) { return sum + weights[std::size_t(tap)] * value; });
+      filter(smooth, scratch, steps[k], int(weights.size() / 2), 0,
+             [&](float sum, float value, int tap) { return sum + weights[std::size_t(tap)] * value; });
     }
     const auto brightest = [](float most, float value, int) { return std::max(most, value); };
     const auto darkest = [](float least, float value, int) { return std::min(least, value); };
     std::vector<float> around = smooth, least = smooth;
     for (int k = 0; k < 3; ++k) filter(around, scratch, steps[k], radius_[k], -1e9f, brightest);
     for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], 1, 1e9f, darkest);
-    std::vector<float> closed = around;  // grey closing: what is dark between two bright things is as bright as they are
+    std::vector<float> closed =
+        around;  // grey closing: what is dark between two bright things is as bright as they are
     for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], 1e9f, darkest);
     std::vector<std::uint8_t>& costs = costs_[block];
     costs.assign(std::size_t(kBlock) * kBlock * kBlock, kStopped);
@@ -140,10 +152,12 @@ class Costs {
         for (int x = 0; x < kBlock; ++x) {
           const std::size_t at = (z + halo_[2]) * steps[2] + (y + halo_[1]) * steps[1] + std::size_t(x + halo_[0]);
           if (smooth[at] < race_.floor_hu) continue;
-          // At the rim of the bone the cleft is open to the side: a front that could run along the rim would pass around it.
+          // At the rim of the bone the cleft is open to the side: a front that could run along the rim would pass
+          // around it.
           const float walls = least[at] < race_.floor_hu ? around[at] : closed[at];
           const double part = std::max(0.f, walls - smooth[at]) / std::max(walls, 1.f) / race_.cleft_part;
-          costs[local(x, y, z)] = std::uint8_t(std::min(kMostCost, std::round(kFreeCost * std::exp(std::min(part * part, 10.0)))));
+          costs[local(x, y, z)] =
+              std::uint8_t(std::min(kMostCost, std::round(kFreeCost * std::exp(std::min(part * part, 10.0)))));
         }
   }
 
@@ -170,7 +184,8 @@ std::vector<std::array<int, 3>> ball(const Grid& grid, const Eigen::Vector3d& ce
 
 }  // namespace
 
-std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vector<Eigen::Vector3d>>& seeds, const Race& race) {
+std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
+                               const Race& race) {
   struct Arrival {
     std::uint32_t at;
     std::uint8_t fragment;

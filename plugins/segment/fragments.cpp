@@ -71,7 +71,8 @@ Grid grid_of(const Grid& grid, const Mask& mask) {
 std::vector<float> cut_out(const Volume& volume, const Mask& mask) {
   std::vector<float> values(mask.is_inside.size());
   for_rows(mask, [&](int y, int z) {
-    std::copy_n(volume.values.data() + volume.grid.offset(mask.first[0], y, z), mask.size[0], values.data() + mask.offset(mask.first[0], y, z));
+    std::copy_n(volume.values.data() + volume.grid.offset(mask.first[0], y, z), mask.size[0],
+                values.data() + mask.offset(mask.first[0], y, z));
   });
   return values;
 }
@@ -79,7 +80,8 @@ std::vector<float> cut_out(const Volume& volume, const Mask& mask) {
 SignedField paste(const Grid& grid, const Mask& mask, const std::vector<float>& values_mm, float outside_mm) {
   SignedField field{grid, std::vector<float>(grid.count(), outside_mm)};
   for_rows(mask, [&](int y, int z) {
-    std::copy_n(values_mm.data() + mask.offset(mask.first[0], y, z), mask.size[0], field.values_mm.data() + grid.offset(mask.first[0], y, z));
+    std::copy_n(values_mm.data() + mask.offset(mask.first[0], y, z), mask.size[0],
+                field.values_mm.data() + grid.offset(mask.first[0], y, z));
   });
   return field;
 }
@@ -97,13 +99,16 @@ SignedField field_at_threshold(const Volume& volume, const Mask& mask, double su
         int before[3] = {x, y, z}, after[3] = {x, y, z};
         before[k] = std::max(before[k] - 1, 0);
         after[k] = std::min(after[k] + 1, grid.size[k] - 1);
-        at_surface |= mask.at(before[0], before[1], before[2]) != inside || mask.at(after[0], after[1], after[2]) != inside;
-        const double rise = double(volume.at(after[0], after[1], after[2])) - double(volume.at(before[0], before[1], before[2]));
+        at_surface |=
+            mask.at(before[0], before[1], before[2]) != inside || mask.at(after[0], after[1], after[2]) != inside;
+        const double rise =
+            double(volume.at(after[0], after[1], after[2])) - double(volume.at(before[0], before[1], before[2]));
         squared_steepness += std::pow(rise / (2 * grid.spacing_mm[k]), 2);
       }
       const double hu = volume.at(x, y, z);
       double distance = half_voxel_mm;
-      if (at_surface && (hu >= surface_hu) == inside) distance = std::abs(hu - surface_hu) / std::max(std::sqrt(squared_steepness), 1.0);
+      if (at_surface && (hu >= surface_hu) == inside)
+        distance = std::abs(hu - surface_hu) / std::max(std::sqrt(squared_steepness), 1.0);
       distance = std::clamp(distance, 1e-4, grid.spacing_mm.maxCoeff());
       values[mask.offset(x, y, z)] = float(inside ? -distance : distance);
     }

@@ -107,7 +107,8 @@ Front::Front(const marrow::Grid& grid, double band_mm, const segment::Mask& mask
     for (int z = 0; z < e.size[2]; ++z)
       for (int y = 0; y < e.size[1]; ++y)
         for (int x = 0; x < e.size[0]; ++x)
-          values[(z * kTile + y) * kTile + x] = mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
+          values[(z * kTile + y) * kTile + x] =
+              mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
   }
   for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
   for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // the band widens with each step of the front
@@ -145,23 +146,27 @@ void Front::load(std::size_t tile, Halo& halo) const {
     const int k = std::clamp(e.first[2] + z - 1, 0, grid_.size[2] - 1);
     for (int y = 0; y < e.size[1] + 2; ++y) {
       const int j = std::clamp(e.first[1] + y - 1, 0, grid_.size[1] - 1);
-      const std::size_t tiles_row = tile_of(0, j / kTile, k / kTile), local_row = std::size_t((k % kTile) * kTile + j % kTile) * kTile;
+      const std::size_t tiles_row = tile_of(0, j / kTile, k / kTile),
+                        local_row = std::size_t((k % kTile) * kTile + j % kTile) * kTile;
       const auto value = [&](int i) {
         const std::int32_t slot = slots_[tiles_row + std::size_t(i / kTile)];
-        return slot < 0 ? (slot == kInside ? -band_mm_ : band_mm_) : values_mm_[std::size_t(slot) * kVoxels + local_row + std::size_t(i % kTile)];
+        return slot < 0 ? (slot == kInside ? -band_mm_ : band_mm_)
+                        : values_mm_[std::size_t(slot) * kVoxels + local_row + std::size_t(i % kTile)];
       };
       float* out = halo.data() + z * kZ + y * kY;
       const std::int32_t slot = slots_[tiles_row + std::size_t(t[0])];
-      if (slot >= 0) std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + local_row, e.size[0], out + 1);
-      else std::fill_n(out + 1, e.size[0], slot == kInside ? -band_mm_ : band_mm_);
+      if (slot >= 0)
+        std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + local_row, e.size[0], out + 1);
+      else
+        std::fill_n(out + 1, e.size[0], slot == kInside ? -band_mm_ : band_mm_);
       out[0] = value(std::max(e.first[0] - 1, 0));
       out[e.size[0] + 1] = value(std::min(e.first[0] + e.size[0], grid_.size[0] - 1));
     }
   }
 }
 
-/// Calls visit(value and its neighbours, x, y, z, place in next_values_, place in the tiles' memory) for each voxel of an
-/// active tile.
+/// Calls visit(value and its neighbours, x, y, z, place in next_values_, place in the tiles' memory) for each voxel of
+/// an active tile.
 template <class Visit>
 void Front::for_voxels(std::size_t position, const Visit& visit) {
   const std::size_t tile = active_[position], slot = std::size_t(slots_[tile]);
@@ -172,8 +177,8 @@ void Front::for_voxels(std::size_t position, const Visit& visit) {
     for (int y = 0; y < e.size[1]; ++y)
       for (int x = 0; x < e.size[0]; ++x) {
         const std::size_t local = std::size_t(z * kTile + y) * kTile + std::size_t(x);
-        visit(halo.data() + (z + 1) * kZ + (y + 1) * kY + x + 1, e.first[0] + x, e.first[1] + y, e.first[2] + z, position * kVoxels + local,
-              slot * kVoxels + local);
+        visit(halo.data() + (z + 1) * kZ + (y + 1) * kY + x + 1, e.first[0] + x, e.first[1] + y, e.first[2] + z,
+              position * kVoxels + local, slot * kVoxels + local);
       }
 }
 
@@ -191,7 +196,8 @@ void Front::choose_active() {
     if (!is_awake_[slot]) continue;
     const auto t = place_of(tile_in_slot_[slot]);
     const auto choose = [&](int i, int j, int k) {
-      if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2]) chosen.push_back(std::uint32_t(tile_of(i, j, k)));
+      if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
+        chosen.push_back(std::uint32_t(tile_of(i, j, k)));
     };
     choose(t[0], t[1], t[2]);
     for (int side : {-1, 1}) {
@@ -215,7 +221,8 @@ void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& pr
       const float length = g.norm();
       if (length < 0.1f) return;
       const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
-      shift_mm_[at] = float(profile.thin_cortex_shift_mm(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index));
+      shift_mm_[at] =
+          float(profile.thin_cortex_shift_mm(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index));
     });
   });
 }
@@ -254,7 +261,9 @@ void Front::advance(double step_mm) {
       for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
       const std::int32_t slot = slots_[tile_of(nearest[0] / kTile, nearest[1] / kTile, nearest[2] / kTile)];
       if (slot < 0) return;
-      const float speed = speed_[std::size_t(slot) * kVoxels + std::size_t((nearest[2] % kTile) * kTile + nearest[1] % kTile) * kTile + std::size_t(nearest[0] % kTile)];
+      const float speed =
+          speed_[std::size_t(slot) * kVoxels + std::size_t((nearest[2] % kTile) * kTile + nearest[1] % kTile) * kTile +
+                 std::size_t(nearest[0] % kTile)];
       const float moved = *v - float(step_mm) * speed * upwind_gradient(v, voxels_per_mm_, speed);
       next_values_[place] = std::clamp(moved, -band_mm_, band_mm_);
     });
@@ -300,8 +309,12 @@ std::vector<float> Front::values_mm() const {
         const std::int32_t slot = slots_[tile_of(x / kTile, y / kTile, z / kTile)];
         float* out = values.data() + grid_.offset(x, y, z);
         const int count = std::min(kTile, grid_.size[0] - x);
-        if (slot < 0) std::fill_n(out, count, slot == kInside ? -band_mm_ : band_mm_);
-        else std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + std::size_t((z % kTile) * kTile + y % kTile) * kTile, count, out);
+        if (slot < 0)
+          std::fill_n(out, count, slot == kInside ? -band_mm_ : band_mm_);
+        else
+          std::copy_n(
+              values_mm_.data() + std::size_t(slot) * kVoxels + std::size_t((z % kTile) * kTile + y % kTile) * kTile,
+              count, out);
       }
   });
   return values;

@@ -2,8 +2,8 @@
 #pragma once
 // A moving surface: a signed distance, kept in a narrow band around its zero level only (Adalsteinsson and Sethian, A
 // fast level set method for propagating interfaces, J. Comput. Phys. 1995). The grid is divided in tiles of 8 x 8 x 8
-// voxels; only tiles near the surface have memory, and only those near a part of it that still moves are visited: memory
-// grows with the surface, the time of a step with what moves.
+// voxels; only tiles near the surface have memory, and only those near a part of it that still moves are visited:
+// memory grows with the surface, the time of a step with what moves.
 #include <array>
 #include <cstdint>
 #include <vector>

@@ -12,9 +12,11 @@ namespace {
 
 using Image = itk::Image<float, 3>;
 
-Image::Pointer image_of(const std::vector<float>& values, const std::array<int, 3>& size, const std::array<double, 3>& spacing_mm) {
+Image::Pointer image_of(const std::vector<float>& values, const std::array<int, 3>& size,
+                        const std::array<double, 3>& spacing_mm) {
   const auto image = Image::New();
-  image->SetRegions(Image::SizeType{{itk::SizeValueType(size[0]), itk::SizeValueType(size[1]), itk::SizeValueType(size[2])}});
+  image->SetRegions(
+      Image::SizeType{{itk::SizeValueType(size[0]), itk::SizeValueType(size[1]), itk::SizeValueType(size[2])}});
   image->SetSpacing(spacing_mm.data());
   image->Allocate();
   std::copy(values.begin(), values.end(), image->GetBufferPointer());
@@ -23,8 +25,8 @@ Image::Pointer image_of(const std::vector<float>& values, const std::array<int, 
 
 }  // namespace
 
-Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const std::array<int, 3>& size, const std::array<double, 3>& spacing_mm,
-                 const Settings& settings) {
+Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const std::array<int, 3>& size,
+                 const std::array<double, 3>& spacing_mm, const Settings& settings) {
   using Gradient = itk::GradientMagnitudeRecursiveGaussianImageFilter<Image, Image>;
   const auto gradient = Gradient::New();
   gradient->SetInput(image_of(hu, size, spacing_mm));

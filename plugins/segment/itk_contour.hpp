@@ -20,7 +20,7 @@ struct Contour {
 };
 
 /// Moves the zero level of `start` (distances, negative inside) by ITK's GeodesicActiveContourLevelSetImageFilter.
-Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const std::array<int, 3>& size, const std::array<double, 3>& spacing_mm,
-                 const Settings& settings);
+Contour geodesic(const std::vector<float>& hu, std::vector<float> start, const std::array<int, 3>& size,
+                 const std::array<double, 3>& spacing_mm, const Settings& settings);
 
 }  // namespace itk_contour

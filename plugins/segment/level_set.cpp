@@ -1,4 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
+// The chapter's narrow-band level set (its Eq 5 and 6 in their corrected reading: see front.hpp): one front for each
+// fragment, all moving together and never into each other. They begin where a race from the seeds ends (expansion.hpp),
+// with everything inside filled, and come to rest on the CT's edges.
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
@@ -45,30 +48,36 @@ void keep_all_apart(std::vector<Front>& fronts) {
 std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
   const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
   context.progress(0, "racing");
-  const auto owner = level_set::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
+  const auto owner =
+      level_set::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
   std::vector<Front> fronts;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(0.3 + 0.2 * double(f) / double(seeds.size()), "filling");
     const segment::Mask mask = segment::solid(volume.grid, owner, std::uint8_t(f));
-    if (mask.empty()) throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    if (mask.empty())
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
+                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
     fronts.emplace_back(volume.grid, options.band_voxels * volume.grid.spacing_mm[0], mask);
   }
   return fronts;
 }
 
-void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int step, double step_mm, Context& context) {
+void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int step, double step_mm,
+                Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     char line[200];
-    std::snprintf(line, sizeof line, "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step, seeds.name(f).c_str(),
-                  fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm), fronts[f].band_voxels());
+    std::snprintf(line, sizeof line, "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step,
+                  seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm),
+                  fronts[f].band_voxels());
     context.info(line);
   }
 }
 
 /// Moves all fronts together until each of them rests on the walls of its bone: on the steepest descent of the CT along
 /// its normal, or, where there is none (the mouth of a canal), where it began.
-void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts, Context& context) {
+void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
+          Context& context) {
   const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm, options.cortex_hu);
   const Force force{options.advection, options.curvature_mm, options.edge_hu, options.floor_hu};
   const double step_mm = kStepVoxels * volume.grid.spacing_mm.minCoeff();
@@ -136,21 +145,24 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0.1), marrow::at_most(5))
       .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that holds a racing front up", marrow::at_least(0.5),
               marrow::at_most(10))
-      .option("cleft_part", &Options::cleft_part, "a cleft darker than its walls by this part of them slows a front e times",
-              marrow::at_least(0.02), marrow::at_most(1))
+      .option("cleft_part", &Options::cleft_part,
+              "a cleft darker than its walls by this part of them slows a front e times", marrow::at_least(0.02),
+              marrow::at_most(1))
       .option("floor_hu", &Options::floor_hu, "no front advances into what is darker; nor may a seed be",
               marrow::unit("HU"))
-      .option("advection", &Options::advection, "F0: how much a front expands where no edge holds it", marrow::at_least(0), marrow::at_most(1))
+      .option("advection", &Options::advection, "F0: how much a front expands where no edge holds it",
+              marrow::at_least(0), marrow::at_most(1))
       .option("edge_hu", &Options::edge_hu, "K: drop of the CT that halves the speed", marrow::at_least(1),
               marrow::unit("HU"))
-      .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative along the normal",
-              marrow::at_least(0.1), marrow::at_most(5))
+      .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative along the normal", marrow::at_least(0.1),
+              marrow::at_most(5))
       .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
               marrow::at_most(5))
-      .option("cortex_hu", &Options::cortex_hu, "density of cortical bone, to correct the edge of a thin cortex by; 0: no correction",
+      .option("cortex_hu", &Options::cortex_hu,
+              "density of cortical bone, to correct the edge of a thin cortex by; 0: no correction",
               marrow::at_least(0), marrow::unit("HU"))
-      .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature",
-              marrow::at_least(0), marrow::at_most(0.5))
+      .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature", marrow::at_least(0),
+              marrow::at_most(0.5))
       .option("stop_speed", &Options::stop_speed, "a part of a front that is slower (F0 is 1) comes to rest",
               marrow::at_least(0.001), marrow::at_most(0.5))
       .option("steps", &Options::steps, "most time steps of the fronts", marrow::at_least(0));

@@ -34,7 +34,9 @@ double distance_to(const Triangle& triangle, const Vector3d& p) {
 /// Where the line through (x, y) along z meets the triangle. A line that only touches an edge is moved aside: each edge
 /// belongs to one side, so that neighbouring triangles count it once.
 bool crossing(const Triangle& t, double x, double y, double& z) {
-  const auto side = [&](const Vector3d& a, const Vector3d& b) { return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x()); };
+  const auto side = [&](const Vector3d& a, const Vector3d& b) {
+    return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
+  };
   const double u = side(t[1], t[2]), v = side(t[2], t[0]), w = side(t[0], t[1]);
   if (!((u > 0 && v > 0 && w > 0) || (u < 0 && v < 0 && w < 0))) return false;
   z = (u * t[0].z() + v * t[1].z() + w * t[2].z()) / (u + v + w);
@@ -56,7 +58,8 @@ marrow::SignedField field_of_mesh(const marrow::Grid& grid, const marrow::Mesh& 
       index[k] = grid.index_from_point(mesh.vertices_mm[corners[k]]);
       mm[k] = index[k].cwiseProduct(spacing);
     }
-    const Vector3d least = index[0].cwiseMin(index[1]).cwiseMin(index[2]), most = index[0].cwiseMax(index[1]).cwiseMax(index[2]);
+    const Vector3d least = index[0].cwiseMin(index[1]).cwiseMin(index[2]),
+                   most = index[0].cwiseMax(index[1]).cwiseMax(index[2]);
     int low[3], high[3];
     for (int k = 0; k < 3; ++k) {
       low[k] = std::max(0, int(std::floor(std::clamp(least[k] - reach_mm / spacing[k], -1e6, 1e6))));
@@ -65,7 +68,8 @@ marrow::SignedField field_of_mesh(const marrow::Grid& grid, const marrow::Mesh& 
     for (int y = low[1]; y <= high[1]; ++y)
       for (int x = low[0]; x <= high[0]; ++x) {
         double z = 0;
-        if (crossing(index, x + aside.x(), y + aside.y(), z)) crossings[std::size_t(y) * size[0] + std::size_t(x)].push_back(float(z));
+        if (crossing(index, x + aside.x(), y + aside.y(), z))
+          crossings[std::size_t(y) * size[0] + std::size_t(x)].push_back(float(z));
         for (int k = low[2]; k <= high[2]; ++k) {
           float& value = distance[grid.offset(x, y, k)];
           value = std::min(value, float(distance_to(mm, Vector3d(x, y, k).cwiseProduct(spacing))));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994): of all voxels beside the regions the one
-// that is most like the region beside it joins it first. The fragments' regions grow at the same time, so what lies between them is
-// shared out last, and a gap that is a little darker than the bone keeps them apart.
+// Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994): of all voxels beside the
+// regions the one that is most like the region beside it joins it first. The fragments' regions grow at the same time,
+// so what lies between them is shared out last, and a gap that is a little darker than the bone keeps them apart.
 #include <cmath>
 #include <deque>
 #include <marrow/plugin.hpp>
@@ -27,7 +27,12 @@ struct Options {
 class Growth {
  public:
   Growth(const Volume& volume, std::size_t fragments, double least_hu)
-      : volume_(volume), least_hu_(least_hu), owner_(volume.values.size(), segment::kNobody), sums_hu_(fragments, 0), counts_(fragments, 0), waiting_(kSteps) {}
+      : volume_(volume),
+        least_hu_(least_hu),
+        owner_(volume.values.size(), segment::kNobody),
+        sums_hu_(fragments, 0),
+        counts_(fragments, 0),
+        waiting_(kSteps) {}
 
   void claim(std::size_t at, std::uint8_t fragment) {
     if (owner_[at] != segment::kNobody || volume_.values[at] < least_hu_) return;
@@ -84,7 +89,8 @@ class Growth {
   std::size_t first_ = kSteps;  // no step before it has a candidate
 };
 
-List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
+List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options,
+                                 Context& context) {
   marrow::check_volume(volume, "volume");
   // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
   const auto indices = segment::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
@@ -95,7 +101,8 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
       for (int k = -1; k <= 1; ++k)
         for (int j = -1; j <= 1; ++j)
           for (int i = -1; i <= 1; ++i)
-            if (volume.grid.contains(x + i, y + j, z + k)) growth.claim(volume.grid.offset(x + i, y + j, z + k), std::uint8_t(f));
+            if (volume.grid.contains(x + i, y + j, z + k))
+              growth.claim(volume.grid.offset(x + i, y + j, z + k), std::uint8_t(f));
     }
   growth.run(context);
   std::vector<SignedField> fields;
@@ -103,10 +110,12 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
     context.check_cancelled();
     context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
     if (!growth.has_any(f))
-      throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " + std::to_string(int(options.least_hu)) +
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " +
+                          std::to_string(int(options.least_hu)) +
                           " HU, or it belongs to another fragment; add a point in brighter bone, or lower least_hu");
     if (!seeds[f].wanted) continue;
-    const segment::Mask mask = segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
+    const segment::Mask mask =
+        segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
     fields.push_back(segment::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
   }
   return segment::list_of(seeds, std::move(fields));
@@ -120,7 +129,8 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("least_hu", &Options::least_hu, "nothing darker is bone; the surface is where the CT crosses it", marrow::unit("HU"))
+      .option("least_hu", &Options::least_hu, "nothing darker is bone; the surface is where the CT crosses it",
+              marrow::unit("HU"))
       .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker", marrow::unit("HU"))
       .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
 }

@@ -99,7 +99,8 @@ void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
 
 SignedField field_of(const Volume& volume, const Options& options, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment) {
-  const segment::Mask mask = segment::solid(volume.grid, owner, fragment, segment::margin(volume.grid, options.band_mm));
+  const segment::Mask mask =
+      segment::solid(volume.grid, owner, fragment, segment::margin(volume.grid, options.band_mm));
   return segment::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
 }
 

@@ -17,9 +17,11 @@ namespace {
 
 using Image = itk::Image<float, 3>;
 
-Image::Pointer image_of(const std::vector<float>& values, const std::array<int, 3>& size, const std::array<double, 3>& spacing_mm) {
+Image::Pointer image_of(const std::vector<float>& values, const std::array<int, 3>& size,
+                        const std::array<double, 3>& spacing_mm) {
   auto image = Image::New();
-  image->SetRegions(Image::SizeType{{itk::SizeValueType(size[0]), itk::SizeValueType(size[1]), itk::SizeValueType(size[2])}});
+  image->SetRegions(
+      Image::SizeType{{itk::SizeValueType(size[0]), itk::SizeValueType(size[1]), itk::SizeValueType(size[2])}});
   image->SetSpacing(spacing_mm.data());
   image->Allocate();
   std::copy(values.begin(), values.end(), image->GetBufferPointer());
@@ -46,7 +48,8 @@ Image::Pointer speed_image(const Image::Pointer& ct, const Settings& settings) {
   return sigmoid->GetOutput();
 }
 
-Result contour(const Image::Pointer& ct, const Image::Pointer& speed, const std::vector<std::array<int, 3>>& seeds, const Settings& settings) {
+Result contour(const Image::Pointer& ct, const Image::Pointer& speed, const std::vector<std::array<int, 3>>& seeds,
+               const Settings& settings) {
   using March = itk::FastMarchingImageFilter<Image, Image>;
   const auto march = March::New();
   const auto points = March::NodeContainer::New();
@@ -73,17 +76,22 @@ Result contour(const Image::Pointer& ct, const Image::Pointer& speed, const std:
   geodesic->Update();
   Result result;
   const Image::Pointer field = geodesic->GetOutput();
-  result.field.assign(field->GetBufferPointer(), field->GetBufferPointer() + field->GetBufferedRegion().GetNumberOfPixels());
+  result.field.assign(field->GetBufferPointer(),
+                      field->GetBufferPointer() + field->GetBufferedRegion().GetNumberOfPixels());
   result.iterations = int(geodesic->GetElapsedIterations());
   return result;
 }
 
 }  // namespace
 
-std::string version() { return itk::Version::GetITKVersion(); }
+std::string version() {
+  return itk::Version::GetITKVersion();
+}
 
-std::vector<Result> geodesic_active_contours(const std::vector<float>& hu, const std::array<int, 3>& size, const std::array<double, 3>& spacing_mm,
-                                             const std::vector<std::vector<std::array<int, 3>>>& seeds, const Settings& settings) {
+std::vector<Result> geodesic_active_contours(const std::vector<float>& hu, const std::array<int, 3>& size,
+                                             const std::array<double, 3>& spacing_mm,
+                                             const std::vector<std::vector<std::array<int, 3>>>& seeds,
+                                             const Settings& settings) {
   itk::MultiThreaderBase::SetGlobalMaximumNumberOfThreads(settings.threads);
   itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(settings.threads);
   const auto ct = image_of(hu, size, spacing_mm);

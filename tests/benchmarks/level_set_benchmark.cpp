@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// segment.level_set against ITK's geodesic active contour on a bone that no threshold segments, and its time and memory on a whole CT.
-// Each measurement has a process of its own, so that its peak memory is its own. All use two threads.
+// segment.level_set against ITK's geodesic active contour on a bone that no threshold segments, and its time and memory
+// on a whole CT. Each measurement has a process of its own, so that its peak memory is its own. All use two threads.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <tbb/global_control.h>
@@ -24,7 +24,8 @@ class Stopwatch {
  public:
   std::string text() const {
     char text[80];
-    std::snprintf(text, sizeof text, "%.2f s (%.2f s of processor time)", std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(),
+    std::snprintf(text, sizeof text, "%.2f s (%.2f s of processor time)",
+                  std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(),
                   used_s() - used_at_start_s_);
     return text;
   }
@@ -33,7 +34,8 @@ class Stopwatch {
   static double used_s() {
     rusage usage{};
     getrusage(RUSAGE_SELF, &usage);
-    return double(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) + 1e-6 * double(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
+    return double(usage.ru_utime.tv_sec + usage.ru_stime.tv_sec) +
+           1e-6 * double(usage.ru_utime.tv_usec + usage.ru_stime.tv_usec);
   }
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
   double used_at_start_s_ = used_s();
@@ -75,7 +77,9 @@ void print_accuracy(const phantom::DistalEnd& bone, const List<SignedField>& fie
     const auto not_the_end = [](const Eigen::Vector3d& p) { return p.z() < 90; };
     const auto at_fracture = [&](const Eigen::Vector3d& p) { return std::abs(bone.over_cut_mm(p)) < 2.5; };
     phantom::print("  " + fields.name(f), phantom::compare(fields[f], truth, not_the_end));
-    phantom::print("    outer surface", phantom::compare(fields[f], truth, [&](const auto& p) { return not_the_end(p) && !at_fracture(p); }));
+    phantom::print("    outer surface", phantom::compare(fields[f], truth, [&](const auto& p) {
+                     return not_the_end(p) && !at_fracture(p);
+                   }));
     phantom::print("    fracture", phantom::compare(fields[f], truth, at_fracture));
   }
 }
@@ -100,13 +104,15 @@ void itk_contour(const phantom::DistalEnd& bone, const Volume& volume, const itk
   }
   const auto& s = volume.grid.spacing_mm;
   const Stopwatch stopwatch;
-  const auto results = itk_peer::geodesic_active_contours(volume.values, volume.grid.size, {s.x(), s.y(), s.z()}, seeds, settings);
+  const auto results =
+      itk_peer::geodesic_active_contours(volume.values, volume.grid.size, {s.x(), s.y(), s.z()}, seeds, settings);
   std::printf("  %s for both fragments: speed image %.2f s", stopwatch.text().c_str(), results[0].speed_image_s);
   for (std::size_t f = 0; f < results.size(); ++f)
     std::printf(", %s %d iterations %.2f s", list.name(f).c_str(), results[f].iterations, results[f].contour_s);
   std::printf("\n");
   List<SignedField> fields;
-  // A contour that began in the cortex leaves the canal out: filled here as segment.level_set fills it, outside the time.
+  // A contour that began in the cortex leaves the canal out: filled here as segment.level_set fills it, outside the
+  // time.
   for (std::size_t f = 0; f < results.size(); ++f) {
     std::vector<std::uint8_t> is_bone(volume.grid.count()), is_other(volume.grid.count());
     SignedField field{volume.grid, results[f].field};
@@ -135,7 +141,8 @@ Volume whole_ct(double length_mm) {
         const auto inside = [](double d) { return 1 / (1 + std::exp(std::clamp(2.4 * d / 0.7, -30.0, 30.0))); };
         const double gap = inside(0.5 - std::abs(p.z()));
         const double bone = inside(outer) * gap, canal = inside(outer + 5) * gap;
-        const double noise = 40 * (double(random()) + double(random()) + double(random()) - 1.5 * 2147483647.0) / 2147483647.0 * 2;
+        const double noise =
+            40 * (double(random()) + double(random()) + double(random()) - 1.5 * 2147483647.0) / 2147483647.0 * 2;
         volume.values[volume.grid.offset(x, y, z)] = float(std::round(50 + 1250 * bone - 1340 * canal + noise));
       }
   });
@@ -147,7 +154,9 @@ void whole_ct_case(double length_mm) {
   List<Seeds> seeds;
   for (const auto& [name, z] : {std::pair{"proximal", 20.0}, {"distal", -20.0}}) {
     const double part = 0.5 + z / length_mm, to_wall_mm = 22 - 8 * part - 2.5;
-    seeds.add(name, Seeds{name, {{60 + 10 * part + to_wall_mm, 20 + 5 * part, z}, {60 + 10 * part - to_wall_mm, 20 + 5 * part, z}}});
+    seeds.add(name, Seeds{name,
+                          {{60 + 10 * part + to_wall_mm, 20 + 5 * part, z},
+                           {60 + 10 * part - to_wall_mm, 20 + 5 * part, z}}});
   }
   Context context;
   const Stopwatch stopwatch;
@@ -168,8 +177,10 @@ int main(int count, char** arguments) {
   const phantom::DistalEnd bone;
   const auto crop = [&] { return bone.scan_of({128, 128, 192}, 40); };
   if (is_asked("crop")) measure("segment.level_set, 128 x 128 x 192", [&] { our_level_set(bone, crop(), {}); });
-  if (is_asked("itk")) measure("ITK's geodesic active contour, 128 x 128 x 192", [&] { itk_contour(bone, crop(), {}); });
+  if (is_asked("itk"))
+    measure("ITK's geodesic active contour, 128 x 128 x 192", [&] { itk_contour(bone, crop(), {}); });
   if (is_asked("whole"))
     for (const double length_mm : {80.0, 160.0, 320.0})
-      measure(("segment.level_set, 512 x 512 x 400, bone of " + std::to_string(int(length_mm)) + " mm").c_str(), [&] { whole_ct_case(length_mm); });
+      measure(("segment.level_set, 512 x 512 x 400, bone of " + std::to_string(int(length_mm)) + " mm").c_str(),
+              [&] { whole_ct_case(length_mm); });
 }

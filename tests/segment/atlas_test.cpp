@@ -12,14 +12,17 @@ struct Bone {
   double gap_mm = 0, turned_deg = 0, aside_mm = 0;
 
   static double whole(const Vector3d& p) {
-    const double shaft = phantom::round_cone(p, {0, 0, -25}, {0, 0, 25}, 8, 7), head = phantom::round_cone(p, {0, 0, 25}, {8, 0, 30}, 9, 7);
+    const double shaft = phantom::round_cone(p, {0, 0, -25}, {0, 0, 25}, 8, 7),
+                 head = phantom::round_cone(p, {0, 0, 25}, {8, 0, 30}, 9, 7);
     const double foot = phantom::round_cone(p, {-5, -4, -25}, {6, 2, -27}, 9, 9);
     return std::min({shaft, head, foot});
   }
   Vector3d in_distal(const Vector3d& p) const {
     return Eigen::AngleAxisd(-turned_deg * M_PI / 180, Vector3d::UnitX()) * (p - Vector3d(0, aside_mm, 0));
   }
-  Vector3d out_of_distal(const Vector3d& p) const { return Eigen::AngleAxisd(turned_deg * M_PI / 180, Vector3d::UnitX()) * p + Vector3d(0, aside_mm, 0); }
+  Vector3d out_of_distal(const Vector3d& p) const {
+    return Eigen::AngleAxisd(turned_deg * M_PI / 180, Vector3d::UnitX()) * p + Vector3d(0, aside_mm, 0);
+  }
   double distance(const Vector3d& p, std::size_t fragment) const {
     if (fragment == 0) return std::max(whole(p), 0.5 * gap_mm - p.z());
     const Vector3d q = in_distal(p);
@@ -27,7 +30,10 @@ struct Bone {
   }
   Volume volume() const {
     return phantom::scan(
-        phantom::ct_grid({52, 60, 96}), [&](const Vector3d& p) { return 50 + 900 * std::min(1.0, phantom::filled(distance(p, 0)) + phantom::filled(distance(p, 1))); },
+        phantom::ct_grid({52, 60, 96}),
+        [&](const Vector3d& p) {
+          return 50 + 900 * std::min(1.0, phantom::filled(distance(p, 0)) + phantom::filled(distance(p, 1)));
+        },
         0.5, 30, 9);
   }
   List<Seeds> seeds() const {
@@ -45,13 +51,15 @@ Mesh template_mesh(double scale, const Vector3d& shift) {
   const auto surface = [&](double t, double angle) -> Vector3d {
     const Vector3d middle(0, 0, -25 + 50 * std::clamp(t, 0.0, 1.0));
     const double tilt = t < 0 ? t : t > 1 ? t - 1 : 0;  // beyond the ends the rays turn to the poles
-    const Vector3d ray = Vector3d(std::cos(angle) * std::cos(tilt), std::sin(angle) * std::cos(tilt), std::sin(tilt)).normalized();
+    const Vector3d ray =
+        Vector3d(std::cos(angle) * std::cos(tilt), std::sin(angle) * std::cos(tilt), std::sin(tilt)).normalized();
     double low = 0, high = 40;
     for (int i = 0; i < 40; ++i) (Bone::whole(middle + 0.5 * (low + high) * ray) < 0 ? low : high) = 0.5 * (low + high);
     return scale * (middle + low * ray) + shift;
   };
   for (int i = 1; i < rings; ++i)
-    for (int j = 0; j < around; ++j) mesh.vertices_mm.push_back(surface(-M_PI / 2 + (1 + M_PI) * i / rings, 2 * M_PI * j / around));
+    for (int j = 0; j < around; ++j)
+      mesh.vertices_mm.push_back(surface(-M_PI / 2 + (1 + M_PI) * i / rings, 2 * M_PI * j / around));
   const auto at = [&](int i, int j) { return std::uint32_t((i - 1) * around + j % around); };
   for (int i = 1; i + 1 < rings; ++i)
     for (int j = 0; j < around; ++j) {
@@ -63,8 +71,10 @@ Mesh template_mesh(double scale, const Vector3d& shift) {
     mesh.vertices_mm.push_back(surface(top ? 1 + M_PI / 2 : -M_PI / 2, 0));
     for (int j = 0; j < around; ++j) {
       const int ring = top ? rings - 1 : 1;
-      if (top) mesh.triangles.push_back({at(ring, j), at(ring, j + 1), pole});
-      else mesh.triangles.push_back({at(ring, j + 1), at(ring, j), pole});
+      if (top)
+        mesh.triangles.push_back({at(ring, j), at(ring, j + 1), pole});
+      else
+        mesh.triangles.push_back({at(ring, j + 1), at(ring, j), pole});
     }
   }
   return mesh;
@@ -77,7 +87,9 @@ std::array<phantom::Accuracy, 2> accuracy_of(const Bone& bone) {
   EXPECT_EQ(phantom::overlap(fields), 0u);
   std::array<phantom::Accuracy, 2> accuracies;
   for (std::size_t f = 0; f < 2; ++f) {
-    accuracies[f] = phantom::compare(fields[f], [&](const Vector3d& p) { return bone.distance(p, f); }, [&](const Vector3d& p) { return std::abs(p.z()) > 6; });
+    accuracies[f] = phantom::compare(
+        fields[f], [&](const Vector3d& p) { return bone.distance(p, f); },
+        [&](const Vector3d& p) { return std::abs(p.z()) > 6; });
     phantom::print(fields.name(f), accuracies[f]);
   }
   return accuracies;

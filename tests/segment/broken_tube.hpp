@@ -28,14 +28,16 @@ struct BrokenTube {
     return 50 + 1250 * std::min(1.0, proximal + distal) - 1320 * std::min(1.0, canal);
   }
   marrow::Volume volume() const {
-    return scan(ct_grid({44, 44, 72}), [this](const Vector3d& p) { return hu(p); }, 0.5, 30, 3);
+    return scan(
+        ct_grid({44, 44, 72}), [this](const Vector3d& p) { return hu(p); }, 0.5, 30, 3);
   }
   marrow::List<marrow::Seeds> seeds(bool both_wanted = true) const {
     marrow::List<marrow::Seeds> seeds;
     const Eigen::AngleAxisd turn(turned_deg * M_PI / 180, Vector3d::UnitX());
     const Vector3d aside(0, aside_mm, 0);
     seeds.add("proximal", marrow::Seeds{"proximal", {{9.7, 0, 18}, {-9.7, 0, 18}}, both_wanted});
-    seeds.add("distal", marrow::Seeds{"distal", {turn * Vector3d(9.3, 0, -18) + aside, turn * Vector3d(-9.3, 0, -18) + aside}});
+    seeds.add("distal",
+              marrow::Seeds{"distal", {turn * Vector3d(9.3, 0, -18) + aside, turn * Vector3d(-9.3, 0, -18) + aside}});
     return seeds;
   }
   /// Dice of a fragment, and its wall's distance from the truth, away from the cut and from the volume's ends.
@@ -48,7 +50,8 @@ struct BrokenTube {
 
 inline std::size_t overlap(const marrow::List<marrow::SignedField>& fields) {
   std::size_t both = 0;
-  for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at) both += fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0;
+  for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
+    both += fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0;
   return both;
 }
 

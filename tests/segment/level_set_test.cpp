@@ -113,7 +113,8 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
     for (std::size_t f = 0; f < 2; ++f) {
       const double side = f == 0 ? -1 : 1;
       const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + gap_mm / 2); };
-      const auto wall = phantom::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
+      const auto wall =
+          phantom::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
       phantom::print("gap " + std::to_string(gap_mm) + " " + fields.name(f), wall);
       EXPECT_GT(wall.dice, 0.97);
       EXPECT_LT(std::abs(wall.bias_mm), 0.05);
@@ -130,8 +131,9 @@ TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
   const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds(), {}, context); });
   std::printf("%.2f s\n", seconds);
   for (std::size_t f = 0; f < 2; ++f) {
-    const auto accuracy = phantom::compare(fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
-                                           [](const Vector3d& p) { return p.z() < 90; });
+    const auto accuracy = phantom::compare(
+        fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
+        [](const Vector3d& p) { return p.z() < 90; });
     phantom::print(fields.name(f), accuracy);
     EXPECT_GT(accuracy.dice, 0.99);
     EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);

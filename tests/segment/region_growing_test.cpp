@@ -29,7 +29,8 @@ TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {
   ASSERT_EQ(one.size(), 1u);
   EXPECT_EQ(one.name(0), "distal");
   std::size_t different = 0;  // both may fill the same voxel of the gap
-  for (std::size_t at = 0; at < one[0].values_mm.size(); ++at) different += (one[0].values_mm[at] < 0) != (both[1].values_mm[at] < 0);
+  for (std::size_t at = 0; at < one[0].values_mm.size(); ++at)
+    different += (one[0].values_mm[at] < 0) != (both[1].values_mm[at] < 0);
   EXPECT_LT(different, 10u);
 }
 

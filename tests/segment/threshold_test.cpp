@@ -94,7 +94,8 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
   }
 }
 
-// What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone at all.)
+// What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone
+// at all.)
 TEST(Threshold, NoThresholdSegmentsADistalEnd) {
   const phantom::DistalEnd bone;
   const Volume volume = bone.scan_of({128, 128, 192}, 40);
@@ -105,8 +106,9 @@ TEST(Threshold, NoThresholdSegmentsADistalEnd) {
     const auto fields = threshold(volume, &seeds, {.threshold_hu = threshold_hu}, context);
     double worst_mm = 0;
     for (std::size_t f = 0; f < 2; ++f) {
-      const auto accuracy = phantom::compare(fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
-                                             [](const Vector3d& p) { return p.z() < 90; });
+      const auto accuracy = phantom::compare(
+          fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
+          [](const Vector3d& p) { return p.z() < 90; });
       phantom::print(std::to_string(int(threshold_hu)) + " HU, " + fields.name(f), accuracy);
       worst_mm = std::max(worst_mm, accuracy.mean_mm);
     }
