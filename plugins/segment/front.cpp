@@ -50,7 +50,9 @@ float eikonal(const float* v, float sign, const Eigen::Vector3f& per_mm) {
   const int steps[3] = {kX, kY, kZ};
   for (int k = 0; k < 3; ++k)
     neighbours[k] = {std::max(0.f, std::min(sign * v[steps[k]], sign * v[-steps[k]])), per_mm[k] * per_mm[k]};
-  std::sort(neighbours.begin(), neighbours.end());
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
+  if (neighbours[2].first < neighbours[1].first) std::swap(neighbours[1], neighbours[2]);
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
   float a = 0, b = 0, c = -1, distance = 0;
   for (int k = 0; k < 3; ++k) {
     if (k && distance <= neighbours[k].first) break;
@@ -248,10 +250,12 @@ void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, c
 }
 
 void Front::advance(double step_mm) {
+  // The rest of the band gets its distances from these when they are made again.
+  const float moving_mm = std::min(band_mm_, 3 * near_mm_);
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
       next_values_[place] = *v;
-      if (std::abs(*v) >= band_mm_) return;
+      if (std::abs(*v) >= moving_mm) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
       if (length < 0.1f) return;
@@ -298,7 +302,7 @@ void Front::finish() {
   active_ = tile_in_slot_;
   std::sort(active_.begin(), active_.end());
   next_values_.resize(active_.size() * kVoxels);
-  for (int pass = 0; pass * grid_.spacing_mm.minCoeff() < band_mm_ + 1; ++pass) redistance_once(false);
+  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // what moved last has widened its band already
 }
 
 std::vector<float> Front::values_mm() const {

@@ -34,11 +34,11 @@ struct Options {
   double cortex_hu = 1200;
   double curvature_mm = 0.1;
   double stop_speed = 0.02;
-  int steps = 30;
+  int steps = 32;
 };
 
 constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant, Friedrichs and Lewy)
-constexpr int kStepsPerCycle = 3;
+constexpr int kStepsPerCycle = 4;
 
 void keep_all_apart(std::vector<Front>& fronts) {
   for (std::size_t a = 0; a < fronts.size(); ++a)
