@@ -13,7 +13,7 @@ const std::vector<Kind>& kinds() {
        {{"edges", "edge_map", ""}, {"view", "view", ""}},
        {{"lines", "shaft_lines", ""}}},
       {"segment", "signed distance field per fragment, negative inside",
-       {{"volume", "volume", ""}, {"seeds", "seeds", "fragment"}},
+       {{"volume", "volume", ""}, {"seeds", "seeds", "fragment"}, {"template", "mesh", ""}},
        {{"field", "signed_field", "fragment"}}},
       {"mesh", "closed surface: of a signed field, or made from another one", {{"field", "signed_field", ""}, {"mesh", "mesh", ""}}, {{"mesh", "mesh", ""}}},
       {"project", "draws a model as a view would see it: outline or radiograph",

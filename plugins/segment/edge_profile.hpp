@@ -38,9 +38,10 @@ struct Edge {
 
 class EdgeProfile {
  public:
-  /// `sigma_mm` of the Gaussian derivative; `blur_mm`: width (standard deviation) of an ideal edge in the CT itself.
-  EdgeProfile(double sigma_mm, double blur_mm)
-      : step_mm_(kStep * sigma_mm), variance_mm2_(sigma_mm * sigma_mm + blur_mm * blur_mm) {
+  /// `sigma_mm` of the Gaussian derivative; `blur_mm`: width (standard deviation) of an ideal edge in the CT itself;
+  /// `cortex_hu` of a cortex too thin to be seen as such.
+  EdgeProfile(double sigma_mm, double blur_mm, double cortex_hu)
+      : step_mm_(kStep * sigma_mm), variance_mm2_(sigma_mm * sigma_mm + blur_mm * blur_mm), cortex_hu_(cortex_hu) {
     double sum = 0, second_sum = 0, half = 0;
     for (int k = -kReach; k <= kReach; ++k) {
       const double t = k * kStep;  // in sigmas
@@ -76,10 +77,41 @@ class EdgeProfile {
     return {mean, slope * drop_per_slope_mm_, slope > 1e-3 ? variance_mm2_ * bend / slope : 0};
   }
 
+  /// How far inside the edge at() sees the surface of a thin cortex, whose light is blurred outwards. The cortex's
+  /// thickness follows from how much more the CT shows than a step from spongy bone to tissue would, given the cortex's
+  /// density (after Treece, Gee, Mayhew and Poole, Med. Image Anal. 2010). `index` is on the surface.
+  double thin_cortex_shift_mm(const marrow::Volume& volume, const Eigen::Vector3f& index,
+                              const Eigen::Vector3f& normal_index) const {
+    constexpr double kStep_mm = 0.5;
+    double spongy = 0, tissue = 0, brightest = -1e9, sum = 0;
+    for (int k = -8; k <= 7; ++k) {
+      const Eigen::Vector3f p = index + float((k + 0.5) * kStep_mm) * normal_index;
+      const double value = sample(volume, p.x(), p.y(), p.z());
+      if (k < -5)
+        spongy += value / 3;
+      else if (k > 4)
+        tissue += value / 3;
+      else
+        sum += value, brightest = std::max(brightest, value);
+    }
+    const double cortex = std::max(cortex_hu_, brightest), light = (sum - 5 * spongy - 5 * tissue) * kStep_mm;
+    const double is_thin =
+        std::clamp(((brightest - spongy) / std::max(brightest - tissue, 1.0) - 0.15) / 0.15, 0.0, 1.0);
+    if (is_thin == 0 || light <= 0 || spongy - tissue < 50 || cortex - spongy < 100) return 0;
+    // Seen with blur s, a cortex of thickness k s between tissue outside and spongy bone inside has on its surface the
+    // slope
+    // -((cortex - tissue) - (cortex - spongy) e) / s and the second derivative -(cortex - spongy) k e / s^2, e =
+    // exp(-k^2/2), both over sqrt(2 pi): at() takes that for a point so far inside the edge.
+    const double s = std::sqrt(variance_mm2_), k = light / (cortex - spongy) / s,
+                 part = (cortex - spongy) / (cortex - tissue);
+    const double e = std::exp(-0.5 * k * k);
+    return is_thin * s * std::min(part * k * e / (1 - part * e), 1.5);
+  }
+
  private:
   static constexpr int kReach = 4;       // samples on either side
   static constexpr double kStep = 0.75;  // in sigmas
-  double step_mm_, variance_mm2_, drop_per_slope_mm_ = 1;
+  double step_mm_, variance_mm2_, cortex_hu_, drop_per_slope_mm_ = 1;
   std::array<std::array<double, 3>, 2 * kReach + 1> weights_{};
 };
 

@@ -50,7 +50,9 @@ float eikonal(const float* v, float sign, const Eigen::Vector3f& per_mm) {
   const int steps[3] = {kX, kY, kZ};
   for (int k = 0; k < 3; ++k)
     neighbours[k] = {std::max(0.f, std::min(sign * v[steps[k]], sign * v[-steps[k]])), per_mm[k] * per_mm[k]};
-  std::sort(neighbours.begin(), neighbours.end());
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
+  if (neighbours[2].first < neighbours[1].first) std::swap(neighbours[1], neighbours[2]);
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
   float a = 0, b = 0, c = -1, distance = 0;
   for (int k = 0; k < 3; ++k) {
     if (k && distance <= neighbours[k].first) break;
@@ -74,37 +76,49 @@ bool beyond_band(const float* v, float band) {
 
 }  // namespace
 
-Front::Front(const marrow::Grid& grid, double band_mm)
+Front::Front(const marrow::Grid& grid, double band_mm, const segment::Mask& mask)
     : grid_(grid),
       band_mm_(float(band_mm)),
       near_mm_(float(std::max(grid.spacing_mm.norm() / 2 * 1.2, grid.spacing_mm.maxCoeff()))),
-      voxels_per_mm_(grid.spacing_mm.cwiseInverse().cast<float>()),
-      values_mm_(grid.count(), float(band_mm)),
-      values_before_(values_mm_),
-      speed_(grid.count(), 0.f) {
+      voxels_per_mm_(grid.spacing_mm.cwiseInverse().cast<float>()) {
   for (int k = 0; k < 3; ++k) tiles_[k] = (grid.size[k] + kTile - 1) / kTile;
-  is_active_.assign(tile_count(), 0);
-  is_awake_.assign(tile_count(), 0);
-}
-
-void Front::add_ball(const Eigen::Vector3d& centre_index, double radius_mm) {
-  const double reach_mm = radius_mm + band_mm_;
-  int low[3], high[3];
-  for (int k = 0; k < 3; ++k) {
-    low[k] = std::max(0, int(std::floor(centre_index[k] - reach_mm / grid_.spacing_mm[k])));
-    high[k] = std::min(grid_.size[k] - 1, int(std::ceil(centre_index[k] + reach_mm / grid_.spacing_mm[k])));
+  slots_.assign(std::size_t(tiles_[0]) * tiles_[1] * tiles_[2], kOutside);
+  std::vector<std::uint8_t> is_mixed(slots_.size(), 0);
+  tbb::parallel_for(std::size_t(0), slots_.size(), [&](std::size_t tile) {
+    const Extent e = extent(tile);
+    for (int k = 0; k < 3; ++k)
+      if (e.first[k] + kTile < mask.first[k] || e.first[k] >= mask.first[k] + mask.size[k]) return;
+    const bool inside = mask.at(e.first[0], e.first[1], e.first[2]);
+    if (inside) slots_[tile] = kInside;
+    // One voxel beyond the tile, so that a surface between two tiles is seen.
+    for (int z = e.first[2]; z < std::min(e.first[2] + kTile + 1, grid_.size[2]); ++z)
+      for (int y = e.first[1]; y < std::min(e.first[1] + kTile + 1, grid_.size[1]); ++y)
+        for (int x = e.first[0]; x < std::min(e.first[0] + kTile + 1, grid_.size[0]); ++x)
+          is_mixed[tile] |= mask.at(x, y, z) != inside;
+  });
+  for (std::size_t tile = 0; tile < slots_.size(); ++tile)
+    if (is_mixed[tile]) {
+      provide(tile);
+      is_awake_[std::size_t(slots_[tile])] = 1;
+    }
+  choose_active();
+  const float half_voxel_mm = 0.5f * float(grid.spacing_mm.minCoeff());
+  for (const std::uint32_t tile : active_) {
+    const Extent e = extent(tile);
+    float* values = values_mm_.data() + std::size_t(slots_[tile]) * kVoxels;
+    for (int z = 0; z < e.size[2]; ++z)
+      for (int y = 0; y < e.size[1]; ++y)
+        for (int x = 0; x < e.size[0]; ++x)
+          values[(z * kTile + y) * kTile + x] =
+              mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
   }
-  for (int z = low[2]; z <= high[2]; ++z)
-    for (int y = low[1]; y <= high[1]; ++y)
-      for (int x = low[0]; x <= high[0]; ++x) {
-        const Eigen::Vector3d away = (Eigen::Vector3d(x, y, z) - centre_index).cwiseProduct(grid_.spacing_mm);
-        float& value = values_mm_[grid_.offset(x, y, z)];
-        value = std::min(value, float(away.norm() - radius_mm));
-      }
+  for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
+  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // the band widens with each step of the front
+  values_before_ = values_mm_;
 }
 
 Front::Extent Front::extent(std::size_t tile) const {
-  const int t[3] = {int(tile % tiles_[0]), int(tile / tiles_[0] % tiles_[1]), int(tile / tiles_[0] / tiles_[1])};
+  const auto t = place_of(tile);
   Extent extent;
   for (int k = 0; k < 3; ++k) {
     extent.first[k] = t[k] * kTile;
@@ -113,92 +127,122 @@ Front::Extent Front::extent(std::size_t tile) const {
   return extent;
 }
 
-void Front::load(const Extent& extent, Halo& halo) const {
-  for (int z = 0; z < extent.size[2] + 2; ++z)
-    for (int y = 0; y < extent.size[1] + 2; ++y) {
-      const float* row = values_mm_.data() + grid_.offset(0, std::clamp(extent.first[1] + y - 1, 0, grid_.size[1] - 1),
-                                                          std::clamp(extent.first[2] + z - 1, 0, grid_.size[2] - 1));
-      float* out = halo.data() + z * kZ + y * kY;
-      std::copy_n(row + extent.first[0], extent.size[0], out + 1);
-      out[0] = row[std::max(extent.first[0] - 1, 0)];
-      out[extent.size[0] + 1] = row[std::min(extent.first[0] + extent.size[0], grid_.size[0] - 1)];
-    }
+/// Gives a tile memory.
+void Front::provide(std::size_t tile) {
+  if (slots_[tile] >= 0) return;
+  const float value = slots_[tile] == kInside ? -band_mm_ : band_mm_;
+  slots_[tile] = std::int32_t(tile_in_slot_.size());
+  tile_in_slot_.push_back(std::uint32_t(tile));
+  is_awake_.push_back(0);
+  values_mm_.resize(values_mm_.size() + kVoxels, value);
+  values_before_.resize(values_mm_.size(), value);
+  speed_.resize(values_mm_.size(), 0.f);
+  shift_mm_.resize(values_mm_.size(), 0.f);
 }
 
-/// Calls visit(value and its neighbours, x, y, z, place in next_values_) for each voxel of an active tile.
+/// The values of a tile and one voxel all around; beyond the grid its border goes on.
+void Front::load(std::size_t tile, Halo& halo) const {
+  const Extent e = extent(tile);
+  const auto t = place_of(tile);
+  for (int z = 0; z < e.size[2] + 2; ++z) {
+    const int k = std::clamp(e.first[2] + z - 1, 0, grid_.size[2] - 1);
+    for (int y = 0; y < e.size[1] + 2; ++y) {
+      const int j = std::clamp(e.first[1] + y - 1, 0, grid_.size[1] - 1);
+      const std::size_t tiles_row = tile_of(0, j / kTile, k / kTile),
+                        local_row = std::size_t((k % kTile) * kTile + j % kTile) * kTile;
+      const auto value = [&](int i) {
+        const std::int32_t slot = slots_[tiles_row + std::size_t(i / kTile)];
+        return slot < 0 ? (slot == kInside ? -band_mm_ : band_mm_)
+                        : values_mm_[std::size_t(slot) * kVoxels + local_row + std::size_t(i % kTile)];
+      };
+      float* out = halo.data() + z * kZ + y * kY;
+      const std::int32_t slot = slots_[tiles_row + std::size_t(t[0])];
+      if (slot >= 0)
+        std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + local_row, e.size[0], out + 1);
+      else
+        std::fill_n(out + 1, e.size[0], slot == kInside ? -band_mm_ : band_mm_);
+      out[0] = value(std::max(e.first[0] - 1, 0));
+      out[e.size[0] + 1] = value(std::min(e.first[0] + e.size[0], grid_.size[0] - 1));
+    }
+  }
+}
+
+/// Calls visit(value and its neighbours, x, y, z, place in next_values_, place in the tiles' memory) for each voxel of
+/// an active tile.
 template <class Visit>
 void Front::for_voxels(std::size_t position, const Visit& visit) {
-  const Extent e = extent(active_[position]);
+  const std::size_t tile = active_[position], slot = std::size_t(slots_[tile]);
+  const Extent e = extent(tile);
   Halo halo;
-  load(e, halo);
+  load(tile, halo);
   for (int z = 0; z < e.size[2]; ++z)
     for (int y = 0; y < e.size[1]; ++y)
-      for (int x = 0; x < e.size[0]; ++x)
+      for (int x = 0; x < e.size[0]; ++x) {
+        const std::size_t local = std::size_t(z * kTile + y) * kTile + std::size_t(x);
         visit(halo.data() + (z + 1) * kZ + (y + 1) * kY + x + 1, e.first[0] + x, e.first[1] + y, e.first[2] + z,
-              position * kTile * kTile * kTile + std::size_t(z * kTile + y) * kTile + x);
+              position * kVoxels + local, slot * kVoxels + local);
+      }
 }
 
 void Front::write_back() {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    const Extent e = extent(active_[position]);
-    for (int z = 0; z < e.size[2]; ++z)
-      for (int y = 0; y < e.size[1]; ++y)
-        std::copy_n(next_values_.data() + position * kTile * kTile * kTile + std::size_t(z * kTile + y) * kTile,
-                    e.size[0], values_mm_.data() + grid_.offset(e.first[0], e.first[1] + y, e.first[2] + z));
+    const std::size_t slot = std::size_t(slots_[active_[position]]);
+    std::copy_n(next_values_.data() + position * kVoxels, kVoxels, values_mm_.data() + slot * kVoxels);
   });
 }
 
-void Front::wake_all() {
-  tbb::parallel_for(std::size_t(0), tile_count(), [&](std::size_t tile) {
-    const Extent e = extent(tile);
-    const bool inside = values_mm_[grid_.offset(e.first[0], e.first[1], e.first[2])] < 0;
-    is_awake_[tile] = 0;
-    // One voxel beyond the tile, so that a surface between two tiles wakes both.
-    for (int z = e.first[2]; z < std::min(e.first[2] + kTile + 1, grid_.size[2]); ++z)
-      for (int y = e.first[1]; y < std::min(e.first[1] + kTile + 1, grid_.size[1]); ++y)
-        for (int x = e.first[0]; x < std::min(e.first[0] + kTile + 1, grid_.size[0]); ++x)
-          is_awake_[tile] |= (values_mm_[grid_.offset(x, y, z)] < 0) != inside;
-  });
-  choose_active();
-}
-
+/// Active are the tiles that are awake and those beside them, which get memory.
 void Front::choose_active() {
-  std::fill(is_active_.begin(), is_active_.end(), std::uint8_t(0));
-  for (int z = 0; z < tiles_[2]; ++z)
-    for (int y = 0; y < tiles_[1]; ++y)
-      for (int x = 0; x < tiles_[0]; ++x) {
-        if (!is_awake_[(std::size_t(z) * tiles_[1] + y) * tiles_[0] + x]) continue;
-        const auto choose = [&](int i, int j, int k) {
-          if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
-            is_active_[(std::size_t(k) * tiles_[1] + j) * tiles_[0] + i] = 1;
-        };
-        choose(x, y, z);
-        for (int side : {-1, 1}) {
-          choose(x + side, y, z);
-          choose(x, y + side, z);
-          choose(x, y, z + side);
-        }
-      }
-  active_.clear();
-  for (std::size_t tile = 0; tile < tile_count(); ++tile)
-    if (is_active_[tile]) active_.push_back(std::uint32_t(tile));
-  next_values_.resize(active_.size() * kTile * kTile * kTile);
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t slot = 0; slot < is_awake_.size(); ++slot) {
+    if (!is_awake_[slot]) continue;
+    const auto t = place_of(tile_in_slot_[slot]);
+    const auto choose = [&](int i, int j, int k) {
+      if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
+        chosen.push_back(std::uint32_t(tile_of(i, j, k)));
+    };
+    choose(t[0], t[1], t[2]);
+    for (int side : {-1, 1}) {
+      choose(t[0] + side, t[1], t[2]);
+      choose(t[0], t[1] + side, t[2]);
+      choose(t[0], t[1], t[2] + side);
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  for (const std::uint32_t tile : chosen) provide(tile);
+  active_ = std::move(chosen);
+  next_values_.resize(active_.size() * kVoxels);
+}
+
+void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+      if (std::abs(*v) > near_mm_) return;
+      const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
+      const float length = g.norm();
+      if (length < 0.1f) return;
+      const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
+      shift_mm_[at] =
+          float(profile.thin_cortex_shift_mm(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index));
+    });
+  });
 }
 
 void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
       if (std::abs(*v) > near_mm_) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
-      float& speed = speed_[grid_.offset(x, y, z)];
+      float& speed = speed_[at];
       speed = 0;
       if (length < 0.1f) return;
       const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
       const Edge edge = profile.at(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index);
       const double ratio = std::max(0.0, edge.drop_hu) / force.edge_hu, open = 1 / (1 + ratio * ratio);
       const double bone = std::clamp((edge.mean_hu - force.floor_hu) / 50, -1.0, 1.0);
-      const double towards_edge = std::clamp(-edge.offset_mm / grid_.spacing_mm[0], -1.0, 1.0);
+      const double towards_edge = std::clamp(-(edge.offset_mm + shift_mm_[at]) / grid_.spacing_mm[0], -1.0, 1.0);
       const double bend = std::clamp(double(curvature(v, voxels_per_mm_, g)), -2.0, 2.0);
       speed = float(force.advection * bone * open + towards_edge * (1 - open) - force.curvature_mm * bend);
     });
@@ -206,10 +250,12 @@ void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, c
 }
 
 void Front::advance(double step_mm) {
+  // The rest of the band gets its distances from these when they are made again.
+  const float moving_mm = std::min(band_mm_, 3 * near_mm_);
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
       next_values_[place] = *v;
-      if (std::abs(*v) >= band_mm_) return;
+      if (std::abs(*v) >= moving_mm) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
       if (length < 0.1f) return;
@@ -217,7 +263,11 @@ void Front::advance(double step_mm) {
       const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
       int nearest[3];
       for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
-      const float speed = speed_[grid_.offset(nearest[0], nearest[1], nearest[2])];
+      const std::int32_t slot = slots_[tile_of(nearest[0] / kTile, nearest[1] / kTile, nearest[2] / kTile)];
+      if (slot < 0) return;
+      const float speed =
+          speed_[std::size_t(slot) * kVoxels + std::size_t((nearest[2] % kTile) * kTile + nearest[1] % kTile) * kTile +
+                 std::size_t(nearest[0] % kTile)];
       const float moved = *v - float(step_mm) * speed * upwind_gradient(v, voxels_per_mm_, speed);
       next_values_[place] = std::clamp(moved, -band_mm_, band_mm_);
     });
@@ -225,24 +275,58 @@ void Front::advance(double step_mm) {
   write_back();
 }
 
-void Front::redistance() {
-  for (int pass = 0; pass < 2; ++pass) {
-    tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-      for_voxels(position, [&](const float* v, int, int, int, std::size_t place) {
-        const float sign = *v < 0 ? -1.f : 1.f;
-        if (beside_surface(v)) {
-          const float length = gradient(v, voxels_per_mm_).norm();
-          const float rescaled = pass == 0 && length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
-          next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // no voxel beside it is farther
-        } else if (beyond_band(v, sign * band_mm_)) {
-          next_values_[place] = sign * band_mm_;
-        } else {
-          next_values_[place] = sign * std::min(eikonal(v, sign, voxels_per_mm_), band_mm_);
-        }
-      });
+void Front::redistance_once(bool rescale) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int, int, int, std::size_t place, std::size_t) {
+      const float sign = *v < 0 ? -1.f : 1.f;
+      if (beside_surface(v)) {
+        const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
+        const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
+        next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // no voxel beside it is farther
+      } else if (beyond_band(v, sign * band_mm_)) {
+        next_values_[place] = sign * band_mm_;
+      } else {
+        next_values_[place] = sign * std::min(eikonal(v, sign, voxels_per_mm_), band_mm_);
+      }
     });
-    write_back();
-  }
+  });
+  write_back();
+}
+
+void Front::redistance() {
+  redistance_once(true);
+  redistance_once(false);
+}
+
+void Front::finish() {
+  active_ = tile_in_slot_;
+  std::sort(active_.begin(), active_.end());
+  next_values_.resize(active_.size() * kVoxels);
+  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // what moved last has widened its band already
+}
+
+std::vector<float> Front::values_mm() const {
+  std::vector<float> values(grid_.count());
+  tbb::parallel_for(0, grid_.size[2], [&](int z) {
+    for (int y = 0; y < grid_.size[1]; ++y)
+      for (int x = 0; x < grid_.size[0]; x += kTile) {
+        const std::int32_t slot = slots_[tile_of(x / kTile, y / kTile, z / kTile)];
+        float* out = values.data() + grid_.offset(x, y, z);
+        const int count = std::min(kTile, grid_.size[0] - x);
+        if (slot < 0)
+          std::fill_n(out, count, slot == kInside ? -band_mm_ : band_mm_);
+        else
+          std::copy_n(
+              values_mm_.data() + std::size_t(slot) * kVoxels + std::size_t((z % kTile) * kTile + y % kTile) * kTile,
+              count, out);
+      }
+  });
+  return values;
+}
+
+bool Front::has_vanished() const {
+  return std::none_of(slots_.begin(), slots_.end(), [](std::int32_t slot) { return slot == kInside; }) &&
+         std::none_of(values_mm_.begin(), values_mm_.end(), [](float value) { return value < 0; });
 }
 
 bool Front::rest(double least_motion_mm) {
@@ -253,8 +337,8 @@ bool Front::rest(double least_motion_mm) {
   std::vector<Tally> tallies(active_.size());
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     Tally& tally = tallies[position];
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t) {
-      float& before = values_before_[grid_.offset(x, y, z)];
+    for_voxels(position, [&](const float* v, int, int, int, std::size_t, std::size_t at) {
+      float& before = values_before_[at];
       tally.band += std::abs(*v) < band_mm_;
       if (beside_surface(v)) {
         tally.motion_mm += std::abs(*v - before);
@@ -262,7 +346,7 @@ bool Front::rest(double least_motion_mm) {
       }
       before = *v;
     });
-    is_awake_[active_[position]] = tally.motion_mm > least_motion_mm * double(tally.surface);
+    is_awake_[std::size_t(slots_[active_[position]])] = tally.motion_mm > least_motion_mm * double(tally.surface);
   });
   Tally sum;
   for (const Tally& tally : tallies) {
@@ -277,17 +361,16 @@ bool Front::rest(double least_motion_mm) {
 }
 
 void Front::keep_apart(Front& a, Front& b) {
-  tbb::parallel_for(std::size_t(0), a.tile_count(), [&](std::size_t tile) {
-    if (!a.is_active_[tile] && !b.is_active_[tile]) return;
-    const Extent e = a.extent(tile);
-    for (int z = 0; z < e.size[2]; ++z)
-      for (int y = 0; y < e.size[1]; ++y)
-        for (int x = 0; x < e.size[0]; ++x) {
-          const std::size_t at = a.grid_.offset(e.first[0] + x, e.first[1] + y, e.first[2] + z);
-          const float overlap = std::min(0.f, 0.5f * (a.values_mm_[at] + b.values_mm_[at]));
-          a.values_mm_[at] -= overlap;
-          b.values_mm_[at] -= overlap;
-        }
+  tbb::parallel_for(std::size_t(0), a.active_.size(), [&](std::size_t position) {
+    const std::size_t tile = a.active_[position];
+    if (b.slots_[tile] < 0) return;
+    float* of_a = a.values_mm_.data() + std::size_t(a.slots_[tile]) * kVoxels;
+    float* of_b = b.values_mm_.data() + std::size_t(b.slots_[tile]) * kVoxels;
+    for (std::size_t i = 0; i < kVoxels; ++i) {
+      const float overlap = std::min(0.f, 0.5f * (of_a[i] + of_b[i]));
+      of_a[i] -= overlap;
+      of_b[i] -= overlap;
+    }
   });
 }
 

@@ -54,8 +54,10 @@ struct Planes {
   double slope_u, slope_v;
 
   int shift(int i, int j) const {
-    return int(std::lround(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) +
-                           slope_v * (j - (box.first[v] + box.last[v]) / 2.0)));
+    constexpr int kFar = 1 << 20;  // rounds by cutting off, as rounding functions are slow
+    return int(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) + slope_v * (j - (box.first[v] + box.last[v]) / 2.0) +
+               (kFar + 0.5)) -
+           kFar;
   }
   int reach() const {
     return int(std::ceil(std::abs(slope_u) * (box.last[u] - box.first[u]) +
@@ -73,37 +75,39 @@ void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>
   const std::size_t steps[3] = {1, std::size_t(planes.grid.size[0]),
                                 std::size_t(planes.grid.size[0]) * planes.grid.size[1]};
   thread_local std::vector<std::uint8_t> closed;
-  thread_local std::vector<std::size_t> source;
   thread_local std::vector<int> stack;
   closed.assign(std::size_t(width) * height, 0);
-  source.assign(closed.size(), 0);
+  // Where the voxel of a pixel lies; nowhere when the plane has left the box there.
+  const auto source = [&](int i, int j, std::size_t& at) {
+    const int a = box.first[planes.u] + i - 1, b = box.first[planes.v] + j - 1, c = plane + planes.shift(a, b);
+    at = a * steps[planes.u] + b * steps[planes.v] + c * steps[planes.w];
+    return c >= box.first[planes.w] && c <= box.last[planes.w];
+  };
+  std::size_t at = 0;
   bool any_bone = false;
   for (int j = 1; j < height - 1; ++j)
     for (int i = 1; i < width - 1; ++i) {
-      const int a = box.first[planes.u] + i - 1, b = box.first[planes.v] + j - 1, c = plane + planes.shift(a, b);
-      if (c < box.first[planes.w] || c > box.last[planes.w]) continue;
-      const std::size_t at = a * steps[planes.u] + b * steps[planes.v] + c * steps[planes.w];
-      source[std::size_t(j) * width + i] = at + 1;
-      any_bone |= closed[std::size_t(j) * width + i] = is_bone[at];
+      if (source(i, j, at)) any_bone |= closed[std::size_t(j) * width + i] = is_bone[at];
     }
   if (!any_bone) return;
   stack.assign(1, 0);
   closed[0] = 2;  // reached from outside
   while (!stack.empty()) {
-    const int at = stack.back(), i = at % width, j = at / width;
+    const int from = stack.back(), i = from % width, j = from / width;
     stack.pop_back();
     const auto visit = [&](bool exists, int next) {
       if (!exists || closed[std::size_t(next)]) return;
       closed[std::size_t(next)] = 2;
       stack.push_back(next);
     };
-    visit(i > 0, at - 1);
-    visit(i + 1 < width, at + 1);
-    visit(j > 0, at - width);
-    visit(j + 1 < height, at + width);
+    visit(i > 0, from - 1);
+    visit(i + 1 < width, from + 1);
+    visit(j > 0, from - width);
+    visit(j + 1 < height, from + width);
   }
-  for (std::size_t k = 0; k < closed.size(); ++k)
-    if (!closed[k] && source[k]) is_filled[source[k] - 1] = 1;
+  for (int j = 1; j < height - 1; ++j)
+    for (int i = 1; i < width - 1; ++i)
+      if (!closed[std::size_t(j) * width + i] && source(i, j, at)) is_filled[at] = 1;
 }
 
 bool beside_zero(const Grid& grid, const std::vector<float>& values, int x, int y, int z) {

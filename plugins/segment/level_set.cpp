@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <tbb/parallel_for.h>
-
+// The chapter's narrow-band level set (its Eq 5 and 6 in their corrected reading: see front.hpp): one front for each
+// fragment, all moving together and never into each other. They begin where a race from the seeds ends (expansion.hpp),
+// with everything inside filled, and come to rest on the CT's edges.
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include "expansion.hpp"
+#include "fragments.hpp"
 #include "front.hpp"
-#include "interior.hpp"
 #include "seed_points.hpp"
 
 namespace {
@@ -21,98 +23,83 @@ using marrow::Volume;
 
 struct Options {
   double band_voxels = 5;
-  double curvature_mm = 0.1;
-  double edge_hu = 150;
+  double sigma_mm = 0.7;
+  double cleft_mm = 3.2;
+  double cleft_part = 0.1;
   double floor_hu = 150;
-  double expand_sigma_mm = 0.8;
+  double advection = 0;
+  double edge_hu = 150;
   double edge_sigma_mm = 0.4;
   double blur_mm = 0.7;
-  double refine_curvature_mm = 0.1;
-  double stop_speed = 0.05;
-  int max_steps = 3000;
-  int refine_steps = 20;
+  double cortex_hu = 1200;
+  double curvature_mm = 0.1;
+  double stop_speed = 0.02;
+  int steps = 32;
 };
 
 constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant, Friedrichs and Lewy)
-constexpr int kStepsPerCycle = 3, kCyclesPerRest = 3;
+constexpr int kStepsPerCycle = 4;
 
 void keep_all_apart(std::vector<Front>& fronts) {
   for (std::size_t a = 0; a < fronts.size(); ++a)
     for (std::size_t b = a + 1; b < fronts.size(); ++b) Front::keep_apart(fronts[a], fronts[b]);
 }
 
-void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, const char* phase, int step,
+std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
+  const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
+  context.progress(0, "racing");
+  const auto owner =
+      level_set::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
+  std::vector<Front> fronts;
+  for (std::size_t f = 0; f < seeds.size(); ++f) {
+    context.check_cancelled();
+    context.progress(0.3 + 0.2 * double(f) / double(seeds.size()), "filling");
+    const segment::Mask mask = segment::solid(volume.grid, owner, std::uint8_t(f));
+    if (mask.empty())
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
+                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    fronts.emplace_back(volume.grid, options.band_voxels * volume.grid.spacing_mm[0], mask);
+  }
+  return fronts;
+}
+
+void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int step, double step_mm,
                 Context& context) {
   for (std::size_t f = 0; f < fronts.size(); ++f) {
     char line[200];
-    std::snprintf(line, sizeof line, "%s, step %d, %s: moved %.4f mm a step, %zu voxels in the moving band", phase,
-                  step, seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * kCyclesPerRest),
+    std::snprintf(line, sizeof line, "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step,
+                  seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm),
                   fronts[f].band_voxels());
     context.info(line);
   }
 }
 
-/// Some time steps, then distances again.
-void cycle(const Volume& volume, const EdgeProfile& profile, const Force& force, std::vector<Front>& fronts) {
+/// Moves all fronts together until each of them rests on the walls of its bone: on the steepest descent of the CT along
+/// its normal, or, where there is none (the mouth of a canal), where it began.
+void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
+          Context& context) {
+  const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm, options.cortex_hu);
+  const Force force{options.advection, options.curvature_mm, options.edge_hu, options.floor_hu};
   const double step_mm = kStepVoxels * volume.grid.spacing_mm.minCoeff();
-  for (int step = 0; step < kStepsPerCycle; ++step) {
-    for (Front& front : fronts) {
-      front.evaluate(volume, profile, force);
-      front.advance(step_mm);
-    }
-    keep_all_apart(fronts);
-  }
-  for (Front& front : fronts) front.redistance();
-}
-
-/// Expands all fronts together until each of them rests on the walls of its bone.
-void expand(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
-            Context& context) {
-  const EdgeProfile profile(options.expand_sigma_mm, options.blur_mm);
-  const Force force{1, options.curvature_mm, options.edge_hu, options.floor_hu};
-  constexpr int kSteps = kStepsPerCycle * kCyclesPerRest;
-  const double least_motion_mm = options.stop_speed * kSteps * kStepVoxels * volume.grid.spacing_mm.minCoeff();
-  for (int step = 0; step < options.max_steps; step += kSteps) {
+  for (int step = 0; step < options.steps; step += kStepsPerCycle) {
     context.check_cancelled();
-    context.progress(0.6 * step / options.max_steps, "expanding");
-    for (int k = 0; k < kCyclesPerRest; ++k) cycle(volume, profile, force, fronts);
+    context.progress(0.5 + 0.5 * step / options.steps, "moving");
+    if (options.cortex_hu > 0)
+      for (Front& front : fronts) front.find_thin_cortex(volume, profile);
+    for (int k = 0; k < kStepsPerCycle; ++k) {
+      for (Front& front : fronts) {
+        front.evaluate(volume, profile, force);
+        front.advance(step_mm);
+      }
+      keep_all_apart(fronts);
+    }
     bool at_rest = true;
-    for (Front& front : fronts) at_rest &= front.rest(least_motion_mm);
-    if (at_rest || step / kSteps % 10 == 9) log_fronts(fronts, seeds, "expanding", step, context);
-    if (at_rest) return;
-  }
-  context.warn("the fronts still moved after " + std::to_string(options.max_steps) +
-               " steps; they may leak, or max_steps is too small for this bone");
-}
-
-/// Leaves only the outer surface of each front, with nothing inside.
-void fill(const marrow::Grid& grid, std::vector<Front>& fronts) {
-  for (std::size_t f = 0; f < fronts.size(); ++f) {
-    std::vector<float>& values = fronts[f].values_mm();
-    std::vector<std::uint8_t> is_bone(grid.count()), is_other(grid.count(), 0);
-    for (std::size_t at = 0; at < is_bone.size(); ++at) {
-      is_bone[at] = values[at] < 0;
-      for (std::size_t other = 0; other < fronts.size(); ++other)
-        if (other != f) is_other[at] |= fronts[other].values_mm()[at] < 0;
+    for (Front& front : fronts) {
+      front.redistance();
+      at_rest &= front.rest(options.stop_speed * kStepsPerCycle * step_mm);
     }
-    segment::fill_interior(grid, is_bone, is_other);
-    const float half_voxel = float(grid.spacing_mm[0] / 2);
-    for (std::size_t at = 0; at < is_bone.size(); ++at)
-      if (is_bone[at] && values[at] >= 0) values[at] = -half_voxel;
-    fronts[f].wake_all();
-    for (int k = 0; k < 3; ++k) fronts[f].redistance();
-  }
-}
-
-/// Draws the surfaces to the steepest descent of the CT along their normals; where there is none (the mouth of a
-/// canal), they stay.
-void refine(const Volume& volume, const Options& options, std::vector<Front>& fronts, Context& context) {
-  const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm);
-  const Force force{0, options.refine_curvature_mm, options.edge_hu, options.floor_hu};
-  for (int step = 0; step < options.refine_steps; step += kStepsPerCycle) {
-    context.check_cancelled();
-    context.progress(0.7 + 0.3 * step / options.refine_steps, "refining");
-    cycle(volume, profile, force, fronts);
+    log_fronts(fronts, seeds, step + kStepsPerCycle, step_mm, context);
+    if (at_rest) return;
   }
 }
 
@@ -128,32 +115,17 @@ void check(const Volume& volume) {
 List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                    Context& context) {
   check(volume);
-  const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
-  const double in_plane_mm = volume.grid.spacing_mm[0], band_mm = options.band_voxels * in_plane_mm;
-  std::vector<Front> fronts;
-  for (const auto& points : indices) {
-    Front& front = fronts.emplace_back(volume.grid, band_mm);
-    for (const auto& point : points) front.add_ball(point, 2 * in_plane_mm);
-    front.wake_all();
-  }
-  keep_all_apart(fronts);
-  expand(volume, seeds, options, fronts, context);
+  std::vector<Front> fronts = begin(volume, seeds, options, context);
+  move(volume, seeds, options, fronts, context);
+  List<SignedField> fields;
   for (std::size_t f = 0; f < fronts.size(); ++f) {
-    const auto& values = fronts[f].values_mm();
-    if (std::none_of(values.begin(), values.end(), [](float v) { return v < 0; }))
+    if (fronts[f].has_vanished())
       throw marrow::Error("fragment '" + seeds.name(f) +
                           "': the front vanished, as its seeds lie too close to the edge of "
                           "the bone; move them towards the middle of the cortical or spongy bone");
-  }
-  fill(volume.grid, fronts);
-  refine(volume, options, fronts, context);
-  tbb::parallel_for(std::size_t(0), fronts.size(), [&](std::size_t f) {
-    if (seeds[f].wanted) segment::march_distances(volume.grid, fronts[f].values_mm(), band_mm);
-  });
-  List<SignedField> fields;
-  for (std::size_t f = 0; f < fronts.size(); ++f) {
     if (!seeds[f].wanted) continue;
-    fields.add(seeds.name(f), SignedField{volume.grid, std::move(fronts[f].values_mm())});
+    fronts[f].finish();
+    fields.add(seeds.name(f), SignedField{volume.grid, fronts[f].values_mm()});
   }
   if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
   return fields;
@@ -169,22 +141,29 @@ MARROW_PLUGIN(plugin) {
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
       .option("band_voxels", &Options::band_voxels, "half width of the narrow band, in in-plane voxels",
               marrow::at_least(3), marrow::at_most(20), marrow::unit("voxels"))
-      .option("curvature_mm", &Options::curvature_mm, "weight of the curvature while the fronts expand",
-              marrow::at_least(0), marrow::at_most(0.5))
-      .option("edge_hu", &Options::edge_hu, "drop of the CT that halves the speed", marrow::at_least(1),
-              marrow::unit("HU"))
+      .option("sigma_mm", &Options::sigma_mm, "smoothing of the CT in which the fronts race from the seeds",
+              marrow::at_least(0.1), marrow::at_most(5))
+      .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that holds a racing front up", marrow::at_least(0.5),
+              marrow::at_most(10))
+      .option("cleft_part", &Options::cleft_part,
+              "a cleft darker than its walls by this part of them slows a front e times", marrow::at_least(0.02),
+              marrow::at_most(1))
       .option("floor_hu", &Options::floor_hu, "no front advances into what is darker; nor may a seed be",
               marrow::unit("HU"))
-      .option("expand_sigma_mm", &Options::expand_sigma_mm, "Gaussian derivative while the fronts expand",
-              marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative that the final surface rests on",
-              marrow::at_least(0.1), marrow::at_most(5))
+      .option("advection", &Options::advection, "F0: how much a front expands where no edge holds it",
+              marrow::at_least(0), marrow::at_most(1))
+      .option("edge_hu", &Options::edge_hu, "K: drop of the CT that halves the speed", marrow::at_least(1),
+              marrow::unit("HU"))
+      .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative along the normal", marrow::at_least(0.1),
+              marrow::at_most(5))
       .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
               marrow::at_most(5))
-      .option("refine_curvature_mm", &Options::refine_curvature_mm, "weight of the curvature in the final surface",
-              marrow::at_least(0), marrow::at_most(0.5))
+      .option("cortex_hu", &Options::cortex_hu,
+              "density of cortical bone, to correct the edge of a thin cortex by; 0: no correction",
+              marrow::at_least(0), marrow::unit("HU"))
+      .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature", marrow::at_least(0),
+              marrow::at_most(0.5))
       .option("stop_speed", &Options::stop_speed, "a part of a front that is slower (F0 is 1) comes to rest",
               marrow::at_least(0.001), marrow::at_most(0.5))
-      .option("max_steps", &Options::max_steps, "most time steps of the expansion", marrow::at_least(1))
-      .option("refine_steps", &Options::refine_steps, "time steps of the final refinement", marrow::at_least(0));
+      .option("steps", &Options::steps, "most time steps of the fronts", marrow::at_least(0));
 }

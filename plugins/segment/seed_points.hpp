@@ -10,6 +10,8 @@
 
 namespace segment {
 
+constexpr std::size_t kMostFragments = 253;  // one byte says who owns a voxel
+
 /// The seeds of each fragment as fractional indices. Throws Error for no seeds, a fragment without any, or a seed that
 /// lies outside the volume or where the CT, averaged over 3 x 3 x 3 voxels, is below `least_hu`.
 inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volume& volume,
@@ -19,6 +21,9 @@ inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volu
   if (seeds.empty())
     throw Error(
         "seeds: there are none; give at least one fragment with one point inside its bone (seeds in case.yaml)");
+  if (seeds.size() > kMostFragments)
+    throw Error("seeds: at most " + std::to_string(kMostFragments) + " fragments expected, got " +
+                std::to_string(seeds.size()));
   std::vector<std::vector<Eigen::Vector3d>> indices(seeds.size());
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     const std::string fragment = "seeds of fragment '" + seeds.name(f) + "'";

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <queue>
 
-#include "interior.hpp"
+#include "fragments.hpp"
 #include "seed_points.hpp"
 
 namespace {
@@ -20,7 +20,8 @@ struct Options {
   double band_mm = 4;
 };
 
-constexpr std::uint8_t kNobody = 255, kUnclaimed = 254;
+using segment::kNobody;
+constexpr std::uint8_t kUnclaimed = 254;
 
 template <class Visit>
 void for_neighbours(const Grid& grid, std::size_t at, const Visit& visit) {
@@ -96,45 +97,11 @@ void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
   for (std::size_t at : largest) owner[at] = 0;
 }
 
-/// Signed distance to the outer surface of one fragment: where its bone meets dark voxels, the surface is where the CT,
-/// interpolated, crosses the threshold; where it meets another fragment, halfway.
 SignedField field_of(const Volume& volume, const Options& options, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment) {
-  const Grid& grid = volume.grid;
-  std::vector<std::uint8_t> is_bone(owner.size()), is_other(owner.size());
-  for (std::size_t at = 0; at < owner.size(); ++at) {
-    is_bone[at] = owner[at] == fragment;
-    is_other[at] = owner[at] < kUnclaimed && owner[at] != fragment;
-  }
-  segment::fill_interior(grid, is_bone, is_other);
-  SignedField field{grid, std::vector<float>(owner.size())};
-  const double half_voxel_mm = grid.spacing_mm.minCoeff() / 2;
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) {
-        const std::size_t at = grid.offset(x, y, z);
-        const auto slope = [&](int dx, int dy, int dz, int axis) {
-          const auto value = [&](int sign) {
-            const int i = std::clamp(x + sign * dx, 0, grid.size[0] - 1),
-                      j = std::clamp(y + sign * dy, 0, grid.size[1] - 1),
-                      k = std::clamp(z + sign * dz, 0, grid.size[2] - 1);
-            return double(volume.at(i, j, k));
-          };
-          return (value(1) - value(-1)) / (2 * grid.spacing_mm[axis]);
-        };
-        bool at_surface = false;
-        for_neighbours(grid, at, [&](std::size_t next) { at_surface |= is_bone[next] != is_bone[at]; });
-        const bool agrees = (volume.values[at] >= options.threshold_hu) == bool(is_bone[at]);
-        double distance = half_voxel_mm;
-        if (at_surface && agrees) {
-          const double steepness = Eigen::Vector3d(slope(1, 0, 0, 0), slope(0, 1, 0, 1), slope(0, 0, 1, 2)).norm();
-          distance = std::abs(volume.values[at] - options.threshold_hu) / std::max(steepness, 1.0);
-        }
-        distance = std::clamp(distance, 1e-4, grid.spacing_mm.maxCoeff());
-        field.values_mm[at] = float(is_bone[at] ? -distance : distance);
-      }
-  segment::march_distances(grid, field.values_mm, options.band_mm);
-  return field;
+  const segment::Mask mask =
+      segment::solid(volume.grid, owner, fragment, segment::margin(volume.grid, options.band_mm));
+  return segment::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
 }
 
 List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, const Options& options, Context& context) {
@@ -146,14 +113,13 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   if (!any)
     throw marrow::Error("volume: no voxel reaches the threshold of " + std::to_string(int(options.threshold_hu)) +
                         " HU, so there is no bone; lower threshold_hu, and check that the CT is in Hounsfield units");
-  List<SignedField> fields;
   if (!seeds) {
     claim_largest(volume.grid, owner);
-    fields.add("bone", field_of(volume, options, owner, 0));
-    return fields;
+    List<SignedField> bone;
+    bone.add("bone", field_of(volume, options, owner, 0));
+    return bone;
   }
-  if (seeds->size() >= kUnclaimed)
-    throw marrow::Error("seeds: at most 253 fragments expected, got " + std::to_string(seeds->size()));
+  std::vector<SignedField> fields;
   // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
   const double least_hu = std::min(options.floor_hu, options.threshold_hu);
   claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, least_hu), owner);
@@ -161,10 +127,9 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   for (std::size_t f = 0; f < seeds->size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds->size()), seeds->name(f));
-    if ((*seeds)[f].wanted) fields.add(seeds->name(f), field_of(volume, options, owner, std::uint8_t(f)));
+    if ((*seeds)[f].wanted) fields.push_back(field_of(volume, options, owner, std::uint8_t(f)));
   }
-  if (fields.empty()) throw marrow::Error("seeds: no fragment is wanted; set wanted: true for at least one");
-  return fields;
+  return segment::list_of(*seeds, std::move(fields));
 }
 
 }  // namespace

@@ -72,11 +72,14 @@ class Siblings(Case):
         replaced = set()
         for name, node in yaml.safe_load(FEMUR.read_text())["nodes"].items():
             for other in siblings(nodes, node):
+                if other == "segment.region_growing":
+                    continue  # in voxels as coarse as this case's it takes part of the other fragment: the chapter says that it cannot split bones
                 setting = "%s.uses=%s" % (name, other)
                 with self.subTest(setting):
                     self.check_errors(self.run_femur(self.case, "--set", setting, out=setting), "distal", setting)
                 replaced.add(other)
-        self.assertLessEqual({"segment.threshold", "mesh.flying_edges", "mesh.surface_nets", "mesh.poisson", "mesh.delaunay", "mesh.smooth", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
+        self.assertLessEqual({"segment.threshold", "segment.distance_regularised", "segment.sparse_field", "mesh.flying_edges", "mesh.surface_nets", "mesh.poisson",
+                              "mesh.delaunay", "mesh.smooth", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
                              replaced)
 
     def test_the_truth_changes_no_byte_of_a_pose(self):

@@ -7,7 +7,7 @@
 #include <chrono>
 #include <cstring>
 
-#include "segment/phantom.hpp"
+#include "segment/distal_end.hpp"
 
 namespace {
 
@@ -93,6 +93,52 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
   }
   for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
     ASSERT_FALSE(fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0) << "both claim voxel " << at;
+}
+
+TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
+  HollowBone bone;
+  bone.wall_high_mm = 4;
+  for (double gap_mm : {1.2, 2.0, 4.0}) {
+    const Vector3d normal = Vector3d(0.5, 0.2, 1).normalized();
+    marrow::Grid grid = phantom::ct_grid({44, 42, 92});
+    grid.spacing_mm.setConstant(1.2);
+    grid.origin_mm = -Vector3d(43, 41, 91) * 0.6;
+    const Volume volume = phantom::scan(
+        grid, [&](const Vector3d& p) { return bone.hu(p, gap_mm / 2 - std::abs(normal.dot(p))); }, 0.5, 30, 2);
+    List<Seeds> seeds;
+    seeds.add("proximal", Seeds{"proximal", {bone.seed(40)}});
+    seeds.add("distal", Seeds{"distal", {bone.seed(-15)}});
+    Context context;
+    const auto fields = level_set_fields(volume, seeds, {}, context);
+    for (std::size_t f = 0; f < 2; ++f) {
+      const double side = f == 0 ? -1 : 1;
+      const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + gap_mm / 2); };
+      const auto wall =
+          phantom::compare(fields[f], truth, [&](const Vector3d& p) { return std::abs(normal.dot(p)) > 5; });
+      phantom::print("gap " + std::to_string(gap_mm) + " " + fields.name(f), wall);
+      EXPECT_GT(wall.dice, 0.97);
+      EXPECT_LT(std::abs(wall.bias_mm), 0.05);
+      EXPECT_LT(wall.mean_mm, 0.1);
+    }
+  }
+}
+
+TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
+  const phantom::DistalEnd bone;
+  const Volume volume = bone.scan_of({128, 128, 192}, 40);
+  Context context;
+  List<SignedField> fields;
+  const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds(), {}, context); });
+  std::printf("%.2f s\n", seconds);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const auto accuracy = phantom::compare(
+        fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
+        [](const Vector3d& p) { return p.z() < 90; });
+    phantom::print(fields.name(f), accuracy);
+    EXPECT_GT(accuracy.dice, 0.99);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.06);
+    EXPECT_LT(accuracy.mean_mm, 0.1);
+  }
 }
 
 /// A short bone in a grid that is turned against the frame, both ends inside the volume.

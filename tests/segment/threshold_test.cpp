@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "segment/phantom.hpp"
+#include "segment/distal_end.hpp"
 
 namespace {
 
@@ -92,6 +92,29 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
                  "seeds of fragment 'distal': at none of them the CT reaches the threshold of 250 HU, or it belongs to "
                  "another fragment; add a point in cortical bone, or lower threshold_hu");
   }
+}
+
+// What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone
+// at all.)
+TEST(Threshold, NoThresholdSegmentsADistalEnd) {
+  const phantom::DistalEnd bone;
+  const Volume volume = bone.scan_of({128, 128, 192}, 40);
+  const auto seeds = bone.seeds();
+  double least_mm = 1e9;
+  for (const double threshold_hu : {160.0, 200.0, 250.0}) {
+    Context context;
+    const auto fields = threshold(volume, &seeds, {.threshold_hu = threshold_hu}, context);
+    double worst_mm = 0;
+    for (std::size_t f = 0; f < 2; ++f) {
+      const auto accuracy = phantom::compare(
+          fields[f], [&](const Vector3d& p) { return bone.distance(p, f == 0 ? 1 : -1); },
+          [](const Vector3d& p) { return p.z() < 90; });
+      phantom::print(std::to_string(int(threshold_hu)) + " HU, " + fields.name(f), accuracy);
+      worst_mm = std::max(worst_mm, accuracy.mean_mm);
+    }
+    least_mm = std::min(least_mm, worst_mm);
+  }
+  EXPECT_GT(least_mm, 0.3);
 }
 
 TEST(Threshold, SaysWhenThereIsNoBone) {

@@ -73,7 +73,36 @@ Value seeds_of(const Tube& tube) {
   return Value::of<Seeds>(list, "fragment");
 }
 
-Inputs inputs_of(const Tube& tube) { return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}}; }
+/// The unbroken tube's outer surface, for nodes that begin with a template.
+Mesh template_of(const Tube& tube) {
+  const RigidTransform ct_from_tube = inverse(tube.tube_from_ct);
+  constexpr int kAround = 64, kRings = 33;
+  Mesh mesh;
+  const auto add = [&](double radius, double angle, double z) { mesh.vertices_mm.push_back(ct_from_tube * Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z)); };
+  for (int ring = 0; ring < kRings; ++ring)
+    for (int i = 0; i < kAround; ++i) add(kOuter_mm, 2 * M_PI * i / kAround, -32 + 2.0 * ring);
+  add(0, 0, -32);
+  add(0, 0, 32);
+  const auto at = [](int ring, int i) { return std::uint32_t(ring * kAround + i % kAround); };
+  const auto low = std::uint32_t(kRings * kAround), high = low + 1;
+  for (int i = 0; i < kAround; ++i) {
+    for (int ring = 0; ring + 1 < kRings; ++ring) {
+      mesh.triangles.push_back({at(ring, i), at(ring, i + 1), at(ring + 1, i)});
+      mesh.triangles.push_back({at(ring, i + 1), at(ring + 1, i + 1), at(ring + 1, i)});
+    }
+    mesh.triangles.push_back({at(0, i + 1), at(0, i), low});
+    mesh.triangles.push_back({at(kRings - 1, i), at(kRings - 1, i + 1), high});
+  }
+  return mesh;
+}
+
+Inputs inputs_of(const Tube& tube) { return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}, {"template", item(template_of(tube))}}; }
+
+/// A template is of an unbroken bone: where the fracture is cannot be asked of a node that takes one.
+void needs_the_fracture(const Subject& subject) {
+  for (const PortInfo& port : subject.info().inputs)
+    if (port.name == "template" && !port.optional) throw NotApplicable("a template knows no fracture, and such a node cannot find one");
+}
 
 void validate(const Inputs& inputs, const std::vector<PortInfo>&, const std::vector<Value>& outputs) {
   const Volume& volume = inputs.at("volume").as<Volume>();
@@ -110,6 +139,7 @@ void for_voxels(const Subject& subject, const Tube& tube, const Visit& visit) {
 
 /// 100 (1 - Dice) of the worse fragment, without the canal.
 double dice_error(const Subject& subject, const Tube& tube) {
+  needs_the_fracture(subject);
   long both[2] = {0, 0}, sum[2] = {0, 0};
   for_voxels(subject, tube, [&](const Eigen::Vector3d& p, float proximal, float distal) {
     const bool solid = p.head<2>().norm() < kOuter_mm;
@@ -130,6 +160,7 @@ double overlap(const Subject& subject, const Tube& tube) {
 
 /// Where a fragment reaches into the other's bone, as a part of that.
 double leak_percent(const Subject& subject, const Tube& tube) {
+  needs_the_fracture(subject);
   long leaked = 0, all = 0;
   for_voxels(subject, tube, [&](const Eigen::Vector3d& p, float proximal, float distal) {
     const double height = over_cut_mm(p);
@@ -178,7 +209,7 @@ Inputs changed(const std::function<void(Volume&, List<Seeds>&)>& change) {
   Volume volume = volume_of(bone);
   List<Seeds> seeds = seeds_of(bone).as_list<Seeds>();
   change(volume, seeds);
-  return {{"volume", item(volume)}, {"seeds", Value::of<Seeds>(seeds, "fragment")}};
+  return {{"volume", item(volume)}, {"seeds", Value::of<Seeds>(seeds, "fragment")}, {"template", item(template_of(bone))}};
 }
 
 std::vector<Trial> trials() {

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994): of all voxels beside the
+// regions the one that is most like the region beside it joins it first. The fragments' regions grow at the same time,
+// so what lies between them is shared out last, and a gap that is a little darker than the bone keeps them apart.
+#include <cmath>
+#include <deque>
+#include <marrow/plugin.hpp>
+
+#include "fragments.hpp"
+#include "seed_points.hpp"
+
+namespace {
+
+using marrow::Context;
+using marrow::List;
+using marrow::Seeds;
+using marrow::SignedField;
+using marrow::Volume;
+
+struct Options {
+  double least_hu = 250;
+  double floor_hu = 150;
+  double band_mm = 4;
+};
+
+/// The regions and the voxels beside them, which wait in the order of unlikeness, in steps of one HU.
+class Growth {
+ public:
+  Growth(const Volume& volume, std::size_t fragments, double least_hu)
+      : volume_(volume),
+        least_hu_(least_hu),
+        owner_(volume.values.size(), segment::kNobody),
+        sums_hu_(fragments, 0),
+        counts_(fragments, 0),
+        waiting_(kSteps) {}
+
+  void claim(std::size_t at, std::uint8_t fragment) {
+    if (owner_[at] != segment::kNobody || volume_.values[at] < least_hu_) return;
+    owner_[at] = fragment;
+    sums_hu_[fragment] += volume_.values[at];
+    ++counts_[fragment];
+    const std::size_t row = std::size_t(volume_.grid.size[0]), slice = row * volume_.grid.size[1];
+    if (at % row > 0) wait(at - 1, fragment);
+    if (at % row + 1 < row) wait(at + 1, fragment);
+    if (at % slice >= row) wait(at - row, fragment);
+    if (at % slice + row < slice) wait(at + row, fragment);
+    if (at >= slice) wait(at - slice, fragment);
+    if (at + slice < owner_.size()) wait(at + slice, fragment);
+  }
+
+  void run(Context& context) {
+    for (std::size_t claimed = 0; first_ < kSteps; ++claimed) {
+      if (claimed % 1000000 == 0) context.check_cancelled();
+      auto& candidates = waiting_[first_];
+      if (candidates.empty()) {
+        ++first_;
+        continue;
+      }
+      const auto [at, fragment] = candidates.front();
+      candidates.pop_front();
+      claim(at, fragment);
+    }
+  }
+
+  bool has_any(std::size_t fragment) const { return counts_[fragment] > 0; }
+  const std::vector<std::uint8_t>& owner() const { return owner_; }
+
+ private:
+  static constexpr std::size_t kSteps = 4096;
+  struct Candidate {
+    std::size_t at;
+    std::uint8_t fragment;
+  };
+
+  void wait(std::size_t at, std::uint8_t fragment) {
+    if (owner_[at] != segment::kNobody || volume_.values[at] < least_hu_) return;
+    const double unlikeness = std::abs(volume_.values[at] - sums_hu_[fragment] / double(counts_[fragment]));
+    const std::size_t step = std::min(std::size_t(unlikeness), kSteps - 1);
+    waiting_[step].push_back({at, fragment});
+    first_ = std::min(first_, step);
+  }
+
+  const Volume& volume_;
+  double least_hu_;
+  std::vector<std::uint8_t> owner_;
+  std::vector<double> sums_hu_;
+  std::vector<std::size_t> counts_;
+  std::vector<std::deque<Candidate>> waiting_;
+  std::size_t first_ = kSteps;  // no step before it has a candidate
+};
+
+List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options,
+                                 Context& context) {
+  marrow::check_volume(volume, "volume");
+  // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
+  const auto indices = segment::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
+  Growth growth(volume, seeds.size(), options.least_hu);
+  for (std::size_t f = 0; f < indices.size(); ++f)
+    for (const Eigen::Vector3d& index : indices[f]) {
+      const int x = int(std::lround(index.x())), y = int(std::lround(index.y())), z = int(std::lround(index.z()));
+      for (int k = -1; k <= 1; ++k)
+        for (int j = -1; j <= 1; ++j)
+          for (int i = -1; i <= 1; ++i)
+            if (volume.grid.contains(x + i, y + j, z + k))
+              growth.claim(volume.grid.offset(x + i, y + j, z + k), std::uint8_t(f));
+    }
+  growth.run(context);
+  std::vector<SignedField> fields;
+  for (std::size_t f = 0; f < seeds.size(); ++f) {
+    context.check_cancelled();
+    context.progress(0.4 + 0.6 * double(f) / double(seeds.size()), seeds.name(f));
+    if (!growth.has_any(f))
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) + "': at none of them the CT reaches " +
+                          std::to_string(int(options.least_hu)) +
+                          " HU, or it belongs to another fragment; add a point in brighter bone, or lower least_hu");
+    if (!seeds[f].wanted) continue;
+    const segment::Mask mask =
+        segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
+    fields.push_back(segment::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
+  }
+  return segment::list_of(seeds, std::move(fields));
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("segment.region_growing", region_growing)
+      .summary("Regions that grow from the seeds of all fragments at once, the likest voxel first")
+      .in("volume", "CT in Hounsfield units")
+      .in("seeds", "points inside each fragment", marrow::over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .option("least_hu", &Options::least_hu, "nothing darker is bone; the surface is where the CT crosses it",
+              marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker", marrow::unit("HU"))
+      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+}

@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// ITK's geodesic active contour (Caselles, Kimmel and Sapiro, IJCV 22, 1997) on Whitaker's sparse field (IJCV 29,
+// 1998), one contour for each fragment. It begins where the race from all seeds ended (expansion.hpp), which also says
+// what belongs to another fragment.
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "expansion.hpp"
+#include "fragments.hpp"
+#include "interior.hpp"
+#include "itk_contour.hpp"
+#include "seed_points.hpp"
+
+namespace {
+
+using marrow::Context;
+using marrow::Grid;
+using marrow::List;
+using marrow::Seeds;
+using marrow::SignedField;
+using marrow::Volume;
+
+struct Options {
+  double floor_hu = 150;
+  double sigma_mm = 0.5;
+  double edge_hu_per_mm = 100;
+  double propagation = 0;
+  double curvature = 0.2;
+  double advection = 1;
+  int iterations = 60;
+  double least_rms = 0.005;
+  double band_mm = 4;
+};
+
+SignedField field_of(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
+                     std::uint8_t fragment, const std::string& name, const Options& options, Context& context) {
+  const Grid box = segment::grid_of(volume.grid, mask);
+  const float half_voxel_mm = float(box.spacing_mm.minCoeff() / 2);
+  std::vector<float> start(mask.is_inside.size());
+  for (std::size_t at = 0; at < start.size(); ++at) start[at] = mask.is_inside[at] ? -half_voxel_mm : half_voxel_mm;
+  segment::march_distances(box, start, options.band_mm);
+  const auto& s = box.spacing_mm;
+  const itk_contour::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation,
+                                       options.curvature, options.advection,      options.iterations,
+                                       options.least_rms};
+  itk_contour::Contour contour = itk_contour::geodesic(segment::cut_out(volume, mask), std::move(start), box.size,
+                                                       {s.x(), s.y(), s.z()}, settings);
+  char line[200];
+  std::snprintf(line, sizeof line, "%s: %d iterations, last change %.4f", name.c_str(), contour.iterations,
+                contour.rms);
+  context.info(line);
+  for (int z = 0; z < box.size[2]; ++z)
+    for (int y = 0; y < box.size[1]; ++y)
+      for (int x = 0; x < box.size[0]; ++x) {
+        const std::uint8_t here = owner[volume.grid.offset(mask.first[0] + x, mask.first[1] + y, mask.first[2] + z)];
+        if (here == fragment || here == segment::kNobody) continue;
+        float& value = contour.values[box.offset(x, y, z)];
+        value = std::max(value, 0.1f * half_voxel_mm);
+      }
+  if (std::none_of(contour.values.begin(), contour.values.end(), [](float value) { return value < 0; }))
+    throw marrow::Error("fragment '" + name + "': its contour vanished; take fewer iterations, or less curvature");
+  segment::march_distances(box, contour.values, options.band_mm);
+  return segment::paste(volume.grid, mask, contour.values, float(options.band_mm));
+}
+
+List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, const Options& options,
+                               Context& context) {
+  marrow::check_volume(volume, "volume");
+  for (int size : volume.grid.size)
+    if (size < 4)
+      throw marrow::Error("volume: at least 4 voxels along each axis expected, got " + std::to_string(size));
+  const auto owner =
+      level_set::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
+  std::vector<SignedField> fields;
+  for (std::size_t f = 0; f < seeds.size(); ++f) {
+    context.check_cancelled();
+    context.progress(double(f) / double(seeds.size()), seeds.name(f));
+    const segment::Mask mask =
+        segment::solid(volume.grid, owner, std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
+    if (mask.empty())
+      throw marrow::Error("seeds of fragment '" + seeds.name(f) +
+                          "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
+    if (seeds[f].wanted)
+      fields.push_back(field_of(volume, mask, owner, std::uint8_t(f), seeds.name(f), options, context));
+  }
+  return segment::list_of(seeds, std::move(fields));
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("segment.sparse_field", sparse_field)
+      .summary("ITK's geodesic active contour, a sparse-field level set")
+      .in("volume", "CT in Hounsfield units")
+      .in("seeds", "points inside each fragment", marrow::over("fragment"))
+      .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
+      .option("floor_hu", &Options::floor_hu,
+              "the race from the seeds does not enter what is darker; nor may a seed be", marrow::unit("HU"))
+      .option("sigma_mm", &Options::sigma_mm, "Gaussian of the gradient", marrow::at_least(0.1), marrow::at_most(5))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "gradient of the CT that halves the speed",
+              marrow::at_least(1), marrow::unit("HU/mm"))
+      .option("propagation", &Options::propagation, "weight of the expansion", marrow::at_least(-5), marrow::at_most(5))
+      .option("curvature", &Options::curvature, "weight of the curvature", marrow::at_least(0), marrow::at_most(5))
+      .option("advection", &Options::advection, "weight of the pull towards edges", marrow::at_least(0),
+              marrow::at_most(10))
+      .option("iterations", &Options::iterations, "most iterations", marrow::at_least(1))
+      .option("least_rms", &Options::least_rms, "mean change at which it stops", marrow::at_least(0.0001),
+              marrow::at_most(1))
+      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+}
