@@ -9,7 +9,7 @@ std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, cons
 
 }  // namespace
 
-TEST(RayCasting, ChordsOfABall) { radiograph_behaviour::chords_of_a_ball(make, 0.03, 0.6); }
+TEST(RayCasting, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.03, 0.2); }
 TEST(RayCasting, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
 TEST(RayCasting, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
 TEST(RayCasting, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 1e-5); }

@@ -9,7 +9,7 @@ std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, cons
 
 }  // namespace
 
-TEST(SiddonJacobs, ChordsOfABall) { radiograph_behaviour::chords_of_a_ball(make, 0.12, 2.5); }
+TEST(SiddonJacobs, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.07, 2); }
 TEST(SiddonJacobs, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
 TEST(SiddonJacobs, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
 TEST(SiddonJacobs, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 1e-5); }
