@@ -27,11 +27,12 @@ std::optional<Eigen::Matrix<double, 2, 4>> aligned_rows(const std::vector<Eigen:
     system.block<1, 4>(Eigen::Index(i), 0) = seen[i].y() * points[i].transpose();
     system.block<1, 4>(Eigen::Index(i), 4) = -seen[i].x() * points[i].transpose();
   }
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(system, Eigen::ComputeThinU | Eigen::ComputeThinV);
+  // By the squares: they are exact enough for a start, and a singular value decomposition takes a minute to compile.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 8, 8>> least(system.transpose() * system);
   // Points in one plane leave more than one direction undetermined.
-  if (svd.singularValues()[6] < 1e-6 * svd.singularValues()[0]) return std::nullopt;
+  if (least.eigenvalues()[1] < 1e-12 * least.eigenvalues()[7]) return std::nullopt;
   Eigen::Matrix<double, 2, 4> rows;
-  rows << svd.matrixV().col(7).head<4>().transpose(), svd.matrixV().col(7).tail<4>().transpose();
+  rows << least.eigenvectors().col(0).head<4>().transpose(), least.eigenvectors().col(0).tail<4>().transpose();
   double agreement = 0;
   for (std::size_t i = 0; i < points.size(); ++i) agreement += seen[i].dot(rows * points[i]);
   return agreement < 0 ? -rows : rows;

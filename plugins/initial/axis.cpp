@@ -2,7 +2,7 @@
 #include "axis.hpp"
 
 #include <Eigen/Geometry>
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdio>
 #include <marrow/domain/error.hpp>
@@ -33,9 +33,9 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
     normals.row(Eigen::Index(i)) = planes[i].normal.transpose();
     offsets(Eigen::Index(i)) = planes[i].offset_mm;
   }
-  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(normals, Eigen::ComputeThinU | Eigen::ComputeFullV);
-  const double spread = planes.size() < 2 ? 0 : svd.singularValues()(1) / svd.singularValues()(0);
-  // Two planes at an angle a have singular values sqrt(1 +- cos a), of ratio tan(a / 2).
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(normals.transpose() * normals);  // ascending
+  const double spread = planes.size() < 2 ? 0 : std::sqrt(squares.eigenvalues()(1) / squares.eigenvalues()(2));
+  // Two planes at an angle a have squared singular values 1 +- cos a, of ratio tan(a / 2) squared.
   const double angle_deg = degrees(2 * std::atan(spread));
   if (angle_deg < 10) {
     char text[20];
@@ -45,9 +45,10 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
                 " degrees, where 10 are needed; use views farther apart, or a single one");
   }
   Axis axis;
-  axis.direction = svd.matrixV().col(2);
-  for (Eigen::Index i = 0; i < 2; ++i)  // the pseudo-inverse of rank two
-    axis.point_mm += svd.matrixV().col(i) * (svd.matrixU().col(i).dot(offsets) / svd.singularValues()(i));
+  axis.direction = squares.eigenvectors().col(0);
+  const Eigen::Vector3d right = normals.transpose() * offsets;
+  for (Eigen::Index i = 1; i < 3; ++i)  // the pseudo-inverse of rank two
+    axis.point_mm += squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
   return axis;
 }
 

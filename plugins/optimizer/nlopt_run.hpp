@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <algorithm>
-#include <cmath>
 #include <exception>
-#include <limits>
-#include <marrow/domain/error.hpp>
-#include <marrow/domain/functions.hpp>
 #include <nlopt.hpp>
-#include <string>
 #include <vector>
+
+#include "evaluations.hpp"
 
 /// Runs one of NLopt's algorithms without derivatives on a problem. The algorithm works in units of the initial step,
 /// so that coordinates of different scale are alike to it.
@@ -16,7 +12,7 @@ class NloptRun {
  public:
   NloptRun(nlopt::algorithm algorithm, const marrow::MinimisationProblem& problem)
       : problem_(problem), optimizer_(algorithm, unsigned(problem.start.size())) {
-    check();
+    check_problem(problem);
     const std::vector<double> ones(std::size_t(problem.start.size()), 1.0);
     optimizer_.set_min_objective(&NloptRun::evaluate, this);
     optimizer_.set_initial_step(ones);
@@ -44,23 +40,6 @@ class NloptRun {
   }
 
  private:
-  void check() const {
-    const auto n = problem_.start.size();
-    if (problem_.initial_step.size() != n || !(problem_.initial_step.array() > 0).all() ||
-        !problem_.initial_step.allFinite() || !problem_.start.allFinite())
-      throw marrow::Error("the optimizer needs a finite start and one positive initial step per coordinate");
-    for (const auto* bound : {&problem_.lower, &problem_.upper})
-      if (bound->size() && bound->size() != n)
-        throw marrow::Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " +
-                            std::to_string(n) + " coordinates");
-    if ((problem_.lower.size() && (problem_.lower.array() > problem_.start.array()).any()) ||
-        (problem_.upper.size() && (problem_.upper.array() < problem_.start.array()).any()))
-      throw marrow::Error("the optimizer's start lies outside the bounds");
-    if (problem_.max_evaluations < 1)
-      throw marrow::Error("the optimizer needs at least one evaluation, got max_evaluations = " +
-                          std::to_string(problem_.max_evaluations));
-  }
-
   std::vector<double> scaled(const Eigen::VectorXd& bound) const {
     const Eigen::VectorXd y = (bound - problem_.start).cwiseQuotient(problem_.initial_step);
     return {y.begin(), y.end()};

@@ -22,6 +22,7 @@ struct Options {
   int finalists = 1;
   std::vector<double> contour_spacing_px{8, 4, 2};
   std::vector<double> reach_px{24, 12, 6};
+  std::vector<double> pixel_step;
   std::vector<double> step_deg{3, 1, 0.3};
   std::vector<double> step_axial_deg{6, 3, 1};
   std::vector<double> step_mm{3, 1, 0.3};
@@ -243,6 +244,7 @@ void check_options(const Options& options) {
   };
   check(options.contour_spacing_px, "contour_spacing_px");
   check(options.reach_px, "reach_px");
+  if (!options.pixel_step.empty()) check(options.pixel_step, "pixel_step");
   check(options.step_deg, "step_deg");
   check(options.step_axial_deg, "step_axial_deg");
   check(options.step_mm, "step_mm");
@@ -255,7 +257,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   marrow::check_rigid(initial.world_from_model, "the pose to start from");
   Levels levels;
   for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
-    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i]}));
+    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i], options.pixel_step.empty() ? 0 : int(options.pixel_step[i])}));
   Search search(optimizer, initial, options, context);
 
   Result result;
@@ -320,6 +322,7 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared; none: as the cost says")
       .option("step_deg", &Options::step_deg,
               "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg,

@@ -99,7 +99,7 @@ inline std::vector<Damaged> damaged_copies(const Sample& sample, int cuts, int f
       const std::size_t at = random() % sample.header_bytes;
       const char mask = char(random() % 255 + 1);
       copy.bytes[at] = char(copy.bytes[at] ^ mask);
-      copy.how += " " + std::to_string(at) + "^" + std::to_string(std::uint8_t(mask));
+      copy.how.append(" ").append(std::to_string(at)).append("^").append(std::to_string(std::uint8_t(mask)));
     }
     copies.push_back(std::move(copy));
   }

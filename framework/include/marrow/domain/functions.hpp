@@ -53,11 +53,12 @@ class Projector {
 };
 
 /// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond which
-/// a point counts as unmatched; of grey values, every how many pixels they are compared, after smoothing as much.
+/// a point counts as unmatched; of grey values, every how many pixels they are compared, 0 = as the
+/// cost was made.
 struct CostLevel {
   double contour_spacing_px = 1;
   double reach_px = 8;
-  int pixel_step = 1;
+  int pixel_step = 0;
 };
 
 /// How badly a pose explains the images; smaller is better.

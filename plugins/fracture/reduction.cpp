@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "fragments.hpp"
+
+namespace {
+
+using marrow::fracture::displacement;
+using marrow::fracture::Options;
+using marrow::fracture::pose_of;
+
+struct Reduction {
+  marrow::Pose pose;
+  marrow::Metrics motion;
+};
+
+Reduction reduction(const marrow::List<marrow::Pose>& poses, const Options& options) {
+  const marrow::Vector6d motion = displacement(poses, options);
+  const marrow::Pose &moved = pose_of(poses, options.moved), &reference = pose_of(poses, options.reference);
+  Reduction result;
+  result.pose = moved;
+  result.pose.world_from_model = reference.world_from_model;
+  result.pose.covariance.reset();
+  result.pose.convergence.clear();
+  // In the world: how far the fragment's middle moves, and by what rotation vector it turns about it.
+  const Eigen::AngleAxisd turn(Eigen::Matrix3d(reference.world_from_model.rotation * moved.world_from_model.rotation.transpose()));
+  const Eigen::Vector3d turn_deg = marrow::degrees(turn.angle()) * turn.axis();
+  const Eigen::Vector3d shift_mm = reference.world_from_model * moved.frame.origin_mm - moved.world_from_model * moved.frame.origin_mm;
+  result.motion.items = {{"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"}, {"turn_z_deg", turn_deg.z(), "deg"},
+                         {"turn_deg", marrow::degrees(motion.head<3>().norm()), "deg"},
+                         {"shift_x_mm", shift_mm.x(), "mm"}, {"shift_y_mm", shift_mm.y(), "mm"}, {"shift_z_mm", shift_mm.z(), "mm"}, {"shift_mm", shift_mm.norm(), "mm"}};
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("fracture.reduction", reduction)
+      .summary("Where a fragment has to go to restore the bone as the CT shows it, and the motion that brings it there")
+      .in("poses", "poses of both fragments", marrow::over("fragment"))
+      .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
+      .out("motion", &Reduction::motion, "in the world: rotation vector, and shift of the fragment's middle, about which it turns")
+      .option("moved", &Options::moved, "fragment that is moved")
+      .option("reference", &Options::reference, "fragment that stays");
+}

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "nlopt_run.hpp"
+
+namespace {
+
+struct Options {
+  double reach = 10;
+};
+
+class Direct : public marrow::Optimizer {
+ public:
+  explicit Direct(double reach) : reach_(reach) {}
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    check_problem(problem);
+    marrow::MinimisationProblem bounded = problem;
+    if (bounded.lower.size() == 0) bounded.lower = problem.start - reach_ * problem.initial_step;
+    if (bounded.upper.size() == 0) bounded.upper = problem.start + reach_ * problem.initial_step;
+    return NloptRun(nlopt::GN_DIRECT_L, bounded).run();
+  }
+
+ private:
+  const double reach_;
+};
+
+std::shared_ptr<const marrow::Optimizer> direct(const Options& options) { return std::make_shared<Direct>(options.reach); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("optimizer.direct", direct)
+      .summary("Divides the whole range into ever smaller boxes where it is promising (DIRECT-L: Gablonsky and Kelley 2001; NLopt)")
+      .out("optimizer", "global minimiser without derivatives")
+      .option("reach", &Options::reach, "range to either side where the problem has no bounds, in initial steps", marrow::at_least(1e-3), marrow::unit("1"));
+}

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What every optimizer does alike: checks the problem, counts evaluations, keeps the best point, spends no more than its budget.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <marrow/domain/error.hpp>
+#include <marrow/domain/functions.hpp>
+#include <string>
+
+/// Throws Error for a problem that cannot be minimised.
+inline void check_problem(const marrow::MinimisationProblem& problem) {
+  const auto n = problem.start.size();
+  if (problem.initial_step.size() != n || !(problem.initial_step.array() > 0).all() || !problem.initial_step.allFinite() || !problem.start.allFinite())
+    throw marrow::Error("the optimizer needs a finite start and one positive initial step per coordinate");
+  for (const auto* bound : {&problem.lower, &problem.upper})
+    if (bound->size() && bound->size() != n)
+      throw marrow::Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " + std::to_string(n) + " coordinates");
+  if ((problem.lower.size() && (problem.lower.array() > problem.start.array()).any()) || (problem.upper.size() && (problem.upper.array() < problem.start.array()).any()))
+    throw marrow::Error("the optimizer's start lies outside the bounds");
+  if (problem.max_evaluations < 1)
+    throw marrow::Error("the optimizer needs at least one evaluation, got max_evaluations = " + std::to_string(problem.max_evaluations));
+}
+
+/// Evaluations of a problem in units of its initial step about its start: y = (x - start) / initial_step.
+class Evaluations {
+ public:
+  struct Spent {};  ///< thrown instead of one evaluation too many
+
+  explicit Evaluations(const marrow::MinimisationProblem& problem) : problem_(problem) {
+    check_problem(problem);
+    result_.x = problem.start;
+    result_.value = std::numeric_limits<double>::infinity();
+  }
+
+  Eigen::Index size() const { return problem_.start.size(); }
+  double tolerance() const { return problem_.step_tolerance; }
+  int left() const { return problem_.max_evaluations - result_.evaluations; }
+
+  /// The nearest point within the bounds.
+  Eigen::VectorXd within(const Eigen::VectorXd& y) const {
+    Eigen::VectorXd x = at(y);
+    if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);
+    if (problem_.upper.size()) x = x.cwiseMin(problem_.upper);
+    return (x - problem_.start).cwiseQuotient(problem_.initial_step);
+  }
+
+  /// The value at a point within the bounds; what is not finite counts as worse than all that was seen. Throws Spent.
+  double operator()(const Eigen::VectorXd& y) {
+    if (left() < 1) throw Spent();
+    Eigen::VectorXd x = at(y);
+    if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);
+    if (problem_.upper.size()) x = x.cwiseMin(problem_.upper);
+    const double value = problem_.function(x);
+    ++result_.evaluations;
+    if (problem_.observer) problem_.observer(result_.evaluations, x, value);
+    if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
+    worst_ = std::max(worst_, value);
+    if (value < result_.value) {
+      result_.value = value;
+      result_.x = x;
+    }
+    return value;
+  }
+
+  /// Runs an algorithm that returns why it stopped.
+  template <class Algorithm>
+  marrow::MinimisationResult run(const Algorithm& algorithm) {
+    try {
+      result_.stopped_because = algorithm(*this);
+    } catch (const Spent&) {
+      result_.stopped_because = "the budget of evaluations is spent";
+    }
+    return result_;
+  }
+
+ private:
+  Eigen::VectorXd at(const Eigen::VectorXd& y) const { return problem_.start + problem_.initial_step.cwiseProduct(y); }
+
+  const marrow::MinimisationProblem& problem_;
+  marrow::MinimisationResult result_;
+  double worst_ = 0;
+};

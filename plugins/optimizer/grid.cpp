@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "evaluations.hpp"
+
+namespace {
+
+struct Options {
+  int points = 3;
+};
+
+/// All points of a grid about the best so far, then a finer one about the best of these: as wide as one step of the last.
+std::string search(Evaluations& evaluate, int points) {
+  const Eigen::Index n = evaluate.size();
+  Eigen::VectorXd centre = Eigen::VectorXd::Zero(n);
+  double least = evaluate(centre);
+  const int half = points / 2;
+  for (double step = 1; step >= evaluate.tolerance();) {
+    Eigen::VectorXd best = centre;
+    Eigen::VectorXi at = Eigen::VectorXi::Constant(n, -half);
+    for (Eigen::Index k = 0; k < n;) {
+      if (at.any()) {
+        const Eigen::VectorXd y = evaluate.within(centre + step * at.cast<double>());
+        if (const double value = evaluate(y); value < least) least = value, best = y;
+      }
+      for (k = 0; k < n && ++at[k] > half; ++k) at[k] = -half;
+    }
+    // Where the best lies at the border, the grid follows it before it becomes finer.
+    if ((best - centre).cwiseAbs().maxCoeff() < (half - 0.5) * step || best == centre) step /= half + 1;
+    centre = best;
+  }
+  return "steps are below the tolerance";
+}
+
+class GridSearch : public marrow::Optimizer {
+ public:
+  explicit GridSearch(int points) : points_(points) {}
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return Evaluations(problem).run([&](Evaluations& evaluate) { return search(evaluate, points_); });
+  }
+
+ private:
+  const int points_;
+};
+
+std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
+  if (options.points % 2 == 0) throw marrow::Error("points: expected an odd number, so that the middle is one of them, got " + std::to_string(options.points));
+  return std::make_shared<GridSearch>(options.points);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("optimizer.grid", grid)
+      .summary("All points of a grid, then of a finer one about the best")
+      .out("optimizer", "minimiser without derivatives")
+      .option("points", &Options::points, "along each coordinate, odd", marrow::at_least(3), marrow::at_most(101));
+}

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "nlopt_run.hpp"
+
+namespace {
+
+class Sbplx : public marrow::Optimizer {
+ public:
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override { return NloptRun(nlopt::LN_SBPLX, problem).run(); }
+};
+
+std::shared_ptr<const marrow::Optimizer> sbplx() { return std::make_shared<Sbplx>(); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("optimizer.sbplx", sbplx)
+      .summary("Downhill simplex on subspaces (Rowan 1990, as NLopt has it)")
+      .out("optimizer", "minimiser without derivatives");
+}

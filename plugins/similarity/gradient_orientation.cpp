@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "intensity.hpp"
+
+namespace {
+
+using marrow::similarity::Patch;
+
+/// The median length of the gradients that count and are not zero.
+double median_length(const std::vector<float>& u, const std::vector<float>& v, const std::vector<char>& counts) {
+  std::vector<double> lengths;
+  for (std::size_t i = 0; i < u.size(); ++i)
+    if (counts[i] && (u[i] != 0 || v[i] != 0)) lengths.push_back(std::hypot(u[i], v[i]));
+  if (lengths.empty()) return INFINITY;
+  std::nth_element(lengths.begin(), lengths.begin() + std::ptrdiff_t(lengths.size() / 2), lengths.end());
+  return lengths[lengths.size() / 2];
+}
+
+/// Mean of (1 - cos of the angle) / 2 where both gradients are longer than the median of theirs; over a tenth of the pixels at least.
+double value(const Patch& patch) {
+  const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
+  const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts), least_seen = median_length(g.seen_u, g.seen_v, g.counts);
+  double used = 0, sum = 0, all = 0;
+  for (std::size_t i = 0; i < g.counts.size(); ++i) {
+    if (!g.counts[i]) continue;
+    all += 1;
+    const double a = std::hypot(g.rendered_u[i], g.rendered_v[i]), b = std::hypot(g.seen_u[i], g.seen_v[i]);
+    if (a < least_rendered || b < least_seen || a == 0 || b == 0) continue;
+    used += 1;
+    sum += 0.5 * (1 + (double(g.rendered_u[i]) * g.seen_u[i] + double(g.rendered_v[i]) * g.seen_v[i]) / (a * b));
+  }
+  return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
+}
+
+std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+                                                         const marrow::similarity::IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(projector, views, options, 1, value);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  auto node = plugin.node("similarity.gradient_orientation", gradient_orientation);
+  node.summary("How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for its logarithm)");
+  marrow::similarity::declare<decltype(node), marrow::similarity::IntensityOptions>(node);
+}

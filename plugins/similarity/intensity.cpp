@@ -1,0 +1,190 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "intensity.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::similarity {
+namespace {
+
+/// One view at one step: every step-th pixel of its smoothed line integrals.
+struct Level {
+  cv::Mat seen;    ///< CV_32F
+  cv::Mat counts;  ///< CV_8U
+};
+
+class IntensityCost : public Cost {
+ public:
+  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, Measure measure)
+      : projector_(projector), views_(views), options_(options), worst_(worst), measure_(std::move(measure)) {
+    for (const View& view : views) levels_.push_back(level_of(view));
+  }
+
+  double value(const RigidTransform& world_from_model) const override {
+    std::vector<double> of_view(views_.size());
+    tbb::parallel_for(std::size_t(0), views_.size(), [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
+    double sum = 0, weights = 0;
+    for (std::size_t i = 0; i < of_view.size(); ++i) {
+      const double weight = options_.weights.empty() ? 1 : options_.weights[i];
+      sum += weight * (std::isfinite(of_view[i]) ? of_view[i] : worst_);
+      weights += weight;
+    }
+    return sum / weights;
+  }
+
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
+    if (level.pixel_step <= 0 || level.pixel_step == options_.pixel_step) return std::make_shared<IntensityCost>(*this);
+    IntensityOptions options = options_;
+    options.pixel_step = level.pixel_step;
+    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_);
+  }
+
+ private:
+  Level level_of(const View& view) const {
+    const int step = options_.pixel_step;
+    cv::Mat smooth = line_integrals(view.image.pixels);
+    if (const double sigma = options_.blur_px * step; sigma > 0.1) cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
+    Level level{cv::Mat((smooth.rows + step - 1) / step, (smooth.cols + step - 1) / step, CV_32F), {}};
+    level.counts = cv::Mat(level.seen.rows, level.seen.cols, CV_8U, cv::Scalar(1));
+    for (int row = 0; row < level.seen.rows; ++row)
+      for (int column = 0; column < level.seen.cols; ++column) {
+        const float value = smooth.at<float>(row * step, column * step);
+        level.seen.at<float>(row, column) = value;
+        const bool is_out = !std::isfinite(value) || (!view.mask.empty() && !view.mask.at<std::uint8_t>(row * step, column * step));
+        if (is_out) level.counts.at<std::uint8_t>(row, column) = 0;
+      }
+    return level;
+  }
+
+  double value_in(std::size_t index, const RigidTransform& world_from_model) const {
+    const Camera& camera = views_[index].camera;
+    const Level& level = levels_[index];
+    const PixelGrid region = projector_.region(camera, world_from_model);
+    if (region.count() == 0) return worst_;
+    const int step = options_.pixel_step, margin = options_.margin_px;
+    const int left = std::max(0, (int(region.u_px) - margin) / step), top = std::max(0, (int(region.v_px) - margin) / step);
+    const int right = std::min(level.seen.cols - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
+              bottom = std::min(level.seen.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
+    if (right - left < 3 || bottom - top < 3) return worst_;
+    Patch patch{right - left + 1, bottom - top + 1, {}, {}, {}};
+    patch.rendered = projector_.radiograph(camera, world_from_model, PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
+    patch.seen.resize(patch.rendered.size());
+    patch.counts.resize(patch.rendered.size());
+    for (int row = 0; row < patch.rows; ++row) {
+      std::copy_n(level.seen.ptr<float>(top + row) + left, patch.columns, patch.seen.begin() + std::ptrdiff_t(patch.at(0, row)));
+      std::copy_n(level.counts.ptr<std::uint8_t>(top + row) + left, patch.columns, patch.counts.begin() + std::ptrdiff_t(patch.at(0, row)));
+    }
+    return measure_(patch);
+  }
+
+  const Projector& projector_;
+  const List<View> views_;
+  const IntensityOptions options_;
+  const double worst_;
+  const Measure measure_;
+  std::vector<Level> levels_;
+};
+
+}  // namespace
+
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, Measure measure) {
+  if (views.size() == 0) throw Error("there is no view to compare the radiographs with");
+  for (const View& view : views) {
+    check_view(view);
+    check_camera(view.camera, "view '" + view.name + "'");
+  }
+  if (!options.weights.empty() && options.weights.size() != views.size())
+    throw Error("weights has " + std::to_string(options.weights.size()) + " numbers, but there are " + std::to_string(views.size()) + " views; give one for each");
+  double sum = 0;
+  for (const double weight : options.weights) {
+    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + std::to_string(weight));
+    sum += weight;
+  }
+  if (!options.weights.empty() && !(sum > 0)) throw Error("weights: one at least must be above 0");
+  return std::make_shared<IntensityCost>(projector, views, options, worst, std::move(measure));
+}
+
+cv::Mat line_integrals(const cv::Mat& image) {
+  cv::Mat values;
+  image.convertTo(values, CV_32F);
+  double brightest = 0;
+  cv::minMaxLoc(values, nullptr, &brightest);
+  // A step of grey of integer images; of others a hundred-thousandth of the brightest.
+  const float least = image.depth() == CV_32F ? float(std::max(1e-5 * brightest, 1e-30)) : 1;
+  for (int row = 0; row < values.rows; ++row)
+    for (int column = 0; column < values.cols; ++column) {
+      float& value = values.at<float>(row, column);
+      value = -std::log(std::max(value, least) / std::max(float(brightest), least));
+    }
+  return values;
+}
+
+Gradients gradients_of(const Patch& patch) {
+  Gradients g;
+  const std::size_t count = patch.rendered.size();
+  for (auto* values : {&g.rendered_u, &g.rendered_v, &g.seen_u, &g.seen_v}) values->assign(count, 0.0f);
+  g.counts.assign(count, 0);
+  const std::ptrdiff_t down = patch.columns;
+  for (int row = 1; row + 1 < patch.rows; ++row)
+    for (int column = 1; column + 1 < patch.columns; ++column) {
+      const std::size_t i = patch.at(column, row);
+      const char* c = patch.counts.data() + i;
+      g.counts[i] = c[-down - 1] && c[-down] && c[-down + 1] && c[-1] && c[0] && c[1] && c[down - 1] && c[down] && c[down + 1];
+      const auto sobel = [&](const float* p, float& du, float& dv) {
+        const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down], m = p[down + 1];
+        du = 0.125f * (d - a + 2 * (f - e) + m - h);
+        dv = 0.125f * (h - a + 2 * (k - b) + m - d);
+      };
+      sobel(patch.rendered.data() + i, g.rendered_u[i], g.rendered_v[i]);
+      sobel(patch.seen.data() + i, g.seen_u[i], g.seen_v[i]);
+    }
+  return g;
+}
+
+namespace {
+
+struct Moments {
+  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+};
+
+Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
+  Moments m;
+  // About the first value that counts, so that a constant of any size leaves no rounding errors.
+  const auto first = std::find(counts.begin(), counts.end(), 1);
+  if (first == counts.end()) return m;
+  const std::size_t at = std::size_t(first - counts.begin());
+  const double a0 = a[at], b0 = b[at];
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!counts[i]) continue;
+    const double x = a[i] - a0, y = b[i] - b0;
+    m.n += 1, m.a += x, m.b += y, m.aa += x * x, m.bb += y * y, m.ab += x * y;
+  }
+  return m;
+}
+
+}  // namespace
+
+double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
+  const Moments m = moments_of(a, b, counts);
+  if (m.n < 16) return 0;
+  const double aa = m.aa - m.a * m.a / m.n, bb = m.bb - m.b * m.b / m.n, ab = m.ab - m.a * m.b / m.n;
+  if (!(aa > 1e-12 * std::max(m.aa, 1e-30)) || !(bb > 1e-12 * std::max(m.bb, 1e-30))) return 0;
+  return std::clamp(ab / std::sqrt(aa * bb), -1.0, 1.0);
+}
+
+Fit fit_of(const Patch& patch) {
+  const Moments m = moments_of(patch.rendered, patch.seen, patch.counts);
+  if (m.n < 16) return {};
+  const double aa = m.aa - m.a * m.a / m.n;
+  if (!(aa > 1e-12 * std::max(m.aa, 1e-30))) return {};
+  const std::size_t at = std::size_t(std::find(patch.counts.begin(), patch.counts.end(), 1) - patch.counts.begin());
+  const double scale = (m.ab - m.a * m.b / m.n) / aa;
+  return {scale, patch.seen[at] + m.b / m.n - scale * (patch.rendered[at] + m.a / m.n)};
+}
+
+}  // namespace marrow::similarity

@@ -1,0 +1,21 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "intensity.hpp"
+
+namespace {
+
+using marrow::similarity::IntensityOptions;
+using marrow::similarity::Patch;
+
+std::shared_ptr<const marrow::Cost> normalised_cross_correlation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(projector, views, options, 2, [](const Patch& patch) { return 1 - marrow::similarity::correlation(patch.rendered, patch.seen, patch.counts); });
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  auto node = plugin.node("similarity.normalised_cross_correlation", normalised_cross_correlation);
+  node.summary("1 - normalised cross-correlation of radiograph and image (Penney et al., IEEE Trans Med Imaging 1998)");
+  marrow::similarity::declare<decltype(node), IntensityOptions>(node);
+}

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "plugins/fracture/misalignment.cpp"
+
+#include "poses.hpp"
+
+TEST(Misalignment, IsTheMotionAboutTheFragmentsOwnAxes) {
+  // Small enough that the rotation vector's parts are rotations about the axes.
+  const auto found = misalignment(displaced({3, 0, 0, 2, -4, 5}), {});
+  EXPECT_NEAR(figure(found, "angulation_frontal_axis_deg"), 3, 1e-9);
+  EXPECT_NEAR(figure(found, "angulation_deg"), 3, 1e-9);
+  EXPECT_NEAR(figure(found, "malrotation_deg"), 0, 1e-9);
+  EXPECT_NEAR(figure(found, "shift_frontal_mm"), 2, 1e-9);
+  EXPECT_NEAR(figure(found, "shift_lateral_mm"), -4, 1e-9);
+  EXPECT_NEAR(figure(found, "shift_mm"), std::sqrt(20), 1e-9);
+  EXPECT_NEAR(figure(found, "shortening_mm"), 5, 1e-9) << "towards the proximal fragment, so they overlap";
+  EXPECT_NEAR(figure(misalignment(displaced({0, 0, 20, 0, 0, -7}), {}), "malrotation_deg"), 20, 1e-9);
+  EXPECT_NEAR(figure(misalignment(displaced({0, 0, 20, 0, 0, -7}), {}), "shortening_mm"), -7, 1e-9) << "drawn apart";
+}
+
+TEST(Misalignment, NoneWhereNothingMoved) {
+  for (const marrow::Metric& metric : misalignment(displaced(marrow::Vector6d::Zero()), {}).items) EXPECT_NEAR(metric.value, 0, 1e-9) << metric.name;
+}
+
+TEST(Misalignment, RefusesOtherFragments) {
+  const auto message = [](const marrow::List<marrow::Pose>& poses, const Options& options) -> std::string {
+    try {
+      misalignment(poses, options);
+    } catch (const marrow::Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  auto poses = displaced(marrow::Vector6d::Zero());
+  EXPECT_EQ(message(poses, {"distal", "shaft"}), "there is no pose of a fragment 'shaft', only of proximal, distal; name both fragments with moved and reference, and register both");
+  EXPECT_EQ(message(poses, {"distal", "distal"}), "moved and reference both name 'distal'; they must be two fragments");
+  marrow::List<marrow::Pose> mixed;
+  marrow::Pose other = poses[1];
+  other.world_from_model.source = "ct2";
+  mixed.add("proximal", poses[0]);
+  mixed.add("distal", other);
+  EXPECT_EQ(message(mixed, {}), "the poses of 'proximal' and 'distal' are between other frames; both fragments must come from one CT");
+}
