@@ -32,7 +32,8 @@ class NloptRun {
     } catch (const nlopt::roundoff_limited&) {
       result_.stopped_because = "rounding errors hide any further progress";
     } catch (const nlopt::forced_stop&) {
-      if (!thrown_) throw;
+      if (is_spent_) result_.stopped_because = words(nlopt::MAXEVAL_REACHED);
+      else if (!thrown_) throw;
     }
     // NLopt replaces what the function throws by its own exceptions, so the original is kept here.
     if (thrown_) std::rethrow_exception(thrown_);
@@ -50,6 +51,11 @@ class NloptRun {
   }
 
   double evaluate(const std::vector<double>& y) {
+    if (result_.evaluations >= problem_.max_evaluations) {  // not all of NLopt's algorithms keep to it
+      is_spent_ = true;
+      optimizer_.force_stop();
+      return worst_;
+    }
     try {
       const Eigen::VectorXd x =
           problem_.start + problem_.initial_step.cwiseProduct(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
@@ -88,5 +94,6 @@ class NloptRun {
   nlopt::opt optimizer_;
   marrow::MinimisationResult result_;
   double worst_ = 0;
+  bool is_spent_ = false;
   std::exception_ptr thrown_;
 };

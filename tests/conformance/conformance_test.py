@@ -27,6 +27,11 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "mesh.fat": {"sphere_distance", "torus_distance"},
     "mesh.unturned": {"turned_sphere_distance", "blobs_distance"},
     "mesh.endless": {"nothing_inside"},
+    "optimizer.lazy": {"sphere", "rosenbrock"},
+    "optimizer.spending": {"budget"},
+    "optimizer.unbounded": {"bounds"},
+    "optimizer.fooled": {"not_a_number"},
+    "optimizer.changing": {"repeated"},
     "segment.fat": {"wall_bias"},
     "segment.swapped": {"dice"},
     "segment.merged": {"overlap"},
@@ -77,7 +82,7 @@ class Conformance(unittest.TestCase):
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
-        for node in ("camera.plain", "edges.plain", "mesh.plain", "segment.plain", "shaft.plain"):
+        for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "segment.plain", "shaft.plain"):
             result, nodes = conformance(node, seconds=60)
             self.assertEqual(result.returncode, 0, result.stdout)
 

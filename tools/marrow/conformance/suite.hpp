@@ -96,6 +96,7 @@ std::vector<Check> checks_of(const Suite& suite);
 Suite camera_suite();
 Suite edges_suite();
 Suite mesh_suite();
+Suite optimizer_suite();
 Suite segment_suite();
 Suite shaft_suite();
 
