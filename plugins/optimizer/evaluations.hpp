@@ -38,22 +38,18 @@ class Evaluations {
   int left() const { return problem_.max_evaluations - result_.evaluations; }
 
   /// The nearest point within the bounds.
-  Eigen::VectorXd within(const Eigen::VectorXd& y) const {
-    Eigen::VectorXd x = at(y);
-    if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);
-    if (problem_.upper.size()) x = x.cwiseMin(problem_.upper);
-    return (x - problem_.start).cwiseQuotient(problem_.initial_step);
-  }
+  Eigen::VectorXd within(const Eigen::VectorXd& y) const { return in_steps(point(y)); }
+  /// x as y.
+  Eigen::VectorXd in_steps(const Eigen::VectorXd& x) const { return (x - problem_.start).cwiseQuotient(problem_.initial_step); }
 
   /// The value at a point within the bounds; what is not finite counts as worse than all that was seen. Throws Spent.
   double operator()(const Eigen::VectorXd& y) {
     if (left() < 1) throw Spent();
-    Eigen::VectorXd x = at(y);
-    if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);
-    if (problem_.upper.size()) x = x.cwiseMin(problem_.upper);
+    const Eigen::VectorXd x = point(y);
     const double value = problem_.function(x);
     ++result_.evaluations;
     if (problem_.observer) problem_.observer(result_.evaluations, x, value);
+    // A finite number, because the models that some algorithms fit would turn infinity into NaN.
     if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
     worst_ = std::max(worst_, value);
     if (value < result_.value) {
@@ -75,7 +71,12 @@ class Evaluations {
   }
 
  private:
-  Eigen::VectorXd at(const Eigen::VectorXd& y) const { return problem_.start + problem_.initial_step.cwiseProduct(y); }
+  Eigen::VectorXd point(const Eigen::VectorXd& y) const {
+    Eigen::VectorXd x = problem_.start + problem_.initial_step.cwiseProduct(y);
+    if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);
+    if (problem_.upper.size()) x = x.cwiseMin(problem_.upper);
+    return x;
+  }
 
   const marrow::MinimisationProblem& problem_;
   marrow::MinimisationResult result_;

@@ -11,11 +11,9 @@
 class NloptRun {
  public:
   NloptRun(nlopt::algorithm algorithm, const marrow::MinimisationProblem& problem)
-      : problem_(problem), optimizer_(algorithm, unsigned(problem.start.size())) {
-    check_problem(problem);
-    const std::vector<double> ones(std::size_t(problem.start.size()), 1.0);
+      : evaluate_(problem), optimizer_(algorithm, unsigned(problem.start.size())) {
     optimizer_.set_min_objective(&NloptRun::evaluate, this);
-    optimizer_.set_initial_step(ones);
+    optimizer_.set_initial_step(std::vector<double>(std::size_t(problem.start.size()), 1.0));
     optimizer_.set_xtol_abs(problem.step_tolerance);
     optimizer_.set_maxeval(problem.max_evaluations);
     if (problem.lower.size()) optimizer_.set_lower_bounds(scaled(problem.lower));
@@ -23,57 +21,35 @@ class NloptRun {
   }
 
   marrow::MinimisationResult run() {
-    std::vector<double> y(std::size_t(problem_.start.size()), 0.0);
-    double value = 0;
-    result_.x = problem_.start;
-    result_.value = std::numeric_limits<double>::infinity();
-    try {
-      result_.stopped_because = words(optimizer_.optimize(y, value));
-    } catch (const nlopt::roundoff_limited&) {
-      result_.stopped_because = "rounding errors hide any further progress";
-    } catch (const nlopt::forced_stop&) {
-      if (is_spent_) result_.stopped_because = words(nlopt::MAXEVAL_REACHED);
-      else if (!thrown_) throw;
-    }
-    // NLopt replaces what the function throws by its own exceptions, so the original is kept here.
-    if (thrown_) std::rethrow_exception(thrown_);
-    return result_;
+    return evaluate_.run([&](Evaluations&) -> std::string {
+      std::vector<double> y(std::size_t(evaluate_.size()), 0.0);
+      double value = 0;
+      try {
+        return words(optimizer_.optimize(y, value));
+      } catch (const nlopt::roundoff_limited&) {
+        return "rounding errors hide any further progress";
+      } catch (const nlopt::forced_stop&) {
+        // NLopt replaces what the function throws by its own exceptions, so the original is kept here.
+        if (thrown_) std::rethrow_exception(thrown_);
+        throw;
+      }
+    });
   }
 
  private:
   std::vector<double> scaled(const Eigen::VectorXd& bound) const {
-    const Eigen::VectorXd y = (bound - problem_.start).cwiseQuotient(problem_.initial_step);
+    const Eigen::VectorXd y = evaluate_.in_steps(bound);
     return {y.begin(), y.end()};
   }
 
   static double evaluate(const std::vector<double>& y, std::vector<double>&, void* self) {
-    return static_cast<NloptRun*>(self)->evaluate(y);
-  }
-
-  double evaluate(const std::vector<double>& y) {
-    if (result_.evaluations >= problem_.max_evaluations) {  // not all of NLopt's algorithms keep to it
-      is_spent_ = true;
-      optimizer_.force_stop();
-      return worst_;
-    }
+    NloptRun& run = *static_cast<NloptRun*>(self);
     try {
-      const Eigen::VectorXd x =
-          problem_.start + problem_.initial_step.cwiseProduct(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
-      const double value = problem_.function(x);
-      ++result_.evaluations;
-      if (problem_.observer) problem_.observer(result_.evaluations, x, value);
-      // A finite number, because the models that some algorithms fit would turn infinity into NaN.
-      if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
-      worst_ = std::max(worst_, value);
-      if (value < result_.value) {
-        result_.value = value;
-        result_.x = x;
-      }
-      return value;
-    } catch (...) {
-      thrown_ = std::current_exception();
-      optimizer_.force_stop();
-      return worst_;
+      return run.evaluate_(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
+    } catch (...) {  // of the function; or Spent, as not all of NLopt's algorithms keep to their budget
+      run.thrown_ = std::current_exception();
+      run.optimizer_.force_stop();
+      return 0;
     }
   }
 
@@ -90,10 +66,7 @@ class NloptRun {
     }
   }
 
-  const marrow::MinimisationProblem& problem_;
+  Evaluations evaluate_;
   nlopt::opt optimizer_;
-  marrow::MinimisationResult result_;
-  double worst_ = 0;
-  bool is_spent_ = false;
   std::exception_ptr thrown_;
 };

@@ -77,12 +77,6 @@ std::shared_ptr<const marrow::Projector> joseph(const marrow::Volume& volume, co
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("project.joseph", joseph)
-      .summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): a sum over slices, whole images slice by slice")
-      .in("volume", "CT")
-      .in("field", "signed field of one fragment, to leave all else out")
-      .out("projector", "draws the radiograph for any camera and pose")
-      .option("below_hu", &AttenuationOptions::below_hu, "voxels below attenuate nothing", marrow::unit("HU"))
-      .option("background_hu", &AttenuationOptions::background_hu, "what attenuates nothing: air, or the tissue around the bone", marrow::unit("HU"))
-      .option("margin_mm", &AttenuationOptions::margin_mm, "voxels further than this outside the field attenuate nothing", marrow::at_least(0));
+  auto node = plugin.node("project.joseph", joseph);
+  marrow::rays::declare<AttenuationOptions>(node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): a sum over slices, whole images slice by slice"));
 }

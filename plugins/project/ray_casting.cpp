@@ -62,13 +62,6 @@ std::shared_ptr<const marrow::Projector> ray_casting(const marrow::Volume& volum
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("project.ray_casting", ray_casting)
-      .summary("Radiographs by ray casting: trilinear values at even steps")
-      .in("volume", "CT")
-      .in("field", "signed field of one fragment, to leave all else out")
-      .out("projector", "draws the radiograph for any camera and pose")
-      .option("step_mm", &Options::step_mm, "from one value to the next", marrow::at_least(0.01))
-      .option("below_hu", &Options::below_hu, "voxels below attenuate nothing", marrow::unit("HU"))
-      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone", marrow::unit("HU"))
-      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing", marrow::at_least(0));
+  auto node = plugin.node("project.ray_casting", ray_casting);
+  marrow::rays::declare<Options>(node.summary("Radiographs by ray casting: trilinear values at even steps")).option("step_mm", &Options::step_mm, "from one value to the next", marrow::at_least(0.01));
 }

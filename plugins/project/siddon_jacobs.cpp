@@ -58,12 +58,6 @@ std::shared_ptr<const marrow::Projector> siddon_jacobs(const marrow::Volume& vol
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("project.siddon_jacobs", siddon_jacobs)
-      .summary("Radiographs by exact path lengths (Siddon, Med Phys 1985), voxel by voxel (Jacobs et al., 1998)")
-      .in("volume", "CT")
-      .in("field", "signed field of one fragment, to leave all else out")
-      .out("projector", "draws the radiograph for any camera and pose")
-      .option("below_hu", &AttenuationOptions::below_hu, "voxels below attenuate nothing", marrow::unit("HU"))
-      .option("background_hu", &AttenuationOptions::background_hu, "what attenuates nothing: air, or the tissue around the bone", marrow::unit("HU"))
-      .option("margin_mm", &AttenuationOptions::margin_mm, "voxels further than this outside the field attenuate nothing", marrow::at_least(0));
+  auto node = plugin.node("project.siddon_jacobs", siddon_jacobs);
+  marrow::rays::declare<AttenuationOptions>(node.summary("Radiographs by exact path lengths (Siddon, Med Phys 1985), voxel by voxel (Jacobs et al., 1998)"));
 }
