@@ -7,6 +7,7 @@
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/functions.hpp>
 #include <string>
+#include <vector>
 
 /// Throws Error for a problem that cannot be minimised.
 inline void check_problem(const marrow::MinimisationProblem& problem) {
@@ -44,19 +45,18 @@ class Evaluations {
 
   /// The value at a point within the bounds; what is not finite counts as worse than all that was seen. Throws Spent.
   double operator()(const Eigen::VectorXd& y) {
-    if (left() < 1) throw Spent();
-    const Eigen::VectorXd x = point(y);
-    const double value = problem_.function(x);
-    ++result_.evaluations;
-    if (problem_.observer) problem_.observer(result_.evaluations, x, value);
-    // A finite number, because the models that some algorithms fit would turn infinity into NaN.
-    if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
-    worst_ = std::max(worst_, value);
-    if (value < result_.value) {
-      result_.value = value;
-      result_.x = x;
-    }
-    return value;
+    const Eigen::VectorXd x = next(y);
+    return noted(x, problem_.function(x));
+  }
+
+  bool has_residuals() const { return bool(problem_.residuals); }
+  /// The numbers whose squares add up to the function; empty where one of them is not finite. One evaluation. Throws Spent.
+  Eigen::VectorXd residuals(const Eigen::VectorXd& y) {
+    const Eigen::VectorXd x = next(y);
+    const std::vector<double> r = problem_.residuals(x);
+    const auto squared = Eigen::VectorXd::Map(r.data(), Eigen::Index(r.size()));
+    noted(x, squared.squaredNorm());
+    return squared.allFinite() ? Eigen::VectorXd(squared) : Eigen::VectorXd();
   }
 
   /// Runs an algorithm that returns why it stopped.
@@ -71,6 +71,22 @@ class Evaluations {
   }
 
  private:
+  Eigen::VectorXd next(const Eigen::VectorXd& y) const {
+    if (left() < 1) throw Spent();
+    return point(y);
+  }
+  double noted(const Eigen::VectorXd& x, double value) {
+    ++result_.evaluations;
+    if (problem_.observer) problem_.observer(result_.evaluations, x, value);
+    // A finite number, because the models that some algorithms fit would turn infinity into NaN.
+    if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
+    worst_ = std::max(worst_, value);
+    if (value < result_.value) {
+      result_.value = value;
+      result_.x = x;
+    }
+    return value;
+  }
   Eigen::VectorXd point(const Eigen::VectorXd& y) const {
     Eigen::VectorXd x = problem_.start + problem_.initial_step.cwiseProduct(y);
     if (problem_.lower.size()) x = x.cwiseMax(problem_.lower);

@@ -71,6 +71,9 @@ class Cost {
   virtual std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const;
   /// The same cost at another resolution.
   virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
+  /// Where the cost is a sum of squares: numbers whose squares add up to value(), as many for every pose and each one
+  /// smooth in it, for optimizers that use them (Levenberg-Marquardt). Else empty, as by default.
+  virtual std::vector<double> residuals(const RigidTransform& world_from_model) const;
   /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then predicts
   /// the covariance of the minimum. Absent where the cost has no noise model.
   virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
@@ -79,6 +82,9 @@ class Cost {
 /// A function R^n -> R to be minimised, knowing nothing of poses.
 struct MinimisationProblem {
   std::function<double(const Eigen::VectorXd&)> function;
+  /// Where the function is a sum of squares: the numbers that are squared, as many everywhere. May be empty. One call counts as
+  /// one evaluation.
+  std::function<std::vector<double>(const Eigen::VectorXd&)> residuals;
   Eigen::VectorXd start;
   Eigen::VectorXd initial_step;               ///< positive, per coordinate
   Eigen::VectorXd lower, upper;               ///< empty = unbounded

@@ -4,6 +4,7 @@
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
+#include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
 #include "marrow/runtime/value.hpp"
 
@@ -17,6 +18,7 @@ MARROW_VALUE_TYPE(marrow::Camera, "camera", 1)
 MARROW_VALUE_TYPE(marrow::View, "view", 1)
 MARROW_VALUE_TYPE(marrow::EdgeMap, "edge_map", 1)
 MARROW_VALUE_TYPE(marrow::ShaftLines, "shaft_lines", 2)
+MARROW_VALUE_TYPE(marrow::Landmarks, "landmarks", 1)
 MARROW_VALUE_TYPE(marrow::Pose, "pose", 2)
 MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
 MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
@@ -26,3 +28,23 @@ MARROW_VALUE_TYPE(marrow::Case, "case", 1)
 MARROW_FUNCTION_TYPE(marrow::Projector, "projector", 1)
 MARROW_FUNCTION_TYPE(marrow::Cost, "cost", 1)
 MARROW_FUNCTION_TYPE(marrow::Optimizer, "optimizer", 1)
+
+namespace marrow {
+extern template const Content* content_of<Image>();
+extern template const Content* content_of<Picture>();
+extern template const Content* content_of<Volume>();
+extern template const Content* content_of<SignedField>();
+extern template const Content* content_of<Seeds>();
+extern template const Content* content_of<Mesh>();
+extern template const Content* content_of<Camera>();
+extern template const Content* content_of<View>();
+extern template const Content* content_of<EdgeMap>();
+extern template const Content* content_of<ShaftLines>();
+extern template const Content* content_of<Landmarks>();
+extern template const Content* content_of<Pose>();
+extern template const Content* content_of<Truth>();
+extern template const Content* content_of<Metrics>();
+extern template const Content* content_of<Scene>();
+extern template const Content* content_of<Landscape>();
+extern template const Content* content_of<Case>();
+}  // namespace marrow

@@ -40,13 +40,16 @@ struct Content {
   std::shared_ptr<const void> (*unpack)(Unpacker&);
 };
 
-namespace detail {
+/// The content of a type. Defined once for each of marrow's own types, in its library (types.hpp), so that not every plugin
+/// compiles them all again.
 template <class T>
-inline constexpr Content kContent{
-    [](const void* data) { return hash_of(*static_cast<const T*>(data)); },
-    [](const void* data, Archive& archive) { archive.add(*static_cast<const T*>(data)); },
-    [](Unpacker& packed) -> std::shared_ptr<const void> { return std::make_shared<const T>(packed.get<T>()); }};
-}  // namespace detail
+__attribute__((visibility("default"))) const Content* content_of() {
+  static constexpr Content kContent{
+      [](const void* data) { return hash_of(*static_cast<const T*>(data)); },
+      [](const void* data, Archive& archive) { archive.add(*static_cast<const T*>(data)); },
+      [](Unpacker& packed) -> std::shared_ptr<const void> { return std::make_shared<const T>(packed.get<T>()); }};
+  return &kContent;
+}
 
 /// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different layout
 /// would pass for each other.)
@@ -63,7 +66,7 @@ struct TypeInfo {
   template <Registered T>
   static TypeInfo of() {
     TypeInfo type{ValueType<T>::kId, ValueType<T>::kVersion, sizeof(T), ValueType<T>::kIsFunction};
-    if constexpr (!ValueType<T>::kIsFunction) type.content = &detail::kContent<T>;
+    if constexpr (!ValueType<T>::kIsFunction) type.content = content_of<T>();
     return type;
   }
 };

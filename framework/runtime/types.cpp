@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/runtime/types.hpp"
+
+namespace marrow {
+
+template const Content* content_of<Image>();
+template const Content* content_of<Picture>();
+template const Content* content_of<Volume>();
+template const Content* content_of<SignedField>();
+template const Content* content_of<Seeds>();
+template const Content* content_of<Mesh>();
+template const Content* content_of<Camera>();
+template const Content* content_of<View>();
+template const Content* content_of<EdgeMap>();
+template const Content* content_of<ShaftLines>();
+template const Content* content_of<Landmarks>();
+template const Content* content_of<Pose>();
+template const Content* content_of<Truth>();
+template const Content* content_of<Metrics>();
+template const Content* content_of<Scene>();
+template const Content* content_of<Landscape>();
+template const Content* content_of<Case>();
+
+}  // namespace marrow
