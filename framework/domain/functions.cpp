@@ -33,7 +33,7 @@ std::vector<double> Cost::values(const std::vector<RigidTransform>& poses) const
   return results;
 }
 
-std::vector<double> Cost::residuals(const RigidTransform&) const { return {}; }
+std::optional<Cost::Expansion> Cost::expansion(const RigidTransform&, const FragmentFrame&) const { return std::nullopt; }
 std::optional<double> Cost::likelihood_factor(const RigidTransform&) const { return std::nullopt; }
 
 }  // namespace marrow

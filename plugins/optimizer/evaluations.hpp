@@ -6,8 +6,8 @@
 #include <limits>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/functions.hpp>
+#include <optional>
 #include <string>
-#include <vector>
 
 /// Throws Error for a problem that cannot be minimised.
 inline void check_problem(const marrow::MinimisationProblem& problem) {
@@ -49,14 +49,17 @@ class Evaluations {
     return noted(x, problem_.function(x));
   }
 
-  bool has_residuals() const { return bool(problem_.residuals); }
-  /// The numbers whose squares add up to the function; empty where one of them is not finite. One evaluation. Throws Spent.
-  Eigen::VectorXd residuals(const Eigen::VectorXd& y) {
+  bool has_derivatives() const { return bool(problem_.expansion); }
+  /// The function about a point within the bounds, in steps; absent where it is not finite. One evaluation. Throws Spent.
+  std::optional<marrow::MinimisationProblem::Expansion> expansion(const Eigen::VectorXd& y) {
     const Eigen::VectorXd x = next(y);
-    const std::vector<double> r = problem_.residuals(x);
-    const auto squared = Eigen::VectorXd::Map(r.data(), Eigen::Index(r.size()));
-    noted(x, squared.squaredNorm());
-    return squared.allFinite() ? Eigen::VectorXd(squared) : Eigen::VectorXd();
+    marrow::MinimisationProblem::Expansion about = problem_.expansion(x);
+    noted(x, about.value);
+    if (!std::isfinite(about.value) || !about.gradient.allFinite() || !about.curvature.allFinite()) return std::nullopt;
+    const Eigen::VectorXd& scale = problem_.initial_step;
+    about.gradient = about.gradient.cwiseProduct(scale).eval();
+    about.curvature = (scale.asDiagonal() * about.curvature * scale.asDiagonal()).eval();
+    return about;
   }
 
   /// Runs an algorithm that returns why it stopped.

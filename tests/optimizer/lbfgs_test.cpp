@@ -8,3 +8,14 @@ TEST(Lbfgs, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_b
 TEST(Lbfgs, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*lbfgs()); }
 TEST(Lbfgs, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*lbfgs()); }
 TEST(Lbfgs, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*lbfgs()); }
+
+TEST(Lbfgs, UsesDerivatives) {
+  auto problem = optimizer_behaviour::valley();
+  problem.expansion = [&](const Eigen::VectorXd& x) {
+    const double bend = x[1] - x[0] * x[0];
+    return marrow::MinimisationProblem::Expansion{problem.function(x), Eigen::Vector2d(-2 * (1 - x[0]) - 400 * x[0] * bend, 200 * bend), Eigen::Matrix2d::Identity()};
+  };
+  const auto result = lbfgs()->minimise(problem);
+  EXPECT_NEAR((result.x - Eigen::Vector2d(1, 1)).norm(), 0, 1e-5);
+  EXPECT_LT(result.evaluations, 150);
+}

@@ -9,24 +9,40 @@ TEST(LevenbergMarquardt, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_f
 TEST(LevenbergMarquardt, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*levenberg_marquardt()); }
 TEST(LevenbergMarquardt, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*levenberg_marquardt()); }
 
-// r = (10 (y - x^2), 1 - x): what the valley is made of.
-TEST(LevenbergMarquardt, UsesResiduals) {
+// The valley is the sum of the squares of r = (10 (y - x^2), 1 - x).
+marrow::MinimisationProblem valley_of_squares() {
   auto problem = optimizer_behaviour::valley();
-  problem.residuals = [](const Eigen::VectorXd& x) { return std::vector<double>{10 * (x[1] - x[0] * x[0]), 1 - x[0]}; };
-  problem.function = [&](const Eigen::VectorXd& x) {
-    const auto r = problem.residuals(x);
-    return r[0] * r[0] + r[1] * r[1];
+  problem.expansion = [](const Eigen::VectorXd& x) {
+    const Eigen::Vector2d r(10 * (x[1] - x[0] * x[0]), 1 - x[0]);
+    Eigen::Matrix2d jacobian;
+    jacobian << -20 * x[0], 10, -1, 0;
+    return marrow::MinimisationProblem::Expansion{3 + r.squaredNorm(), 2 * jacobian.transpose() * r, 2 * jacobian.transpose() * jacobian};
   };
-  const auto result = levenberg_marquardt()->minimise(problem);
-  EXPECT_NEAR(result.x[0], 1, 1e-6);
-  EXPECT_NEAR(result.x[1], 1, 1e-6);
-  EXPECT_LT(result.evaluations, 200);
+  return problem;
 }
 
-// Where residuals are not numbers, values are used instead.
-TEST(LevenbergMarquardt, SurvivesResidualsThatAreNoNumbers) {
-  auto problem = optimizer_behaviour::valley();
-  problem.residuals = [](const Eigen::VectorXd&) { return std::vector<double>{std::nan("")}; };
-  problem.function = [](const Eigen::VectorXd& x) { return x.squaredNorm(); };
-  EXPECT_NEAR(levenberg_marquardt()->minimise(problem).x.norm(), 0, 1e-4);
+TEST(LevenbergMarquardt, UsesDerivatives) {
+  const auto result = levenberg_marquardt()->minimise(valley_of_squares());
+  EXPECT_NEAR(result.x[0], 1, 1e-6);
+  EXPECT_NEAR(result.x[1], 1, 1e-6);
+  EXPECT_NEAR(result.value, 3, 1e-12);
+  EXPECT_LT(result.evaluations, 60);
+}
+
+// A gradient of the wrong sign leads nowhere: then differences of the values do.
+TEST(LevenbergMarquardt, SurvivesDerivativesThatMislead) {
+  auto problem = valley_of_squares();
+  const auto right = problem.expansion;
+  problem.expansion = [=](const Eigen::VectorXd& x) {
+    auto about = right(x);
+    about.gradient = -about.gradient;
+    return about;
+  };
+  EXPECT_NEAR(levenberg_marquardt()->minimise(problem).value, 3, 1e-4);
+  problem.expansion = [=](const Eigen::VectorXd& x) {
+    auto about = right(x);
+    about.curvature(0, 0) = std::nan("");
+    return about;
+  };
+  EXPECT_NEAR(levenberg_marquardt()->minimise(problem).value, 3, 1e-4);
 }

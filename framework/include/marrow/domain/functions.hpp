@@ -64,6 +64,14 @@ struct CostLevel {
 /// How badly a pose explains the images; smaller is better.
 class Cost {
  public:
+  /// value + gradient . m + m . curvature m / 2 for a small motion m = (r [rad], t [mm]); the curvature has no negative
+  /// eigenvalue (Gauss and Newton's of a sum of squares).
+  struct Expansion {
+    double value = 0;
+    Vector6d gradient = Vector6d::Zero();
+    Matrix6d curvature = Matrix6d::Zero();
+  };
+
   virtual ~Cost();
   /// The cost at a pose. Finite for every finite pose: where nothing can be compared it is the worst value.
   virtual double value(const RigidTransform& world_from_model) const = 0;
@@ -71,9 +79,9 @@ class Cost {
   virtual std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const;
   /// The same cost at another resolution.
   virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
-  /// Where the cost is a sum of squares: numbers whose squares add up to value(), as many for every pose and each one
-  /// smooth in it, for optimizers that use them (Levenberg-Marquardt). Else empty, as by default.
-  virtual std::vector<double> residuals(const RigidTransform& world_from_model) const;
+  /// The cost about a pose, for small motions of the fragment about this frame as Pose defines them; for optimizers that use
+  /// derivatives. As dear as one value(). Absent where the cost does not know its derivatives, as by default.
+  virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
   /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then predicts
   /// the covariance of the minimum. Absent where the cost has no noise model.
   virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
@@ -82,9 +90,14 @@ class Cost {
 /// A function R^n -> R to be minimised, knowing nothing of poses.
 struct MinimisationProblem {
   std::function<double(const Eigen::VectorXd&)> function;
-  /// Where the function is a sum of squares: the numbers that are squared, as many everywhere. May be empty. One call counts as
-  /// one evaluation.
-  std::function<std::vector<double>(const Eigen::VectorXd&)> residuals;
+  /// value + gradient . d + d . curvature d / 2 about a point, where the function knows its derivatives; the curvature has no
+  /// negative eigenvalue. May be empty. One call counts as one evaluation.
+  struct Expansion {
+    double value = 0;
+    Eigen::VectorXd gradient;
+    Eigen::MatrixXd curvature;
+  };
+  std::function<Expansion(const Eigen::VectorXd&)> expansion;
   Eigen::VectorXd start;
   Eigen::VectorXd initial_step;               ///< positive, per coordinate
   Eigen::VectorXd lower, upper;               ///< empty = unbounded
