@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <map>
 #include <marrow/plugin.hpp>
@@ -23,6 +24,8 @@ struct Residual {
   float along_normal;  ///< signed, positive where the edge lies outside the outline
   float beyond;        ///< how far the edge lies beyond the point along the outline: 0 on an edge without gaps
   float u, v;
+  float normal_u, normal_v;
+  Eigen::Vector3f model_mm;
 };
 
 struct Matches {
@@ -64,17 +67,34 @@ class ContourDistance : public marrow::Cost {
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     const std::vector<Matches> views = match(world_from_model);
+    return value_of(views, offset_of(views));
+  }
+
+  /// By the motion of each point against its edge, along the normal, both held fast (Gauss-Newton with the weights of the loss). The
+  /// edge offset is one more unknown, eliminated.
+  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model, const marrow::FragmentFrame& frame) const override {
+    const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
-    double sum = 0;
-    for (const Matches& view : views) {
-      double of_view = 0;
-      for (const Residual& r : view.residuals) of_view += loss_(distance2(r, offset));
-      // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
-      const double points = std::max(double(view.points), least_points());
-      of_view += (points - double(view.residuals.size())) * loss_.worst();
-      sum += of_view / points;
+    Expansion about;
+    about.value = value_of(views, offset);
+    marrow::Vector6d mixed = marrow::Vector6d::Zero();
+    double weights = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const double of_view = 1 / (std::max(double(views[i].points), least_points()) * double(views.size()));
+      const marrow::RigidTransform camera_from_model = scene_->views[i].camera.camera_from_world * world_from_model;
+      for (const Residual& r : views[i].residuals) {
+        const double weight = of_view * loss_.weight(distance2(r, offset));
+        if (weight == 0) continue;
+        const marrow::Vector6d slope = -outward_motion_px(r, scene_->views[i].camera, camera_from_model, frame);
+        about.gradient += weight * (double(r.along_normal) - offset) * slope;
+        about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
+        mixed += weight * slope;
+        weights += weight;
+      }
     }
-    return sum / double(views.size());
+    if (scene_->options.estimate_offset && weights > 0) about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(mixed, -1 / weights);
+    about.curvature = about.curvature.selfadjointView<Eigen::Lower>();
+    return about;
   }
 
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
@@ -121,6 +141,31 @@ class ContourDistance : public marrow::Cost {
   /// Fewer points in a view than this many are filled up with unmatched ones.
   double least_points() const { return 60 / level_.contour_spacing_px; }
 
+  double value_of(const std::vector<Matches>& views, double offset) const {
+    double sum = 0;
+    for (const Matches& view : views) {
+      double of_view = 0;
+      for (const Residual& r : view.residuals) of_view += loss_(distance2(r, offset));
+      // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
+      const double points = std::max(double(view.points), least_points());
+      of_view += (points - double(view.residuals.size())) * loss_.worst();
+      sum += of_view / points;
+    }
+    return sum / double(views.size());
+  }
+
+  /// How far a point moves along its normal in the image, for each motion about the frame.
+  static marrow::Vector6d outward_motion_px(const Residual& r, const marrow::Camera& camera, const marrow::RigidTransform& camera_from_model,
+                                            const marrow::FragmentFrame& frame) {
+    const Eigen::Vector3d point = r.model_mm.cast<double>(), seen = camera_from_model * point;
+    const Eigen::RowVector3d by_camera = (double(r.normal_u) * (camera.intrinsics.row(0) - double(r.u) * camera.intrinsics.row(2)) +
+                                          double(r.normal_v) * (camera.intrinsics.row(1) - double(r.v) * camera.intrinsics.row(2))) / seen.z();
+    const Eigen::Vector3d by_point = (by_camera * camera_from_model.rotation).transpose();
+    marrow::Vector6d motion;
+    motion << frame.axes.transpose() * (point - frame.origin_mm).cross(by_point), frame.axes.transpose() * by_point;
+    return motion;
+  }
+
   static double distance2(const Residual& r, double offset) {
     const double across = double(r.along_normal) - offset;
     return across * across + double(r.beyond) * double(r.beyond);
@@ -150,7 +195,8 @@ class ContourDistance : public marrow::Cost {
       const float du = edge->u_px - p.u_px, dv = edge->v_px - p.v_px;
       const float along = std::abs(dv * p.normal_u - du * p.normal_v);
       matches.residuals.push_back(
-          {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px});
+          {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px,
+                                   p.normal_u, p.normal_v, p.model_mm});
     }
     return matches;
   }
