@@ -23,7 +23,7 @@ class Bricks {
  private:
   std::array<int, 3> first_{0, 0, 0};  ///< the first voxel that has an offset
   std::array<std::vector<std::uint32_t>, 3> offsets_;
-  std::vector<std::int16_t> values_;
+  std::vector<std::int16_t, LargePages<std::int16_t>> values_;
 };
 
 }  // namespace marrow::rays
