@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Landmarks of a phantom's fragments as a person or a tracker would find them: with noise, so that a method never sees the truth.
+#include <algorithm>
 #include <marrow/plugin.hpp>
 
 #include "phantom.hpp"
@@ -22,7 +23,7 @@ bool is_seen(const Camera& camera, const Eigen::Vector3d& world_mm) {
 }
 
 /// Points of the surface that all views show, each as far as can be from those before it; the first is the farthest from the
-/// centroid.
+/// centroid. None where too little is seen.
 std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<Camera>& cameras, int count) {
   constexpr std::size_t kCandidates = 4000;
   std::vector<Eigen::Vector3d> candidates;
@@ -31,9 +32,7 @@ std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<
     for (const Camera& camera : cameras) seen = seen && is_seen(camera, fragment.world_from_ct * point);
     if (seen) candidates.push_back(point);
   }
-  if (int(candidates.size()) < count)
-    throw Error("simulate.landmarks: of fragment '" + fragment.name + "' the views show too little for " + std::to_string(count) +
-                " landmarks in all of them; choose fewer, or turn the cameras to it");
+  if (int(candidates.size()) < count) return {};
   std::vector<double> distances;
   for (const Eigen::Vector3d& candidate : candidates) distances.push_back((candidate - fragment.frame.origin_mm).norm());
   std::vector<Eigen::Vector3d> points;
@@ -56,23 +55,33 @@ List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* 
     const Fragment& fragment = phantom.fragments[f];
     if (fragment.outer.triangles.empty())
       throw Error("simulate.landmarks: fragment '" + fragment.name + "' has no surface of its own; make it with simulate.fracture");
+    const std::vector<Eigen::Vector3d> points = spread_points(fragment, views, options.count);
+    if (points.empty()) {
+      context.warn("of fragment '" + fragment.name + "' the views show too little for " + std::to_string(options.count) +
+                   " landmarks in all of them; it is left out");
+      continue;
+    }
     simulate::Random random(context.seed(), f);
     Landmarks found;
-    for (const Eigen::Vector3d& point : spread_points(fragment, views, options.count)) {
-      const std::string name = "p" + std::to_string(found.points.size() + 1);
+    for (const Eigen::Vector3d& point : points) {
+      std::string name = "p";
+      name += std::to_string(found.points.size() + 1);
       const Eigen::Vector3d world = fragment.world_from_ct * point;
       const auto off = [&](double deviation) { return deviation * random.normal(); };
       found.points.push_back({name, point});
       for (std::size_t v = 0; v < views.size(); ++v) {
         const Eigen::Vector2d pixel = project(views[v], world);
-        const double u = pixel.x() + off(options.noise_px), v_px = pixel.y() + off(options.noise_px);
-        found.seen.push_back({name, views.name(v), {u, v_px}});
+        const double right = off(options.noise_px), down = off(options.noise_px);
+        found.seen.push_back({name, views.name(v), pixel + Eigen::Vector2d(right, down)});
       }
-      const double x = world.x() + off(options.noise_mm), y = world.y() + off(options.noise_mm), z = world.z() + off(options.noise_mm);
-      found.tracked.push_back({name, {x, y, z}});
+      const double x = off(options.noise_mm), y = off(options.noise_mm), z = off(options.noise_mm);
+      found.tracked.push_back({name, world + Eigen::Vector3d(x, y, z)});
     }
     all.add(fragment.name, std::move(found));
   }
+  if (all.empty())
+    throw Error("simulate.landmarks: all views together show too little of every fragment for " + std::to_string(options.count) +
+                " landmarks; choose fewer, or turn the cameras to a fragment");
   return all;
 }
 
