@@ -61,7 +61,10 @@ std::vector<RigidTransform> starts_of_view(const std::vector<Sight>& sights) {
   }
   std::vector<cv::Mat> turns, shifts;
   try {
-    cv::solvePnPGeneric(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false, sights.size() == 3 ? cv::SOLVEPNP_AP3P : cv::SOLVEPNP_SQPNP);
+    if (sights.size() == 3)
+      cv::solveP3P(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, cv::SOLVEPNP_AP3P);
+    else
+      cv::solvePnPGeneric(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false, cv::SOLVEPNP_SQPNP);
   } catch (const cv::Exception&) {
     return {};  // points on a line: others may serve
   }

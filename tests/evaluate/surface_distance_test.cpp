@@ -48,13 +48,14 @@ TEST(SurfaceDistance, OfConcentricBalls) {
 }
 
 TEST(SurfaceDistance, OfBoxesOfWhichOneIsLonger) {
-  // 20 x 20 x 40 and 20 x 20 x 46, 3 mm beyond at both ends: there 3 mm on the ends (areas 400 of 4000 and of 4480 each) and, on the longer one's
-  // sides, 0 to 3 mm of the part that sticks out (4 * 20 * 3 at each end, 1.5 mm on average).
+  // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and of its sides what sticks out
+  // (20 x 3, four times at each end) 0 to 3 mm: 2 * (400 * 3 + 240 * 1.5) over its area of 4480. The shorter one's ends lie 3 mm
+  // off, or m mm where a side is nearer: 14 * 14 * 3 + the integral of m * 4 (20 - 2 m) from 0 to 3, 288; squared 14 * 14 * 9 + 558.
   const auto metrics = distance(box({0, 0, 0}, {20, 20, 46}), box({0, 0, 0}, {20, 20, 40}));
-  const double longer = (2 * 400 * 3 + 2 * 240 * 1.5) / 4480, shorter = 2 * 400 * 3 / 4000.0;
-  EXPECT_NEAR(shipped::figure(metrics, "mean_mm"), 0.5 * (longer + shorter), 0.01);
-  EXPECT_NEAR(shipped::figure(metrics, "bias_mm"), longer, 0.01);
-  EXPECT_NEAR(shipped::figure(metrics, "rms_mm"), std::sqrt(0.5 * ((2 * 400 * 9 + 2 * 240 * 3) / 4480.0 + 2 * 400 * 9 / 4000.0)), 0.01);
+  const double longer = 2 * (400 * 3 + 240 * 1.5) / 4480, shorter = 2 * (196 * 3 + 288) / 4000.0;
+  EXPECT_NEAR(shipped::figure(metrics, "mean_mm"), 0.5 * (longer + shorter), 0.005);
+  EXPECT_NEAR(shipped::figure(metrics, "bias_mm"), longer, 0.005);
+  EXPECT_NEAR(shipped::figure(metrics, "rms_mm"), std::sqrt(0.5 * (2 * (400 * 9 + 240 * 3) / 4480.0 + 2 * (196 * 9 + 558) / 4000.0)), 0.005);
   EXPECT_NEAR(shipped::figure(metrics, "max_mm"), 3, 1e-9);
   EXPECT_NEAR(shipped::figure(metrics, "p95_mm"), 3, 1e-9);
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
 #include <random>
 
-#include "domain/shapes.hpp"
 #include "initial/landmark_scene.hpp"
 
 namespace {
