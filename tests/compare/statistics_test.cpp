@@ -86,6 +86,15 @@ TEST(CaptureRange, PassesOverEmptyBinsButReachesNoFurtherByThem) {
   EXPECT_FALSE(capture_range({}).is_open);
 }
 
+TEST(CaptureRange, LostStartsShareTheLastBin) {
+  const CaptureRange capture = capture_range({{1, true}, {250, false}, {1e9, false}});
+  EXPECT_EQ(capture.range, 2);
+  ASSERT_EQ(capture.bins.size(), 100u);
+  EXPECT_EQ(capture.bins.back().from, 198);
+  EXPECT_EQ(capture.bins.back().to, 1e9);
+  EXPECT_EQ(capture.bins.back().runs, 2u);
+}
+
 TEST(CaptureRange, OfOtherBinsAndRates) {
   std::vector<StartOutcome> outcomes;
   add(outcomes, 0.5, 9, 10);

@@ -92,9 +92,13 @@ std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
 
 /// A row a bin, a column a variant; at last how far each captures.
 std::string capture_text(const Experiment& experiment, const Answer& answer) {
-  std::size_t bins = 0, unknown = 0;
-  for (const VariantSummary& summary : answer.variants) bins = std::max(bins, summary.capture.bins.size()), unknown += summary.unknown_starts;
-  if (!bins) return "";
+  std::vector<compare::CaptureRange::Bin> longest;
+  std::size_t unknown = 0;
+  for (const VariantSummary& summary : answer.variants) {
+    if (summary.capture.bins.size() > longest.size()) longest = summary.capture.bins;
+    unknown += summary.unknown_starts;
+  }
+  if (longest.empty()) return "";
   std::string text = "\nCapture range: success over " + experiment.initial_error + ", with 95 % intervals\n";
   char part[100];
   const auto row = [&](const std::string& head, const auto& cell) {
@@ -108,14 +112,17 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
     text += "\n";
   };
   row("start", [&](std::size_t v) { return experiment.variants[v].name; });
-  for (std::size_t b = 0; b < bins; ++b)
-    row(std::to_string(2 * b) + " to " + std::to_string(2 * b + 2), [&](std::size_t v) -> std::string {
+  for (std::size_t b = 0; b < longest.size(); ++b) {
+    char bin[64];
+    std::snprintf(bin, sizeof bin, "%g to %g", longest[b].from, longest[b].to);
+    row(bin, [&](std::size_t v) -> std::string {
       const auto& all = answer.variants[v].capture.bins;
       if (b >= all.size() || !all[b].runs) return "-";
       char cell[100];
       std::snprintf(cell, sizeof cell, "%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs, 100 * all[b].success.lower, 100 * all[b].success.upper);
       return cell;
     });
+  }
   row("95 % or more to", [&](std::size_t v) -> std::string {
     char cell[100];
     std::snprintf(cell, sizeof cell, answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f", answer.variants[v].capture.range);

@@ -43,7 +43,7 @@ struct StartOutcome {
   bool success = false;
 };
 
-/// Success over the start's error, in bins of equal width from 0 to the farthest start.
+/// Success over the start's error, in bins of equal width from 0 to the farthest start; of 100 bins the last holds all beyond.
 struct CaptureRange {
   struct Bin {
     double from = 0, to = 0;  ///< from <= error < to
