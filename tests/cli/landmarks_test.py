@@ -28,7 +28,7 @@ class Landmarks(Case):
 
     def test_landmarks_are_a_start_that_the_outline_refines(self):
         self.assertEqual(self.result.returncode, 0, self.result.stderr)
-        start, final = self.figures("errors", "start"), self.figures("errors", "final")
+        start, final = self.figures("seen_errors"), self.figures("errors", "final")
         tracked, mtre, mpd, mrpd = (self.figures(name) for name in ("tracked_errors", "at_landmarks", "projection", "reprojection"))
         print("mTRE %.2f mm by what is seen (largest deviation predicted %.2f mm), %.2f mm by what is tracked, %.2f mm refined, %.2f mm at the landmarks; mPD %.2f px, mRPD %.2f mm" % (
             start["mtre_mm"], start["predicted_max_mm"], tracked["mtre_mm"], final["mtre_mm"], mtre["mtre_mm"], mpd["mpd_px"], mrpd["mrpd_mm"]))

@@ -97,6 +97,17 @@ TEST(Landmarks, RefusesWhatDoesNotDetermineAPose) {
   EXPECT_EQ(refusal(unknown), "view 'frontal' shows 'patella', but the landmarks have no point of that name in the CT; give its place there, or leave it out");
 }
 
+TEST(Landmarks, LeavesOutWhatOtherViewsShow) {
+  marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal"});
+  landmarks.seen.push_back({landmarks.points[0].name, "axial", {3, 4}});
+  std::vector<std::string> warnings;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, bool is_warning) { if (is_warning) warnings.emplace_back(text); };
+  const auto outputs = shipped::call("initial.landmarks", {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}}, {}, marrow::Context(hooks));
+  expect_exact(outputs.at("pose").as<marrow::Pose>(), "the frontal view alone");
+  EXPECT_EQ(warnings, std::vector<std::string>{"landmarks are seen in a view 'axial', which is none of the views; they are left out"});
+}
+
 TEST(Landmarks, RefusesAPlaneThatMayTiltToEitherSide) {
   // 6 points within 30 mm in a plane across the beam, tilted by 10 degrees: both tilts show them within a fraction of a pixel.
   std::vector<Vector3d> flat;
