@@ -29,21 +29,23 @@ std::vector<double> distances_mm(const View& view, const RigidTransform& pose, c
   return distances;
 }
 
+void add_mean(const std::string& prefix, const std::vector<double>& distances_mm, Metrics& metrics) {
+  metrics.items.push_back({prefix + "mrpd_mm", evaluate::mean(distances_mm), "mm"});
+}
+
 Metrics reprojection_distance(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
                               const List<View>& views, const Options& options) {
   evaluate::check_poses(pose.world_from_model, truth.world_from_model);
   if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
   const std::vector<Eigen::Vector3d> targets = evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
-  Metrics each;
-  double sum = 0;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const double mean = evaluate::mean(distances_mm(views[i], pose.world_from_model, truth.world_from_model, targets));
-    each.items.push_back({views.name(i) + "_mrpd_mm", mean, "mm"});
-    sum += mean;
-  }
   Metrics metrics;
-  metrics.items.push_back({"mrpd_mm", sum / double(views.size()), "mm"});
-  metrics.items.insert(metrics.items.end(), each.items.begin(), each.items.end());
+  std::vector<double> all;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const std::vector<double> distances = distances_mm(views[i], pose.world_from_model, truth.world_from_model, targets);
+    add_mean(views.name(i) + "_", distances, metrics);
+    all.insert(all.end(), distances.begin(), distances.end());
+  }
+  add_mean("", all, metrics);
   return metrics;
 }
 

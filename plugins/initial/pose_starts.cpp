@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "pose_starts.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <opencv2/calib3d.hpp>
 
@@ -30,19 +32,24 @@ std::optional<Eigen::Vector3d> triangulated(const std::vector<Sight>& sights, co
     across += off;
     right += off * source_position_mm(*sight.camera);
   }
-  if (!(Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(across, Eigen::EigenvaluesOnly).eigenvalues()[0] > 0.5 * kLeastParallax)) return std::nullopt;
-  return across.ldlt().solve(right);
+  // Of one ray it is 0, of two twice the squared sine of the angle between them.
+  if (across.determinant() < 2 * kLeastParallax) return std::nullopt;
+  return across.inverse() * right;
 }
 
 /// The same view of a plane tilted to the other side: turned about the axis in the image that the plane's normal leans about.
 RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::vector<Sight>& sights) {
+  std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  for (const Sight& sight : sights) centre += sight.model_mm / double(sights.size());
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Sight& sight : sights) scatter += (sight.model_mm - centre) * (sight.model_mm - centre).transpose();
-  const Eigen::Vector3d normal = camera_from_model.rotation * Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter).eigenvectors().col(0);
+  for (const Sight& sight : sights) {
+    points.push_back(sight.model_mm);
+    centre += sight.model_mm / double(sights.size());
+  }
+  const Eigen::Vector3d normal = camera_from_model.rotation * plane_normal(points);
   const Eigen::Vector3d there = camera_from_model * centre, beam = normal.dot(there) < 0 ? Eigen::Vector3d(-there.normalized()) : there.normalized();
-  const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(normal, 2 * normal.dot(beam) * beam - normal).toRotationMatrix();
+  const Eigen::Vector3d axis = normal.cross(beam);
+  const double sine = axis.norm(), leaning_rad = std::atan2(sine, normal.dot(beam));
+  const Eigen::Matrix3d turn = rotation_from_vector(2 * leaning_rad / std::max(sine, 1e-12) * axis);
   RigidTransform tilted = camera_from_model;
   tilted.rotation = turn * camera_from_model.rotation;
   tilted.translation_mm = there - tilted.rotation * centre;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "rigid_fit.hpp"
 
-#include <Eigen/Dense>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
 
@@ -16,6 +17,14 @@ Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& points) {
   return sum / double(points.size());
 }
 
+/// Squared extents of the points, rising, and the directions that they are along.
+Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(const std::vector<Eigen::Vector3d>& points) {
+  const Eigen::Vector3d centre = centre_of(points);
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& point : points) scatter += (point - centre) * (point - centre).transpose();
+  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter);
+}
+
 double root_mean_square_mm(const Eigen::Matrix3d& map, const std::vector<Eigen::Vector3d>& from, const std::vector<Eigen::Vector3d>& to) {
   const Eigen::Vector3d from_centre = centre_of(from), to_centre = centre_of(to);
   double sum = 0;
@@ -25,12 +34,13 @@ double root_mean_square_mm(const Eigen::Matrix3d& map, const std::vector<Eigen::
 
 }  // namespace
 
+Eigen::Vector3d plane_normal(const std::vector<Eigen::Vector3d>& points_mm) {
+  return principal(points_mm).eigenvectors().col(0);
+}
+
 bool lie_on_a_line(const std::vector<Eigen::Vector3d>& points_mm) {
   constexpr double kThinnest = 0.01;  // width of the points over their length
-  const Eigen::Vector3d centre = centre_of(points_mm);
-  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
-  for (const Eigen::Vector3d& point : points_mm) scatter += (point - centre) * (point - centre).transpose();
-  const Eigen::Vector3d squares = Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d squares = principal(points_mm).eigenvalues();
   return !(squares[1] > kThinnest * kThinnest * squares[2]);
 }
 

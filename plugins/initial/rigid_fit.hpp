@@ -8,6 +8,8 @@
 
 namespace marrow::initial {
 
+/// Unit normal of the plane that lies nearest to the points.
+Eigen::Vector3d plane_normal(const std::vector<Eigen::Vector3d>& points_mm);
 /// Whether points lie on a line, or all in one place: a fragment may turn about it unseen.
 bool lie_on_a_line(const std::vector<Eigen::Vector3d>& points_mm);
 /// Throws Error for fewer than three points, or points on a line. `what` names them: "the
