@@ -11,7 +11,7 @@ using Eigen::Vector3d;
 /// The distal half of a femur, and where it lies in the world.
 struct Bone {
   Bone() {
-    const auto bone = shipped::call("simulate.femur", {}).at("bone");
+    const auto bone = shipped::call("simulate.femur", {}, {{"resolution_mm", 2.0}}).at("bone");
     const auto phantom = shipped::call("simulate.fracture", {{"bone", bone}}).at("phantom");
     model = *shipped::call("simulate.truth", {{"phantom", phantom}}).at("models").as_list<marrow::Mesh>().find("distal");
     frame = fragment_frame(model);

@@ -8,7 +8,7 @@ namespace {
 /// A broken femur, the truth of its fragments, and two cameras that show 180 mm of its distal end.
 struct Broken {
   Broken() {
-    const auto bone = shipped::call("simulate.femur", {}, {{"isocentre_from_distal_end_mm", 70.0}}).at("bone");
+    const auto bone = shipped::call("simulate.femur", {}, {{"isocentre_from_distal_end_mm", 70.0}, {"resolution_mm", 2.0}}).at("bone");
     phantom = shipped::call("simulate.fracture", {{"bone", bone}}, {{"rotation_deg", std::vector<double>{4, -5, 7}}, {"translation_mm", std::vector<double>{5, -4, 6}}}).at("phantom");
     truths = shipped::call("simulate.truth", {{"phantom", phantom}}).at("truths");
     cameras = shipped::call("camera.carm", {}, {{"names", std::vector<std::string>{"frontal", "lateral"}}, {"alpha_deg", std::vector<double>{0, 0}},
