@@ -6,8 +6,11 @@
 #include <marrow/plugin.hpp>
 
 #include "edge_search.hpp"
+#include "targets.hpp"
 
 namespace {
+
+using marrow::evaluate::quantile;
 
 struct Options {
   double spacing_px = 1;
@@ -63,15 +66,6 @@ Distances measure(const marrow::RigidTransform& world_from_model, const marrow::
     distances.mm.push_back(px * marrow::pixel_size_at_mm(view.camera, world_mm));
   }
   return distances;
-}
-
-/// Quantile with linear interpolation between order statistics.
-double quantile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  const double at = fraction * double(values.size() - 1);
-  const std::size_t below = std::size_t(at);
-  const std::size_t above = std::min(below + 1, values.size() - 1);
-  return values[below] + (at - double(below)) * (values[above] - values[below]);
 }
 
 void report(const std::string& prefix, const Distances& distances, marrow::Metrics& metrics) {

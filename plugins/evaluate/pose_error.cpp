@@ -6,6 +6,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "targets.hpp"
+
 namespace {
 
 using marrow::degrees;
@@ -13,26 +15,6 @@ using marrow::degrees;
 struct Options {
   int points = 500;
 };
-
-void check_frames(const marrow::RigidTransform& pose, const marrow::RigidTransform& truth, const marrow::Mesh& model) {
-  marrow::check_rigid(pose, "pose");
-  marrow::check_rigid(truth, "truth");
-  const auto name = [](const marrow::RigidTransform& t) { return t.target + "_from_" + t.source; };
-  if (pose.target != truth.target || pose.source != truth.source)
-    throw marrow::Error("the pose is " + name(pose) + ", but the truth is " + name(truth) +
-                        "; compare poses between the same two frames");
-  if (model.frame != pose.source)
-    throw marrow::Error("the model is in the frame '" + model.frame + "', but the pose takes points in '" +
-                        pose.source + "'; give the model that was registered");
-}
-
-/// Root mean square would hide outliers and the maximum is one point's: the mean distance is the usual mTRE.
-double mean_target_error_mm(const marrow::RigidTransform& pose, const marrow::RigidTransform& truth,
-                            const std::vector<Eigen::Vector3d>& targets_mm) {
-  double sum = 0;
-  for (const auto& target : targets_mm) sum += (pose * target - truth * target).norm();
-  return sum / double(targets_mm.size());
-}
 
 /// The covariance of the same small motion about another point and along other axes: r and t of frame `from` become
 /// to^T (from r) and to^T (from t + (from r) x (to's origin - from's origin)).
@@ -69,7 +51,8 @@ void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& fram
 marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth, const marrow::Mesh& model,
                            const Options& options) {
   const marrow::RigidTransform &found = pose.world_from_model, &exact = truth.world_from_model;
-  check_frames(found, exact, model);
+  marrow::evaluate::check_poses(found, exact);
+  marrow::evaluate::check_model(found, model);
   const marrow::FragmentFrame frame = marrow::fragment_frame(model);
   const marrow::Vector6d motion = marrow::motion_between(exact, found, frame);
   const Eigen::Vector3d turn_rad = motion.head<3>(), shift_mm = motion.tail<3>();
@@ -83,7 +66,7 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
       {"translation_mm", shift_mm.norm(), "mm"},
       {"along_mm", shift_mm[2], "mm"},
       {"across_mm", std::hypot(shift_mm[0], shift_mm[1]), "mm"},
-      {"mtre_mm", mean_target_error_mm(found, exact, marrow::sample_surface(model, std::size_t(options.points))), "mm"},
+      {"mtre_mm", marrow::evaluate::mean(marrow::evaluate::target_errors_mm(found, exact, marrow::sample_surface(model, std::size_t(options.points)))), "mm"},
       {"chapter_rotation_deg", degrees(turn_rad.cwiseAbs().mean()), "deg"},
       {"chapter_translation_mm", shift_mm.cwiseAbs().mean(), "mm"},
   };

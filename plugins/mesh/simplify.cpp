@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <vtkCellArray.h>
-#include <vtkNew.h>
-#include <vtkPoints.h>
-#include <vtkPolyData.h>
 #include <vtkQuadricDecimation.h>
 
 #include <marrow/plugin.hpp>
+
+#include "to_vtk.hpp"
 
 namespace {
 
@@ -13,26 +11,11 @@ struct Options {
   int triangles = 20000;
 };
 
-vtkSmartPointer<vtkPolyData> to_vtk(const marrow::Mesh& mesh) {
-  vtkNew<vtkPoints> points;
-  points->SetDataTypeToDouble();
-  for (const Eigen::Vector3d& vertex : mesh.vertices_mm) points->InsertNextPoint(vertex.data());
-  vtkNew<vtkCellArray> polygons;
-  for (const auto& triangle : mesh.triangles) {
-    const vtkIdType corners[3] = {vtkIdType(triangle[0]), vtkIdType(triangle[1]), vtkIdType(triangle[2])};
-    polygons->InsertNextCell(3, corners);
-  }
-  auto data = vtkSmartPointer<vtkPolyData>::New();
-  data->SetPoints(points);
-  data->SetPolys(polygons);
-  return data;
-}
-
 marrow::Mesh simplify(const marrow::Mesh& mesh, const Options& options) {
   marrow::check_mesh(mesh, "mesh to simplify");
   if (mesh.triangles.size() <= std::size_t(options.triangles)) return mesh;
   vtkNew<vtkQuadricDecimation> filter;
-  filter->SetInputData(to_vtk(mesh));
+  filter->SetInputData(marrow::to_vtk(mesh));
   filter->SetTargetReduction(1.0 - double(options.triangles) / double(mesh.triangles.size()));
   filter->VolumePreservationOn();
   filter->Update();

@@ -8,10 +8,12 @@ namespace {
 struct Options {
   std::filesystem::path path;
   double scale = 1;
+  std::string frame = "ct";
 };
 
 marrow::Mesh mesh(const Options& options, marrow::Context& context) {
   marrow::Mesh mesh = marrow::read::read_mesh_file(options.path, options.scale);
+  mesh.frame = options.frame;
   const auto largest = [&] {
     Eigen::AlignedBox3d box;
     for (const auto& vertex : mesh.vertices_mm) box.extend(vertex);
@@ -30,5 +32,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Triangle surface from STL or PLY, equal vertices merged")
       .out("mesh", "the surface in mm")
       .option("path", &Options::path, "STL or PLY file", marrow::required())
-      .option("scale", &Options::scale, "factor to mm: 1000 for a file in metres", marrow::at_least(1e-6));
+      .option("scale", &Options::scale, "factor to mm: 1000 for a file in metres", marrow::at_least(1e-6))
+      .option("frame", &Options::frame, "what its coordinates are: those of the CT, or of the world (a surface that was tracked)",
+              marrow::one_of({"ct", "world"}));
 }

@@ -45,6 +45,21 @@ class Compare(Case):
         """Of each cell all but times and how often it was tried."""
         return {name: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for name, row in self.rows(out).items()}
 
+    def test_capture_range(self):
+        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
+        for i in range(3):
+            (self.scratch / "cases" / str(i)).mkdir(parents=True)
+        experiment = self.write("e.yaml", HEAD.replace("value: 10", "value: 2") + "initial_error: number.value\nvariants: {near: {m.value: 1.5}, far: {m.value: 4}}\n")
+        result = self.compare(experiment, "--out", self.scratch / "out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        # 3 of 3: Wilson's interval begins at 3 / (3 + 1.96^2) = 0.438
+        rows = [line.split() for line in result.stdout[result.stdout.index("Capture range"):].splitlines()]
+        self.assertEqual(rows[:6], ["Capture range: success over number.value, with 95 % intervals".split(), ["start", "near", "far"], "0 to 2 3/3 (44 to 100 %) -".split(),
+                                    "2 to 4 - -".split(), "4 to 6 - 0/3 (0 to 56 %)".split(), "95 % or more to at least 1.5 0.0".split()])
+        near, far = (variant["capture"] for variant in json.loads((self.scratch / "out" / "comparison.json").read_text())["variants"])
+        self.assertEqual((near["range"], near["is_open"], far["range"], far["is_open"]), (1.5, True, 0, False))
+        self.assertEqual([bin["of"] for bin in far["bins"]], [0, 0, 3])
+
     def test_which_values_are_better(self):
         self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
         for i in range(8):

@@ -81,7 +81,7 @@ class ReportTest(unittest.TestCase):
         self.browser.open(self.comparison)
         self.assertEqual(self.browser.js("return [...document.querySelectorAll('main > section')].map((s) => s.id)"), SECTIONS)
         self.assertEqual(len(self.texts("#summary tbody tr")), 4)
-        self.assertEqual(len(self.texts(".verdicts li")), 3)
+        self.assertEqual(len(self.texts("#summary .verdicts li")), 3)
         self.assertEqual(self.texts("#contents a"), self.texts("main > section > h2"))
         done = sum(cell["status"] == "done" for cell in self.comparison_data["cells"])
         self.assertEqual(len(self.texts("#distributions .point")), done)
@@ -101,6 +101,12 @@ class ReportTest(unittest.TestCase):
         counts = self.browser.js("return Figures.captureBins(Data.load()).map((row) => row.reduce((sum, item) => [sum[0] + item.count, sum[1] + item.of], [0, 0]))")
         wanted = [[item["success"]["count"], item["success"]["of"]] for item in self.comparison_data["summary"]]
         self.assertEqual(counts, wanted)
+        shown = self.texts("#capture .verdicts li")
+        for variant, item, text in zip(self.comparison_data["variants"], self.comparison_data["summary"], shown, strict=True):
+            name, value = text.split(": ")
+            self.assertEqual(name, variant["name"])
+            self.assertEqual(value.startswith("at least "), item["capture"]["is_open"])
+            self.assertAlmostEqual(float(value.removeprefix("at least ").removesuffix(" mm")), item["capture"]["range"], delta=0.05)
         ours = self.browser.js("return Data.wilson(7, 20)")
         for key, value in synthetic.wilson(7, 20).items():
             self.assertAlmostEqual(ours[key], value, 9)

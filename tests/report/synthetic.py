@@ -58,12 +58,24 @@ def make_cell(chance, variant, case, start, far_mm, hardness):
     return cell
 
 
+def capture_of(cells):
+    """Success in bins of 2 mm, and up to where it is 95 % or more in each."""
+    farthest = max(cell["initial_mtre_mm"] for cell in cells)
+    bins = []
+    for low in range(0, int(farthest) + 1, 2):
+        inside = [cell for cell in cells if low <= cell["initial_mtre_mm"] < low + 2]
+        success = wilson(sum(cell["success"] for cell in inside), len(inside)) if inside else {"count": 0, "of": 0, "low": 0, "high": 1}
+        bins.append({"from": low, "to": low + 2, **{key: success[key] for key in ("count", "of", "low", "high")}})
+    fails = next((item["from"] for item in bins if item["count"] < 0.95 * item["of"]), None)
+    return {"range": farthest if fails is None else fails, "is_open": fails is None, "unknown_starts": 0, "bins": bins}
+
+
 def summary_of(cells):
     done = [cell for cell in cells if cell["status"] == "done"]
     column = lambda values: {"count": len(values), "median": quantile(values, 0.5), "q1": quantile(values, 0.25), "q3": quantile(values, 0.75), "p95": quantile(values, 0.95), "worst": max(values), "mean": statistics.fmean(values)}
     return {"runs": len(cells), "failed": len(cells) - len(done), "success": wilson(sum(cell["success"] for cell in cells), len(cells)),
             "metrics": {metric["name"]: column([cell["values"][i] for cell in done]) for i, metric in enumerate(METRICS)},
-            "seconds": column([cell["seconds"] for cell in done]), "evaluations": column([cell["evaluations"] for cell in done])}
+            "seconds": column([cell["seconds"] for cell in done]), "evaluations": column([cell["evaluations"] for cell in done]), "capture": capture_of(cells)}
 
 
 def comparison_of(cells, variant, metric):

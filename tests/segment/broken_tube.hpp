@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A hollow bone in two fragments, cut obliquely, which may be displaced: what every segmenter of the kind is tried on.
+#include <gtest/gtest.h>
+
 #include "marrow/domain/list.hpp"
 #include "segment/phantom.hpp"
 
@@ -53,6 +55,18 @@ inline std::size_t overlap(const marrow::List<marrow::SignedField>& fields) {
   for (std::size_t at = 0; at < fields[0].values_mm.size(); ++at)
     both += fields[0].values_mm[at] < 0 && fields[1].values_mm[at] < 0;
   return both;
+}
+
+/// Both fragments are there, apart from each other and as large as they are.
+inline void expect_both(const BrokenTube& tube, const marrow::List<marrow::SignedField>& fields) {
+  ASSERT_EQ(fields.size(), 2u);
+  EXPECT_EQ(overlap(fields), 0u);
+  for (std::size_t f = 0; f < 2; ++f) {
+    const Accuracy accuracy = tube.compare(fields, f);
+    print(fields.name(f), accuracy);
+    EXPECT_GT(accuracy.dice, 0.97) << fields.name(f);
+    EXPECT_LT(std::abs(accuracy.bias_mm), 0.1) << fields.name(f);
+  }
 }
 
 }  // namespace phantom

@@ -10,15 +10,7 @@ namespace {
 TEST(SparseField, TwoFragmentsOneMillimetreApart) {
   const phantom::BrokenTube tube;
   Context context;
-  const auto fields = sparse_field(tube.volume(), tube.seeds(), {}, context);
-  ASSERT_EQ(fields.size(), 2u);
-  EXPECT_EQ(phantom::overlap(fields), 0u);
-  for (std::size_t f = 0; f < 2; ++f) {
-    const auto accuracy = tube.compare(fields, f);
-    phantom::print(fields.name(f), accuracy);
-    EXPECT_GT(accuracy.dice, 0.97);
-    EXPECT_LT(std::abs(accuracy.bias_mm), 0.1);
-  }
+  phantom::expect_both(tube, sparse_field(tube.volume(), tube.seeds(), {}, context));
 }
 
 TEST(SparseField, GivesOnlyWantedFragments) {

@@ -11,7 +11,8 @@
 //   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it, success_above; the first is the main one
 //   cases: ["case-01", ...], starts: ["0", ...]
 //   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
-//     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median}}]
+//     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median},
+//     capture: {range, is_open (no bin fails), unknown_starts (runs left out), bins: [{from, to, count, of, low, high}]}}]       mm; may be missing
 //   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
 //   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
 //     initial_mtre_mm, seconds, evaluations, cached_nodes, values: [number | null per metric],

@@ -96,28 +96,27 @@ const Figures = (() => {
     }));
   }
 
-  const BIN_MM = 2;
-
-  // Success counted in bins of the start's mTRE; failed cells count as no success.
+  // Success in bins of the start's mTRE: a row a variant, all of equal length.
   function captureBins(data) {
-    const far = data.cells.filter((cell) => Number.isFinite(cell.initial_mtre_mm));
-    const count = far.length ? Math.floor(Math.max(...far.map((cell) => cell.initial_mtre_mm)) / BIN_MM) + 1 : 0;
-    return data.variants.map((_, variant) => Array.from({ length: count }, (_, bin) => {
-      const inside = far.filter((cell) => cell.variant === variant && Math.floor(cell.initial_mtre_mm / BIN_MM) === bin);
-      return { bin, ...Data.wilson(inside.filter((cell) => Data.outcome(cell) === "success").length, inside.length) };
-    }));
+    const rows = data.variants.map((_, variant) => ((data.summary[variant] || {}).capture || {}).bins || []), longest = rows.reduce((a, b) => (b.length > a.length ? b : a), []);
+    return rows.map((row) => longest.map(({ from, to }, bin) => ({ count: 0, of: 0, ...row[bin], from, to, rate: row[bin] && row[bin].of ? row[bin].count / row[bin].of : NaN })));
+  }
+
+  function captureRange(data, variant) {
+    const capture = (data.summary[variant] || {}).capture;
+    return capture ? (capture.is_open ? "at least " : "") + number(capture.range) + " mm" : "–";
   }
 
   function drawCapture(data, bins, width) {
-    const count = Math.max(...bins.map((row) => row.length));
+    const farthest = Math.max(...bins[0].map((item) => item.to)), wide = bins[0][0].to - bins[0][0].from;
     const { root, x, y } = Plots.frame({ width, height: 340, label: "Success rate against the mTRE of the start; the numbers are in the table below",
-      x: { domain: [0, count * BIN_MM], title: "mTRE of the start (mm), bins of " + BIN_MM + " mm" }, y: { domain: [0, 1], title: "success rate (95 % interval)", format: percent } });
-    const shift = Math.min(7, 0.7 * (x(BIN_MM) - x(0)) / bins.length);
+      x: { domain: [0, farthest], title: "mTRE of the start (mm), bins of " + wide + " mm" }, y: { domain: [0, 1], title: "success rate (95 % interval)", format: percent } });
+    const shift = Math.min(7, 0.7 * (x(wide) - x(0)) / bins.length);
     bins.forEach((row, variant) => {
-      const place = (item) => x((item.bin + 0.5) * BIN_MM) + (variant - (bins.length - 1) / 2) * shift, full = row.filter((item) => item.of);
+      const place = (item) => x(0.5 * (item.from + item.to)) + (variant - (bins.length - 1) / 2) * shift, full = row.filter((item) => item.of);
       root.append(Plots.polyline(full.map((item) => [place(item), y(item.rate)]), variant, { "stroke-width": 1.5, opacity: 0.8 }));
       for (const item of full) {
-        const tip = data.variants[variant].name + ", start " + item.bin * BIN_MM + " to " + (item.bin + 1) * BIN_MM + " mm\n" + item.count + " of " + item.of + " = " + percent(item.rate) + ", 95 % interval " + percent(item.low) + " to " + percent(item.high);
+        const tip = data.variants[variant].name + ", start " + item.from + " to " + item.to + " mm\n" + item.count + " of " + item.of + " = " + percent(item.rate) + ", 95 % interval " + percent(item.low) + " to " + percent(item.high);
         root.append(svg("g", { "data-tip": tip }, svg("line", { x1: place(item), x2: place(item), y1: y(item.low), y2: y(item.high), stroke: Plots.colour(variant), "stroke-width": 1.5, opacity: 0.6 }),
           Plots.marker(variant, place(item), y(item.rate), 4.5)));
       }
@@ -128,9 +127,9 @@ const Figures = (() => {
   function captureTable(data, bins) {
     const used = bins[0].map((_, bin) => bin).filter((bin) => bins.some((row) => row[bin].of));
     return el("div", { class: "scroll" }, el("table", {}, el("thead", {}, el("tr", {}, el("th", { scope: "col" }, "Start, mm"), data.variants.map((variant) => el("th", { scope: "col", class: "number" }, variant.name)))),
-      el("tbody", {}, used.map((bin) => el("tr", {}, el("th", { scope: "row" }, bin * BIN_MM + "–" + (bin + 1) * BIN_MM),
+      el("tbody", {}, used.map((bin) => el("tr", {}, el("th", { scope: "row" }, bins[0][bin].from + "–" + bins[0][bin].to),
         bins.map((row) => el("td", { class: "number" }, row[bin].of ? row[bin].count + " / " + row[bin].of : "–", " ", row[bin].of ? el("small", {}, "[" + percent(row[bin].low) + ", " + percent(row[bin].high) + "]") : "")))))));
   }
 
-  return { drawDistribution, drawDifferences, drawPairs, captureBins, drawCapture, captureTable };
+  return { drawDistribution, drawDifferences, drawPairs, captureBins, captureRange, drawCapture, captureTable };
 })();

@@ -41,9 +41,10 @@ const Page = (() => {
 
   function capture(data) {
     const bins = Figures.captureBins(data);
-    if (!bins.length || !Math.max(...bins.map((row) => row.length))) return null;
-    return section("capture", "Capture range", "How far from the truth a start may lie. Runs are counted in bins of the start’s mTRE; bars are Wilson’s 95 % intervals, failed runs count as no success.",
-      Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)), el("details", {}, el("summary", {}, "The counts"), Figures.captureTable(data, bins)));
+    if (!bins.length || !bins[0].length) return null;
+    const ranges = el("ul", { class: "verdicts" }, data.variants.map((variant, i) => el("li", { style: "--mark: " + Plots.colour(i) }, variant.name + ": " + Figures.captureRange(data, i))));
+    return section("capture", "Capture range", "How far from the truth a start may lie: up to the given mTRE, each bin of starts has a success rate of 95 % or more. Bars are Wilson’s 95 % intervals, failed runs count as no success.",
+      ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)), el("details", {}, el("summary", {}, "The counts"), Figures.captureTable(data, bins)));
   }
 
   function byCase(data) {

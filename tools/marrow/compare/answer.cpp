@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <map>
 #include <sstream>
@@ -45,6 +46,29 @@ VariantSummary summary_of(const Experiment& experiment, const std::string& varia
   return summary;
 }
 
+/// Errors of the starts by case and start: of a run that failed they are those that another variant began with.
+using StartErrors = std::map<std::pair<std::string, std::string>, double>;
+
+StartErrors start_errors(const std::vector<CellRow>& rows) {
+  StartErrors errors;
+  for (const CellRow& row : rows)
+    if (row.initial_error) errors.emplace(std::pair(row.case_name, row.start), *row.initial_error);
+  return errors;
+}
+
+void add_capture(const Experiment& experiment, const std::string& variant, const std::vector<CellRow>& rows, const StartErrors& errors, VariantSummary& summary) {
+  std::vector<compare::StartOutcome> outcomes;
+  for (const CellRow& row : rows) {
+    if (row.variant != variant) continue;
+    const auto known = errors.find({row.case_name, row.start});
+    if (row.initial_error || known != errors.end())
+      outcomes.push_back({std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment)});
+    else
+      ++summary.unknown_starts;
+  }
+  summary.capture = compare::capture_range(outcomes);
+}
+
 /// The cells that both variants did, in one figure.
 std::vector<compare::Pair> pairs_of(const Experiment& experiment, std::size_t variant, std::size_t metric, const std::vector<CellRow>& rows) {
   std::map<std::pair<std::string, std::string>, double> reference;
@@ -66,11 +90,57 @@ std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
   return "";
 }
 
+/// A row a bin, a column a variant; at last how far each captures.
+std::string capture_text(const Experiment& experiment, const Answer& answer) {
+  std::vector<compare::CaptureRange::Bin> longest;
+  std::size_t unknown = 0;
+  for (const VariantSummary& summary : answer.variants) {
+    if (summary.capture.bins.size() > longest.size()) longest = summary.capture.bins;
+    unknown += summary.unknown_starts;
+  }
+  if (longest.empty()) return "";
+  std::string text = "\nCapture range: success over " + experiment.initial_error + ", with 95 % intervals\n";
+  char part[100];
+  const auto row = [&](const std::string& head, const auto& cell) {
+    std::snprintf(part, sizeof part, "%-16s", head.c_str());
+    text += part;
+    for (std::size_t v = 0; v < answer.variants.size(); ++v) {
+      std::snprintf(part, sizeof part, " %-24s", cell(v).c_str());
+      text += part;
+    }
+    text.erase(text.find_last_not_of(' ') + 1);
+    text += "\n";
+  };
+  row("start", [&](std::size_t v) { return experiment.variants[v].name; });
+  for (std::size_t b = 0; b < longest.size(); ++b) {
+    char bin[64];
+    std::snprintf(bin, sizeof bin, "%g to %g", longest[b].from, longest[b].to);
+    row(bin, [&](std::size_t v) -> std::string {
+      const auto& all = answer.variants[v].capture.bins;
+      if (b >= all.size() || !all[b].runs) return "-";
+      char cell[100];
+      std::snprintf(cell, sizeof cell, "%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs, 100 * all[b].success.lower, 100 * all[b].success.upper);
+      return cell;
+    });
+  }
+  row("95 % or more to", [&](std::size_t v) -> std::string {
+    char cell[100];
+    std::snprintf(cell, sizeof cell, answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f", answer.variants[v].capture.range);
+    return cell;
+  });
+  if (unknown) text += std::to_string(unknown) + " runs failed before the error of their start was known, and do not count here\n";
+  return text;
+}
+
 }  // namespace
 
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
-  for (const compare::Variant& variant : experiment.variants) answer.variants.push_back(summary_of(experiment, variant.name, rows));
+  const StartErrors errors = start_errors(rows);
+  for (const compare::Variant& variant : experiment.variants) {
+    answer.variants.push_back(summary_of(experiment, variant.name, rows));
+    if (!experiment.initial_error.empty()) add_capture(experiment, variant.name, rows, errors, answer.variants.back());
+  }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
@@ -123,6 +193,7 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
       out << line;
     }
   }
+  out << capture_text(experiment, answer);
   out << "\n* the baseline";
   if (experiment.variants.size() > 1) out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
   for (const Finding& finding : answer.findings) out << "  " << finding.sentence << "\n";

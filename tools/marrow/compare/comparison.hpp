@@ -46,6 +46,8 @@ struct VariantSummary {
   std::size_t runs = 0, failed = 0, successes = 0;
   compare::Interval success;
   std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
+  compare::CaptureRange capture;       ///< without bins where the experiment names no initial_error
+  std::size_t unknown_starts = 0;      ///< runs that failed before any variant knew the error of their start: not in `capture`
   VariantFigure seconds, evaluations;
 };
 /// A variant against the baseline in one figure.

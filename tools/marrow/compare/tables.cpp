@@ -91,6 +91,13 @@ json of(const VariantFigure& figure) {
           {"p95", figure.summary.percentile_95}, {"worst", figure.summary.worst}, {"mean", figure.summary.mean}};
 }
 
+json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
+  json bins = json::array();
+  for (const compare::CaptureRange::Bin& bin : capture.bins)
+    bins.push_back({{"from", bin.from}, {"to", bin.to}, {"count", bin.successes}, {"of", bin.runs}, {"low", bin.success.lower}, {"high", bin.success.upper}});
+  return {{"range", capture.range}, {"is_open", capture.is_open}, {"unknown_starts", unknown_starts}, {"bins", bins}};
+}
+
 }  // namespace
 
 json answer_json(const Experiment& experiment, const Answer& answer) {
@@ -103,6 +110,7 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"success", {{"count", summary.successes}, {"of", summary.runs}, {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
                                      {"low", summary.success.lower}, {"high", summary.success.upper}}},
                         {"metrics", figures}, {"seconds", of(summary.seconds)}, {"evaluations", of(summary.evaluations)}});
+    if (!experiment.initial_error.empty()) variants.back()["capture"] = of(summary.capture, summary.unknown_starts);
   }
   for (const Finding& finding : answer.findings)
     findings.push_back({{"variant", experiment.variants[finding.variant].name}, {"metric", experiment.metrics[finding.metric].path},

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+// Target registration error: how far a pose takes points of the fragment from where the truth does.
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "targets.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  int points = 500;
+};
+
+Metrics mtre(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks, const Options& options) {
+  evaluate::check_poses(pose.world_from_model, truth.world_from_model);
+  const std::vector<double> errors =
+      evaluate::target_errors_mm(pose.world_from_model, truth.world_from_model,
+                                 evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points));
+  Metrics metrics;
+  metrics.items = {{"mtre_mm", evaluate::mean(errors), "mm"},
+                   {"rms_mm", evaluate::root_mean_square(errors), "mm"},
+                   {"max_mm", *std::max_element(errors.begin(), errors.end()), "mm"}};
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.mtre", mtre)
+      .summary("Target registration error over the fragment's surface or its landmarks: mean, root mean square, maximum")
+      .in("pose", "pose found")
+      .in("truth", "exact pose")
+      .in("model", "the fragment's surface: the targets are spread over it")
+      .in("landmarks", "their points are the targets instead")
+      .out("metrics", "mTRE (van de Kraats et al., IEEE TMI 2005), root mean square and largest error")
+      .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6));
+}

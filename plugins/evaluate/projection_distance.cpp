@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// mPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how far apart
+// the images of the targets lie at the found and at the true pose. What a pose is wrong along the beam hardly counts.
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "targets.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  int points = 500;
+  std::vector<double> source_to_detector_mm;
+};
+
+struct Distances {
+  std::vector<double> px, mm, detector_mm;
+};
+
+/// The detector's distance of a view; 0 where it is not known. A camera matrix knows it in pixels alone.
+double source_to_detector_mm(const Options& options, std::size_t view, std::size_t views) {
+  const std::vector<double>& given = options.source_to_detector_mm;
+  if (given.empty()) return 0;
+  if (given.size() != 1 && given.size() != views)
+    throw Error("source_to_detector_mm has " + std::to_string(given.size()) + " numbers, but there are " + std::to_string(views) +
+                " views; give one for all, or one for each");
+  const double distance = given[given.size() == 1 ? 0 : view];
+  if (!(distance > 0)) throw Error("source_to_detector_mm: each number must be positive, got " + std::to_string(distance));
+  return distance;
+}
+
+Distances distances_of(const View& view, const RigidTransform& pose, const RigidTransform& truth,
+                       const std::vector<Eigen::Vector3d>& targets_mm, double detector_mm) {
+  check_camera(view.camera, "view '" + view.name + "'");
+  Distances distances;
+  for (const Eigen::Vector3d& target : targets_mm) {
+    const Eigen::Vector2d apart = project(view.camera, pose * target) - project(view.camera, truth * target);
+    if (!apart.allFinite())
+      throw Error("view '" + view.name + "': a target does not lie in front of the X-ray source" +
+                  (project(view.camera, truth * target).allFinite() ? " at the pose found" : " at the true pose; is the truth of another world frame?"));
+    distances.px.push_back(apart.norm());
+    distances.mm.push_back(apart.norm() * pixel_size_at_mm(view.camera, truth * target));
+    const Eigen::Vector2d focal_px(view.camera.intrinsics(0, 0), view.camera.intrinsics(1, 1));
+    if (detector_mm > 0) distances.detector_mm.push_back(detector_mm * apart.cwiseQuotient(focal_px).norm());
+  }
+  return distances;
+}
+
+void report(const std::string& prefix, const Distances& distances, Metrics& metrics) {
+  metrics.items.push_back({prefix + "mpd_px", evaluate::mean(distances.px), "px"});
+  metrics.items.push_back({prefix + "mpd_mm", evaluate::mean(distances.mm), "mm"});
+  if (!distances.detector_mm.empty()) metrics.items.push_back({prefix + "mpd_detector_mm", evaluate::mean(distances.detector_mm), "mm"});
+}
+
+Metrics projection_distance(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
+                            const List<View>& views, const Options& options) {
+  evaluate::check_poses(pose.world_from_model, truth.world_from_model);
+  if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
+  const std::vector<Eigen::Vector3d> targets = evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
+  Distances all;
+  Metrics each, metrics;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Distances one = distances_of(views[i], pose.world_from_model, truth.world_from_model, targets,
+                                       source_to_detector_mm(options, i, views.size()));
+    report(views.name(i) + "_", one, each);
+    all.px.insert(all.px.end(), one.px.begin(), one.px.end());
+    all.mm.insert(all.mm.end(), one.mm.begin(), one.mm.end());
+    all.detector_mm.insert(all.detector_mm.end(), one.detector_mm.begin(), one.detector_mm.end());
+  }
+  report("", all, metrics);
+  metrics.items.insert(metrics.items.end(), each.items.begin(), each.items.end());
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.projection_distance", projection_distance)
+      .summary("Mean projection distance (mPD) between the images of the targets at the found and the true pose")
+      .in("pose", "pose found")
+      .in("truth", "exact pose")
+      .in("model", "the fragment's surface: the targets are spread over it")
+      .in("landmarks", "their points are the targets instead")
+      .in("views", "X-ray views, for their cameras", over("view"))
+      .out("metrics",
+           "over all views and for each: mPD in pixels, in mm at the target's depth (divided by the magnification) and, where the detector's "
+           "distance is known, in mm on the detector")
+      .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm,
+              "distance of the detector from the source, one for all views or one for each; none: not known");
+}

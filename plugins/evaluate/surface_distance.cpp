@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// How far two surfaces lie apart, by exact distances from points of each to the triangles of the other.
+#include <vtkImplicitPolyDataDistance.h>
+#include <vtkNew.h>
+
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "../mesh/to_vtk.hpp"
+#include "targets.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  int points = 20000;
+};
+
+/// Signed distances (negative inside) of points spread over a surface from another one. The vertices, at which the largest
+/// distance is usually found, count for that alone: they are denser where a mesh is finer.
+struct Distances {
+  std::vector<double> of_points_mm;
+  double largest_mm = 0;
+};
+
+Distances distances_from(const Mesh& mesh, const Mesh& other, int points, const Context& context) {
+  vtkNew<vtkImplicitPolyDataDistance> surface;
+  surface->SetInput(to_vtk(other));
+  Distances distances;
+  const auto signed_distance = [&](Eigen::Vector3d point) {
+    const double distance = surface->EvaluateFunction(point.data());
+    distances.largest_mm = std::max(distances.largest_mm, std::abs(distance));
+    return distance;
+  };
+  for (const Eigen::Vector3d& point : sample_surface(mesh, std::size_t(points))) distances.of_points_mm.push_back(signed_distance(point));
+  context.check_cancelled();
+  for (const Eigen::Vector3d& vertex : mesh.vertices_mm) signed_distance(vertex);
+  context.check_cancelled();
+  return distances;
+}
+
+Metrics surface_distance(const Mesh& mesh, const Mesh& reference, const Options& options, Context& context) {
+  check_mesh(mesh, "mesh");
+  check_mesh(reference, "reference");
+  if (mesh.frame != reference.frame)
+    throw Error("the mesh is in the frame '" + mesh.frame + "', but the reference in '" + reference.frame +
+                "'; move one of them into the frame of the other");
+  const Distances there = distances_from(mesh, reference, options.points, context),
+                  back = distances_from(reference, mesh, options.points, context);
+  std::vector<double> both;
+  for (const Distances* one : {&there, &back})
+    for (const double distance : one->of_points_mm) both.push_back(std::abs(distance));
+  if (!is_closed(reference))
+    context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
+  Metrics metrics;
+  metrics.items = {{"mean_mm", evaluate::mean(both), "mm"},
+                   {"rms_mm", evaluate::root_mean_square(both), "mm"},
+                   {"p95_mm", evaluate::quantile(both, 0.95), "mm"},
+                   {"max_mm", std::max(there.largest_mm, back.largest_mm), "mm"},
+                   {"bias_mm", evaluate::mean(there.of_points_mm), "mm"}};
+  return metrics;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("evaluate.surface_distance", surface_distance)
+      .summary("Distances between two surfaces, both ways: mean, root mean square, 95th percentile, maximum (Hausdorff) and bias")
+      .in("mesh", "surface")
+      .in("reference", "surface to compare with")
+      .out("metrics", "symmetric figures over points of both surfaces; bias: signed mean distance of the mesh from the reference, positive where it is too large")
+      .option("points", &Options::points, "points spread over each surface", at_least(100), at_most(1e6));
+}

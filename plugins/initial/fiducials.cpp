@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// A start from markers, or landmarks touched by a pointer, that a tracking system finds in the world: least squares over paired
+// points (Arun, Huang and Blostein 1987). Horn's quaternions (J Opt Soc Am A 1987) come to the same optimum.
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "rigid_fit.hpp"
+
+namespace {
+
+using namespace marrow;
+using initial::short_number;
+
+struct Options {
+  double noise_mm = 0;
+  double warn_above_mm = 2;
+};
+
+/// Points of the CT and where they were tracked, in the same order.
+struct Pairs {
+  std::vector<std::string> names;
+  std::vector<Eigen::Vector3d> model_mm, world_mm;
+};
+
+Pairs pairs_of(const Landmarks& landmarks) {
+  Pairs pairs;
+  for (const Landmarks::Tracked& tracked : landmarks.tracked) {
+    const auto point = std::find_if(landmarks.points.begin(), landmarks.points.end(), [&](const auto& one) { return one.name == tracked.name; });
+    if (point == landmarks.points.end())
+      throw Error("'" + tracked.name + "' was tracked, but the landmarks have no point of that name in the CT; give its place there, or leave it out");
+    pairs.names.push_back(tracked.name);
+    pairs.model_mm.push_back(point->model_mm);
+    pairs.world_mm.push_back(tracked.world_mm);
+  }
+  return pairs;
+}
+
+/// Distances that are left, and what follows from them.
+struct Residuals {
+  double squares = 0, largest = 0;
+  std::string farthest;
+};
+
+Residuals residuals_of(const Pairs& pairs, const RigidTransform& world_from_model) {
+  Residuals residuals;
+  for (std::size_t i = 0; i < pairs.names.size(); ++i) {
+    const double distance = (world_from_model * pairs.model_mm[i] - pairs.world_mm[i]).norm();
+    residuals.squares += distance * distance;
+    if (distance < residuals.largest) continue;
+    residuals.largest = distance;
+    residuals.farthest = pairs.names[i];
+  }
+  return residuals;
+}
+
+/// Of the small motion, where each coordinate of a pair is off by `deviation`. At any target it gives the expected error of
+/// Fitzpatrick, West and Maurer (IEEE TMI 17, 1998).
+Matrix6d covariance_of(const Pairs& pairs, const FragmentFrame& frame, double deviation_mm) {
+  Matrix6d information = Matrix6d::Zero();
+  for (const Eigen::Vector3d& point : pairs.model_mm) {
+    const auto derivatives = initial::point_by_motion(frame, point);
+    information += derivatives.transpose() * derivatives;
+  }
+  return deviation_mm * deviation_mm * information.inverse();
+}
+
+Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& options, Context& context) {
+  check_mesh(model, "model");
+  const Pairs pairs = pairs_of(landmarks);
+  const double count = double(pairs.names.size());
+  Pose pose;
+  pose.world_from_model = initial::fit_rigid(pairs.model_mm, pairs.world_mm, "the tracked points");
+  pose.world_from_model.source = model.frame;
+  pose.frame = fragment_frame(model);
+  const Residuals residuals = residuals_of(pairs, pose.world_from_model);
+  pose.cost = std::sqrt(residuals.squares / count);
+  const double deviation_mm = options.noise_mm > 0 ? options.noise_mm : std::sqrt(residuals.squares / (3 * count - 6));
+  pose.covariance = covariance_of(pairs, pose.frame, deviation_mm);
+  context.info("fiducial registration error " + short_number(pose.cost) + " mm over " + std::to_string(pairs.names.size()) +
+               " points, localisation error " + short_number(std::sqrt(3.0) * deviation_mm) + " mm; predicted error of the fragment's centroid " +
+               short_number(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace())) + " mm");
+  if (pose.cost > options.warn_above_mm) {
+    pose.warnings.push_back("the tracked points do not fit those in the CT: they are off by " + short_number(pose.cost) + " mm, '" +
+                            residuals.farthest + "' by " + short_number(residuals.largest) + " mm; are two names exchanged, or did a marker move?");
+    context.warn(pose.warnings.back());
+  }
+  return pose;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("initial.fiducials", fiducials)
+      .summary("Rigid fit of the tracked landmarks to those in the CT (Arun, Huang and Blostein 1987), with its predicted error")
+      .in("model", "surface of the fragment: gives its axes")
+      .in("landmarks", "points in the CT and where they were tracked")
+      .out("pose", "its cost is the fiducial registration error in mm; its covariance follows from the localisation error")
+      .option("noise_mm", &Options::noise_mm, "standard deviation of each coordinate of a pair; 0: what the residuals say", at_least(0))
+      .option("warn_above_mm", &Options::warn_above_mm, "fiducial registration error that gives a warning", at_least(0));
+}

@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "yaml_values.hpp"
+
+namespace {
+
+using namespace marrow;
+using read::YamlFile, read::YamlMap;
+
+struct Options {
+  std::filesystem::path path;
+};
+
+/// The keys of a map whose keys are names that its author chose.
+std::vector<std::string> names_in(const YAML::Node& node) {
+  std::vector<std::string> names;
+  if (node.IsMap())
+    for (const auto& item : node)
+      if (item.first.IsScalar()) names.push_back(item.first.Scalar());
+  return names;
+}
+
+/// Notes a fault where a point that is seen or tracked is none of the CT's.
+void check_known(const Landmarks& landmarks, const YamlMap& map, const std::string& name) {
+  std::vector<std::string> known;
+  for (const Landmarks::Point& point : landmarks.points) known.push_back(point.name);
+  if (std::find(known.begin(), known.end(), name) != known.end()) return;
+  const std::string near = read::nearest(name, known);
+  map.fault(name, "the points have no '" + name + "'; " + (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
+}
+
+Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
+  Landmarks landmarks;
+  const auto points = fragment.required("points");
+  if (!points) return landmarks;
+  const YamlMap places(file, *points, fragment.what() + ", points", names_in(*points));
+  for (const std::string& name : names_in(*points)) {
+    const auto place = places.vector3(name);
+    landmarks.points.push_back({name, place.value_or(Eigen::Vector3d::Zero())});
+  }
+  if (places.valid() && landmarks.points.empty()) fragment.fault("points", "points: expected places [x, y, z] in mm by name, got none");
+  if (const YAML::Node seen = fragment.node("seen"); seen.IsDefined()) {
+    const YamlMap views(file, seen, fragment.what() + ", seen", names_in(seen));
+    for (const std::string& view : names_in(seen)) {
+      const YAML::Node node = views.node(view);
+      const YamlMap pixels(file, node, fragment.what() + ", seen, view '" + view + "'", names_in(node));
+      for (const std::string& name : names_in(node)) {
+        check_known(landmarks, pixels, name);
+        if (const auto pixel = pixels.numbers(name, 2)) landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
+      }
+    }
+  }
+  if (const YAML::Node tracked = fragment.node("tracked"); tracked.IsDefined()) {
+    const YamlMap found(file, tracked, fragment.what() + ", tracked", names_in(tracked));
+    for (const std::string& name : names_in(tracked)) {
+      check_known(landmarks, found, name);
+      if (const auto place = found.vector3(name)) landmarks.tracked.push_back({name, *place});
+    }
+  }
+  return landmarks;
+}
+
+List<Landmarks> landmarks(const Options& options) {
+  YamlFile file(options.path);
+  const YamlMap map(file, file.root(), "landmarks", {"marrow-landmarks", "fragments"});
+  read::check_version(map, "marrow-landmarks");
+  List<Landmarks> landmarks;
+  if (const auto fragments = map.required("fragments")) {
+    const YamlMap by_name(file, *fragments, "fragments", names_in(*fragments));
+    if (by_name.valid() && fragments->size() == 0) map.fault("fragments", "fragments: expected fragments by name, got none");
+    for (const std::string& name : names_in(*fragments))
+      landmarks.add(name, landmarks_of(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"points", "seen", "tracked"}), file));
+  }
+  file.finish();
+  return landmarks;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.landmarks", landmarks)
+      .summary("Landmarks or markers of each fragment: where the CT has them, the images show them and a tracker found them, from marrow's YAML")
+      .out("landmarks", "points in CT coordinates, seen in pixels of views, tracked in the world", over("fragment"))
+      .option("path", &Options::path, "file of landmarks", required());
+}
