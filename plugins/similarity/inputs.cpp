@@ -73,6 +73,7 @@ void check_weights(const std::vector<double>& weights, std::size_t views) {
 }
 
 void check_edges(const List<View>& views, const List<EdgeMap>& edges) {
+  if (views.size() == 0) throw Error("there is no view to compare the model with");
   if (views.size() != edges.size())
     throw Error("there are " + std::to_string(views.size()) + " views, but edge maps of " + std::to_string(edges.size()) + "; give the edges of each view");
   const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): where the pose is right, the ray from the source through
-// an edge of the image touches the surface, so the least signed distance along it is 0 (their section 3). Needs no outline.
+// an edge of the image touches the surface, so the signed distance has a minimum of 0 along it (their section 3). Needs no outline.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -56,19 +56,28 @@ class Distance {
     return {from, to};
   }
 
-  /// Trilinear, at an index inside the box; with its gradient by the index.
-  float at(const Eigen::Vector3d& index, Eigen::Vector3d* gradient = nullptr) const {
+  /// Trilinear, at an index inside the box.
+  float at(const Eigen::Vector3d& index) const {
     const int x = int(index.x()), y = int(index.y()), z = int(index.z());
     const float u = float(index.x() - x), v = float(index.y() - y), w = float(index.z() - z);
     const std::size_t down = std::size_t(field_.grid.size[0]), back = down * std::size_t(field_.grid.size[1]);
     const float* p = field_.values_mm.data() + field_.grid.offset(x, y, z);
     const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
-    const float a = mix(p[0], p[1], u), b = mix(p[down], p[down + 1], u), c = mix(p[back], p[back + 1], u), d = mix(p[back + down], p[back + down + 1], u);
-    if (gradient) {
-      const float du = mix(mix(p[1] - p[0], p[down + 1] - p[down], v), mix(p[back + 1] - p[back], p[back + down + 1] - p[back + down], v), w);
-      *gradient = {double(du), double(mix(b - a, d - c, w)), double(mix(c, d, v) - mix(a, b, v))};
+    const float near = mix(mix(p[0], p[1], u), mix(p[down], p[down + 1], u), v);
+    const float far = mix(mix(p[back], p[back + 1], u), mix(p[back + down], p[back + down + 1], u), v);
+    return mix(near, far, w);
+  }
+
+  /// The gradient over a voxel to each side, in the model's frame: without the steps of a trilinear one from cell to cell.
+  Eigen::Vector3d gradient(const Eigen::Vector3d& index) const {
+    Eigen::Vector3d slope;
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d low = index, high = index;
+      low[k] = std::max(low_[k], index[k] - 1);
+      high[k] = std::min(high_[k], index[k] + 1);
+      slope[k] = double(at(high) - at(low)) / (std::max(high[k] - low[k], 1e-9) * field_.grid.spacing_mm[k]);
     }
-    return mix(mix(a, b, v), mix(c, d, v), w);
+    return field_.grid.direction * slope;
   }
 
  private:
@@ -170,7 +179,8 @@ class RayToSurface : public marrow::Cost {
     return touches;
   }
 
-  /// Nothing where the ray passes too far off.
+  /// Of all places where the distance along the ray is least around, the one that explains the edge best: X-rays show a bone's inner
+  /// outlines as well, where rays touch it that run through it elsewhere. Nothing where the ray passes too far off.
   std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera, const Eigen::Matrix3d& line_from_normal) const {
     const Distance& distance = scene_->distance;
     const marrow::Grid& grid = distance.grid();
@@ -178,33 +188,36 @@ class RayToSurface : public marrow::Cost {
     const Eigen::Vector3d along = model_from_camera.rotation * ray.direction;  // 1 mm long
     const Eigen::Vector3d direction = (grid.direction.transpose() * along).cwiseQuotient(grid.spacing_mm);
     const auto [from, to] = distance.span(start, direction);
-    if (!(from < to)) return std::nullopt;
-    const double finest_mm = 0.5 * grid.spacing_mm.minCoeff();
-    double best = 1e30, at = from;
-    // A distance falls by no more than 1 mm per mm, so nothing below the best is passed over.
+    const double finest_mm = 0.5 * grid.spacing_mm.minCoeff(), offset = scene_->options.edge_offset_mm;
+    std::optional<Touch> best;
+    double least = loss_.worst(), before = 1e30, here = 1e30, at = from;
+    // A distance changes by no more than 1 mm per mm, so nothing within reach is passed over.
     for (double t = from; t < to;) {
-      const double here = distance.at(start + t * direction);
-      if (here < best) best = here, at = t;
-      t += std::max(finest_mm, here - best);
+      const double after = distance.at(start + t * direction);
+      if (here < before && here <= after && std::abs(here - offset) < loss_.reach) {
+        const Touch touch = touch_at(ray, start, direction, std::clamp(at + vertex(before, here, after) * finest_mm, from, to - 1e-9), line_from_normal);
+        if (const double cost = loss_.worst() + touch.like * (loss_(touch.distance_mm) - loss_.worst()); cost < least) least = cost, best = touch;
+      }
+      before = here, here = after, at = t;
+      t += std::max(finest_mm, std::abs(after - offset) - loss_.reach);
     }
-    if (best >= loss_.reach + scene_->options.edge_offset_mm) return std::nullopt;
-    at = std::clamp(vertex(distance, start, direction, at, finest_mm), from, to - 1e-9);
+    return best;
+  }
+
+  Touch touch_at(const Ray& ray, const Eigen::Vector3d& start, const Eigen::Vector3d& direction, double at, const Eigen::Matrix3d& line_from_normal) const {
+    const Eigen::Vector3d index = start + at * direction;
     Touch touch;
-    Eigen::Vector3d slope;
-    touch.distance_mm = distance.at(start + at * direction, &slope) - scene_->options.edge_offset_mm;
-    touch.point = grid.point_from_index(start + at * direction);
-    touch.normal = grid.direction * slope.cwiseQuotient(grid.spacing_mm);
+    touch.distance_mm = double(scene_->distance.at(index)) - scene_->options.edge_offset_mm;
+    touch.point = scene_->distance.grid().point_from_index(index);
+    touch.normal = scene_->distance.gradient(index);
     touch.like = likeness(line_from_normal * touch.normal, ray);
     return touch;
   }
 
-  /// Where the parabola through the distances on either side is lowest.
-  static double vertex(const Distance& distance, const Eigen::Vector3d& start, const Eigen::Vector3d& direction, double at, double step) {
-    const auto [from, to] = distance.span(start, direction);
-    if (at - step < from || at + step >= to) return at;
-    const double before = distance.at(start + (at - step) * direction), here = distance.at(start + at * direction), after = distance.at(start + (at + step) * direction);
+  /// Where the parabola through three distances is lowest, in steps from the middle one.
+  static double vertex(double before, double here, double after) {
     const double bend = before - 2 * here + after;
-    return bend > 1e-9 ? at + step * std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : at;
+    return bend > 1e-9 && bend < 1e9 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0;
   }
 
   /// 1 where the surface's normal, as the image shows it, points to the edge's brighter side; 0 from the tolerance on.
