@@ -20,7 +20,6 @@ std::shared_ptr<const Projector> made(const std::string& node, const shipped::In
   const auto kept = std::make_shared<std::pair<shipped::Inputs, shipped::Outputs>>(in, shipped::call(node, in, options));
   return {kept, &kept->second.at("projector").as<Projector>()};
 }
-std::shared_ptr<const Projector> make(const Volume& volume, const marrow::SignedField* field) { return made("project.lightfield", inputs(volume, field)); }
 std::shared_ptr<const Projector> make_medium(const Volume& volume, const marrow::SignedField* field) {
   return made("project.lightfield", inputs(volume, field), {{"step_mm", 2.0}, {"step_deg", 1.5}, {"range_deg", 2.0}});
 }
