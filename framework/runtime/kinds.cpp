@@ -30,7 +30,7 @@ const std::vector<Kind>& kinds() {
         {"landmarks", "landmarks", ""}, {"cost", "cost", ""}, {"optimizer", "optimizer", ""}},
        {{"pose", "pose", ""}}},
       {"register", "pose of least cost, with its predicted uncertainty",
-       {{"cost", "cost", ""}, {"finer_cost", "cost", ""}, {"optimizer", "optimizer", ""}, {"initial", "pose", ""}, {"model", "mesh", ""},
+       {{"cost", "cost", ""}, {"finer_cost", "cost", ""}, {"optimizer", "optimizer", ""}, {"finer_optimizer", "optimizer", ""}, {"initial", "pose", ""}, {"model", "mesh", ""},
         {"target", "mesh", ""}},
        {{"pose", "pose", ""}, {"stages", "pose", "stage"}}},
       {"fracture", "misalignment and reduction from the poses of two fragments", {}, {}, true, false},

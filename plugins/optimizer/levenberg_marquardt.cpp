@@ -2,7 +2,6 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <marrow/plugin.hpp>
-#include <limits>
 #include <string>
 
 #include "evaluations.hpp"
@@ -39,41 +38,38 @@ Expansion by_differences(Evaluations& evaluate, const Eigen::VectorXd& here, dou
 /// Steps that Marquardt's damping keeps short while the expansion misleads (SIAM J Appl Math 1963).
 class Search {
  public:
-  explicit Search(Evaluations& evaluate) : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())) { look(here_); }
+  explicit Search(Evaluations& evaluate) : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())), derivatives_(evaluate.has_derivatives()) {
+    value_ = look(here_);
+    about_ = seen_;
+  }
 
   std::string run() {
     const double least_h = 0.1 * evaluate_.tolerance();
-    for (;;) {
-      if (!about_) about_ = by_differences(evaluate_, here_, value_, h_);
-      const bool is_exact = evaluate_.has_derivatives() && h_ == kWidest;
+    for (double h = 0.1;;) {
+      if (!about_) about_ = by_differences(evaluate_, here_, value_, h);
       const double moved = step();
       if (moved >= evaluate_.tolerance()) {
-        if (!is_exact) h_ = std::clamp(0.3 * moved, least_h, h_);
-      } else if (is_exact && moved > 0) {
+        h = std::clamp(0.3 * moved, least_h, h);
+      } else if (derivatives_ || h <= least_h) {
         return "steps are below the tolerance";
-      } else if (h_ > least_h) {
-        h_ = std::max(least_h, 0.1 * h_);  // derivatives may mislead here: by narrower differences
-        about_.reset();
       } else {
-        return "steps are below the tolerance";
+        h = std::max(least_h, 0.1 * h);  // the differences may be too wide to tell the slope here
+        about_.reset();
       }
     }
   }
 
  private:
-  static constexpr double kWidest = 0.1, kLongest = 4, kMostDamping = 1e6;
+  static constexpr double kLongest = 4, kMostDamping = 1e6;
 
-  /// The value there, with derivatives where the function knows them.
+  /// The value there, with derivatives as long as the function knows them.
   double look(const Eigen::VectorXd& there) {
-    if (evaluate_.has_derivatives() && h_ == kWidest) {
-      seen_ = evaluate_.expansion(there);
-      value_there_ = seen_ ? seen_->value : std::numeric_limits<double>::infinity();
-    } else {
-      seen_.reset();
-      value_there_ = evaluate_(there);
+    if (derivatives_) {
+      if ((seen_ = evaluate_.expansion(there))) return seen_->value;
+      derivatives_ = false;
     }
-    if (there == here_) value_ = value_there_, about_ = seen_;
-    return value_there_;
+    seen_.reset();
+    return evaluate_(there);
   }
 
   /// Goes to a lower place; returns how far. 0 where none was found.
@@ -89,9 +85,10 @@ class Search {
       const Eigen::VectorXd there = evaluate_.within(here_ + step);
       const double moved = (there - here_).norm();
       if (moved < 0.1 * evaluate_.tolerance()) break;
-      if (look(there) >= value_) continue;
+      const double value = look(there);
+      if (value >= value_) continue;
       here_ = there;
-      value_ = value_there_;
+      value_ = value;
       about_ = seen_;
       damping_ = std::max(0.1 * damping_, 1e-6);
       return moved;
@@ -102,7 +99,8 @@ class Search {
 
   Evaluations& evaluate_;
   Eigen::VectorXd here_;
-  double value_ = 0, value_there_ = 0, damping_ = 1e-2, h_ = kWidest;
+  double value_ = 0, damping_ = 1e-2;
+  bool derivatives_;
   std::optional<Expansion> about_, seen_;  ///< here, and at the place last looked at
 };
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "large_pages.hpp"
 #include "marrow/plugin.hpp"
 
 namespace marrow::rays {
@@ -19,7 +20,7 @@ struct AttenuationOptions {
 /// Thousandths of water's attenuation per voxel, x fastest, then y, then z.
 struct Attenuation {
   Grid grid;
-  std::vector<std::int16_t> thousandths;
+  std::vector<std::int16_t, LargePages<std::int16_t>> thousandths;
   std::array<int, 3> first{0, 0, 0}, last{-1, -1, -1};  ///< box of what attenuates; last < first where nothing does
 
   bool is_empty() const { return last[0] < first[0]; }

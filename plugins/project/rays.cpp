@@ -9,6 +9,24 @@
 
 namespace marrow::rays {
 
+namespace {
+
+/// Pixels in the order of tiles of the image: neighbouring rays read the same memory.
+std::vector<std::uint32_t> by_neighbourhood(const std::vector<Eigen::Vector2f>& pixels) {
+  constexpr float kTile_px = 16;
+  std::vector<std::pair<std::int64_t, std::uint32_t>> keys(pixels.size());
+  for (std::uint32_t i = 0; i < pixels.size(); ++i) {
+    const auto tile = [&](float x) { return std::int64_t(std::clamp(x / kTile_px, -1e6f, 1e6f)); };
+    keys[i] = {tile(pixels[i].y()) * (std::int64_t(1) << 22) + tile(pixels[i].x()), i};
+  }
+  std::sort(keys.begin(), keys.end());
+  std::vector<std::uint32_t> order(pixels.size());
+  for (std::size_t k = 0; k < order.size(); ++k) order[k] = keys[k].second;
+  return order;
+}
+
+}  // namespace
+
 Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid) {
   check_camera(camera, "the camera");
   const RigidTransform model_from_camera = inverse(world_from_model) * inverse(camera.camera_from_world);
@@ -50,8 +68,12 @@ std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTra
   const Rays rays = rays_of(camera, world_from_model, attenuation_.grid);
   std::vector<float> values(pixels.size(), 0.0f);
   if (attenuation_.is_empty()) return values;
+  const std::vector<std::uint32_t> order = by_neighbourhood(pixels);
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pixels.size(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t i = range.begin(); i < range.end(); ++i) values[i] = integral(rays.source, rays.direction(pixels[i].x(), pixels[i].y()));
+    for (std::size_t k = range.begin(); k < range.end(); ++k) {
+      const Eigen::Vector2f& pixel = pixels[order[k]];
+      values[order[k]] = integral(rays.source, rays.direction(pixel.x(), pixel.y()));
+    }
   });
   return values;
 }

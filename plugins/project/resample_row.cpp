@@ -37,6 +37,17 @@ __attribute__((target("avx2"))) void mix_avx2(const std::int16_t* a, const std::
   mix_plain(a + i, b + i, weight, count - i, mixed + i);
 }
 
+__attribute__((target("avx512f"))) void mix_avx512(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+  const __m512 w = _mm512_set1_ps(weight), v = _mm512_set1_ps(1 - weight);
+  int i = 0;
+  for (; i + 16 <= count; i += 16) {
+    const __m512 x = _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(a + i))));
+    const __m512 y = _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(b + i))));
+    _mm512_storeu_ps(mixed + i, _mm512_add_ps(_mm512_mul_ps(v, x), _mm512_mul_ps(w, y)));
+  }
+  mix_avx2(a + i, b + i, weight, count - i, mixed + i);
+}
+
 /// Eight positions lie within eight neighbours of the first where |step| is small: they are picked within one register.
 __attribute__((target("avx2"))) int add_avx2(const float* row, float position, float step, int count, float* sum) {
   const __m256 lanes = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), steps = _mm256_set1_ps(step);
@@ -104,6 +115,7 @@ void mix_rows(const std::int16_t* a, const std::int16_t* b, float weight, int co
     return;
   }
 #if defined(__x86_64__)
+  if (kHasAvx512) return mix_avx512(a, b, weight, count, mixed);
   if (kHasAvx2) return mix_avx2(a, b, weight, count, mixed);
 #endif
   mix_plain(a, b, weight, count, mixed);

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "coarse_surface.hpp"
 #include "surface_patches.hpp"
 #include "volume_border.hpp"
 
@@ -278,26 +279,34 @@ class OuterOutline {
 
 class SilhouetteEdges : public marrow::Projector {
  public:
-  explicit SilhouetteEdges(SurfacePatches surface) : surface_(std::move(surface)) {}
+  SilhouetteEdges(SurfacePatches surface, SurfacePatches coarse) : surface_(std::move(surface)), coarse_(std::move(coarse)) {}
 
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
                                             const marrow::RigidTransform& world_from_model,
                                             double spacing_px) const override {
     if (!(spacing_px > 0)) throw marrow::Error("the outline's spacing must be positive");
-    const Geometry geometry = geometry_of(camera, world_from_model, surface_.origin_mm);
-    const std::vector<ContourPiece> pieces = ContourFinder(surface_, geometry).find();
-    return OuterOutline(surface_, pieces, camera, geometry, spacing_px).find();
+    const SurfacePatches& surface = spacing_px >= kCoarse_px && !coarse_.patches.empty() ? coarse_ : surface_;
+    const Geometry geometry = geometry_of(camera, world_from_model, surface.origin_mm);
+    const std::vector<ContourPiece> pieces = ContourFinder(surface, geometry).find();
+    return OuterOutline(surface, pieces, camera, geometry, spacing_px).find();
   }
 
  private:
-  SurfacePatches surface_;
+  static constexpr double kCoarse_px = 4;  ///< from this spacing on a coarse surface serves as well
+  SurfacePatches surface_, coarse_;
 };
 
 std::shared_ptr<const marrow::Projector> silhouette_edges(const marrow::Mesh& mesh, const marrow::Volume* volume,
                                                           const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
-  return std::make_shared<SilhouetteEdges>(
-      make_surface_patches(mesh, vertices_at_volume_border(mesh, volume, options.border_voxels)));
+  constexpr std::size_t kWorthIt = 20000;  // triangles
+  const std::vector<char> at_border = vertices_at_volume_border(mesh, volume, options.border_voxels);
+  SurfacePatches coarse;
+  if (mesh.triangles.size() >= kWorthIt) {
+    CoarseSurface surface = coarse_surface(mesh, at_border);
+    if (!surface.mesh.triangles.empty()) coarse = make_surface_patches(surface.mesh, surface.at_border);
+  }
+  return std::make_shared<SilhouetteEdges>(make_surface_patches(mesh, at_border), std::move(coarse));
 }
 
 }  // namespace

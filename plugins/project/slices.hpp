@@ -37,7 +37,7 @@ class Slices {
 
  private:
   const Attenuation& attenuation_;
-  std::vector<std::int16_t> turned_;  ///< y fastest, then x, then z
+  std::vector<std::int16_t, LargePages<std::int16_t>> turned_;  ///< y fastest, then x, then z
   std::array<Stack, 3> stacks_;       ///< by the axis across the slices
 };
 

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <oneapi/tbb/parallel_invoke.h>
+#include <oneapi/tbb/parallel_sort.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <map>
 #include <marrow/domain/mesh.hpp>
 #include <numeric>
 #include <vector>
@@ -43,7 +45,7 @@ inline std::vector<Triangle> weld(const marrow::Mesh& mesh) {
     const Eigen::Vector3d& v = mesh.vertices_mm[i];
     return std::make_tuple(v.x(), v.y(), v.z(), i);
   };
-  std::sort(order.begin(), order.end(), [&](auto a, auto b) { return key(a) < key(b); });
+  tbb::parallel_sort(order.begin(), order.end(), [&](auto a, auto b) { return key(a) < key(b); });
   for (std::size_t i = 0; i < order.size(); ++i) {
     const bool same = i > 0 && mesh.vertices_mm[order[i]] == mesh.vertices_mm[order[i - 1]];
     kept[order[i]] = same ? kept[order[i - 1]] : order[i];
@@ -69,12 +71,8 @@ inline std::vector<Eigen::Vector3d> vertex_normals(const marrow::Mesh& mesh, con
 }
 
 /// Sorts triangles[first, last) into groups of at most `most` by halving along the feature that spreads most.
-inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>& features, std::size_t first,
-                  std::size_t last, std::size_t most, std::vector<std::size_t>& ends) {
-  if (last - first <= most) {
-    ends.push_back(last);
-    return;
-  }
+inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>& features, std::size_t first, std::size_t last, std::size_t most) {
+  if (last - first <= most) return;
   Feature low = features[order[first]], high = low;
   for (std::size_t i = first; i < last; ++i) {
     low = low.cwiseMin(features[order[i]]);
@@ -88,8 +86,20 @@ inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>&
                      const float fa = features[a][widest], fb = features[b][widest];
                      return fa != fb ? fa < fb : a < b;
                    });
-  split(order, features, first, middle, most, ends);
-  split(order, features, middle, last, most, ends);
+  constexpr std::size_t kWorthATask = 4096;
+  const auto left = [&] { split(order, features, first, middle, most); };
+  const auto right = [&] { split(order, features, middle, last, most); };
+  if (last - first > kWorthATask)
+    tbb::parallel_invoke(left, right);
+  else
+    left(), right();
+}
+
+/// Where the groups that split() makes end.
+inline void find_ends(std::size_t first, std::size_t last, std::size_t most, std::vector<std::size_t>& ends) {
+  if (last - first <= most) return ends.push_back(last);
+  find_ends(first, (first + last) / 2, most, ends);
+  find_ends((first + last) / 2, last, most, ends);
 }
 
 /// For each triangle a bit per edge k -> k+1 that no other triangle shares.
@@ -101,7 +111,7 @@ inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangle
       const std::uint64_t a = triangles[i][k], b = triangles[i][(k + 1) % 3];
       edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), 3 * i + k);
     }
-  std::sort(edges.begin(), edges.end());
+  tbb::parallel_sort(edges.begin(), edges.end());
   std::vector<std::uint8_t> rims(triangles.size(), 0);
   for (std::size_t i = 0; i < edges.size(); ++i) {
     const bool before = i > 0 && edges[i - 1].first == edges[i].first;
@@ -155,7 +165,8 @@ inline SurfacePatches make_surface_patches(const marrow::Mesh& mesh, const std::
   std::vector<std::uint32_t> order(triangles.size());
   std::iota(order.begin(), order.end(), 0u);
   std::vector<std::size_t> ends;
-  split(order, features, 0, order.size(), kTriangles, ends);
+  split(order, features, 0, order.size(), kTriangles);
+  find_ends(0, order.size(), kTriangles, ends);
 
   std::size_t first = 0;
   for (const std::size_t last : ends) {
@@ -163,14 +174,15 @@ inline SurfacePatches make_surface_patches(const marrow::Mesh& mesh, const std::
     patch.first_vertex = std::uint32_t(s.x.size());
     patch.first_triangle = std::uint32_t(s.triangles.size());
     patch.first_rim = std::uint32_t(s.rims.size());
-    std::map<std::uint32_t, std::uint8_t> local;
+    std::vector<std::uint32_t> local;
     for (; first < last; ++first) {
       std::array<std::uint8_t, 3> corners{};
       for (std::size_t k = 0; k < 3; ++k) {
         const std::uint32_t vertex = triangles[order[first]][k];
-        const auto [at, added] = local.emplace(vertex, std::uint8_t(local.size()));
-        corners[k] = at->second;
-        if (!added) continue;
+        const auto at = std::find(local.begin(), local.end(), vertex);
+        corners[k] = std::uint8_t(at - local.begin());
+        if (at != local.end()) continue;
+        local.push_back(vertex);
         const Eigen::Vector3f p = (mesh.vertices_mm[vertex] - s.origin_mm).cast<float>();
         const Eigen::Vector3f n = normals[vertex].cast<float>();
         s.x.push_back(p.x()), s.y.push_back(p.y()), s.z.push_back(p.z());

@@ -8,6 +8,8 @@
 #include <string>
 #include <vector>
 
+namespace marrow::registration {
+
 /// Units in which poses are searched: degrees about and millimetres along the axes of the fragment.
 inline marrow::RigidTransform moved_by_units(const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame,
                                              const marrow::Vector6d& deg_and_mm) {
@@ -64,15 +66,11 @@ class PredictedCovariance {
     return text;
   }
 
-  double at(int i, double step_i, int j = 0, double step_j = 0) {
-    marrow::Vector6d motion = marrow::Vector6d::Zero();
-    motion[i] += step_i;
-    motion[j] += step_j;
-    ++evaluations_;
-    return cost_.value(moved_by_units(pose_, frame_, motion));
+  double rise(int axis, double step) {
+    const marrow::Vector6d motion = step * marrow::Vector6d::Unit(axis);
+    evaluations_ += 2;
+    return 0.5 * (cost_.value(moved_by_units(pose_, frame_, motion)) + cost_.value(moved_by_units(pose_, frame_, -motion))) - value_;
   }
-
-  double rise(int axis, double step) { return 0.5 * (at(axis, step) + at(axis, -step)) - value_; }
 
   void choose_step(int axis) {
     double step = 0.5, height = rise(axis, step);
@@ -83,15 +81,24 @@ class PredictedCovariance {
     undetermined_[std::size_t(axis)] = height < kLeastRise_px;
   }
 
-  /// In units of the steps.
+  /// In units of the steps. Mixed second derivatives by the mean rise along both diagonal senses, less those of the two axes.
   marrow::Matrix6d hessian() {
+    std::vector<marrow::RigidTransform> poses;
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < i; ++j)
+        for (const double sense : {1.0, -1.0}) {
+          marrow::Vector6d motion = marrow::Vector6d::Zero();
+          motion[i] = sense * steps_[i];
+          motion[j] = sense * steps_[j];
+          poses.push_back(moved_by_units(pose_, frame_, motion));
+        }
+    const std::vector<double> values = cost_.values(poses);
+    evaluations_ += int(values.size());
     marrow::Matrix6d h;
+    auto value = values.begin();
     for (int i = 0; i < 6; ++i) {
       h(i, i) = 2 * rises_[i];
-      for (int j = 0; j < i; ++j)
-        h(i, j) = h(j, i) = (at(i, steps_[i], j, steps_[j]) - at(i, steps_[i], j, -steps_[j]) -
-                             at(i, -steps_[i], j, steps_[j]) + at(i, -steps_[i], j, -steps_[j])) /
-                            4;
+      for (int j = 0; j < i; ++j, value += 2) h(i, j) = h(j, i) = 0.5 * (value[0] + value[1]) - value_ - rises_[i] - rises_[j];
     }
     return h;
   }
@@ -124,3 +131,5 @@ class PredictedCovariance {
   std::array<bool, 6> undetermined_{};
   marrow::Matrix6d covariance_;
 };
+
+}  // namespace marrow::registration

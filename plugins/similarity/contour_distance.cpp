@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -34,6 +35,8 @@ struct Residual {
   float along_normal;  ///< signed, positive where the edge lies outside the outline
   float beyond;        ///< how far the edge lies beyond the point along the outline: 0 on an edge without gaps
   float u, v;
+  float normal_u, normal_v;
+  Eigen::Vector3f model_mm;
 };
 
 struct Matches {
@@ -57,10 +60,40 @@ class ContourDistance : public marrow::Cost {
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     const std::vector<Matches> views = match(world_from_model);
+    return value_of(views, offset_of(views));
+  }
+
+  /// By the motion of each point against its edge, along the normal, both held fast (Gauss-Newton with the weights of the loss). The
+  /// edge offset is one more unknown, eliminated.
+  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model, const marrow::FragmentFrame& frame) const override {
+    const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
-    std::vector<double> of_view;
-    for (const Matches& view : views) of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset)) : forward(view, offset));
-    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+    Expansion about;
+    about.value = value_of(views, offset);
+    marrow::Vector6d mixed = marrow::Vector6d::Zero();
+    double weights = 0, of_all = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) of_all += weight_of(scene_->options.weights, i);
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const marrow::RigidTransform camera_from_model = scene_->views[i].camera.camera_from_world * world_from_model;
+      const double of_view = weight_of(scene_->options.weights, i) / of_all, points = std::max(double(views[i].points), least_points());
+      const auto add = [&](const std::vector<Residual>& residuals, double of_each) {
+        for (const Residual& r : residuals) {
+          const double weight = of_each * loss_.weight(distance2(r, offset));
+          if (weight == 0) continue;
+          const marrow::Vector6d slope = -outward_motion_px(r, scene_->views[i].camera, camera_from_model, frame);
+          about.gradient += weight * (double(r.along_normal) - offset) * slope;
+          about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
+          mixed += weight * slope;
+          weights += weight;
+        }
+      };
+      const double half = scene_->options.symmetric ? 0.5 : 1;
+      add(views[i].residuals, half * of_view / points);
+      if (scene_->options.symmetric && backward(views[i], offset) > 0) add(views[i].of_edges, half * of_view / (points * level_.contour_spacing_px));
+    }
+    if (scene_->options.estimate_offset && weights > 0) about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(mixed, -1 / weights);
+    about.curvature = about.curvature.selfadjointView<Eigen::Lower>();
+    return about;
   }
 
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
@@ -108,6 +141,24 @@ class ContourDistance : public marrow::Cost {
  private:
   /// Fewer points in a view than this many are filled up with unmatched ones.
   double least_points() const { return 60 / level_.contour_spacing_px; }
+
+  double value_of(const std::vector<Matches>& views, double offset) const {
+    std::vector<double> of_view;
+    for (const Matches& view : views) of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset)) : forward(view, offset));
+    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+  }
+
+  /// How far a point moves along its normal in the image, for each motion about the frame.
+  static marrow::Vector6d outward_motion_px(const Residual& r, const marrow::Camera& camera, const marrow::RigidTransform& camera_from_model,
+                                            const marrow::FragmentFrame& frame) {
+    const Eigen::Vector3d point = r.model_mm.cast<double>(), seen = camera_from_model * point;
+    const Eigen::RowVector3d by_camera = (double(r.normal_u) * (camera.intrinsics.row(0) - double(r.u) * camera.intrinsics.row(2)) +
+                                          double(r.normal_v) * (camera.intrinsics.row(1) - double(r.v) * camera.intrinsics.row(2))) / seen.z();
+    const Eigen::Vector3d by_point = (by_camera * camera_from_model.rotation).transpose();
+    marrow::Vector6d motion;
+    motion << frame.axes.transpose() * (point - frame.origin_mm).cross(by_point), frame.axes.transpose() * by_point;
+    return motion;
+  }
 
   /// The mean over the points of the outline.
   double forward(const Matches& view, double offset) const {
@@ -172,7 +223,7 @@ class ContourDistance : public marrow::Cost {
     constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
     const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px;
     const float along = std::abs(dv * p.normal_u - du * p.normal_v);
-    return {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px};
+    return {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px, p.normal_u, p.normal_v, p.model_mm};
   }
 
   /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie

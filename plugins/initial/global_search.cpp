@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+
+#include "plugins/register/search.hpp"
+
+namespace {
+
+struct Options {
+  double rotation_side_deg = 20;
+  double rotation_axial_deg = 40;
+  double translation_side_mm = 40;
+  double translation_axial_mm = 40;
+  int poses = 4000;
+  int candidates = 60;
+  int finalists = 8;
+  std::vector<double> contour_spacing_px{12, 6, 3};
+  std::vector<double> reach_px{60, 24, 9};
+  std::vector<double> pixel_step{16, 8, 4};
+  int max_evaluations = 400;
+};
+
+/// The search of register.multiresolution, from everywhere within the ranges. First steps get shorter with the reach.
+marrow::registration::SearchOptions search_options(const Options& options) {
+  marrow::registration::SearchOptions search;
+  search.scan_poses = options.poses;
+  search.scan_side_deg = options.rotation_side_deg;
+  search.scan_rotation_deg = options.rotation_axial_deg;
+  search.scan_side_mm = options.translation_side_mm;
+  search.scan_translation_mm = options.translation_axial_mm;
+  search.scan_reach = 0.25;
+  search.candidates = options.candidates;
+  search.finalists = options.finalists;
+  search.contour_spacing_px = options.contour_spacing_px;
+  search.reach_px = options.reach_px;
+  search.pixel_step = options.pixel_step;
+  search.max_evaluations = options.max_evaluations;
+  search.step_deg.clear(), search.step_axial_deg.clear(), search.step_mm.clear();
+  for (const double reach_px : options.reach_px) {
+    search.step_deg.push_back(reach_px / 8);
+    search.step_axial_deg.push_back(reach_px / 4);
+    search.step_mm.push_back(reach_px / 8);
+  }
+  search.step_tolerance.assign(options.reach_px.size(), 0.1);
+  return search;
+}
+
+marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose* start, const Options& options,
+                           marrow::Context& context) {
+  marrow::check_mesh(model, "model");
+  const marrow::registration::SearchOptions settings = search_options(options);
+  marrow::registration::check_options(settings);
+  marrow::Pose middle;
+  middle.world_from_model = start ? start->world_from_model : marrow::RigidTransform{"world", model.frame};
+  marrow::check_rigid(middle.world_from_model, "start");
+  middle.frame = marrow::fragment_frame(model);
+  const marrow::registration::Levels levels = levels_of(cost, settings);
+  marrow::registration::Search search(optimizer, middle, settings, context);
+  search.go_to(search.best_of(search.scan(*levels.front()), levels).pose);
+  return pose_of(search, middle, *levels.back());
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("initial.global_search", global_search)
+      .summary("The pose of least cost within wide ranges, from many places at once; no start is needed")
+      .in("model", "surface of the fragment")
+      .in("cost", "what a pose costs")
+      .in("optimizer", "minimiser that follows the best places up")
+      .in("start", "middle of the ranges; none: where the CT lies in the world")
+      .out("pose", "pose of least cost")
+      .option("rotation_side_deg", &Options::rotation_side_deg, "rotations about the frontal and lateral axes that are looked at, to either side", marrow::at_least(0),
+              marrow::at_most(180))
+      .option("rotation_axial_deg", &Options::rotation_axial_deg, "rotations about the long axis, to either side", marrow::at_least(0), marrow::at_most(180))
+      .option("translation_side_mm", &Options::translation_side_mm, "shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
+      .option("translation_axial_mm", &Options::translation_axial_mm, "shifts along the long axis, to either side", marrow::at_least(0))
+      .option("poses", &Options::poses, "how many poses are looked at, spread evenly over these ranges", marrow::at_least(1))
+      .option("candidates", &Options::candidates, "best of these, no two of them neighbours, that are followed up", marrow::at_least(1))
+      .option("finalists", &Options::finalists, "best of these after the first level that go through all levels; the last level chooses", marrow::at_least(1))
+      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
+      .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared")
+      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost for each search of a level", marrow::at_least(1));
+}
