@@ -17,7 +17,7 @@ const std::vector<Kind>& kinds() {
        {{"field", "signed_field", "fragment"}}},
       {"mesh", "closed surface: of a signed field, or made from another one", {{"field", "signed_field", ""}, {"mesh", "mesh", ""}}, {{"mesh", "mesh", ""}}},
       {"project", "draws a model as a view would see it: outline or radiograph",
-       {{"mesh", "mesh", ""}, {"volume", "volume", ""}, {"field", "signed_field", ""}},
+       {{"mesh", "mesh", ""}, {"volume", "volume", ""}, {"field", "signed_field", ""}, {"views", "view", "view"}},
        {{"projector", "projector", ""}}},
       {"similarity", "how badly a pose explains the images",
        {{"projector", "projector", ""}, {"mesh", "mesh", ""}, {"volume", "volume", ""}, {"field", "signed_field", ""},

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <marrow/plugin.hpp>
 
+#include "edge_loss.hpp"
+#include "inputs.hpp"
 #include "nearest_edges.hpp"
+#include "nearest_outline.hpp"
 
 namespace {
 
@@ -17,7 +20,15 @@ struct Options {
   double edge_offset_px = 0;
   bool estimate_offset = true;
   double model_error_px = 0.4;
+  bool symmetric = false;
+  double others_reach_px = 3;
+  std::vector<double> weights;
 };
+
+using marrow::similarity::weight_of;
+
+/// The offset between outline and edges is sought this far from the one that is given.
+constexpr double kMostOffset_px = 3;
 
 /// One point of the outline against the edge nearest to it.
 struct Residual {
@@ -31,25 +42,7 @@ struct Residual {
 struct Matches {
   std::vector<Residual> residuals;
   std::size_t points = 0;  ///< compared, with or without an edge
-};
-
-/// sqrt(s^2 + d^2) - s: quadratic near zero, then the distance itself as in the chapter, and no more than at the reach.
-class Loss {
- public:
-  Loss(double scale, double reach)
-      : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
-  double worst() const { return worst_; }
-  double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
-  bool counts(double distance2) const { return distance2 < reach2_; }
-  /// Derivative by the distance, divided by it.
-  double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
-  double second_derivative(double distance2) const {
-    return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0;
-  }
-
- private:
-  double raw(double distance2) const { return std::sqrt(scale2_ + distance2) - scale_; }
-  double scale2_, scale_, reach2_, worst_;
+  std::vector<Residual> of_edges;  ///< of the edges near the outline to it; only where both ways count
 };
 
 /// What does not depend on the level: made once, shared by all.
@@ -78,19 +71,25 @@ class ContourDistance : public marrow::Cost {
     Expansion about;
     about.value = value_of(views, offset);
     marrow::Vector6d mixed = marrow::Vector6d::Zero();
-    double weights = 0;
+    double weights = 0, of_all = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) of_all += weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const double of_view = 1 / (std::max(double(views[i].points), least_points()) * double(views.size()));
       const marrow::RigidTransform camera_from_model = scene_->views[i].camera.camera_from_world * world_from_model;
-      for (const Residual& r : views[i].residuals) {
-        const double weight = of_view * loss_.weight(distance2(r, offset));
-        if (weight == 0) continue;
-        const marrow::Vector6d slope = -outward_motion_px(r, scene_->views[i].camera, camera_from_model, frame);
-        about.gradient += weight * (double(r.along_normal) - offset) * slope;
-        about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
-        mixed += weight * slope;
-        weights += weight;
-      }
+      const double of_view = weight_of(scene_->options.weights, i) / of_all, points = std::max(double(views[i].points), least_points());
+      const auto add = [&](const std::vector<Residual>& residuals, double of_each) {
+        for (const Residual& r : residuals) {
+          const double weight = of_each * loss_.weight(distance2(r, offset));
+          if (weight == 0) continue;
+          const marrow::Vector6d slope = -outward_motion_px(r, scene_->views[i].camera, camera_from_model, frame);
+          about.gradient += weight * (double(r.along_normal) - offset) * slope;
+          about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(slope, weight);
+          mixed += weight * slope;
+          weights += weight;
+        }
+      };
+      const double half = scene_->options.symmetric ? 0.5 : 1;
+      add(views[i].residuals, half * of_view / points);
+      if (scene_->options.symmetric && backward(views[i], offset) > 0) add(views[i].of_edges, half * of_view / (points * level_.contour_spacing_px));
     }
     if (scene_->options.estimate_offset && weights > 0) about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(mixed, -1 / weights);
     about.curvature = about.curvature.selfadjointView<Eigen::Lower>();
@@ -111,8 +110,10 @@ class ContourDistance : public marrow::Cost {
     constexpr double kLeastNoise_px = 0.05;  // no edge pixel is known better than this
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
-    double curvature = 0, variance = 0;
-    for (const Matches& view : views) {
+    double curvature = 0, variance = 0, weights = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const Matches& view = views[i];
+      const double weight = weight_of(scene_->options.weights, i);
       const double points = std::max(double(view.points), least_points());
       struct Block {
         double slope = 0, weight = 0;
@@ -122,7 +123,7 @@ class ContourDistance : public marrow::Cost {
       for (const Residual& r : view.residuals) {
         const double d2 = distance2(r, offset);
         if (!loss_.counts(d2)) continue;
-        curvature += loss_.second_derivative(d2) / points;
+        curvature += weight * loss_.second_derivative(d2) / points;
         Block& block = blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}];
         block.slope += loss_.weight(d2) * (double(r.along_normal) - offset);
         block.weight += loss_.weight(d2);
@@ -130,11 +131,11 @@ class ContourDistance : public marrow::Cost {
       }
       for (const auto& [place, block] : blocks)
         squares += block.slope * block.slope + std::pow(scene_->options.model_error_px * block.weight, 2);
-      variance += std::max(squares, least) / (points * points);
+      variance += weight * weight * std::max(squares, least) / (points * points);
+      weights += weight;
     }
-    const double n = double(views.size());
     if (curvature <= 0) return std::nullopt;
-    return curvature / n / (variance / (n * n));
+    return curvature * weights / variance;
   }
 
  private:
@@ -142,16 +143,9 @@ class ContourDistance : public marrow::Cost {
   double least_points() const { return 60 / level_.contour_spacing_px; }
 
   double value_of(const std::vector<Matches>& views, double offset) const {
-    double sum = 0;
-    for (const Matches& view : views) {
-      double of_view = 0;
-      for (const Residual& r : view.residuals) of_view += loss_(distance2(r, offset));
-      // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
-      const double points = std::max(double(view.points), least_points());
-      of_view += (points - double(view.residuals.size())) * loss_.worst();
-      sum += of_view / points;
-    }
-    return sum / double(views.size());
+    std::vector<double> of_view;
+    for (const Matches& view : views) of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset)) : forward(view, offset));
+    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
   }
 
   /// How far a point moves along its normal in the image, for each motion about the frame.
@@ -164,6 +158,24 @@ class ContourDistance : public marrow::Cost {
     marrow::Vector6d motion;
     motion << frame.axes.transpose() * (point - frame.origin_mm).cross(by_point), frame.axes.transpose() * by_point;
     return motion;
+  }
+
+  /// The mean over the points of the outline.
+  double forward(const Matches& view, double offset) const {
+    double sum = 0;
+    for (const Residual& r : view.residuals) sum += loss_(distance2(r, offset));
+    // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
+    const double points = std::max(double(view.points), least_points());
+    return (sum + (points - double(view.residuals.size())) * loss_.worst()) / points;
+  }
+
+  /// The same from the edges back to the outline: what each edge near it takes off the worst, over the length of the outline in
+  /// pixels, for each of which an image has one edge. Edges further off belong to something else, and so count nothing.
+  double backward(const Matches& view, double offset) const {
+    double gain = 0;
+    for (const Residual& r : view.of_edges) gain += loss_.worst() - loss_(distance2(r, offset));
+    const double length_px = level_.contour_spacing_px * std::max(double(view.points), least_points());
+    return std::max(0.0, loss_.worst() - gain / length_px);
   }
 
   static double distance2(const Residual& r, double offset) {
@@ -179,41 +191,54 @@ class ContourDistance : public marrow::Cost {
 
   Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
     constexpr float kMargin_px = 3;        // edge detectors see nothing at the very border of an image
-    constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
     const marrow::View& view = scene_->views[index];
     const float right = float(view.camera.width_px - 1) - kMargin_px,
                 bottom = float(view.camera.height_px - 1) - kMargin_px;
     Matches matches;
     const auto outline = scene_->projector->outline(view.camera, world_from_model, level_.contour_spacing_px);
     matches.residuals.reserve(outline.size());
+    std::vector<marrow::OutlinePoint> compared;
     for (const marrow::OutlinePoint& p : outline) {
       if (p.u_px < kMargin_px || p.v_px < kMargin_px || p.u_px > right || p.v_px > bottom) continue;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
       ++matches.points;
-      const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v);
-      if (!edge) continue;
-      const float du = edge->u_px - p.u_px, dv = edge->v_px - p.v_px;
-      const float along = std::abs(dv * p.normal_u - du * p.normal_v);
-      matches.residuals.push_back(
-          {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px,
-                                   p.normal_u, p.normal_v, p.model_mm});
+      if (scene_->options.symmetric) compared.push_back(p);
+      if (const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v)) matches.residuals.push_back(residual(p, *edge));
     }
+    if (scene_->options.symmetric) matches.of_edges = match_edges(index, compared);
     return matches;
+  }
+
+  std::vector<Residual> match_edges(std::size_t index, const std::vector<marrow::OutlinePoint>& outline) const {
+    const double reach_px = level_.reach_px + (scene_->options.estimate_offset ? kMostOffset_px : std::abs(scene_->options.edge_offset_px));
+    const float least_cosine = float(std::cos(marrow::radians(scene_->options.direction_tolerance_deg)));
+    const NearestOutline nearest(outline, scene_->views[index].camera.width_px, scene_->views[index].camera.height_px, reach_px);
+    std::vector<Residual> residuals;
+    for (const marrow::EdgePixel& edge : scene_->edges[index].all())
+      if (const int point = nearest.find(edge, reach_px, least_cosine); point >= 0) residuals.push_back(residual(outline[std::size_t(point)], edge));
+    return residuals;
+  }
+
+  static Residual residual(const marrow::OutlinePoint& p, const marrow::EdgePixel& edge) {
+    constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
+    const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px;
+    const float along = std::abs(dv * p.normal_u - du * p.normal_v);
+    return {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px, p.normal_u, p.normal_v, p.model_mm};
   }
 
   /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie
   /// inside its silhouette, and a segmented model may be too fat or too thin. The value that costs least at this pose,
   /// by iteratively reweighted means.
   double offset_of(const std::vector<Matches>& views) const {
-    constexpr double kMost_px = 3;
     constexpr int kRounds = 5;
     double offset = scene_->options.edge_offset_px;
     if (!scene_->options.estimate_offset) return offset;
-    const double low = offset - kMost_px, high = offset + kMost_px;
+    const double low = offset - kMostOffset_px, high = offset + kMostOffset_px;
     for (int round = 0; round < kRounds; ++round) {
       double sum = 0, weights = 0;
-      for (const Matches& view : views) {
-        const double of_view = 1 / std::max(double(view.points), least_points());
+      for (std::size_t i = 0; i < views.size(); ++i) {
+        const Matches& view = views[i];
+        const double of_view = weight_of(scene_->options.weights, i) / std::max(double(view.points), least_points());
         for (const Residual& r : view.residuals) {
           const double weight = of_view * loss_.weight(distance2(r, offset));
           sum += weight * double(r.along_normal);
@@ -228,45 +253,26 @@ class ContourDistance : public marrow::Cost {
 
   std::shared_ptr<const Scene> scene_;
   const marrow::CostLevel level_;
-  const Loss loss_;
+  const EdgeLoss loss_;
 };
 
-void check_inputs(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
-  if (views.size() != edges.size())
-    throw marrow::Error("there are " + std::to_string(views.size()) + " views, but edge maps of " +
-                        std::to_string(edges.size()) + "; give the edges of each view");
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
-    marrow::check_camera(views[i].camera, "view '" + views.name(i) + "'");
-    if (edges[i].pixels.empty())
-      throw marrow::Error(
-          "view '" + views.name(i) +
-          "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, "
-          "or check that the image shows the bone");
-    if (edges[i].width_px != views[i].camera.width_px || edges[i].height_px != views[i].camera.height_px)
-      throw marrow::Error("view '" + views.name(i) + "': the edge map has " +
-                          size(edges[i].width_px, edges[i].height_px) + " pixels, but the camera " +
-                          size(views[i].camera.width_px, views[i].camera.height_px) +
-                          "; give the edges of this view's own image");
-  }
-}
-
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
-                                                     const marrow::List<marrow::View>& views,
-                                                     const marrow::List<marrow::EdgeMap>& edges,
-                                                     const Options& options) {
-  check_inputs(views, edges);
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+                                                     const marrow::List<marrow::EdgeMap>& edges, const marrow::List<marrow::Pose>* others,
+                                                     const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+  marrow::similarity::check_edges(views, edges);
+  marrow::similarity::check_weights(options.weights, views.size());
+  const auto other = marrow::similarity::others_of(projector, others, other_projectors);
+  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;
   scene->options = options;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    scene->edges.emplace_back(edges[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
+    scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
     if (scene->edges.back().empty())
-      throw marrow::Error("view '" + views.name(i) + "': no edge lies inside the mask; widen the mask");
+      throw marrow::Error("view '" + views.name(i) + (other.empty() ? "': no edge lies inside the mask; widen the mask" : "': no edge lies inside the mask that is not another fragment's; widen the mask, or give a smaller others_reach_px"));
   }
-  return std::make_shared<ContourDistance>(std::move(scene),
-                                           marrow::CostLevel{options.contour_spacing_px, options.reach_px});
+  return std::make_shared<ContourDistance>(std::move(scene), marrow::CostLevel{options.contour_spacing_px, options.reach_px});
 }
 
 }  // namespace
@@ -279,6 +285,8 @@ MARROW_PLUGIN(plugin) {
       .in("projector", "draws the outline of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
+      .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
+      .in("other_projectors", "draw their outlines, and maybe this one's", marrow::over("fragment"))
       .out("cost", "mean distance [px]")
       .option("contour_spacing_px", &Options::contour_spacing_px, "distance between points of the outline",
               marrow::at_least(0.25))
@@ -294,5 +302,9 @@ MARROW_PLUGIN(plugin) {
               "find, at each pose, the edge offset common to all views that fits best")
       .option("model_error_px", &Options::model_error_px,
               "for the predicted deviation: how far model and edges may differ all along 32 px of outline",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .option("symmetric", &Options::symmetric, "half of the cost: distances from the edges near the outline back to it")
+      .option("others_reach_px", &Options::others_reach_px, "edges as near as this to another fragment's outline are its own",
+              marrow::at_least(0), marrow::at_most(50))
+      .option("weights", &Options::weights, "of each view; none: all the same");
 }

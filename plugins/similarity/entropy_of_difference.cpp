@@ -30,8 +30,9 @@ double value(const Patch& patch, int bins) {
   return n < 16 ? 1 : marrow::similarity::entropy(histogram, n) / std::log(double(bins));
 }
 
-std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
+std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
 }
 
 }  // namespace

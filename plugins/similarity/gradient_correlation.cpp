@@ -14,8 +14,9 @@ double value(const Patch& patch) {
   return 1 - 0.5 * (correlation(g.rendered_u, g.seen_u, g.counts) + correlation(g.rendered_v, g.seen_v, g.counts));
 }
 
-std::shared_ptr<const marrow::Cost> gradient_correlation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 2, value);
+std::shared_ptr<const marrow::Cost> gradient_correlation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, value);
 }
 
 }  // namespace

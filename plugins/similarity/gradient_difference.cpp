@@ -34,8 +34,9 @@ double value(const Patch& patch) {
   return 1 - 0.5 * (term(g.rendered_u, g.seen_u, g.counts, scale) + term(g.rendered_v, g.seen_v, g.counts, scale));
 }
 
-std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 1, value);
+std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, value);
 }
 
 }  // namespace

@@ -35,9 +35,9 @@ double value(const Patch& patch) {
   return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
 }
 
-std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
-                                                         const marrow::similarity::IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 1, value);
+std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const marrow::similarity::IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, value);
 }
 
 }  // namespace

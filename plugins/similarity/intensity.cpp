@@ -28,13 +28,9 @@ class IntensityCost : public Cost {
   double value(const RigidTransform& world_from_model) const override {
     std::vector<double> of_view(views_.size());
     tbb::parallel_for(std::size_t(0), views_.size(), [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    double sum = 0, weights = 0;
-    for (std::size_t i = 0; i < of_view.size(); ++i) {
-      const double weight = options_.weights.empty() ? 1 : options_.weights[i];
-      sum += weight * (std::isfinite(of_view[i]) ? of_view[i] : worst_);
-      weights += weight;
-    }
-    return sum / weights;
+    for (double& value : of_view)
+      if (!std::isfinite(value)) value = worst_;
+    return weighted_mean(of_view, options_.weights);
   }
 
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
@@ -92,21 +88,12 @@ class IntensityCost : public Cost {
 
 }  // namespace
 
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, Measure measure) {
-  if (views.size() == 0) throw Error("there is no view to compare the radiographs with");
-  for (const View& view : views) {
-    check_view(view);
-    check_camera(view.camera, "view '" + view.name + "'");
-  }
-  if (!options.weights.empty() && options.weights.size() != views.size())
-    throw Error("weights has " + std::to_string(options.weights.size()) + " numbers, but there are " + std::to_string(views.size()) + " views; give one for each");
-  double sum = 0;
-  for (const double weight : options.weights) {
-    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + std::to_string(weight));
-    sum += weight;
-  }
-  if (!options.weights.empty() && !(sum > 0)) throw Error("weights: one at least must be above 0");
-  return std::make_shared<IntensityCost>(projector, views, options, worst, std::move(measure));
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, Measure measure) {
+  check_views(views);
+  check_weights(options.weights, views.size());
+  const List<View> own = without_shadows(views, others_of(projector, others, other_projectors));
+  return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure));
 }
 
 cv::Mat line_integrals(const cv::Mat& image) {

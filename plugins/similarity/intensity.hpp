@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "inputs.hpp"
 #include "marrow/plugin.hpp"
 
 namespace marrow::similarity {
@@ -31,8 +32,10 @@ struct IntensityOptions {
 
 /// The mean of a measure over the views, by their weights. Each view is compared where the model may be seen, and margin_px
 /// around it; a view that does not show the model counts as `worst`. At a level of pixel_step, every so many pixels are
-/// compared, of images smoothed with a Gaussian of blur_px times the step. Throws Error for views that are none.
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, Measure measure);
+/// compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments do not count. Throws
+/// Error for views that are none.
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, Measure measure);
 
 /// -log of the part of the brightest that is left, in arbitrary units: bright = air. Values of 0 or less count as one step of grey.
 cv::Mat line_integrals(const cv::Mat& image);
@@ -59,7 +62,9 @@ template <class Node, class Options>
 void declare(Node& node) {
   node.in("projector", "makes radiographs of the model")
       .in("views", "views with their cameras and masks", over("view"))
-      .out("cost", "how badly radiograph and image agree")
+      .in("others", "where other fragments are, whose shadows are left out", over("fragment"))
+      .in("other_projectors", "draw them, and maybe this one", over("fragment"))
+      .out("cost", "how badly radiograph and image agree; unmoved by gain and offset of the line integrals")
       .option("pixel_step", &Options::pixel_step, "every how many pixels are compared", at_least(1), at_most(64))
       .option("margin_px", &Options::margin_px, "how far around the model the images are compared", at_least(0))
       .option("blur_px", &Options::blur_px, "smoothing, in steps: standard deviation of a Gaussian", at_least(0), at_most(10), unit("steps"))

@@ -28,8 +28,9 @@ double value(const Patch& patch, int bins) {
   return rendered > 0 && seen > 0 ? 2 - (rendered + seen) / together : 1;
 }
 
-std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
+std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
 }
 
 }  // namespace

@@ -32,6 +32,8 @@ class NearestEdges {
   }
 
   bool empty() const { return edges_.empty(); }
+  /// Those that are used, where they were moved to.
+  const std::vector<marrow::EdgePixel>& all() const { return edges_; }
 
   /// The nearest edge, or nullptr when there is none in that direction. The pixel must lie inside the image.
   const marrow::EdgePixel* find(float u, float v, float direction_u, float direction_v) const {

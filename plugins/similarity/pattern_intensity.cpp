@@ -44,8 +44,9 @@ double value(const Patch& patch, const Options& options) {
   return pairs > 0 ? 1 - total / pairs : 1;
 }
 
-std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, options, 1, [options](const Patch& patch) { return value(patch, options); });
+std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [options](const Patch& patch) { return value(patch, options); });
 }
 
 }  // namespace

@@ -32,6 +32,17 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "optimizer.unbounded": {"bounds"},
     "optimizer.fooled": {"not_a_number"},
     "optimizer.changing": {"repeated"},
+    "project.shifted": {"ball", "outline"},
+    "project.dense": {"ball"},
+    "project.narrow": {"region"},
+    "project.behind": {"out_of_view"},
+    "project.silent": {"contract"},
+    "project.coarse": {"sub_sampled"},
+    "project.everything": {"other_fragment"},
+    "project.changing": {"any_threads"},
+    "project.inward": {"outline_direction"},
+    "project.gaps": {"outline_complete"},
+    "project.slanted": {"outline_direction"},
     "segment.fat": {"wall_bias"},
     "segment.swapped": {"dice"},
     "segment.merged": {"overlap"},
@@ -42,6 +53,16 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
     "shaft.swapped": {"contract"},
     "shaft.sure": {"width"},
     "shaft.crashing": {"empty_map", "one_pixel"},
+    "similarity.shifted": {"minimum"},
+    "similarity.careless": {"contract"},
+    "similarity.moved": {"gain"},
+    "similarity.changing": {"any_threads"},
+    "similarity.unordered": {"contract"},
+    "similarity.unmasked": {"mask"},
+    "similarity.flat": {"six_axes", "truth"},
+    "similarity.levels": {"coarse_level"},
+    "similarity.steep": {"slope"},
+    "similarity.alone": {"beside_another"},
 }
 
 
@@ -82,7 +103,7 @@ class Conformance(unittest.TestCase):
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
-        for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "segment.plain", "shaft.plain"):
+        for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "project.plain", "segment.plain", "shaft.plain", "similarity.plain"):
             result, nodes = conformance(node, seconds=60)
             self.assertEqual(result.returncode, 0, result.stdout)
 

@@ -8,5 +8,5 @@ std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector
                                               const marrow::List<marrow::EdgeMap>& edges) {
   Options options;
   options.model_error_px = 0;  // ideal edges have none
-  return contour_distance(projector, views, edges, options);
+  return contour_distance(projector, views, edges, nullptr, nullptr, options);
 }

@@ -59,6 +59,12 @@ Options fixed_offset(double offset_px = 0) {
 
 const LineProjector kLine;
 
+/// Of one fragment alone.
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+                                                     const marrow::List<marrow::EdgeMap>& edges, const Options& options) {
+  return contour_distance(projector, views, edges, nullptr, nullptr, options);
+}
+
 std::string message(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
   try {
     contour_distance(kLine, views, edges, Options{});

@@ -106,7 +106,8 @@ Value Subject::output(const Inputs& inputs, const std::string& port) const {
 }
 
 const Suite* suite_of(const std::string& kind) {
-  static const std::vector<Suite> kSuites{camera_suite(), edges_suite(), mesh_suite(), optimizer_suite(), segment_suite(), shaft_suite()};
+  static const std::vector<Suite> kSuites{camera_suite(), edges_suite(), mesh_suite(), optimizer_suite(),
+                                         project_suite(), segment_suite(), shaft_suite(), similarity_suite()};
   for (const Suite& suite : kSuites)
     if (suite.kind == kind) return &suite;
   return nullptr;

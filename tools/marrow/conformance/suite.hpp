@@ -97,7 +97,9 @@ Suite camera_suite();
 Suite edges_suite();
 Suite mesh_suite();
 Suite optimizer_suite();
+Suite project_suite();
 Suite segment_suite();
 Suite shaft_suite();
+Suite similarity_suite();
 
 }  // namespace marrow::conformance

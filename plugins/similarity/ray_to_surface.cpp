@@ -1,0 +1,276 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): where the pose is right, the ray from the source through
+// an edge of the image touches the surface, so the signed distance has a minimum of 0 along it (their section 3). Needs no outline.
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "inputs.hpp"
+
+namespace {
+
+struct Options {
+  double reach_mm = 4;
+  double direction_tolerance_deg = 40;
+  double edge_offset_mm = 0;
+  int ray_step = 2;
+  std::vector<double> weights;
+};
+
+/// A signed distance where it matters: in the box of all voxels nearer than its largest value.
+class Distance {
+ public:
+  explicit Distance(const marrow::SignedField& field) : field_(field) {
+    for (const float value : field.values_mm) most_ = std::max(most_, value);
+    std::array<int, 3> last{-1, -1, -1};
+    first_ = field.grid.size;
+    for (int z = 0; z < field.grid.size[2]; ++z)
+      for (int y = 0; y < field.grid.size[1]; ++y)
+        for (int x = 0; x < field.grid.size[0]; ++x) {
+          if (field.at(x, y, z) >= most_) continue;
+          const std::array<int, 3> at{x, y, z};
+          for (std::size_t k = 0; k < 3; ++k) first_[k] = std::min(first_[k], at[k]), last[k] = std::max(last[k], at[k]);
+        }
+    for (std::size_t k = 0; k < 3; ++k) {
+      low_[int(k)] = std::max(0, first_[k] - 1);
+      high_[int(k)] = std::min(field.grid.size[k] - 1, last[k] + 1) - 1e-6;
+    }
+  }
+
+  float most_mm() const { return most_; }
+  const marrow::Grid& grid() const { return field_.grid; }
+
+  /// Part of the line inside the box, in units of the direction and in front of its start; empty where from >= to.
+  std::pair<double, double> span(const Eigen::Vector3d& start, const Eigen::Vector3d& direction) const {
+    double from = 0, to = 1e30;
+    for (int k = 0; k < 3; ++k) {
+      if (std::abs(direction[k]) < 1e-12) {
+        if (start[k] < low_[k] || start[k] > high_[k]) return {0, 0};
+        continue;
+      }
+      const double a = (low_[k] - start[k]) / direction[k], b = (high_[k] - start[k]) / direction[k];
+      from = std::max(from, std::min(a, b));
+      to = std::min(to, std::max(a, b));
+    }
+    return {from, to};
+  }
+
+  /// Trilinear, at an index inside the box.
+  float at(const Eigen::Vector3d& index) const {
+    const int x = int(index.x()), y = int(index.y()), z = int(index.z());
+    const float u = float(index.x() - x), v = float(index.y() - y), w = float(index.z() - z);
+    const std::size_t down = std::size_t(field_.grid.size[0]), back = down * std::size_t(field_.grid.size[1]);
+    const float* p = field_.values_mm.data() + field_.grid.offset(x, y, z);
+    const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
+    const float near = mix(mix(p[0], p[1], u), mix(p[down], p[down + 1], u), v);
+    const float far = mix(mix(p[back], p[back + 1], u), mix(p[back + down], p[back + down + 1], u), v);
+    return mix(near, far, w);
+  }
+
+  /// The gradient over a voxel to each side, in the model's frame: without the steps of a trilinear one from cell to cell.
+  Eigen::Vector3d gradient(const Eigen::Vector3d& index) const {
+    Eigen::Vector3d slope;
+    for (int k = 0; k < 3; ++k) {
+      Eigen::Vector3d low = index, high = index;
+      low[k] = std::max(low_[k], index[k] - 1);
+      high[k] = std::min(high_[k], index[k] + 1);
+      slope[k] = double(at(high) - at(low)) / (std::max(high[k] - low[k], 1e-9) * field_.grid.spacing_mm[k]);
+    }
+    return field_.grid.direction * slope;
+  }
+
+ private:
+  const marrow::SignedField& field_;
+  float most_ = 0;
+  std::array<int, 3> first_;
+  Eigen::Vector3d low_, high_;
+};
+
+/// An edge pixel's ray in the camera's frame, and the image's direction there.
+struct Ray {
+  Eigen::Vector3d direction;
+  Eigen::Vector2d towards_brighter;
+};
+
+/// Tukey's biweight: d^2 / 2 near 0, a constant from the reach on (Huber 1981, 4.8).
+struct Loss {
+  double reach;
+  double worst() const { return reach * reach / 6; }
+  double operator()(double d) const { return worst() * (1 - std::pow(1 - share(d), 3)); }
+  /// Derivative by the distance, divided by it.
+  double weight(double d) const { return std::pow(1 - share(d), 2); }
+  double share(double d) const { return std::min(1.0, d * d / (reach * reach)); }
+};
+
+/// What one ray tells of a pose.
+struct Touch {
+  double distance_mm = 0;
+  double like = 0;               ///< from 0 to 1: how well the edge's direction suits the surface there
+  Eigen::Vector3d point, normal; ///< in the model's frame
+};
+
+class RayToSurface : public marrow::Cost {
+ public:
+  struct Scene {
+    marrow::List<marrow::View> views;
+    std::vector<std::vector<Ray>> rays;
+    Distance distance;
+    Options options;
+  };
+  RayToSurface(std::shared_ptr<const Scene> scene, int step, double reach_mm)
+      : scene_(std::move(scene)), step_(std::size_t(step)), loss_{std::min(reach_mm, double(scene_->distance.most_mm()))} {}
+
+  double value(const marrow::RigidTransform& world_from_model) const override {
+    std::vector<double> of_view;
+    for (std::size_t i = 0; i < scene_->views.size(); ++i) {
+      double sum = 0;
+      const auto touches = touches_of(i, world_from_model);
+      for (const auto& touch : touches) sum += touch ? touch->like * (loss_(touch->distance_mm) - loss_.worst()) : 0;
+      of_view.push_back(loss_.worst() + (touches.empty() ? 0 : sum / double(touches.size())));
+    }
+    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+  }
+
+  /// Where the least distance along a ray changes, the point where it lies need not be followed: its own motion along the ray
+  /// changes nothing to first order. How the direction's fit changes with the pose is left out.
+  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model, const marrow::FragmentFrame& frame) const override {
+    Expansion about;
+    double weights = 0;
+    for (std::size_t i = 0; i < scene_->views.size(); ++i) weights += marrow::similarity::weight_of(scene_->options.weights, i);
+    for (std::size_t i = 0; i < scene_->views.size(); ++i) {
+      const auto touches = touches_of(i, world_from_model);
+      const double share = marrow::similarity::weight_of(scene_->options.weights, i) / weights;
+      about.value += share * loss_.worst();
+      for (const auto& touch : touches) {
+        if (!touch) continue;
+        const double one = share / double(touches.size()) * touch->like;
+        // A small motion of the model by (r, t) moves the ray against it by -(r x (p - o) + t), in the fragment's axes.
+        const Eigen::Vector3d normal = frame.axes.transpose() * touch->normal, arm = frame.axes.transpose() * (touch->point - frame.origin_mm);
+        marrow::Vector6d slope;
+        slope << -arm.cross(normal), -normal;
+        const double weight = loss_.weight(touch->distance_mm);
+        about.value += one * (loss_(touch->distance_mm) - loss_.worst());
+        about.gradient += one * weight * touch->distance_mm * slope;
+        about.curvature += one * weight * slope * slope.transpose();
+      }
+    }
+    return about;
+  }
+
+  /// Every so many edge pixels as the outline's points would be apart; the reach in mm at the isocentre.
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+    const marrow::Camera& camera = scene_->views[0].camera;
+    const Eigen::Vector3d isocentre = Eigen::Vector3d::Zero();
+    const bool is_seen = (camera.camera_from_world * isocentre).z() > 0;
+    const double reach_mm = is_seen ? level.reach_px * pixel_size_at_mm(camera, isocentre) : scene_->options.reach_mm;
+    return std::make_shared<RayToSurface>(scene_, std::max(1, int(std::lround(level.contour_spacing_px))), reach_mm);
+  }
+
+ private:
+  std::vector<std::optional<Touch>> touches_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+    const std::vector<Ray>& rays = scene_->rays[view];
+    std::vector<std::optional<Touch>> touches((rays.size() + step_ - 1) / step_);
+    const marrow::RigidTransform model_from_camera = inverse(world_from_model) * inverse(scene_->views[view].camera.camera_from_world);
+    const Eigen::Matrix3d line_from_normal = scene_->views[view].camera.intrinsics.inverse().transpose() * model_from_camera.rotation.transpose();
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, touches.size(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
+      for (std::size_t i = range.begin(); i < range.end(); ++i) touches[i] = touch_of(rays[i * step_], model_from_camera, line_from_normal);
+    });
+    return touches;
+  }
+
+  /// Of all places where the distance along the ray is least around, the one that explains the edge best: X-rays show a bone's inner
+  /// outlines as well, where rays touch it that run through it elsewhere. Nothing where the ray passes too far off.
+  std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera, const Eigen::Matrix3d& line_from_normal) const {
+    const Distance& distance = scene_->distance;
+    const marrow::Grid& grid = distance.grid();
+    const Eigen::Vector3d start = grid.index_from_point(model_from_camera.translation_mm);
+    const Eigen::Vector3d along = model_from_camera.rotation * ray.direction;  // 1 mm long
+    const Eigen::Vector3d direction = (grid.direction.transpose() * along).cwiseQuotient(grid.spacing_mm);
+    const auto [from, to] = distance.span(start, direction);
+    const double finest_mm = 0.5 * grid.spacing_mm.minCoeff(), offset = scene_->options.edge_offset_mm;
+    std::optional<Touch> best;
+    double least = loss_.worst(), before = 1e30, here = 1e30, at = from;
+    // A distance changes by no more than 1 mm per mm, so nothing within reach is passed over.
+    for (double t = from; t < to;) {
+      const double after = distance.at(start + t * direction);
+      if (here < before && here <= after && std::abs(here - offset) < loss_.reach) {
+        const Touch touch = touch_at(ray, start, direction, std::clamp(at + vertex(before, here, after) * finest_mm, from, to - 1e-9), line_from_normal);
+        if (const double cost = loss_.worst() + touch.like * (loss_(touch.distance_mm) - loss_.worst()); cost < least) least = cost, best = touch;
+      }
+      before = here, here = after, at = t;
+      t += std::max(finest_mm, std::abs(after - offset) - loss_.reach);
+    }
+    return best;
+  }
+
+  Touch touch_at(const Ray& ray, const Eigen::Vector3d& start, const Eigen::Vector3d& direction, double at, const Eigen::Matrix3d& line_from_normal) const {
+    const Eigen::Vector3d index = start + at * direction;
+    Touch touch;
+    touch.distance_mm = double(scene_->distance.at(index)) - scene_->options.edge_offset_mm;
+    touch.point = scene_->distance.grid().point_from_index(index);
+    touch.normal = scene_->distance.gradient(index);
+    touch.like = likeness(line_from_normal * touch.normal, ray);
+    return touch;
+  }
+
+  /// Where the parabola through three distances is lowest, in steps from the middle one.
+  static double vertex(double before, double here, double after) {
+    const double bend = before - 2 * here + after;
+    return bend > 1e-9 && bend < 1e9 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0;
+  }
+
+  /// 1 where the surface's normal, as the image shows it, points to the edge's brighter side; 0 from the tolerance on.
+  double likeness(const Eigen::Vector3d& line, const Ray& ray) const {
+    const double length = line.head<2>().norm();
+    if (!(length > 0)) return 0;
+    const double least = std::cos(marrow::radians(scene_->options.direction_tolerance_deg));
+    const double share = std::clamp((line.head<2>().dot(ray.towards_brighter) / length - least) / (0.5 * (1 - least)), 0.0, 1.0);
+    return share * share * (3 - 2 * share);
+  }
+
+  std::shared_ptr<const Scene> scene_;
+  const std::size_t step_;
+  const Loss loss_;
+};
+
+std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges) {
+  const Eigen::Matrix3d ray_from_pixel = view.camera.intrinsics.inverse();
+  std::vector<Ray> rays;
+  for (const marrow::EdgePixel& edge : edges.pixels) {
+    const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
+    const bool is_inside = u >= 0 && v >= 0 && u < edges.width_px && v < edges.height_px;
+    if (!is_inside || (!view.mask.empty() && !view.mask.at<std::uint8_t>(v, u))) continue;
+    rays.push_back({(ray_from_pixel * Eigen::Vector3d(edge.u_px, edge.v_px, 1)).normalized(), {edge.direction_u, edge.direction_v}});
+  }
+  return rays;
+}
+
+std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field, const marrow::List<marrow::View>& views,
+                                                   const marrow::List<marrow::EdgeMap>& edges, const Options& options) {
+  marrow::similarity::check_edges(views, edges);
+  marrow::similarity::check_weights(options.weights, views.size());
+  if (field.values_mm.size() != field.grid.count() || *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
+    throw marrow::Error("the field is empty or broken: it needs 2 x 2 x 2 voxels at least and a value for each; wire that of a segmented fragment");
+  if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0) throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
+  auto scene = std::make_shared<RayToSurface::Scene>(RayToSurface::Scene{views, {}, Distance(field), options});
+  for (std::size_t i = 0; i < views.size(); ++i) scene->rays.push_back(rays_of(views[i], edges[i]));
+  return std::make_shared<RayToSurface>(std::move(scene), options.ray_step, options.reach_mm);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("similarity.ray_to_surface", ray_to_surface)
+      .summary("How far the rays through the images' edges pass the surface (Lavallee and Szeliski, IEEE PAMI 1995), with derivatives")
+      .in("field", "signed distance to the surface")
+      .in("views", "views with their cameras and masks", marrow::over("view"))
+      .in("edges", "edge pixels of each view", marrow::over("view"))
+      .out("cost", "mean of Tukey's biweight of the distances [mm^2]")
+      .option("reach_mm", &Options::reach_mm, "rays further off belong to something else; no more than the field's largest value", marrow::at_least(0.1))
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg, "by how much the directions of edge and surface may differ",
+              marrow::at_least(10), marrow::at_most(180))
+      .option("edge_offset_mm", &Options::edge_offset_mm, "how far edges lie outside the surface; below 0: inside")
+      .option("ray_step", &Options::ray_step, "every how many edge pixels are used", marrow::at_least(1), marrow::at_most(100))
+      .option("weights", &Options::weights, "of each view; none: all the same");
+}

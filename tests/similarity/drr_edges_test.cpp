@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <cmath>
+#include <marrow/domain/features.hpp>
+
+#include "intensity_behaviour.hpp"
+#include "shipped.hpp"
+
+namespace {
+
+using intensity_behaviour::at;
+using marrow::Projector;
+
+constexpr double kWidth_px = 2.5;
+
+/// An upright wall at u = 100 + x that the ray crosses to the right of it, blurred by an error function.
+class WallProjector : public Projector {
+ public:
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose, const marrow::PixelGrid& grid) const override {
+    std::vector<float> values;
+    for (int row = 0; row < grid.rows; ++row)
+      for (int column = 0; column < grid.columns; ++column)
+        values.push_back(float(20 + 20 * std::erf((grid.pixel(column, row).x() - 100 - pose.translation_mm.x()) / (std::sqrt(2.0) * kWidth_px))));
+    return values;
+  }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform& pose) const override {
+    return std::abs(pose.translation_mm.x()) < 60 ? marrow::PixelGrid{60, 20, 1, 80, 130} : marrow::PixelGrid{};
+  }
+};
+
+/// Edges at u, facing left as the wall's do: left of it the image is brighter.
+shipped::Inputs inputs(double u, float direction = -1) {
+  marrow::EdgeMap map{200, 170, {}};
+  for (int v = 0; v < 170; ++v) map.pixels.push_back({float(u), float(v), direction, 0, 1});
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  return {{"projector", marrow::Value::of<Projector>(std::make_shared<const WallProjector>())},
+          {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+          {"edges", shipped::list(edges, "view")}};
+}
+
+double value(const shipped::Inputs& inputs, const marrow::RigidTransform& pose, std::int64_t step = 1) {
+  const marrow::Value cost = shipped::call("similarity.drr_edges", inputs, {{"pixel_step", step}, {"reach_px", 10.0}}).at("cost");
+  return cost.as<marrow::Cost>().value(pose);
+}
+
+double loss(double distance) { return std::sqrt(1 + distance * distance) - 1; }
+
+}  // namespace
+
+TEST(DrrEdges, FindsTheRadiographsEdgesBetweenPixels) {
+  for (const std::int64_t step : {1, 2, 3})
+    for (const double x : {-4.0, -1.3, 0.0, 0.45, 2.0}) EXPECT_NEAR(value(inputs(100.4), at(x, 0), step), loss(x - 0.4), 0.05) << step << " " << x;
+}
+
+TEST(DrrEdges, WhatDoesNotMatchIsTheWorst) {
+  EXPECT_NEAR(value(inputs(130), at(0, 0)), loss(10), 1e-9) << "beyond the reach";
+  EXPECT_NEAR(value(inputs(100, 1), at(0, 0)), loss(10), 1e-9) << "edges of the other direction";
+  EXPECT_NEAR(value(inputs(100), at(80, 0)), loss(10), 1e-9) << "out of view";
+}
+
+TEST(DrrEdges, Levels) {
+  const shipped::Inputs in = inputs(100);
+  const marrow::Value cost = shipped::call("similarity.drr_edges", in).at("cost");
+  const auto coarse = cost.as<marrow::Cost>().at_level({4, 20, 4});
+  EXPECT_NEAR(coarse->value(at(80, 0)), loss(20), 1e-9);
+  EXPECT_LT(coarse->value(at(0, 0)), 0.1);
+  EXPECT_NEAR(coarse->value(at(12, 0)), loss(12), 0.5);
+}

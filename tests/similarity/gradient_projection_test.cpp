@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "project/shapes.hpp"
+#include "shipped.hpp"
+
+namespace {
+
+using marrow::RigidTransform;
+
+constexpr double kRadius_mm = 18;
+const Eigen::Vector3d kMiddle_mm(0, 0, kRadius_mm);
+
+marrow::Volume ball() {
+  marrow::Volume volume;
+  volume.grid.size = {60, 60, 60};
+  volume.grid.origin_mm = kMiddle_mm - Eigen::Vector3d::Constant(29.5);
+  for (int z = 0; z < 60; ++z)
+    for (int y = 0; y < 60; ++y)
+      for (int x = 0; x < 60; ++x) {
+        const double depth = kRadius_mm - (volume.grid.point_from_index({double(x), double(y), double(z)}) - kMiddle_mm).norm();
+        volume.values.push_back(float(800 * std::clamp(depth + 0.5, 0.0, 1.0)));
+      }
+  return volume;
+}
+
+/// The ball as a view shows it: chords, in an image of 16 bits.
+marrow::View view_of(double angle) {
+  marrow::View view{angle > 0 ? "lateral" : "frontal", {}, shapes::c_arm(angle, 256), {}};
+  view.image.pixels = cv::Mat(256, 256, CV_16U);
+  const Eigen::Vector3d source = marrow::source_position_mm(view.camera);
+  for (int v = 0; v < 256; ++v)
+    for (int u = 0; u < 256; ++u) {
+      const double passed = source.cross(marrow::ray_direction(view.camera, Eigen::Vector2d(u, v))).norm();
+      const double chord = passed < kRadius_mm ? 2 * std::sqrt(kRadius_mm * kRadius_mm - passed * passed) : 0;
+      view.image.pixels.at<std::uint16_t>(v, u) = std::uint16_t(40000 * std::exp(-0.02 * chord));
+    }
+  return view;
+}
+
+shipped::Inputs inputs() {
+  marrow::List<marrow::View> views;
+  for (const double angle : {0.0, 90.0}) views.add(angle > 0 ? "lateral" : "frontal", view_of(angle));
+  return {{"mesh", shipped::item(shapes::sphere(kRadius_mm))}, {"volume", shipped::item(ball())}, {"views", shipped::list(views, "view")}};
+}
+
+RigidTransform shifted(double x, double y, double z) { return shapes::centred_at(kMiddle_mm - Eigen::Vector3d(x, y, z)); }
+
+}  // namespace
+
+TEST(GradientProjection, IsBestAtTheTruth) {
+  const shipped::Inputs in = inputs();
+  const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
+  const auto value = [&](double x, double y, double z) { return made.as<marrow::Cost>().value(shifted(x, y, z)); };
+  const double best = value(0, 0, 0);
+  EXPECT_LT(best, 0.4);
+  for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)})
+    for (const double side : {-1.0, 1.0}) {
+      const auto at = [&](double by) { const Eigen::Vector3d p = side * by * axis; return value(p.x(), p.y(), p.z()); };
+      EXPECT_GT(at(1), best);
+      EXPECT_GT(at(3), at(1));
+      EXPECT_GT(at(6), at(3));
+    }
+  EXPECT_NEAR(value(0, 0, 500), 1, 1e-12) << "out of view";
+  EXPECT_NEAR(value(0, -900, 0), 1, 0.2) << "behind one of two sources";
+}
+
+TEST(GradientProjection, DirectionsCount) {
+  // A bright ball: all gradients point the other way.
+  shipped::Inputs in = inputs();
+  marrow::List<marrow::View> views;
+  for (const double angle : {0.0, 90.0}) {
+    marrow::View view = view_of(angle);
+    view.image.pixels = 60000 - view.image.pixels;
+    views.add(view.name, view);
+  }
+  in["views"] = shipped::list(views, "view");
+  const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
+  EXPECT_NEAR(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1, 1e-6);
+}
+
+TEST(GradientProjection, AnEvenImageIsTheWorst) {
+  shipped::Inputs in = inputs();
+  marrow::View view = view_of(0);
+  view.image.pixels = cv::Mat(256, 256, CV_16U, cv::Scalar(20000));
+  marrow::List<marrow::View> views;
+  views.add("frontal", view);
+  in["views"] = shipped::list(views, "view");
+  const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
+  EXPECT_EQ(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1);
+}
+
+TEST(GradientProjection, SaysWhatIsWrong) {
+  shipped::Inputs in = inputs();
+  marrow::Volume even = ball();
+  even.values.assign(even.values.size(), 100);
+  in["volume"] = shipped::item(even);
+  EXPECT_EQ(shipped::refusal("similarity.gradient_projection", in), "the volume has no gradient on the mesh: wire the volume that the mesh was made from");
+}

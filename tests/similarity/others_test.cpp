@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Other fragments in the same images: their shadows and their edges are left out.
+#include <marrow/domain/features.hpp>
+
+#include "intensity_behaviour.hpp"
+#include "shipped.hpp"
+
+namespace {
+
+using intensity_behaviour::at;
+using marrow::Cost;
+using marrow::List;
+using marrow::Pose;
+using marrow::Projector;
+
+/// Lists of fragments: the one in question, and another at a place of its own.
+struct Fragments {
+  std::shared_ptr<const Projector> own, other;
+  shipped::Inputs with(shipped::Inputs inputs) const {
+    List<Projector> projectors;
+    List<Pose> poses;
+    projectors.add_shared("own", own);
+    projectors.add_shared("other", other);
+    poses.add("other", Pose());  // of its own pose there is none yet
+    inputs["projector"] = marrow::Value::of<Projector>(own);
+    inputs["other_projectors"] = shipped::list(projectors, "fragment");
+    inputs["others"] = shipped::list(poses, "fragment");
+    return inputs;
+  }
+};
+
+/// A square of shadow, wherever the pose is.
+class SquareProjector : public Projector {
+ public:
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&, const marrow::PixelGrid& grid) const override {
+    std::vector<float> values;
+    for (int row = 0; row < grid.rows; ++row)
+      for (int column = 0; column < grid.columns; ++column) {
+        const Eigen::Vector2d p = grid.pixel(column, row);
+        values.push_back(p.x() >= 100 && p.x() < 130 && p.y() >= 60 && p.y() < 90 ? 10.0f : 0.0f);
+      }
+    return values;
+  }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {95, 55, 1, 40, 40}; }
+};
+
+/// The same square as an outline, open below.
+class SquareOutline : public Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&, double spacing_px) const override {
+    std::vector<marrow::OutlinePoint> points;
+    for (double at = 0; at < 30; at += spacing_px) {
+      points.push_back({100, float(60 + at), -1, 0, {}});
+      points.push_back({129, float(60 + at), 1, 0, {}});
+      points.push_back({float(100 + at), 60, 0, -1, {}});
+    }
+    return points;
+  }
+};
+
+/// An upright line at u = 60 + x, facing left.
+class LineProjector : public Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose, double spacing_px) const override {
+    std::vector<marrow::OutlinePoint> points;
+    for (double v = 20; v < 140; v += spacing_px) points.push_back({float(60 + pose.translation_mm.x()), float(v), -1, 0, {}});
+    return points;
+  }
+};
+
+/// The image with the square in other grey values, as another fragment makes them.
+marrow::View view_with(double grey) {
+  marrow::View view = intensity_behaviour::view_of(50000, 0.02, 0);
+  view.image.pixels = view.image.pixels.clone();
+  view.image.pixels(cv::Rect(100, 60, 30, 30)).setTo(grey);
+  return view;
+}
+
+double value(const std::string& node, const shipped::Inputs& inputs, const marrow::RigidTransform& pose, const shipped::Options& options) {
+  const marrow::Value cost = shipped::call(node, inputs, options).at("cost");
+  return cost.as<Cost>().value(pose);
+}
+
+}  // namespace
+
+TEST(Others, TheirShadowsDoNotCount) {
+  const shipped::Options options{{"blur_px", 0.0}};
+  const auto own = std::make_shared<const intensity_behaviour::BlobProjector>();
+  for (const std::shared_ptr<const Projector>& other : {std::shared_ptr<const Projector>(new SquareProjector), std::shared_ptr<const Projector>(new SquareOutline)}) {
+    const Fragments fragments{own, other};
+    const auto with = [&](double grey) { return fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}}); };
+    EXPECT_NEAR(value("similarity.normalised_cross_correlation", with(9000), at(2, 1), options), value("similarity.normalised_cross_correlation", with(40000), at(2, 1), options), 1e-6);
+    shipped::Inputs alone = with(9000);
+    alone.erase("others");
+    alone.erase("other_projectors");
+    EXPECT_GT(value("similarity.normalised_cross_correlation", alone, at(0, 0), options), value("similarity.normalised_cross_correlation", with(9000), at(0, 0), options) + 0.05);
+  }
+}
+
+TEST(Others, TheirEdgesDoNotCount) {
+  // Edges of the own line at 64, and of the other fragment's left border at 100, which is nearer to a line at 90.
+  marrow::EdgeMap map{200, 170, {}};
+  for (int v = 10; v < 160; ++v) {
+    map.pixels.push_back({64, float(v), -1, 0, 1});
+    if (v >= 60 && v < 90) map.pixels.push_back({101, float(v), -1, 0, 1});
+  }
+  List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  const Fragments fragments{std::make_shared<const LineProjector>(), std::make_shared<const SquareOutline>()};
+  shipped::Inputs inputs = fragments.with({{"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")}, {"edges", shipped::list(edges, "view")}});
+  shipped::Options options{{"reach_px", 20.0}, {"estimate_offset", false}};
+  const std::string node = "similarity.contour_distance";
+  const double worst = value(node, inputs, at(500, 0), options), left_out = value(node, inputs, at(38, 0), options);
+  EXPECT_NEAR(left_out, worst, 1e-9) << "near the other fragment's edge alone";
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0, 1e-5);
+  options["others_reach_px"] = 0.5;  // the edge lies 1 px off
+  EXPECT_LT(value(node, inputs, at(38, 0), options), worst - 1);
+  inputs.erase("others");
+  EXPECT_EQ(shipped::refusal(node, inputs), "there are projectors of other fragments, but no poses; wire 'others'");
+}
+
+TEST(Others, BothWaysAndWeights) {
+  // Half of the edges lie 3 px off: seen from the outline every point has an edge at 0, seen from the edges half are off.
+  marrow::EdgeMap map{200, 170, {}};
+  for (int v = 20; v < 140; ++v) {
+    if (v % 2) map.pixels.push_back({64, float(v), -1, 0, 1});
+  }
+  List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  shipped::Inputs inputs{{"projector", marrow::Value::of<Projector>(std::make_shared<const LineProjector>())},
+                         {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+                         {"edges", shipped::list(edges, "view")}};
+  shipped::Options options{{"reach_px", 6.0}, {"estimate_offset", false}, {"contour_spacing_px", 1.0}};
+  const std::string node = "similarity.contour_distance";
+  const double worst = std::sqrt(37.0) - 1;
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0, 1e-5);
+  options["symmetric"] = true;
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0.5 * 0.5 * worst, 0.02) << "there is only half of the edges that the outline would make";
+  EXPECT_NEAR(value(node, inputs, at(500, 0), options), worst, 1e-6);
+
+  // A second view without the line: weighted away.
+  marrow::EdgeMap none = map;
+  for (auto& edge : none.pixels) edge.u_px = 150;
+  List<marrow::View> views = intensity_behaviour::views_of(intensity_behaviour::view_of());
+  views.add("lateral", intensity_behaviour::view_of());
+  edges.add("lateral", none);
+  inputs["views"] = shipped::list(views, "view");
+  inputs["edges"] = shipped::list(edges, "view");
+  options["symmetric"] = false;
+  options["weights"] = std::vector<double>{1, 0};
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0, 1e-5);
+  options["weights"] = std::vector<double>{3, 1};
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0.25 * worst, 1e-5);
+  options["weights"] = std::vector<double>{1};
+  EXPECT_EQ(shipped::refusal(node, inputs, options), "weights has 1 numbers, but there are 2 views; give one for each");
+}
