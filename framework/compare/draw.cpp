@@ -42,6 +42,7 @@ std::vector<Start> draw_starts(const StartProtocol& protocol) {
   for (std::size_t i = 0; i < protocol.count; ++i) {
     Start start{std::to_string(i), draw_vector(random, protocol.rotation_deg), {}};
     start.translation_mm = draw_vector(random, protocol.translation_mm);
+    if (protocol.distance_mm > 0) start.distance_mm = protocol.distance_mm * random.uniform();
     starts.push_back(std::move(start));
   }
   return starts;

@@ -46,6 +46,7 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
   const Start& start = experiment.starts[cell.start];
   arguments.overrides.push_back({protocol.node + ".rotation_deg", list_text(start.rotation_deg), protocol.place});
   arguments.overrides.push_back({protocol.node + ".translation_mm", list_text(start.translation_mm), protocol.place});
+  if (protocol.distance_mm > 0) arguments.overrides.push_back({protocol.node + ".distance_mm", number_text(start.distance_mm), protocol.place});
   return arguments;
 }
 

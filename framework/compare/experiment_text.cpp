@@ -157,7 +157,7 @@ class Reader {
   }
 
   void read_starts(const YamlEntry& section) {
-    static const std::vector<std::string> kKeys{"node", "count", "seed", "rotation_deg", "translation_mm"};
+    static const std::vector<std::string> kKeys{"node", "count", "seed", "rotation_deg", "translation_mm", "distance_mm"};
     StartProtocol protocol;
     protocol.place = section.place;
     bool has_node = false, has_count = false;
@@ -169,6 +169,7 @@ class Reader {
       if (entry.key == "seed") protocol.seed = count_of(yaml_, entry, 0, std::int64_t(1) << 62);
       if (entry.key == "rotation_deg") protocol.rotation_deg = limit_of(yaml_, entry, 180);
       if (entry.key == "translation_mm") protocol.translation_mm = limit_of(yaml_, entry, 1000);
+      if (entry.key == "distance_mm") protocol.distance_mm = limit_of(yaml_, entry, 1000);
     }
     if (!section.value.IsMap()) return;
     if (!has_node) yaml_.fault(section.place, "'starts' does not say which node is displaced", "add  node: start");

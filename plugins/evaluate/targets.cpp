@@ -8,12 +8,12 @@
 
 namespace marrow::evaluate {
 
-void check_poses(const RigidTransform& pose, const RigidTransform& truth) {
+void check_poses(const RigidTransform& pose, const RigidTransform& truth, const std::string& other) {
   check_rigid(pose, "pose");
-  check_rigid(truth, "truth");
+  check_rigid(truth, other);
   const auto name = [](const RigidTransform& t) { return t.target + "_from_" + t.source; };
   if (pose.target != truth.target || pose.source != truth.source)
-    throw Error("the pose is " + name(pose) + ", but the truth is " + name(truth) +
+    throw Error("the pose is " + name(pose) + ", but the " + other + " is " + name(truth) +
                 "; compare poses between the same two frames");
 }
 

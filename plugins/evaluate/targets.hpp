@@ -8,8 +8,8 @@
 
 namespace marrow::evaluate {
 
-/// Throws Error unless both are rigid and between the same two frames.
-void check_poses(const RigidTransform& pose, const RigidTransform& truth);
+/// Throws Error unless both are rigid and between the same two frames; `other` is what it calls the second.
+void check_poses(const RigidTransform& pose, const RigidTransform& truth, const std::string& other = "truth");
 
 /// Throws Error unless the model is in the frame that the pose takes points in.
 void check_model(const RigidTransform& pose, const Mesh& model);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A start given by hand: the nominal placement, moved about and along the fragment's own axes.
+#include <cmath>
 #include <marrow/plugin.hpp>
 
 namespace {
@@ -7,7 +8,28 @@ namespace {
 struct Options {
   std::array<double, 3> rotation_deg{0, 0, 0};
   std::array<double, 3> translation_mm{0, 0, 0};
+  double distance_mm = 0;
 };
+
+/// How far the surface's points are moved on average.
+double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidTransform& to, const std::vector<Eigen::Vector3d>& points_mm) {
+  double sum = 0;
+  for (const Eigen::Vector3d& point : points_mm) sum += (to * point - from * point).norm();
+  return sum / double(points_mm.size());
+}
+
+/// The part or multiple of a motion that moves the surface by a distance, by halving: the distance grows with the motion up to half a turn.
+marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose, const marrow::Mesh& model, double distance_mm) {
+  const std::vector<Eigen::Vector3d> points_mm = marrow::sample_surface(model, 500);
+  const auto distance_at = [&](double scale) {
+    return mean_distance_mm(pose.world_from_model, marrow::moved(pose.world_from_model, pose.frame, scale * motion), points_mm);
+  };
+  double low = 0, high = motion.head<3>().norm() > 0 ? marrow::kPi / motion.head<3>().norm() : 2 * distance_mm / motion.tail<3>().norm();
+  if (!std::isfinite(high) || distance_at(high) < distance_mm)
+    throw marrow::Error("distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a rotation or translation, or a shorter distance");
+  for (int i = 0; i < 60; ++i) (distance_at(0.5 * (low + high)) < distance_mm ? low : high) = 0.5 * (low + high);
+  return high * motion;
+}
 
 marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const Options& options) {
   marrow::check_mesh(model, "model");
@@ -23,6 +45,7 @@ marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const 
     motion(i) = marrow::radians(options.rotation_deg[i]);
     motion(3 + i) = options.translation_mm[i];
   }
+  if (options.distance_mm > 0) motion = scaled(motion, pose, model, options.distance_mm);
   pose.world_from_model = marrow::moved(pose.world_from_model, pose.frame, motion);
   return pose;
 }
@@ -36,5 +59,7 @@ MARROW_PLUGIN(plugin) {
       .in("start", "nominal placement; without one the CT's coordinates are the world's")
       .out("pose", "the moved placement")
       .option("rotation_deg", &Options::rotation_deg, "rotation vector about the frontal, lateral and long axis")
-      .option("translation_mm", &Options::translation_mm, "shift along the frontal, lateral and long axis");
+      .option("translation_mm", &Options::translation_mm, "shift along the frontal, lateral and long axis")
+      .option("distance_mm", &Options::distance_mm,
+              "scales both until the surface has moved by this mean distance; 0: as they are", marrow::at_least(0));
 }

@@ -58,6 +58,23 @@ TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
   EXPECT_TRUE(names.contains("2+add"));
 }
 
+TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
+  std::string pipeline = kPipeline;
+  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
+  scratch.write("p.yaml", pipeline);
+  const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics + "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  double mean = 0;
+  int below_10 = 0;
+  for (const auto& start : e.starts) {
+    EXPECT_TRUE(start.distance_mm >= 0 && start.distance_mm < 40);
+    mean += start.distance_mm / 1000;
+    below_10 += start.distance_mm < 10;
+  }
+  EXPECT_NEAR(mean, 20, 1.2);
+  EXPECT_NEAR(below_10, 250, 45) << "four deviations of a uniform draw";
+}
+
 TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
   std::string pipeline = kPipeline;
   pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
@@ -80,6 +97,7 @@ TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
   EXPECT_NEAR(x, 0, 0.04) << "no direction is preferred";
   EXPECT_LE(angle, 3);
   EXPECT_EQ(read(text).starts[5].rotation_deg, e.starts[5].rotation_deg) << "the seed decides";
+  EXPECT_EQ(e.starts[5].distance_mm, 0);
 }
 
 TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {

@@ -30,6 +30,32 @@ TEST(Manual, StartsFromTheNominalPlacement) {
   EXPECT_LT((manual(model, &start, options).world_from_model.translation_mm - Eigen::Vector3d(0, 10, 50)).norm(), 1e-9);
 }
 
+// The mean distance that a tube's surface moves, by integration: a shift moves all points alike.
+TEST(Manual, ScalesToADistance) {
+  const marrow::Mesh model = tube::cylinder(14, 90);
+  Options options;
+  options.translation_mm = {3, 0, 4};
+  options.distance_mm = 12;
+  EXPECT_LT((manual(model, nullptr, options).world_from_model.translation_mm - Eigen::Vector3d(7.2, 0, 9.6)).norm(), 1e-6);
+  options.rotation_deg = {5, -3, 2};
+  const marrow::Pose pose = manual(model, nullptr, options);
+  double sum = 0;
+  const auto points_mm = marrow::sample_surface(model, 3000);
+  for (const auto& point : points_mm) sum += (pose.world_from_model * point - point).norm() / 3000;
+  EXPECT_NEAR(sum, 12, 0.05);
+}
+
+TEST(Manual, RefusesADistanceWithoutAMotion) {
+  Options options;
+  options.distance_mm = 5;
+  try {
+    manual(tube::cylinder(14, 90), nullptr, options);
+    FAIL();
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(), "distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a rotation or translation, or a shorter distance");
+  }
+}
+
 TEST(Manual, RefusesAnEmptyModel) {
   try {
     manual(marrow::Mesh{}, nullptr, Options{});

@@ -29,7 +29,10 @@ std::string starts_sentence(const Experiment& experiment) {
                 "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a direction uniform on the sphere through the "
                 "fragment's centroid, and shifted by 0 to %g mm, uniform, in a direction uniform on the sphere.",
                 protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg, protocol.translation_mm);
-  return text;
+  if (!(protocol.distance_mm > 0)) return text;
+  char scaled[160];
+  std::snprintf(scaled, sizeof scaled, " Each displacement is scaled until the surface has moved by a mean distance uniform in 0 to %g mm.", protocol.distance_mm);
+  return std::string(text) + scaled;
 }
 
 std::string success_sentence(const Experiment& experiment, const std::vector<std::string>& units) {

@@ -32,15 +32,17 @@ struct ExperimentCase {
 struct Start {
   std::string name;
   std::array<double, 3> rotation_deg{}, translation_mm{};
+  double distance_mm = 0;  ///< to which the displacement is scaled; 0 = as it is
 };
 
 /// How starts are drawn: the direction of the rotation vector and of the translation uniform on the sphere, the angle and
-/// the length uniform in [0, limit].
+/// the length uniform in [0, limit]. With a distance, the displacement is then scaled until the surface has moved by a mean distance
+/// that is uniform in [0, limit]: the starts of a capture range fall evenly into its bins.
 struct StartProtocol {
-  std::string node;  ///< whose options rotation_deg and translation_mm are set
+  std::string node;  ///< whose options rotation_deg, translation_mm and distance_mm are set
   std::size_t count = 0;
   std::uint64_t seed = 1;
-  double rotation_deg = 0, translation_mm = 0;
+  double rotation_deg = 0, translation_mm = 0, distance_mm = 0;
   Place place;
 };
 
