@@ -7,11 +7,13 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "bricks.hpp"
 #include "rays.hpp"
 
 namespace {
 
 using marrow::rays::Attenuation;
+using marrow::rays::Bricks;
 using marrow::rays::Rays;
 
 struct Options : marrow::rays::AttenuationOptions {
@@ -20,38 +22,6 @@ struct Options : marrow::rays::AttenuationOptions {
   double step_deg = 1.2;
   int most_mb = 1024;
 };
-
-/// The integral along a ray by Joseph's method (IEEE Trans Med Imaging 1982): bilinear values slice by slice, times the path between.
-float joseph_integral(const Attenuation& attenuation, const Eigen::Vector3d& source, const Eigen::Vector3d& direction) {
-  const marrow::rays::Span span = span_in_box(attenuation, source, direction, 1);
-  if (!(span.from < span.to)) return 0;
-  const marrow::Grid& grid = attenuation.grid;
-  int across = 0;
-  direction.cwiseProduct(grid.spacing_mm).cwiseAbs().maxCoeff(&across);
-  const int a = (across + 1) % 3, b = (across + 2) % 3;
-  const std::ptrdiff_t strides[3] = {1, grid.size[0], std::ptrdiff_t(grid.size[0]) * grid.size[1]};
-  const Eigen::Vector3d slope = direction / direction[across];
-  const double entry = source[across] + span.from * direction[across], exit = source[across] + span.to * direction[across];
-  const int first = std::max(0, int(std::ceil(std::min(entry, exit)))), last = std::min(grid.size[std::size_t(across)] - 1, int(std::floor(std::max(entry, exit))));
-  const int width = grid.size[std::size_t(a)], height = grid.size[std::size_t(b)];
-  const std::int16_t* const values = attenuation.thousandths.data();
-  double sum = 0;
-  for (int slice = first; slice <= last; ++slice) {
-    const float x = float(source[a] + slope[a] * (slice - source[across])), y = float(source[b] + slope[b] * (slice - source[across]));
-    const int i = int(x + 4) - 4, j = int(y + 4) - 4;  // rounds down, as the ray stays within a voxel of the box
-    const float u = x - float(i), v = y - float(j);
-    const std::int16_t* const at = values + slice * strides[across] + i * strides[a] + j * strides[b];
-    if (i >= 0 && j >= 0 && i + 1 < width && j + 1 < height) {
-      const float p = at[0], q = at[strides[b]], near = p + u * (float(at[strides[a]]) - p), far = q + u * (float(at[strides[a] + strides[b]]) - q);
-      sum += near + v * (far - near);
-      continue;
-    }
-    const auto voxel = [&](int m, int n) { return i + m < 0 || j + n < 0 || i + m >= width || j + n >= height ? 0.0f : float(at[m * strides[a] + n * strides[b]]); };
-    const float near = voxel(0, 0) + u * (voxel(1, 0) - voxel(0, 0)), far = voxel(0, 1) + u * (voxel(1, 1) - voxel(0, 1));
-    sum += near + v * (far - near);
-  }
-  return float(sum * slope.cwiseProduct(grid.spacing_mm).norm() * 1e-3);
-}
 
 /// One side of a table: so many samples, the first at `low`.
 struct Side {
@@ -111,9 +81,9 @@ class Field {
   Eigen::Vector3d from_middle(const Eigen::Vector3d& point_mm) const { return axes_.transpose() * (point_mm - middle_); }
   double radius_mm() const { return radius_mm_; }
 
-  void fill(const Attenuation& attenuation) {
+  void fill(const Bricks& bricks, const Eigen::Vector3d& spacing_mm) {
     values_.resize(count());
-    const Eigen::Vector3d per_mm = attenuation.grid.spacing_mm.cwiseInverse();
+    const Eigen::Vector3d per_mm = spacing_mm.cwiseInverse();
     const std::size_t directions = std::size_t(slopes_[0].count) * std::size_t(slopes_[1].count), plane = count() / directions;
     tbb::parallel_for(std::size_t(0), directions, [&](std::size_t d) {
       const Eigen::Vector3d along = axes_ * Eigen::Vector3d(slopes_[0].at(int(d) % slopes_[0].count), slopes_[1].at(int(d) / slopes_[0].count), 1);
@@ -121,7 +91,7 @@ class Field {
       for (int y = 0; y < places_[1].count; ++y)
         for (int x = 0; x < places_[0].count; ++x) {
           const Eigen::Vector3d start = middle_ + axes_ * Eigen::Vector3d(places_[0].at(x), places_[1].at(y), 0) - 2 * radius_mm_ * along;
-          const float value = joseph_integral(attenuation, start.cwiseProduct(per_mm), along.cwiseProduct(per_mm));
+          const float value = bricks.integral(start.cwiseProduct(per_mm), along.cwiseProduct(per_mm));
           values_[at++] = std::uint16_t(std::lround(std::min(value / kUnit_mm, 65535.0f)));
         }
     });
@@ -154,7 +124,7 @@ class Field {
 
 class LightField : public marrow::rays::RayProjector {
  public:
-  LightField(Attenuation attenuation, std::vector<Field> fields) : RayProjector(std::move(attenuation)), fields_(std::move(fields)) {}
+  LightField(Attenuation attenuation, Bricks bricks, std::vector<Field> fields) : RayProjector(std::move(attenuation)), bricks_(std::move(bricks)), fields_(std::move(fields)) {}
 
  protected:
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
@@ -170,10 +140,11 @@ class LightField : public marrow::rays::RayProjector {
       if (start.z() < -nearest->radius_mm())
         if (const auto value = nearest->find(start, nearest->axes().transpose() * along)) return *value;
     }
-    return joseph_integral(attenuation_, source, direction);
+    return bricks_.integral(source, direction);
   }
 
  private:
+  Bricks bricks_;
   std::vector<Field> fields_;
 };
 
@@ -192,8 +163,9 @@ std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume
   if (mb > std::size_t(options.most_mb))
     throw marrow::Error("the integrals would take " + std::to_string(mb) + " MB, but most_mb is " + std::to_string(options.most_mb) + "; take wider steps (step_mm, step_deg), a smaller range_deg, or the field of a fragment");
   context.info("keeps " + std::to_string(count) + " integrals, " + std::to_string(mb) + " MB");
-  for (Field& one : fields) one.fill(attenuation);
-  return std::make_shared<LightField>(std::move(attenuation), std::move(fields));
+  Bricks bricks(attenuation);
+  for (Field& one : fields) one.fill(bricks, attenuation.grid.spacing_mm);
+  return std::make_shared<LightField>(std::move(attenuation), std::move(bricks), std::move(fields));
 }
 
 }  // namespace

@@ -35,10 +35,10 @@ Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const
           index_from_model * model_from_camera.rotation * camera.intrinsics.inverse(), grid.spacing_mm};
 }
 
-Span span_in_box(const Attenuation& attenuation, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin) {
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin) {
   Span span{0, std::numeric_limits<double>::infinity()};
   for (int k = 0; k < 3; ++k) {
-    const double low = attenuation.first[std::size_t(k)] - margin - source[k], high = attenuation.last[std::size_t(k)] + margin - source[k];
+    const double low = first[std::size_t(k)] - margin - source[k], high = last[std::size_t(k)] + margin - source[k];
     if (std::abs(direction[k]) < 1e-12) {
       if (low > 0 || high < 0) return {};
       continue;

@@ -25,7 +25,7 @@ Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const
 struct Span {
   double from = 0, to = 0;
 };
-Span span_in_box(const Attenuation& attenuation, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin);
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin);
 
 /// A projector that integrates ray by ray.
 class RayProjector : public Projector {

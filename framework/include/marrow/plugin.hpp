@@ -296,7 +296,7 @@ class NodeBuilder {
       port.optional = role == detail::Role::optional_input || role == detail::Role::optional_list;
       if constexpr (role == detail::Role::list || role == detail::Role::optional_list) {
         port.type = TypeInfo::of<typename Argument::Plain::value_type>();
-        port.axis = "?";  // named by over()
+        port.axis.assign(1, '?');  // named by over()
       } else {
         port.type = TypeInfo::of<typename Argument::Plain>();
       }

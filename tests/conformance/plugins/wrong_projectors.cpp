@@ -82,14 +82,14 @@ class Plain : public marrow::Projector {
 
   float integral(const marrow::Camera& camera, const marrow::RigidTransform& pose, double u, double v) const {
     static std::atomic<int> calls{0};
-    constexpr double kStep_mm = 0.5;
+    constexpr double kStep_mm = 0.8, kReach_mm = 48;
     marrow::check_camera(camera, "the camera");
     const marrow::RigidTransform model_from_world = inverse(pose);
     const Eigen::Vector3d source = model_from_world * source_position_mm(camera), middle = volume_.grid.point_from_index(0.5 * Eigen::Vector3d(volume_.grid.size[0], volume_.grid.size[1], volume_.grid.size[2]));
     const Eigen::Vector3d along = model_from_world.rotation * ray_direction(camera, {u + (fault == Fault::shifted ? 1.5 : 0), v});
     const double nearest = (middle - source).dot(along);
     double sum = 0;
-    for (double t = nearest - 70; t < nearest + 70; t += kStep_mm) {
+    for (double t = nearest - kReach_mm; t < nearest + kReach_mm; t += kStep_mm) {
       if (t < 0 && fault != Fault::behind) continue;
       const Eigen::Vector3d index = volume_.grid.index_from_point(source + t * along);
       bool is_in = true;
