@@ -21,7 +21,7 @@ class RayCastingProjector : public RayProjector {
 
  protected:
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
-    const Span span = span_in_box(attenuation_.first, attenuation_.last, source, direction, 1);
+    const Span span = marrow::rays::span_in_box(attenuation_.first, attenuation_.last, source, direction, 1);
     if (!(span.from < span.to)) return 0;
     const double length_mm = (span.to - span.from) * direction.cwiseProduct(attenuation_.grid.spacing_mm).norm();
     const int steps = std::max(1, int(std::ceil(length_mm / step_mm_)));

@@ -17,7 +17,7 @@ class SiddonProjector : public RayProjector {
 
  protected:
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
-    const Span span = span_in_box(attenuation_.first, attenuation_.last, source, direction, 0.5);
+    const Span span = marrow::rays::span_in_box(attenuation_.first, attenuation_.last, source, direction, 0.5);
     if (!(span.from < span.to)) return 0;
     const marrow::Grid& grid = attenuation_.grid;
     // A voxel's box reaches half a voxel to each side of its centre.
