@@ -67,7 +67,7 @@ class IntensityCost : public Cost {
     const int right = std::min(level.seen.cols - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
               bottom = std::min(level.seen.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
     if (right - left < 3 || bottom - top < 3) return worst_;
-    Patch patch{right - left + 1, bottom - top + 1, {}, {}, {}};
+    Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
     patch.rendered = projector_.radiograph(camera, world_from_model, PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
     patch.seen.resize(patch.rendered.size());
     patch.counts.resize(patch.rendered.size());

@@ -14,6 +14,7 @@ namespace marrow::similarity {
 /// pixel is not to be compared.
 struct Patch {
   int columns = 0, rows = 0;
+  int left = 0, top = 0;  ///< where it lies in the image, in pixels that are compared
   std::vector<float> rendered, seen;
   std::vector<char> counts;
 

@@ -31,8 +31,11 @@ Correlation correlation_in(const Patch& patch, const std::vector<float>& a, cons
 double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts, int side) {
   double sum = 0, weights = 0;
   const int step = std::max(1, side / 2);
-  for (int top = 0; top + side <= patch.rows; top += step)
-    for (int left = 0; left + side <= patch.columns; left += step) {
+  // The squares lie where they lie in the image, wherever the compared part begins: else each pixel that a pose moves that part by would
+  // change them all, and with them the cost.
+  const auto first = [step](int origin) { return (step - origin % step) % step; };
+  for (int top = first(patch.top); top + side <= patch.rows; top += step)
+    for (int left = first(patch.left); left + side <= patch.columns; left += step) {
       const Correlation one = correlation_in(patch, a, b, counts, left, top, side);
       weights += one.weight;
       sum += one.weight * one.value;

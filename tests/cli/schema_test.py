@@ -59,7 +59,7 @@ variants:
   nelder_mead:
   bobyqa: {optimizer.uses: optimizer.bobyqa}
 matrix: {edges.high: [75, 80]}
-starts: {node: start, count: 2, seed: 3, rotation_deg: 4, translation_mm: 5}
+starts: {node: start, count: 2, seed: 3, rotation_deg: 4, translation_mm: 5, distance_mm: 8}
 metrics: [errors.distal.final.mtre_mm, {figure: errors.distal.final.rotation_deg, label: rotation}]
 success: {errors.distal.final.mtre_mm: 2}
 initial_error: errors.distal.start.mtre_mm

@@ -43,10 +43,4 @@ TEST(Landscape, IsTheCostAlongEachAxisOfTheFragment) {
   }
 }
 
-TEST(Landscape, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

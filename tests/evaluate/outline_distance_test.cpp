@@ -156,10 +156,4 @@ TEST(OutlineDistance, SaysWhatIsWrong) {
             "and the model use the same world frame");
 }
 
-TEST(OutlineDistance, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

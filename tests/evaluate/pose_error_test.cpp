@@ -163,10 +163,4 @@ TEST(PoseError, SaysWhatIsWrong) {
   EXPECT_EQ(message_of([&] { pose_error({}, {}, {}, {}); }), "fragment frame: the surface has no triangles");
 }
 
-TEST(PoseError, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

@@ -29,10 +29,4 @@ TEST(Simplify, LeavesASmallMeshAsItIs) {
   EXPECT_EQ(same.triangles, box.triangles);
 }
 
-TEST(Simplify, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#define marrow_plugin_entry marrow_plugin_entry_of_cost
 #include "nodes.hpp"
 #include "plugins/similarity/contour_distance.cpp"
 

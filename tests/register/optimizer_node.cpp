@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#define marrow_plugin_entry marrow_plugin_entry_of_optimizer
 #include "nodes.hpp"
 #include "plugins/optimizer/levenberg_marquardt.cpp"
 

@@ -54,10 +54,4 @@ TEST(Plot, TicksAreRound) {
   EXPECT_TRUE(round_ticks(0, std::nan(""), 4).empty());
 }
 
-TEST(Landscape, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

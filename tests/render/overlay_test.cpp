@@ -164,10 +164,4 @@ TEST(Overlay, SaysWhatIsWrong) {
   EXPECT_EQ(message(view(), pose), "pose 'result': the transform has a number that is not finite");
 }
 
-TEST(Overlay, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

@@ -84,10 +84,4 @@ TEST(Scene, SaysWhichPoseIsMissing) {
             "fragment 'proximal': there is a mesh, but no pose of that name");
 }
 
-TEST(Scene, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

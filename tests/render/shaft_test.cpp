@@ -70,10 +70,4 @@ TEST(RenderShaft, LinesThatAreNotFiniteDrawNothing) {
   EXPECT_FALSE(shaft(broken, view(), nullptr, five_times()).pixels.empty());
 }
 
-TEST(RenderShaft, DeclarationHasNoFault) {
-  marrow::Plugin plugin;
-  marrow_register_nodes(plugin);
-  for (const auto& node : plugin.nodes) EXPECT_EQ(node.faults, std::vector<std::string>{}) << node.info.name;
-}
-
 }  // namespace

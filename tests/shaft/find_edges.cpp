@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // A program can hold the entry of one plugin only: this one's gets another name.
-#define marrow_plugin_entry edges_plugin_entry
 #include "shaft/find_edges.hpp"
 
 #include "plugins/edges/adaptive_relaxation.cpp"

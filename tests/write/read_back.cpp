@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // read.case beside the writer under test: each is a plugin of its own, so their entry points must not share a name
 // here.
-#define marrow_plugin_entry read_case_plugin_entry
 #include "plugins/read/case.cpp"
 
 marrow::Case read_back(const std::filesystem::path& folder) {

@@ -85,7 +85,7 @@ Metrics warn(marrow::Context& context) {
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
-struct DisplacedOptions { std::array<double, 3> rotation_deg{}, translation_mm{}; };
+struct DisplacedOptions { std::array<double, 3> rotation_deg{}, translation_mm{}; double distance_mm = 0; };
 Metrics displaced(const DisplacedOptions& options) { return number(options.translation_mm[0]); }
 }  // namespace
 
@@ -115,7 +115,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("test.warn", warn).summary("Warns").out("number", "1");
   plugin.node("test.apply", apply).summary("Calls a function").in("adder", "function").in("to", "number").out("number", "result");
   plugin.node("test.displaced", displaced).summary("Takes a displacement").out("number", "its first part")
-      .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation").option("translation_mm", &DisplacedOptions::translation_mm, "translation");
+      .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation").option("translation_mm", &DisplacedOptions::translation_mm, "translation")
+      .option("distance_mm", &DisplacedOptions::distance_mm, "distance");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
   plugin.node("evaluate.test", judge).summary("Sees the truth").in("of", "number").in("truth", "truth").out("number", "the same");
 }
