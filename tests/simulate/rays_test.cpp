@@ -13,6 +13,7 @@ namespace {
 
 using namespace marrow;
 using namespace marrow::simulate;
+namespace shape = marrow::simulate::test;
 
 /// Length of bone on the ray of each pixel: {cortical, inner}.
 std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera& camera) {
@@ -49,11 +50,11 @@ double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction
 
 TEST(Rays, TurnedBoxHasItsChordsToAMillionth) {
   const Eigen::Vector3d low(-20, -10, -30), high(15, 25, 40);
-  Phantom phantom = test::whole(test::box(low, high));
+  Phantom phantom = shape::whole(shape::box(low, high));
   RigidTransform& placed = phantom.fragments[0].world_from_ct;
   placed.rotation = rotation_from_vector({0.3, -0.5, 0.7});
   placed.translation_mm = {4, -3, 2};
-  const Camera camera = test::camera(20, 200);
+  const Camera camera = shape::camera(20, 200);
   const auto measured = lengths(phantom, camera);
   const RigidTransform bone_from_world = inverse(phantom.fragments[0].world_from_bone());
   int off = 0, inside = 0;
@@ -72,9 +73,9 @@ TEST(Rays, TurnedBoxHasItsChordsToAMillionth) {
 }
 
 TEST(Rays, SphereAndHollowCylinderHaveTheirChords) {
-  const Camera camera = test::camera(0, 128);
-  const auto ball = lengths(test::whole(test::sphere({5, 3, -8}, 30, 0.7)), camera);
-  const auto tube = lengths(test::whole(test::cylinder(20, -300, 300), test::cylinder(8, -290, 290)), camera);
+  const Camera camera = shape::camera(0, 128);
+  const auto ball = lengths(shape::whole(shape::sphere({5, 3, -8}, 30, 0.7)), camera);
+  const auto tube = lengths(shape::whole(shape::cylinder(20, -300, 300), shape::cylinder(8, -290, 290)), camera);
   for (int v = 4; v < 128; v += 9)
     for (int u = 3; u < 128; u += 7) {
       const Eigen::Vector3d source = source_position_mm(camera), direction = ray_direction(camera, {double(u), double(v)});
@@ -103,7 +104,7 @@ TEST(Rays, CylinderFormulaAgreesWithAChordByHand) {
 TEST(Rays, RaysThroughEdgesAndCornersMeetEachSurfaceTwice) {
   // A box whose corners, edges and diagonals lie exactly on rays.
   RayBundle rays(12, 12);
-  const Mesh box = test::box({2, 3, 1}, {9, 8, 5});
+  const Mesh box = shape::box({2, 3, 1}, {9, 8, 5});
   std::vector<RayVertex> vertices;
   for (const auto& p : box.vertices_mm) vertices.push_back({p.x(), p.y(), p.z()});
   rays.add(vertices, box.triangles);
@@ -121,7 +122,7 @@ TEST(Rays, RaysThroughEdgesAndCornersMeetEachSurfaceTwice) {
 }
 
 TEST(Polygonise, SphereIsClosedOutwardAndHasItsVolume) {
-  const Mesh ball = test::sphere({1, 2, 3}, 20, 0.9);
+  const Mesh ball = shape::sphere({1, 2, 3}, 20, 0.9);
   EXPECT_TRUE(is_closed(ball));
   EXPECT_NEAR(enclosed_volume_mm3(ball) / (4.0 / 3 * kPi * 8000), 1, 2e-3);
   for (const auto& vertex : ball.vertices_mm) EXPECT_NEAR((vertex - Eigen::Vector3d(1, 2, 3)).norm(), 20, 0.02);
