@@ -189,7 +189,7 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
     pose.world_from_model = move * pose.world_from_model;
     ++pose.evaluations;
     const double shift_mm = (pose.world_from_model * pose.frame.origin_mm - anchor).norm();
-    if (shift_mm < 1e-3 && marrow::geodesic_angle_rad(move.rotation, Eigen::Matrix3d::Identity()) < 1e-5) break;
+    if (shift_mm < 1e-2 && marrow::geodesic_angle_rad(move.rotation, Eigen::Matrix3d::Identity()) < 1e-4) break;
   }
   pose.warnings = doubts(sights, borders_of(model, pose.world_from_model, sights, options.tolerance_mm),
                          pose.world_from_model * pose.frame.origin_mm, options.border_inset_mm);

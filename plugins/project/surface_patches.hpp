@@ -102,22 +102,28 @@ inline void find_ends(std::size_t first, std::size_t last, std::size_t most, std
   find_ends((first + last) / 2, last, most, ends);
 }
 
-/// For each triangle a bit per edge k -> k+1 that no other triangle shares.
-inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangles) {
-  std::vector<std::pair<std::uint64_t, std::uint64_t>> edges;  // undirected edge, 3 * triangle + k
-  edges.reserve(triangles.size() * 3);
+/// For each triangle a bit per edge k -> k+1 that no other triangle shares. Edges are sorted into bins by their lower vertex.
+inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangles, std::size_t vertices) {
+  struct Edge {
+    std::uint32_t higher, at;  ///< vertex; 3 * triangle + k
+  };
+  const auto lower = [&](std::size_t i, std::size_t k) { return std::min(triangles[i][k], triangles[i][(k + 1) % 3]); };
+  std::vector<std::uint32_t> first(vertices + 1, 0);
   for (std::size_t i = 0; i < triangles.size(); ++i)
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint64_t a = triangles[i][k], b = triangles[i][(k + 1) % 3];
-      edges.emplace_back(std::min(a, b) << 32 | std::max(a, b), 3 * i + k);
-    }
-  tbb::parallel_sort(edges.begin(), edges.end());
+    for (std::size_t k = 0; k < 3; ++k) ++first[lower(i, k) + 1];
+  for (std::size_t v = 0; v < vertices; ++v) first[v + 1] += first[v];
+  std::vector<Edge> edges(3 * triangles.size());
+  std::vector<std::uint32_t> next(first.begin(), first.end() - 1);
+  for (std::size_t i = 0; i < triangles.size(); ++i)
+    for (std::size_t k = 0; k < 3; ++k)
+      edges[next[lower(i, k)]++] = {std::max(triangles[i][k], triangles[i][(k + 1) % 3]), std::uint32_t(3 * i + k)};
   std::vector<std::uint8_t> rims(triangles.size(), 0);
-  for (std::size_t i = 0; i < edges.size(); ++i) {
-    const bool before = i > 0 && edges[i - 1].first == edges[i].first;
-    const bool after = i + 1 < edges.size() && edges[i + 1].first == edges[i].first;
-    if (!before && !after) rims[edges[i].second / 3] |= std::uint8_t(1u << (edges[i].second % 3));
-  }
+  for (std::size_t v = 0; v < vertices; ++v)
+    for (std::uint32_t i = first[v]; i < first[v + 1]; ++i) {
+      std::uint32_t shared = 0;
+      for (std::uint32_t j = first[v]; j < first[v + 1]; ++j) shared += edges[j].higher == edges[i].higher;
+      if (shared == 1) rims[edges[i].at / 3] |= std::uint8_t(1u << (edges[i].at % 3));
+    }
   return rims;
 }
 
@@ -148,9 +154,13 @@ inline SurfacePatches make_surface_patches(const marrow::Mesh& mesh, const std::
   using namespace surface_patches;
   constexpr std::size_t kTriangles = 32;
   constexpr float kNormalScale_mm = 15;  // a normal turned by 1 rad counts like this distance
-  const std::vector<Triangle> triangles = weld(mesh);
+  std::vector<Triangle> triangles = mesh.triangles;
+  std::vector<std::uint8_t> rims = rim_edges(triangles, mesh.vertices_mm.size());
+  if (std::any_of(rims.begin(), rims.end(), [](std::uint8_t bits) { return bits; })) {  // a closed surface repeats no vertices
+    triangles = weld(mesh);
+    rims = rim_edges(triangles, mesh.vertices_mm.size());
+  }
   const std::vector<Eigen::Vector3d> normals = vertex_normals(mesh, triangles);
-  const std::vector<std::uint8_t> rims = rim_edges(triangles);
   SurfacePatches s;
   s.origin_mm = marrow::fragment_frame(mesh).origin_mm;
 
