@@ -1,9 +1,10 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""drr_peers.py BUILD: radiographs by marrow and by plastimatch (Debian package plastimatch), same volume, geometry, threads and run.
+"""drr_peers.py BUILD [PICTURES]: radiographs by marrow and by plastimatch (Debian package plastimatch), same volume, geometry, threads and run.
 
 plastimatch is timed by the difference of a run with one image and one with eleven, so neither its start nor the reading of the volume counts. Errors
-are against marrow's ray casting at 0.05 mm, after the factor that plastimatch's units need.
+are against marrow's ray casting at 0.05 mm, after the factor that plastimatch's units need. In the folder PICTURES, for thigh and bone: that reference, each
+program's and projector's image, and below them the differences from the reference, grey = 0, black and white = -5 and 5 mm of water.
 """
 import os
 import pathlib
@@ -25,6 +26,16 @@ def plastimatch(volume, out, pixels, images):
     return time.perf_counter() - start
 
 
+def picture(path, reference, images):
+    import PIL.Image  # python3-pil; only pictures need it
+
+    def grey(image, low, high):
+        return (255 * numpy.clip((image - low) / (high - low), 0, 1)).astype(numpy.uint8)
+    tops = [grey(-image, -reference.max(), 0) for image in [reference] + images]
+    bottoms = [grey(image - reference, -5, 5) for image in [reference] + images]
+    PIL.Image.fromarray(numpy.vstack([numpy.hstack(tops), numpy.hstack(bottoms)])).save(path)
+
+
 def main():
     version = subprocess.run(["plastimatch", "--version"], capture_output=True, text=True).stdout.strip()
     with tempfile.TemporaryDirectory() as folder:
@@ -44,7 +55,14 @@ def main():
                     image = numpy.fromfile(next(iter(sorted(folder.glob("peer_*0000.raw")))), dtype="<f4").reshape(256, 256)
                     reference = numpy.fromfile(folder / (what + "_reference_256.f32"), dtype="<f4").reshape(256, 256)
                     candidates = [numpy.rot90(flipped, turn) for flipped in (image, image[:, ::-1]) for turn in range(4)]
-                    error = ", root mean square error %.4f mm" % min(float(numpy.sqrt(numpy.mean((one * (reference.sum() / one.sum()) - reference) ** 2))) for one in candidates)
+                    root_mean_square = lambda one: float(numpy.sqrt(numpy.mean((one - reference) ** 2)))
+                    peer = min((one * (reference.sum() / one.sum()) for one in candidates), key=root_mean_square)
+                    error = ", root mean square error %.4f mm" % root_mean_square(peer)
+                    if len(sys.argv) > 2:
+                        pathlib.Path(sys.argv[2]).mkdir(parents=True, exist_ok=True)
+                        names = ["joseph", "ray_casting", "siddon_jacobs", "lightfield"]
+                        own = [numpy.fromfile(folder / ("%s_%s_256.f32" % (what, name)), dtype="<f4").reshape(256, 256) for name in names if (folder / ("%s_%s_256.f32" % (what, name))).exists()]
+                        picture(pathlib.Path(sys.argv[2]) / (what + ".png"), reference, own + [peer])
                 print("%s, %d x %d: %s exact %.0f ms%s; project.joseph %.2f ms: %.1f times faster" % (what, pixels, pixels, version, 1000 * seconds, error, mine, 1000 * seconds / mine))
 
 
