@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "conformance/body.hpp"
+#include "conformance/plane_solid.hpp"
 #include "conformance/suite.hpp"
 
 namespace marrow::conformance {
@@ -26,62 +27,9 @@ const std::vector<double>& angles() {
 RigidTransform pose() { return moved_by({0.3, -0.2, 0.5}, {3, -4, 6}); }
 
 Body ball() { return {{{0, 0, 0}, {18, 18, 18}}}; }
-Body egg() { return {{{1, -2, 1.5}, {11, 16, 27}, rotation_from_vector({0.4, 0.2, -0.3})}}; }
-const Eigen::Vector3d kBox_mm(12, 16, 9.6);          // half of its sides, whole voxels
+const Eigen::Vector3d kBox_mm(12, 16, 9.6);        // half of its sides, whole voxels
 const Eigen::Vector3d kOctahedron_mm(20, 16, 24);  // half of its diagonals
-
-/// Length of a line within |normal_k . x| <= 1 for all normals, in front of its start.
-double chord_between(const std::vector<Eigen::Vector3d>& normals, const Eigen::Vector3d& start, const Eigen::Vector3d& direction) {
-  double from = 0, to = 1e9;
-  for (const Eigen::Vector3d& n : normals) {
-    const double s = n.dot(start), d = n.dot(direction);
-    if (std::abs(d) < 1e-12) {
-      if (std::abs(s) > 1) return 0;
-      continue;
-    }
-    const double a = (-1 - s) / d, b = (1 - s) / d;
-    from = std::max(from, std::min(a, b));
-    to = std::min(to, std::max(a, b));
-  }
-  return std::max(0.0, to - from);
-}
-std::vector<Eigen::Vector3d> box_normals() { return {Eigen::Vector3d::UnitX() / kBox_mm.x(), Eigen::Vector3d::UnitY() / kBox_mm.y(), Eigen::Vector3d::UnitZ() / kBox_mm.z()}; }
-std::vector<Eigen::Vector3d> octahedron_normals() {
-  std::vector<Eigen::Vector3d> normals;
-  for (int k = 0; k < 4; ++k) normals.push_back(Eigen::Vector3d(1, k & 1 ? -1 : 1, k & 2 ? -1 : 1).cwiseQuotient(kOctahedron_mm));
-  return normals;
-}
-
-/// A solid bounded by pairs of planes, by the part of each voxel that lies within; 4^3 points of each.
-Volume volume_between(const std::vector<Eigen::Vector3d>& normals, const Grid& grid) {
-  constexpr int kParts = 4;
-  Volume volume{grid, {}};
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) {
-        int inside = 0;
-        for (int i = 0; i < kParts * kParts * kParts; ++i) {
-          const Eigen::Vector3d part(i % kParts, i / kParts % kParts, i / kParts / kParts);
-          const Eigen::Vector3d p = grid.point_from_index(Eigen::Vector3d(x, y, z) + (part + Eigen::Vector3d::Constant(0.5 - 0.5 * kParts)) / kParts);
-          inside += std::all_of(normals.begin(), normals.end(), [&](const Eigen::Vector3d& n) { return std::abs(n.dot(p)) <= 1; });
-        }
-        volume.values.push_back(float(-1000 + 1000 * kDensity * inside / (kParts * kParts * kParts)));
-      }
-  return volume;
-}
-SignedField field_between(const std::vector<Eigen::Vector3d>& normals, const Grid& grid) {
-  SignedField field{grid, {}};
-  for (int z = 0; z < grid.size[2]; ++z)
-    for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) {
-        double distance = -1e9;
-        const Eigen::Vector3d p = grid.point_from_index({double(x), double(y), double(z)});
-        for (const Eigen::Vector3d& n : normals) distance = std::max(distance, (std::abs(n.dot(p)) - 1) / n.norm());
-        field.values_mm.push_back(float(distance));
-      }
-  return field;
-}
-
+Body egg() { return {{{1, -2, 1.5}, {11, 16, 27}, rotation_from_vector({0.4, 0.2, -0.3})}}; }
 Grid fine_grid() { return grid_of({62, 62, 78}, {0.8, 0.8, 0.8}); }
 Grid turned_grid() { return grid_of({56, 70, 48}, {1, 0.8, 1.2}, rotation_from_vector({0.5, -0.3, 0.8})); }
 
@@ -183,8 +131,8 @@ double ball_error_mm(const Subject& subject) {
   return mean_error_mm(subject, inputs_of(ball()), [](const auto& start, const auto& direction) { return chord_mm(ball(), start, direction); });
 }
 double solid_error_mm(const Subject& subject, const std::vector<Eigen::Vector3d>& normals, const Grid& grid) {
-  return mean_error_mm(subject, inputs_of(volume_between(normals, grid), field_between(normals, grid), mesh_of(ball())),
-                       [&](const auto& start, const auto& direction) { return chord_between(normals, start, direction); });
+  return mean_error_mm(subject, inputs_of(volume_of(normals, grid, 1000 * kDensity - 1000), field_of(normals, grid), mesh_of(ball())),
+                       [&](const auto& start, const auto& direction) { return chord_mm(normals, start, direction); });
 }
 
 /// Root mean square of the differences; the bodies' borders are steep, where interpolation differs most.
@@ -403,8 +351,8 @@ Suite project_suite() {
     suite.accuracy.push_back({name, what, limit, unit, std::move(measure)});
   };
   add("ball", "radiograph of a ball of 36 mm: mean error", 0.4, "mm of water", ball_error_mm);
-  add("box", "radiograph of a box in a turned grid: mean error", 0.6, "mm of water", [](const Subject& s) { return solid_error_mm(s, box_normals(), fine_grid()); });
-  add("octahedron", "radiograph of a closed mesh made voxels in a turned grid: mean error", 0.6, "mm of water", [](const Subject& s) { return solid_error_mm(s, octahedron_normals(), turned_grid()); });
+  add("box", "radiograph of a box in a turned grid: mean error", 0.6, "mm of water", [](const Subject& s) { return solid_error_mm(s, box_between(kBox_mm), fine_grid()); });
+  add("octahedron", "radiograph of a closed mesh made voxels in a turned grid: mean error", 0.6, "mm of water", [](const Subject& s) { return solid_error_mm(s, octahedron_between(kOctahedron_mm), turned_grid()); });
   add("single_pixels", "single pixels against the same of a whole radiograph: root mean square", 0.4, "mm of water", [](const Subject& s) { return pixels_off_mm(s, true); });
   add("sub_sampled", "every third pixel against the same of a whole radiograph: root mean square", 1, "mm of water", [](const Subject& s) { return pixels_off_mm(s, false); });
   add("region", "largest value outside of the region", 0, "mm of water", beyond_region_mm);
