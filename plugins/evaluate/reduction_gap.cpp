@@ -42,11 +42,13 @@ marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const mar
   const std::vector<Eigen::Vector3d> points_mm = fracture_points(named(models, options.moved, "models"), named(models, options.reference, "models"), options.border_mm);
   if (points_mm.empty())
     throw marrow::Error("the surfaces of '" + options.moved + "' and '" + options.reference + "' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
+  const Eigen::Vector3d centre_mm = marrow::fragment_frame(named(models, options.moved, "models")).origin_mm;
   const std::vector<double> before = marrow::evaluate::target_errors_mm(true_moved, true_reference, points_mm), after = marrow::evaluate::target_errors_mm(reduced, true_reference, points_mm);
   return {{{"before_mm", marrow::evaluate::mean(before), "mm"},
            {"gap_mm", marrow::evaluate::mean(after), "mm"},
            {"largest_gap_mm", *std::max_element(after.begin(), after.end()), "mm"},
-           {"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(reduced.rotation, true_reference.rotation)), "deg"}}};
+           {"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(reduced.rotation, true_reference.rotation)), "deg"},
+          {"translation_mm", (reduced * centre_mm - true_reference * centre_mm).norm(), "mm"}}};
 }
 
 }  // namespace
@@ -57,7 +59,7 @@ MARROW_PLUGIN(plugin) {
       .in("poses", "poses found", marrow::over("fragment"))
       .in("truths", "exact poses", marrow::over("fragment"))
       .in("models", "surfaces of both fragments", marrow::over("fragment"))
-      .out("metrics", "over the points of the fracture: mean distance from where they belong, before and after, the largest after; the rotation left")
+      .out("metrics", "over the points of the fracture: mean distance from where they belong, before and after, the largest after; the rotation left, and the shift of the fragment's centroid: the misalignment is wrong by as much")
       .option("moved", &Options::moved, "fragment that is moved")
       .option("reference", &Options::reference, "fragment that stays")
       .option("border_mm", &Options::border_mm, "points of the moved surface that lie so near to the other one in the CT are the fracture's", marrow::at_least(0.1));

@@ -64,6 +64,7 @@ TEST(ReductionGap, AnErrorOfAPoseStaysOpen) {
   EXPECT_NEAR(figure(metrics, "before_mm"), 8, 1e-9);
   EXPECT_NEAR(figure(metrics, "gap_mm"), 0.5, 1e-9);
   EXPECT_NEAR(figure(metrics, "largest_gap_mm"), 0.5, 1e-9);
+  EXPECT_NEAR(figure(metrics, "translation_mm"), 0.5, 1e-9);
 }
 
 TEST(ReductionGap, SaysWhatIsWrong) {
