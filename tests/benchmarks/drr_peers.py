@@ -36,6 +36,13 @@ def picture(path, reference, images):
     PIL.Image.fromarray(numpy.vstack([numpy.hstack(tops), numpy.hstack(bottoms)])).save(path)
 
 
+def peer_image(volume, out):
+    """256 x 256 pixels along the same rays as marrow's, but for turns and mirrors."""
+    subprocess.run(["plastimatch", "drr", "-i", "exact", "-r", "256 256", "-z", "230 230", "--sad", "600", "--sid", "1000", "-o", "0 0 0", "-n", "0 1 0", "--vup", "0 0 1", "-t", "raw", "-O", str(out),
+                    str(volume)], check=True, capture_output=True)
+    return numpy.fromfile(str(out) + "0000.raw", dtype="<f4").reshape(256, 256)
+
+
 def main():
     version = subprocess.run(["plastimatch", "--version"], capture_output=True, text=True).stdout.strip()
     with tempfile.TemporaryDirectory() as folder:
@@ -52,7 +59,7 @@ def main():
                 mine = float(next(line for line in ours.splitlines() if line.startswith(what) and "joseph" in line and "%d x %d" % (pixels, pixels) in line).split(":")[1].split()[0])
                 error = ""
                 if pixels == 256:
-                    image = numpy.fromfile(next(iter(sorted(folder.glob("peer_*0000.raw")))), dtype="<f4").reshape(256, 256)
+                    image = peer_image(folder / (what + ".mha"), folder / "view_")
                     reference = numpy.fromfile(folder / (what + "_reference_256.f32"), dtype="<f4").reshape(256, 256)
                     candidates = [numpy.rot90(flipped, turn) for flipped in (image, image[:, ::-1]) for turn in range(4)]
                     root_mean_square = lambda one: float(numpy.sqrt(numpy.mean((one - reference) ** 2)))
