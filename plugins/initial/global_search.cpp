@@ -55,7 +55,7 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
   middle.frame = marrow::fragment_frame(model);
   const marrow::registration::Levels levels = levels_of(cost, settings);
   marrow::registration::Search search(optimizer, middle, settings, context);
-  search.go_to(search.best_of(search.scan(*levels.front()), levels).pose);
+  search.go_to(search.find(levels).pose);
   return pose_of(search, middle, *levels.back());
 }
 

@@ -21,7 +21,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   marrow::registration::Search search(optimizer, initial, options, context);
   Result result;
   result.stages.add("start", pose_of(search, initial, last));
-  const marrow::registration::Found best = search.best_of(search.scan(*levels.front()), levels);
+  const marrow::registration::Found best = search.find(levels);
   search.go_to(best.axial);
   result.stages.add("axial", pose_of(search, initial, last));
   search.go_to(best.pose);

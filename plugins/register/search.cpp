@@ -12,15 +12,16 @@
 
 namespace marrow::registration {
 
+void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels, const std::string& like, const std::string& advice) {
+  if (values.empty() || values.size() != levels)
+    throw Error(name + " has " + std::to_string(values.size()) + " numbers, but " + like + " has " + std::to_string(levels) + "; " + advice);
+  for (const double value : values)
+    if (!(value > 0)) throw Error(name + ": each number must be positive");
+}
+
 void check_options(const SearchOptions& options) {
-  const std::size_t levels = options.contour_spacing_px.size();
   const auto check = [&](const std::vector<double>& values, const char* name) {
-    if (values.empty() || values.size() != levels)
-      throw Error(std::string(name) + " has " + std::to_string(values.size()) +
-                          " numbers, but contour_spacing_px has " + std::to_string(levels) +
-                          "; give reach_px and the four options of steps as many, one for each level");
-    for (const double value : values)
-      if (!(value > 0)) throw Error(std::string(name) + ": each number must be positive");
+    check_level_list(values, name, options.contour_spacing_px.size(), "contour_spacing_px", "give reach_px and the four options of steps as many, one for each level");
   };
   check(options.contour_spacing_px, "contour_spacing_px");
   check(options.reach_px, "reach_px");

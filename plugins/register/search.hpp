@@ -34,6 +34,8 @@ struct SearchOptions {
 
 /// Throws Error unless all options that say something per level say it for as many levels.
 void check_options(const SearchOptions& options);
+/// Throws Error unless the list has as many numbers as there are levels, all positive. `like` names the list that says how many there are.
+void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels, const std::string& like, const std::string& advice);
 
 using Levels = std::vector<std::shared_ptr<const Cost>>;
 Levels levels_of(const Cost& cost, const SearchOptions& options);
@@ -61,6 +63,14 @@ class Search {
   /// The least cost on the way so far; costs of different levels do not compare, so this asks one for all.
   std::vector<Pose::Progress> convergence(const Cost& cost) const;
 
+  /// Looks at poses about the one found so far, follows the best up, and returns where the best of them came to, at the last level.
+  Found find(const Levels& levels) { return best_of(scan(*levels.front()), levels); }
+
+  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the pose found so far, goes there and returns
+  /// the cost. `done` and `share` are for the progress.
+  double refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share);
+
+ private:
   /// Tries poses about the one found so far and returns the best that are no neighbours of a better one: the cost has other
   /// minima within their range.
   std::vector<RigidTransform> scan(const Cost& cost);
@@ -70,11 +80,6 @@ class Search {
   /// tells a good pose from one whose outline lies on other things in the image.
   Found best_of(const std::vector<RigidTransform>& candidates, const Levels& levels);
 
-  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the pose found so far, goes there and returns
-  /// the cost. `done` and `share` are for the progress.
-  double refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share);
-
- private:
   void note(int evaluations, const RigidTransform& pose);
   Steps steps_of(std::size_t level) const;
 

@@ -26,13 +26,8 @@ struct Result {
 void check_finer(const Options& options) {
   for (const auto& [values, name] : {std::pair(&options.finer_pixel_step, "finer_pixel_step"), std::pair(&options.finer_step_deg, "finer_step_deg"),
                                      std::pair(&options.finer_step_axial_deg, "finer_step_axial_deg"), std::pair(&options.finer_step_mm, "finer_step_mm"),
-                                     std::pair(&options.finer_step_tolerance, "finer_step_tolerance")}) {
-    if (values->empty() || values->size() != options.finer_pixel_step.size())
-      throw marrow::Error(std::string(name) + " has " + std::to_string(values->size()) + " numbers, but finer_pixel_step has " +
-                          std::to_string(options.finer_pixel_step.size()) + "; give all options that begin with finer_ as many, one for each level");
-    for (const double value : *values)
-      if (!(value > 0)) throw marrow::Error(std::string(name) + ": each number must be positive");
-  }
+                                     std::pair(&options.finer_step_tolerance, "finer_step_tolerance")})
+    marrow::registration::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step", "give all options that begin with finer_ as many, one for each level");
 }
 
 /// A sentence where the second cost leads far from what the first one found: then one of them is wrong.
@@ -54,7 +49,7 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   Search coarse(optimizer, initial, options, context);
   Result result;
   result.stages.add("start", pose_of(coarse, initial, *levels.back()));
-  coarse.go_to(coarse.best_of(coarse.scan(*levels.front()), levels).pose);
+  coarse.go_to(coarse.find(levels).pose);
   const marrow::Pose first = pose_of(coarse, initial, *levels.back());
   result.stages.add("first", first);
   Search search(finer_optimizer ? *finer_optimizer : optimizer, first, options, context);
