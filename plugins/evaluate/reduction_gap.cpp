@@ -2,13 +2,12 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
+#include "plugins/fracture/fragments.hpp"
 #include "targets.hpp"
 
 namespace {
 
-struct Options {
-  std::string moved = "distal";
-  std::string reference = "proximal";
+struct Options : marrow::fracture::Options {
   double border_mm = 3;
 };
 
