@@ -261,7 +261,7 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& pr
                                                      const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
-  const auto other = marrow::similarity::others_of(projector, others, other_projectors);
+  const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
   const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;

@@ -138,7 +138,7 @@ std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector
   constexpr double kOthersReach_px = 3;
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
-  const auto other = marrow::similarity::others_of(projector, others, other_projectors);
+  const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
   const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;

@@ -69,6 +69,9 @@ GradientImage gradients_of(const marrow::View& view, double blur_px) {
   cv::Mat smooth = marrow::similarity::line_integrals(view.image.pixels);
   image.counts = view.mask.empty() ? cv::Mat(smooth.size(), CV_8U, cv::Scalar(1)) : cv::Mat((view.mask != 0) & 1);
   image.counts.setTo(0, smooth != smooth);
+  // Near the mask's end a gradient is in part of what lies beyond.
+  const int reach = int(std::ceil(4 * blur_px)) + 1;
+  cv::erode(image.counts, image.counts, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
   cv::patchNaNs(smooth, 0);
   cv::GaussianBlur(smooth, smooth, {}, blur_px, blur_px, cv::BORDER_REPLICATE);
   cv::Sobel(smooth, image.u, CV_32F, 1, 0, 3, 1, 0, cv::BORDER_REPLICATE);
@@ -176,14 +179,16 @@ class GradientProjection : public marrow::Cost {
   std::vector<GradientImage> images_;
 };
 
-std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::List<marrow::View>& views, const Options& options) {
+std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::List<marrow::View>& views, const marrow::Projector* projector,
+                                                        const marrow::List<marrow::Pose>* others, const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
   marrow::check_mesh(mesh, "the mesh of the bone");
   marrow::check_volume(volume, "the volume that the mesh was made from");
   if (volume.grid.frame != mesh.frame)
     throw marrow::Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + volume.grid.frame + "'; give the volume that the mesh was made from");
   marrow::similarity::check_views(views);
   marrow::similarity::check_weights(options.weights, views.size());
-  const auto scene = std::make_shared<GradientProjection::Scene>(GradientProjection::Scene{views, points_of(volume, mesh, options.points), options});
+  const marrow::List<marrow::View> own = marrow::similarity::without_shadows(views, marrow::similarity::others_of(projector, others, other_projectors));
+  const auto scene = std::make_shared<GradientProjection::Scene>(GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
   return std::make_shared<GradientProjection>(scene, options.blur_px, 1);
 }
 
@@ -195,6 +200,9 @@ MARROW_PLUGIN(plugin) {
       .in("mesh", "surface of the bone")
       .in("volume", "CT that the surface was made from")
       .in("views", "views with their cameras and masks", marrow::over("view"))
+      .in("projector", "draws this fragment: tells it from others")
+      .in("others", "where other fragments are, whose shadows are left out", marrow::over("fragment"))
+      .in("other_projectors", "draw them, and maybe this one", marrow::over("fragment"))
       .out("cost", "how badly the gradients agree, 0 to 1; unmoved by gain and offset of the line integrals")
       .option("points", &Options::points, "spread over the surface, of which those near its outlines count", marrow::at_least(100), marrow::at_most(1000000))
       .option("blur_px", &Options::blur_px, "smoothing of the images: standard deviation of a Gaussian", marrow::at_least(0.5), marrow::at_most(20))

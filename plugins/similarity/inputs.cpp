@@ -97,12 +97,13 @@ double weighted_mean(const std::vector<double>& of_view, const std::vector<doubl
   return sum / total;
 }
 
-std::vector<Other> others_of(const Projector& own, const List<Pose>* poses, const List<Projector>* projectors) {
+std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors) {
   std::vector<Other> others;
   if (!projectors != !poses) throw Error(std::string("there are ") + (poses ? "poses of other fragments, but nothing draws them; wire 'other_projectors'" : "projectors of other fragments, but no poses; wire 'others'"));
   if (!projectors) return others;
+  if (!own) throw Error("there are other fragments, but it is not known which of them is this one; wire 'projector', the one that draws this fragment");
   for (std::size_t i = 0; i < projectors->size(); ++i) {
-    if (&(*projectors)[i] == &own) continue;
+    if (&(*projectors)[i] == own) continue;
     const Pose* pose = poses->find(projectors->name(i));
     if (!pose) throw Error("other_projectors has the fragment '" + projectors->name(i) + "', but others has no pose of it; give the poses of the same fragments");
     others.push_back({&(*projectors)[i], pose->world_from_model});

@@ -23,8 +23,9 @@ struct Other {
   const Projector* projector;
   RigidTransform world_from_model;
 };
-/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment without a pose.
-std::vector<Other> others_of(const Projector& own, const List<Pose>* poses, const List<Projector>* projectors);
+/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment without a pose, and
+/// for others without `own`.
+std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors);
 
 /// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines where they
 /// are drawn as outlines only.

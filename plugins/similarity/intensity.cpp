@@ -92,7 +92,7 @@ std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const Lis
                                            const IntensityOptions& options, double worst, Measure measure) {
   check_views(views);
   check_weights(options.weights, views.size());
-  const List<View> own = without_shadows(views, others_of(projector, others, other_projectors));
+  const List<View> own = without_shadows(views, others_of(&projector, others, other_projectors));
   return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure));
 }
 

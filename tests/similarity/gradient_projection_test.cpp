@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "other_fragment.hpp"
 #include "project/shapes.hpp"
 #include "shipped.hpp"
 
@@ -79,6 +80,25 @@ TEST(GradientProjection, DirectionsCount) {
   in["views"] = shipped::list(views, "view");
   const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
   EXPECT_NEAR(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1, 1e-6);
+}
+
+TEST(GradientProjection, AnotherFragmentsShadowDoesNotCount) {
+  const auto own = std::make_shared<const other_fragment::SquareOutline>();
+  const other_fragment::Fragments fragments{own, std::make_shared<const other_fragment::SquareProjector>()};
+  const auto value = [&](double grey, bool told) {
+    marrow::List<marrow::View> views;
+    for (const double angle : {0.0, 90.0}) {
+      marrow::View view = view_of(angle);
+      view.image.pixels(cv::Rect(100, 60, 30, 30)).setTo(grey);
+      views.add(view.name, view);
+    }
+    shipped::Inputs in = inputs();
+    in["views"] = shipped::list(views, "view");
+    const marrow::Value made = shipped::call("similarity.gradient_projection", told ? fragments.with(in) : in).at("cost");
+    return made.as<marrow::Cost>().value(shifted(0, 0, 9));
+  };
+  EXPECT_GT(std::abs(value(5000, false) - value(39000, false)), 0.01);
+  EXPECT_NEAR(value(5000, true), value(39000, true), 1e-9);
 }
 
 TEST(GradientProjection, AnEvenImageIsTheWorst) {

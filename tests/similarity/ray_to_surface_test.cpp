@@ -5,6 +5,7 @@
 #include <cmath>
 #include <marrow/domain/features.hpp>
 
+#include "other_fragment.hpp"
 #include "project/shapes.hpp"
 #include "shipped.hpp"
 
@@ -120,6 +121,30 @@ TEST(RayToSurface, LevelsUseFewerRays) {
   const auto coarse = (*cost).at_level({6, 30, 0});
   EXPECT_LT(coarse->value(shifted(0, 0, 0)), 0.01);
   EXPECT_NEAR(coarse->value(shifted(300, 0, 0)), 6.0 * 6 / 6, 1e-9) << "30 px are 10.5 mm at the isocentre, but the field ends at 6 mm";
+}
+
+TEST(RayToSurface, AnotherFragmentsEdgesDoNotCount) {
+  shipped::Inputs alone = inputs(), both = inputs();
+  const auto own = std::make_shared<const other_fragment::SquareProjector>();
+  const other_fragment::Fragments fragments{own, std::make_shared<const other_fragment::SquareOutline>()};
+  const auto edges = both["edges"].as_list<marrow::EdgeMap>();
+  marrow::List<marrow::EdgeMap> more;
+  for (std::size_t i = 0; i < edges.size(); ++i) {
+    marrow::EdgeMap map = edges[i];
+    for (int v = 60; v < 90; ++v) map.pixels.push_back({101, float(v), -1, 0, 100});
+    more.add(edges.name(i), map);
+  }
+  both["edges"] = shipped::list(more, "view");
+  const RigidTransform pose = shifted(0.8, -0.6, 0.7);
+  const shipped::Options all{{"ray_step", std::int64_t(1)}};
+  const double without = (*Made(alone, all)).value(pose);
+  EXPECT_GT((*Made(both, all)).value(pose), without + 0.1);
+  const shipped::Inputs told = fragments.with(both);
+  EXPECT_EQ((*Made(told, all)).value(pose), without);
+  shipped::Inputs unknown = told;
+  unknown.erase("projector");
+  EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", unknown),
+            "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that draws this fragment");
 }
 
 TEST(RayToSurface, SaysWhatIsWrong) {
