@@ -11,6 +11,8 @@
 namespace marrow::rays {
 namespace {
 
+constexpr int kSide = 4;
+
 // Four numbers that the compiler keeps in one register.
 using Four = float __attribute__((vector_size(16)));
 using FourVoxels = std::int16_t __attribute__((vector_size(8)));
@@ -18,7 +20,6 @@ using FourVoxels = std::int16_t __attribute__((vector_size(8)));
 }  // namespace
 
 Bricks::Bricks(const Attenuation& attenuation) : first_(attenuation.first), last_(attenuation.last), spacing_mm_(attenuation.grid.spacing_mm) {
-  constexpr int kSide = 4;
   if (attenuation.is_empty()) return;
   std::uint32_t stride = kSide * kSide * kSide, within = 1;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -57,6 +58,12 @@ float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& dir
   rows += top;
   Four sum{0, 0, 0, 0};
   for (int slice = begin; slice <= end; ++slice) {
+    if (slice % kSide == 0) {
+      // The brick that the ray enters a little later, and its neighbour: waiting for memory is half of the time otherwise.
+      const int ahead = std::min(slice + 4 * kSide, end), i = int(x + dx * float(ahead - begin)), j = int(y + dy * float(ahead - begin));
+      __builtin_prefetch(values_.data() + slices[ahead] + rows[j] + columns[i]);
+      __builtin_prefetch(values_.data() + slices[ahead] + rows[j + 1] + columns[i + 1]);
+    }
     const float px = x + dx * float(slice - begin), py = y + dy * float(slice - begin);
     const int i = int(px), j = int(py);
     const float u = px - float(i), v = py - float(j);

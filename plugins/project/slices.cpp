@@ -24,8 +24,12 @@ struct Sheared {
 
   float at(double column, double row) const {
     if (!(column > -1 && row > -1 && column < columns && row < rows)) return 0;
-    const int c = int(std::floor(column)), r = int(std::floor(row));
+    const int c = int(column + 1) - 1, r = int(row + 1) - 1;  // rounded down
     const float x = float(column - c), y = float(row - r);
+    if (c >= 0 && r >= 0 && c + 1 < columns && r + 1 < rows) {
+      const float *a = sums.data() + std::size_t(r) * std::size_t(columns) + std::size_t(c), *b = a + columns;
+      return (1 - y) * ((1 - x) * a[0] + x * a[1]) + y * ((1 - x) * b[0] + x * b[1]);
+    }
     const auto value = [&](int i, int j) { return i < 0 || j < 0 || i >= columns || j >= rows ? 0.0f : sums[std::size_t(j) * std::size_t(columns) + std::size_t(i)]; };
     return (1 - y) * ((1 - x) * value(c, r) + x * value(c + 1, r)) + y * ((1 - x) * value(c, r + 1) + x * value(c + 1, r + 1));
   }
@@ -133,16 +137,18 @@ std::optional<Sheared> sheared_grid(const Slices::Stack& stack, const Attenuatio
 std::vector<float> warped(const Sheared& image, const Slices::Stack& stack, const Rays& rays, const PixelGrid& grid) {
   const Eigen::Matrix3d slopes = slopes_from_pixel(rays, stack);
   const Eigen::Vector3d mm(rays.spacing_mm[stack.axes[0]], rays.spacing_mm[stack.axes[2]], rays.spacing_mm[stack.axes[1]]);
+  const double per_p = 1 / image.step_p, per_q = 1 / image.step_q;
   std::vector<float> values(grid.count());
   tbb::parallel_for(0, grid.rows, [&](int row) {
     float* out = values.data() + std::size_t(row) * std::size_t(grid.columns);
+    const Eigen::Vector2d pixel = grid.pixel(0, row);
+    const Eigen::Vector3d first = slopes * Eigen::Vector3d(pixel.x(), pixel.y(), 1), change = grid.step_px * slopes.col(0);
     for (int column = 0; column < grid.columns; ++column) {
-      const Eigen::Vector2d pixel = grid.pixel(column, row);
-      const Eigen::Vector3d d = slopes * Eigen::Vector3d(pixel.x(), pixel.y(), 1);
-      const double p = d.x() / d.z(), q = d.y() / d.z();
+      const Eigen::Vector3d d = first + column * change;
+      const double nearer = 1 / d.z(), p = d.x() * nearer, q = d.y() * nearer;
+      const float sum = image.at((p - image.p) * per_p, (q - image.q) * per_q);
       // Length of the ray from one slice to the next, in mm, and thousandths.
-      const double length = Eigen::Vector3d(p * mm.x(), q * mm.y(), mm.z()).norm() * 1e-3;
-      out[column] = float(length) * image.at((p - image.p) / image.step_p, (q - image.q) / image.step_q);
+      if (sum != 0) out[column] = sum * float(Eigen::Vector3d(p * mm.x(), q * mm.y(), mm.z()).norm() * 1e-3);
     }
   });
   return values;

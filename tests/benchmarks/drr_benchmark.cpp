@@ -108,12 +108,16 @@ double rms(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 /// Looked up, of a bone that is turned by a few degrees against what was kept; `fine` draws the truth.
-void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const Projector& fine) {
+void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const Projector& fine, const char* folder) {
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t processor = std::clock();
   const auto one = projector(catalogue, "project.lightfield", volume);
   const double processor_s = double(std::clock() - processor) / CLOCKS_PER_SEC;
   const double made_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (folder) {
+    const auto values = one->radiograph(camera_of(256), {"world", "ct"}, PixelGrid{0, 0, 1, 256, 256});
+    write(std::filesystem::path(folder) / (what + "_lightfield_256.f32"), values.data(), 4 * values.size());
+  }
   const RigidTransform turned{"world", "ct", rotation_from_vector({0.05, -0.03, 0.06}), {3, -2, 4}};
   const PixelGrid grid{0, 0, 1, 512, 512}, some{0, 0, 2, 256, 256};
   const Camera camera = camera_of(512);
@@ -159,6 +163,6 @@ int main(int argc, char** argv) {
       const auto sparse = pixels();
       std::printf("%-6s %-14s 2000 pixels: %.3f ms\n", what.c_str(), name.c_str(), median_ms([&] { one->radiograph(camera_of(512), world_from_model, sparse); }));
     }
-    lookup(catalogue, volume, what, *fine);
+    lookup(catalogue, volume, what, *fine, argc > 1 ? argv[1] : nullptr);
   }
 }

@@ -1,17 +1,18 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""drr_peers.py BUILD [PICTURES]: radiographs by marrow and by plastimatch (Debian package plastimatch), same volume, geometry, threads and run.
+"""drr_peers.py BUILD [PICTURES]: radiographs by marrow and by plastimatch (Debian package plastimatch), same volume, view, threads and run.
 
-plastimatch is timed by the difference of a run with one image and one with eleven, so neither its start nor the reading of the volume counts. Errors
-are against marrow's ray casting at 0.05 mm, after the factor that plastimatch's units need. In the folder PICTURES, for thigh and bone: that reference, each
-program's and projector's image, and below them the differences from the reference, grey = 0, black and white = -5 and 5 mm of water.
+plastimatch is timed by its own clock, which counts neither its start nor the reading of the volume. Errors are against marrow's ray casting at 0.05 mm, after
+the factor that plastimatch's units need. In the folder PICTURES, for thigh and bone: that reference, each projector's image and plastimatch's, and below them
+the differences from the reference, grey = 0, black and white = -5 and 5 mm of water.
 """
 import os
 import pathlib
+import re
+import statistics
 import subprocess
 import sys
 import tempfile
-import time
 
 import numpy
 
@@ -19,11 +20,22 @@ BUILD = pathlib.Path(sys.argv[1])
 THREADS = "2"
 
 
-def plastimatch(volume, out, pixels, images):
-    start = time.perf_counter()
-    subprocess.run(["plastimatch", "drr", "-i", "exact", "-r", "%d %d" % (pixels, pixels), "-z", "230 230", "--sad", "600", "--sid", "1000", "-o", "0 0 0", "-a", str(images), "-N", "0.01",
-                    "-y", "0", "-t", "raw", "-O", str(out), str(volume)], check=True, capture_output=True, env=dict(os.environ, OMP_NUM_THREADS=THREADS))
-    return time.perf_counter() - start
+def plastimatch(volume, out, pixels):
+    """Milliseconds, and the image along the same rays as marrow's, but for turns and mirrors."""
+    done = subprocess.run(["plastimatch", "drr", "-i", "exact", "-r", "%d %d" % (pixels, pixels), "-z", "230 230", "--sad", "600", "--sid", "1000", "-o", "0 0 0", "-n", "0 1 0", "--vup", "0 0 1",
+                           "-t", "raw", "-O", str(out), str(volume)], check=True, capture_output=True, text=True, env=dict(os.environ, OMP_NUM_THREADS=THREADS))
+    total, writing = (float(re.search(what + r" time: ([0-9.e-]+)", done.stdout).group(1)) for what in ("Total", "I/O"))
+    return 1000 * (total - writing), numpy.fromfile(str(out) + "0000.raw", dtype="<f4").reshape(pixels, pixels)
+
+
+def root_mean_square(difference):
+    return float(numpy.sqrt(numpy.mean(difference ** 2)))
+
+
+def like(image, reference):
+    """The image turned, mirrored and scaled as the reference is."""
+    candidates = [numpy.rot90(flipped, turn) for flipped in (image, image[:, ::-1]) for turn in range(4)]
+    return min((one * (reference.sum() / one.sum()) for one in candidates), key=lambda one: root_mean_square(one - reference))
 
 
 def picture(path, reference, images):
@@ -36,13 +48,6 @@ def picture(path, reference, images):
     PIL.Image.fromarray(numpy.vstack([numpy.hstack(tops), numpy.hstack(bottoms)])).save(path)
 
 
-def peer_image(volume, out):
-    """256 x 256 pixels along the same rays as marrow's, but for turns and mirrors."""
-    subprocess.run(["plastimatch", "drr", "-i", "exact", "-r", "256 256", "-z", "230 230", "--sad", "600", "--sid", "1000", "-o", "0 0 0", "-n", "0 1 0", "--vup", "0 0 1", "-t", "raw", "-O", str(out),
-                    str(volume)], check=True, capture_output=True)
-    return numpy.fromfile(str(out) + "0000.raw", dtype="<f4").reshape(256, 256)
-
-
 def main():
     version = subprocess.run(["plastimatch", "--version"], capture_output=True, text=True).stdout.strip()
     with tempfile.TemporaryDirectory() as folder:
@@ -50,27 +55,20 @@ def main():
         ours = subprocess.run([str(BUILD / "bin" / "drr_benchmark"), str(folder)], check=True, capture_output=True, text=True).stdout
         print(ours, end="")
         for what in ("thigh", "bone"):
+            read = lambda name: numpy.fromfile(folder / ("%s_%s_256.f32" % (what, name)), dtype="<f4").reshape(256, 256)
+            reference = read("reference")
             for pixels in (512, 256):
-                times = []
-                for _ in range(3):
-                    one = plastimatch(folder / (what + ".mha"), folder / "peer_", pixels, 1)
-                    times.append((plastimatch(folder / (what + ".mha"), folder / "peer_", pixels, 11) - one) / 10)
-                seconds = sorted(times)[1]
-                mine = float(next(line for line in ours.splitlines() if line.startswith(what) and "joseph" in line and "%d x %d" % (pixels, pixels) in line).split(":")[1].split()[0])
+                runs = [plastimatch(folder / (what + ".mha"), folder / "peer_", pixels) for _ in range(9)]
+                theirs = statistics.median(time for time, _ in runs)
+                mine = float(re.search(r"%s +joseph +%d x %d: +([0-9.]+) ms" % (what, pixels, pixels), ours).group(1))
                 error = ""
                 if pixels == 256:
-                    image = peer_image(folder / (what + ".mha"), folder / "view_")
-                    reference = numpy.fromfile(folder / (what + "_reference_256.f32"), dtype="<f4").reshape(256, 256)
-                    candidates = [numpy.rot90(flipped, turn) for flipped in (image, image[:, ::-1]) for turn in range(4)]
-                    root_mean_square = lambda one: float(numpy.sqrt(numpy.mean((one - reference) ** 2)))
-                    peer = min((one * (reference.sum() / one.sum()) for one in candidates), key=root_mean_square)
-                    error = ", root mean square error %.4f mm" % root_mean_square(peer)
+                    peer = like(runs[0][1], reference)
+                    error = ", root mean square error %.4f mm" % root_mean_square(peer - reference)
                     if len(sys.argv) > 2:
                         pathlib.Path(sys.argv[2]).mkdir(parents=True, exist_ok=True)
-                        names = ["joseph", "ray_casting", "siddon_jacobs", "lightfield"]
-                        own = [numpy.fromfile(folder / ("%s_%s_256.f32" % (what, name)), dtype="<f4").reshape(256, 256) for name in names if (folder / ("%s_%s_256.f32" % (what, name))).exists()]
-                        picture(pathlib.Path(sys.argv[2]) / (what + ".png"), reference, own + [peer])
-                print("%s, %d x %d: %s exact %.0f ms%s; project.joseph %.2f ms: %.1f times faster" % (what, pixels, pixels, version, 1000 * seconds, error, mine, 1000 * seconds / mine))
+                        picture(pathlib.Path(sys.argv[2]) / (what + ".png"), reference, [read(name) for name in ("joseph", "ray_casting", "siddon_jacobs", "lightfield")] + [peer])
+                print("%s, %d x %d: %s exact %.1f ms%s; project.joseph %.2f ms: %.1f times faster" % (what, pixels, pixels, version, theirs, error, mine, theirs / mine))
 
 
 main()
