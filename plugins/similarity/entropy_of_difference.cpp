@@ -12,34 +12,41 @@ struct Options : marrow::similarity::IntensityOptions {
   int bins = 64;
 };
 
-/// Entropy of the histogram of seen - scale * rendered, over its greatest possible value. Bins are as wide as the image's own grey
-/// values spread, so that a smaller spread of the difference shows.
-double value(const Patch& patch, int bins) {
-  const double scale = marrow::similarity::fit_of(patch).scale;
-  if (!(scale > 0)) return 1;
-  const auto seen = bins_of(patch.seen, patch.counts, bins);
-  if (seen.per_unit == 0) return 1;
-  std::vector<float> difference(patch.seen.size());
-  for (std::size_t i = 0; i < difference.size(); ++i) difference[i] = patch.seen[i] - float(scale) * patch.rendered[i];
-  auto own = bins_of(difference, patch.counts, bins);
-  own.per_unit = seen.per_unit;
-  std::vector<double> histogram(static_cast<std::size_t>(bins));
+/// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part of the image's own range, and
+/// go as far below it, where the difference may lie.
+marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
+  marrow::similarity::Bins within = bins_of(whole.seen, whole.counts, bins);
+  if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
+  within.low -= (bins + 0.5) / within.per_unit;  // the brightest, often the background, in the middle of its bin
+  within.count = 2 * bins + 1;
+  std::vector<double> image(static_cast<std::size_t>(within.count));
   double n = 0;
-  for (std::size_t i = 0; i < difference.size(); ++i)
-    if (patch.counts[i]) histogram[std::size_t(own.of(difference[i]))] += 1, n += 1;
-  return n < 16 ? 1 : marrow::similarity::entropy(histogram, n) / std::log(double(bins));
+  for (std::size_t i = 0; i < whole.seen.size(); ++i)
+    if (whole.counts[i]) image[std::size_t(within.of(whole.seen[i]))] += 1, n += 1;
+  const double before = marrow::similarity::entropy(image, n);
+  return [=](const Patch& patch) {
+    const double scale = marrow::similarity::scale_of(marrow::similarity::gradients_of(patch));
+    if (!(scale > 0) || !(before > 0)) return 1.0;
+    std::vector<double> histogram = image;
+    for (std::size_t i = 0; i < patch.seen.size(); ++i) {
+      if (!patch.counts[i] || patch.rendered[i] == 0) continue;
+      histogram[std::size_t(within.of(patch.seen[i]))] -= 1;
+      histogram[std::size_t(within.of(patch.seen[i] - scale * patch.rendered[i]))] += 1;
+    }
+    return std::min(2.0, marrow::similarity::entropy(histogram, n) / before);
+  };
 }
 
 std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
     const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.entropy_of_difference", entropy_of_difference);
-  node.summary("Entropy of the difference image (Buzug et al. 1997; Penney et al., IEEE Trans Med Imaging 1998)");
+  node.summary("Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med Imaging 1998)");
   marrow::similarity::declare<decltype(node), Options>(node);
   node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4), marrow::at_most(1024));
 }

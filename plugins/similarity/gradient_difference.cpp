@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "intensity.hpp"
@@ -8,41 +10,41 @@ namespace {
 using marrow::similarity::IntensityOptions;
 using marrow::similarity::Patch;
 
-/// Mean of A / (A + d^2), with d the difference of gradients and A the variance of the image's; 0 where the image is constant.
-double term(const std::vector<float>& rendered, const std::vector<float>& seen, const std::vector<char>& counts, double scale) {
-  double n = 0, sum = 0, squares = 0;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (!counts[i]) continue;
-    n += 1, sum += seen[i], squares += double(seen[i]) * seen[i];
-  }
-  const double variance = n > 15 ? squares / n - sum * sum / (n * n) : 0;
-  if (!(variance > 1e-14)) return 0;
-  double total = 0;
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (!counts[i]) continue;
-    const double difference = seen[i] - scale * rendered[i];
-    total += variance / (variance + difference * difference);
-  }
-  return total / n;
-}
-
-/// The factor of the rendered gradients is the least-squares one of the grey values.
-double value(const Patch& patch) {
-  const double scale = marrow::similarity::fit_of(patch).scale;
-  if (!(scale > 0)) return 1;
-  const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
-  return 1 - 0.5 * (term(g.rendered_u, g.seen_u, g.counts, scale) + term(g.rendered_v, g.seen_v, g.counts, scale));
+/// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference of gradients and A the
+/// variance of the image's, over the same sums without the model. That is Penney's sum over a fixed region, the image, but for constants.
+marrow::similarity::Measure measure_of(const Patch& whole) {
+  Patch unseen = whole;
+  unseen.rendered.assign(whole.seen.size(), 0.0f);
+  const marrow::similarity::Gradients image = marrow::similarity::gradients_of(unseen);
+  const auto variance = [&](const std::vector<float>& gradients) { return std::max(1e-14, std::pow(marrow::similarity::deviation(gradients, image.counts), 2)); };
+  const double u2 = variance(image.seen_u), v2 = variance(image.seen_v);
+  const auto structure = [](double d, double variance) { return d * d / (variance + d * d); };
+  double all = 0;
+  for (std::size_t i = 0; i < image.counts.size(); ++i)
+    if (image.counts[i]) all += structure(image.seen_u[i], u2) + structure(image.seen_v[i], v2);
+  return [=](const Patch& patch) {
+    const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
+    const double scale = marrow::similarity::scale_of(g);
+    if (!(scale > 0) || !(all > 0)) return 1.0;
+    double less = 0;
+    for (std::size_t i = 0; i < g.counts.size(); ++i) {
+      if (!g.counts[i]) continue;
+      less += structure(g.seen_u[i], u2) - structure(g.seen_u[i] - scale * g.rendered_u[i], u2);
+      less += structure(g.seen_v[i], v2) - structure(g.seen_v[i] - scale * g.rendered_v[i], v2);
+    }
+    return std::min(2.0, 1 - less / all);
+  };
 }
 
 std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
     const marrow::List<marrow::Projector>* other_projectors, const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, value);
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, measure_of);
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_difference", gradient_difference);
-  node.summary("1 - gradient difference, which thin bright lines hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
+  node.summary("Gradients that the difference image has left of the image's (gradient difference), which thin bright lines hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
   marrow::similarity::declare<decltype(node), IntensityOptions>(node);
 }

@@ -12,17 +12,14 @@
 namespace marrow::similarity {
 namespace {
 
-/// One view at one step: every step-th pixel of its smoothed line integrals.
-struct Level {
-  cv::Mat seen;    ///< CV_32F
-  cv::Mat counts;  ///< CV_8U
-};
-
 class IntensityCost : public Cost {
  public:
-  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, Measure measure)
-      : projector_(projector), views_(views), options_(options), worst_(worst), measure_(std::move(measure)) {
-    for (const View& view : views) levels_.push_back(level_of(view));
+  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, MeasureOf measure_of)
+      : projector_(projector), views_(views), options_(options), worst_(worst), measure_of_(std::move(measure_of)) {
+    for (const View& view : views) {
+      images_.push_back(image_of(view));
+      measures_.push_back(measure_of_(images_.back()));
+    }
   }
 
   double value(const RigidTransform& world_from_model) const override {
@@ -37,63 +34,70 @@ class IntensityCost : public Cost {
     if (level.pixel_step <= 0 || level.pixel_step == options_.pixel_step) return std::make_shared<IntensityCost>(*this);
     IntensityOptions options = options_;
     options.pixel_step = level.pixel_step;
-    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_);
+    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_of_);
   }
 
  private:
-  Level level_of(const View& view) const {
+  /// Every step-th pixel of a view's smoothed line integrals.
+  Patch image_of(const View& view) const {
     const int step = options_.pixel_step;
     cv::Mat smooth = line_integrals(view.image.pixels);
     if (const double sigma = options_.blur_px * step; sigma > 0.1) cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
-    Level level{cv::Mat((smooth.rows + step - 1) / step, (smooth.cols + step - 1) / step, CV_32F), {}};
-    level.counts = cv::Mat(level.seen.rows, level.seen.cols, CV_8U, cv::Scalar(1));
-    for (int row = 0; row < level.seen.rows; ++row)
-      for (int column = 0; column < level.seen.cols; ++column) {
+    Patch image{(smooth.cols + step - 1) / step, (smooth.rows + step - 1) / step, 0, 0, {}, {}, {}};
+    for (int row = 0; row < image.rows; ++row)
+      for (int column = 0; column < image.columns; ++column) {
         const float value = smooth.at<float>(row * step, column * step);
-        level.seen.at<float>(row, column) = value;
         const bool is_out = !std::isfinite(value) || (!view.mask.empty() && !view.mask.at<std::uint8_t>(row * step, column * step));
-        if (is_out) level.counts.at<std::uint8_t>(row, column) = 0;
+        image.seen.push_back(value);
+        image.counts.push_back(!is_out);
       }
-    return level;
+    return image;
   }
 
   double value_in(std::size_t index, const RigidTransform& world_from_model) const {
     const Camera& camera = views_[index].camera;
-    const Level& level = levels_[index];
+    const Patch& image = images_[index];
     const PixelGrid region = projector_.region(camera, world_from_model);
     if (region.count() == 0) return worst_;
     const int step = options_.pixel_step, margin = options_.margin_px;
     const int left = std::max(0, (int(region.u_px) - margin) / step), top = std::max(0, (int(region.v_px) - margin) / step);
-    const int right = std::min(level.seen.cols - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
-              bottom = std::min(level.seen.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
+    const int right = std::min(image.columns - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
+              bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
     if (right - left < 3 || bottom - top < 3) return worst_;
     Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
     patch.rendered = projector_.radiograph(camera, world_from_model, PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
     patch.seen.resize(patch.rendered.size());
     patch.counts.resize(patch.rendered.size());
     for (int row = 0; row < patch.rows; ++row) {
-      std::copy_n(level.seen.ptr<float>(top + row) + left, patch.columns, patch.seen.begin() + std::ptrdiff_t(patch.at(0, row)));
-      std::copy_n(level.counts.ptr<std::uint8_t>(top + row) + left, patch.columns, patch.counts.begin() + std::ptrdiff_t(patch.at(0, row)));
+      const auto from = std::ptrdiff_t(image.at(left, top + row)), to = std::ptrdiff_t(patch.at(0, row));
+      std::copy_n(image.seen.begin() + from, patch.columns, patch.seen.begin() + to);
+      std::copy_n(image.counts.begin() + from, patch.columns, patch.counts.begin() + to);
     }
-    return measure_(patch);
+    return measures_[index](patch);
   }
 
   const Projector& projector_;
   const List<View> views_;
   const IntensityOptions options_;
   const double worst_;
-  const Measure measure_;
-  std::vector<Level> levels_;
+  const MeasureOf measure_of_;
+  std::vector<Patch> images_;
+  std::vector<Measure> measures_;
 };
 
 }  // namespace
 
 std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
-                                           const IntensityOptions& options, double worst, Measure measure) {
+                                           const IntensityOptions& options, double worst, MeasureOf measure_of) {
   check_views(views);
   check_weights(options.weights, views.size());
   const List<View> own = without_shadows(views, others_of(&projector, others, other_projectors));
-  return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure));
+  return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
+}
+
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, Measure measure) {
+  return intensity_cost(projector, views, others, other_projectors, options, worst, [measure = std::move(measure)](const Patch&) { return measure; });
 }
 
 cv::Mat line_integrals(const cv::Mat& image) {
@@ -133,6 +137,16 @@ Gradients gradients_of(const Patch& patch) {
   return g;
 }
 
+double scale_of(const Gradients& g) {
+  double products = 0, squares = 0;
+  for (std::size_t i = 0; i < g.counts.size(); ++i) {
+    if (!g.counts[i]) continue;
+    products += double(g.rendered_u[i]) * g.seen_u[i] + double(g.rendered_v[i]) * g.seen_v[i];
+    squares += double(g.rendered_u[i]) * g.rendered_u[i] + double(g.rendered_v[i]) * g.rendered_v[i];
+  }
+  return squares > 0 ? products / squares : 0;
+}
+
 namespace {
 
 struct Moments {
@@ -162,6 +176,11 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b, con
   const double aa = m.aa - m.a * m.a / m.n, bb = m.bb - m.b * m.b / m.n, ab = m.ab - m.a * m.b / m.n;
   if (!(aa > 1e-12 * std::max(m.aa, 1e-30)) || !(bb > 1e-12 * std::max(m.bb, 1e-30))) return 0;
   return std::clamp(ab / std::sqrt(aa * bb), -1.0, 1.0);
+}
+
+double deviation(const std::vector<float>& values, const std::vector<char>& counts) {
+  const Moments m = moments_of(values, values, counts);
+  return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.aa - m.a * m.a / m.n) / m.n);
 }
 
 Fit fit_of(const Patch& patch) {

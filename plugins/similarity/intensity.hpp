@@ -23,6 +23,8 @@ struct Patch {
 
 /// How badly the two agree; smaller is better. Gives the worst value where there is nothing to compare, never NaN.
 using Measure = std::function<double(const Patch&)>;
+/// The measure of one image at one level. It is given the whole of it, without `rendered`.
+using MeasureOf = std::function<Measure(const Patch& whole)>;
 
 struct IntensityOptions {
   int pixel_step = 2;
@@ -36,6 +38,9 @@ struct IntensityOptions {
 /// compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments do not count. Throws
 /// Error for views that are none.
 std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, MeasureOf measure_of);
+/// The same, of a measure that asks of the image only what is compared.
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, Measure measure);
 
 /// -log of the part of the brightest that is left, in arbitrary units: bright = air. Values of 0 or less count as one step of grey.
@@ -48,9 +53,15 @@ struct Gradients {
   std::vector<char> counts;
 };
 Gradients gradients_of(const Patch& patch);
+/// The factor that makes the rendered gradients most like the seen ones by least squares; 0 where there are none. Soft tissue, which the
+/// radiograph of a bone lacks, has little part in it.
+double scale_of(const Gradients& gradients);
 
 /// Pearson's correlation over the pixels that count; 0 where one of the two is constant or fewer than 16 count.
 double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts);
+
+/// The standard deviation of the values that count; 0 of fewer than 16.
+double deviation(const std::vector<float>& values, const std::vector<char>& counts);
 
 /// The factor s that makes s * rendered, but for a constant, most like seen by least squares; 0 where rendered is constant.
 struct Fit {

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <cmath>
 #include <marrow/plugin.hpp>
 
 #include "intensity.hpp"
@@ -12,48 +13,51 @@ struct Options : marrow::similarity::IntensityOptions {
   double sigma = 0.5;
 };
 
-/// Mean over pixels and their neighbours within the radius of s^2 / (s^2 + (D_i - D_j)^2), D = seen - scale * rendered and s the given
-/// part of the deviation of the image: where the model is right, it leaves no structure in D.
-double value(const Patch& patch, const Options& options) {
-  const marrow::similarity::Fit fit = marrow::similarity::fit_of(patch);
-  if (!(fit.scale > 0)) return 1;
-  std::vector<float> difference(patch.seen.size());
-  double n = 0, sum = 0, squares = 0;
-  for (std::size_t i = 0; i < difference.size(); ++i) {
-    difference[i] = patch.seen[i] - float(fit.scale) * patch.rendered[i];
-    if (!patch.counts[i]) continue;
-    n += 1, sum += patch.seen[i], squares += double(patch.seen[i]) * patch.seen[i];
-  }
-  const double variance = options.sigma * options.sigma * (squares / n - sum * sum / (n * n));
-  if (!(variance > 1e-14)) return 1;
-  const int r = options.radius_pixels;
-  double total = 0, pairs = 0;
-  // Each pair once: the neighbours behind a pixel in reading order.
+/// Pairs of pixels within the radius that count, each once: of(i, j) of their places in the patch.
+template <class Of>
+void each_pair(const Patch& patch, int radius, const Of& of) {
   for (int row = 0; row < patch.rows; ++row)
-    for (int down = 0; down <= std::min(r, patch.rows - 1 - row); ++down)
-      for (int right = down == 0 ? 1 : -r; right <= r; ++right) {
-        if (right * right + down * down > r * r) continue;
+    for (int down = 0; down <= std::min(radius, patch.rows - 1 - row); ++down)
+      for (int right = down == 0 ? 1 : -radius; right <= radius; ++right) {
+        if (right * right + down * down > radius * radius) continue;
         for (int column = std::max(0, -right); column < std::min(patch.columns, patch.columns - right); ++column) {
           const std::size_t i = patch.at(column, row), j = patch.at(column + right, row + down);
-          if (!patch.counts[i] || !patch.counts[j]) continue;
-          const double d = difference[i] - difference[j];
-          total += variance / (variance + d * d);
-          pairs += 1;
+          if (patch.counts[i] && patch.counts[j]) of(i, j);
         }
       }
-  return pairs > 0 ? 1 - total / pairs : 1;
+}
+
+/// Structure left: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), D = seen - scale * rendered and s the given part of the
+/// deviation of the image, over the same sum without the model. That is Weese's and Penney's sum over a fixed region, the image, but for
+/// constants; a mean over the model's surroundings would be best where the image is even.
+marrow::similarity::Measure measure_of(const Patch& whole, const Options& options) {
+  const double deviation = marrow::similarity::deviation(whole.seen, whole.counts), s2 = std::pow(options.sigma * deviation, 2);
+  if (!(s2 > 1e-14)) return [](const Patch&) { return 1.0; };
+  const auto structure = [s2](double d) { return d * d / (s2 + d * d); };
+  double all = 0;
+  each_pair(whole, options.radius_pixels, [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
+  return [=, radius = options.radius_pixels](const Patch& patch) {
+    const float scale = float(marrow::similarity::scale_of(marrow::similarity::gradients_of(patch)));
+    if (!(scale > 0) || !(all > 0)) return 1.0;
+    double less = 0;
+    each_pair(patch, radius, [&](std::size_t i, std::size_t j) {
+      const float seen = patch.seen[i] - patch.seen[j], rendered = patch.rendered[i] - patch.rendered[j];
+      if (rendered != 0) less += structure(seen) - structure(seen - scale * rendered);
+    });
+    return std::min(2.0, 1 - less / all);
+  };
 }
 
 std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
     const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [options](const Patch& patch) { return value(patch, options); });
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [options](const Patch& whole) { return measure_of(whole, options); });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.pattern_intensity", pattern_intensity);
-  node.summary("1 - pattern intensity of the difference image (Weese et al., IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)");
+  node.summary("Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)");
   marrow::similarity::declare<decltype(node), Options>(node);
   node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1), marrow::at_most(20))
       .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image", marrow::at_least(1e-3), marrow::unit("1"));

@@ -11,6 +11,6 @@ std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, con
 
 TEST(EntropyOfDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make, false); }
 TEST(EntropyOfDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(EntropyOfDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 1); }
+TEST(EntropyOfDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
 TEST(EntropyOfDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
 TEST(EntropyOfDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }

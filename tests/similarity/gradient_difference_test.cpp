@@ -11,6 +11,6 @@ std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, con
 
 TEST(GradientDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make); }
 TEST(GradientDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(GradientDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 1); }
+TEST(GradientDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
 TEST(GradientDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
 TEST(GradientDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }

@@ -11,6 +11,6 @@ std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, con
 
 TEST(PatternIntensity, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make); }
 TEST(PatternIntensity, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(PatternIntensity, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 1); }
+TEST(PatternIntensity, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
 TEST(PatternIntensity, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
 TEST(PatternIntensity, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }
