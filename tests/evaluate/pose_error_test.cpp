@@ -75,6 +75,8 @@ TEST(PoseError, TranslationIsSplitAlongAndAcrossTheShaft) {
   EXPECT_NEAR(error["translation_mm"], 13, 1e-9);
   EXPECT_NEAR(error["along_mm"], 12, 1e-6);
   EXPECT_NEAR(error["across_mm"], 5, 1e-6);
+  EXPECT_NEAR(error["along_frontal_mm"], 3, 1e-6);
+  EXPECT_NEAR(error["along_lateral_mm"], -4, 1e-6);
   EXPECT_NEAR(error["mtre_mm"], 13, 1e-9);
   EXPECT_NEAR(error["chapter_translation_mm"], (3 + 4 + 12) / 3.0, 1e-6);
   EXPECT_NEAR(error["rotation_deg"], 0, 1e-9);
