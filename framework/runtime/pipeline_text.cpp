@@ -166,11 +166,10 @@ class Reader {
     const std::string what = key.substr(dot + 1);
     const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
     if (what == "uses") {
-      // `with` was written for the node that is replaced: its options mean nothing to another one.
-      if (text != node->uses && !node->options.empty()) {
+      // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for this run, in any order.
+      const auto of_file = [](const auto& option) { return !option.second.is_override; };
+      if (text != node->uses && std::erase_if(node->options, of_file) > 0)
         pipeline_.notes.push_back("node '" + node->id + "': the options written for " + node->uses + " are not used by " + text);
-        node->options.clear();
-      }
       node->uses = text;
       node->uses_place = place;
       return;

@@ -55,6 +55,14 @@ class Commands(Case):
         result = marrow("check", self.write("p.yaml", text + "outputs: {mesh: marching_cubes}\n"))
         self.assertEqual(result.returncode, 0, result.stderr)
 
+    def test_overrides_hold_in_any_order(self):
+        for settings in (["cost.sigma=0.1", "cost.uses=similarity.pattern_intensity"], ["cost.uses=similarity.pattern_intensity", "cost.sigma=0.1"]):
+            out = self.scratch / settings[0]
+            marrow("run", SOURCE / "pipelines" / "femur-grey-values.yaml", "case=/nowhere", "--out", out, *[part for one in settings for part in ("--set", one)])
+            self.assertIn("sigma: 0.1", (out / "pipeline.yaml").read_text())
+        wrong = marrow("check", SOURCE / "pipelines" / "femur-grey-values.yaml", "--set", "cost.sigma=0.1", "--set", "cost.uses=similarity.mutual_information")
+        self.assertIn("--set cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr)
+
     def test_run_writes_its_record(self):
         out = self.scratch / "out"
         result = marrow("run", self.write("p.yaml", NUMBER), "--out", out, "--seed", 5, "--set", "c.value=4", plugins=[TEST_PLUGINS])
