@@ -11,10 +11,11 @@
 namespace marrow::rays {
 namespace {
 
-constexpr int kSide = 4;
+constexpr int kSide = 4;  ///< of a brick, in voxels; and so many slices are followed at a time
 
 // Four numbers that the compiler keeps in one register.
 using Four = float __attribute__((vector_size(16)));
+using FourIntegers = std::int32_t __attribute__((vector_size(16)));
 using FourVoxels = std::int16_t __attribute__((vector_size(8)));
 
 }  // namespace
@@ -57,21 +58,24 @@ float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& dir
   columns += left;
   rows += top;
   Four sum{0, 0, 0, 0};
-  for (int slice = begin; slice <= end; ++slice) {
-    if (slice % kSide == 0) {
-      // The brick that the ray enters a little later, and its neighbour: waiting for memory is half of the time otherwise.
-      const int ahead = std::min(slice + 4 * kSide, end), i = int(x + dx * float(ahead - begin)), j = int(y + dy * float(ahead - begin));
-      __builtin_prefetch(values_.data() + slices[ahead] + rows[j] + columns[i]);
-      __builtin_prefetch(values_.data() + slices[ahead] + rows[j + 1] + columns[i + 1]);
+  for (int first = begin; first <= end; first += kSide) {
+    // The brick that the ray enters a little later, and its neighbour: waiting for memory is half of the time otherwise.
+    const int ahead = std::min(first + 4 * kSide, end), i_ahead = int(x + dx * float(ahead - begin)), j_ahead = int(y + dy * float(ahead - begin));
+    __builtin_prefetch(values_.data() + slices[ahead] + rows[j_ahead] + columns[i_ahead]);
+    __builtin_prefetch(values_.data() + slices[ahead] + rows[j_ahead + 1] + columns[i_ahead + 1]);
+    // Where the ray is in four slices.
+    const float n = float(first - begin);
+    const Four steps{n, n + 1, n + 2, n + 3}, px = x + dx * steps, py = y + dy * steps;
+    const FourIntegers i = __builtin_convertvector(px, FourIntegers), j = __builtin_convertvector(py, FourIntegers);
+    const Four u = px - __builtin_convertvector(i, Four), v = py - __builtin_convertvector(j, Four);
+    const int count = std::min(kSide, end - first + 1);
+    for (int k = 0; k < count; ++k) {
+      const std::int16_t *near_row = values_.data() + slices[first + k] + rows[j[k]], *far_row = values_.data() + slices[first + k] + rows[j[k] + 1];
+      const std::uint32_t c = columns[i[k]], d = columns[i[k] + 1];
+      const FourVoxels voxels{near_row[c], near_row[d], far_row[c], far_row[d]};
+      const Four across_row{1 - u[k], u[k], 1 - u[k], u[k]}, across_rows{1 - v[k], 1 - v[k], v[k], v[k]};
+      sum += across_row * across_rows * __builtin_convertvector(voxels, Four);
     }
-    const float px = x + dx * float(slice - begin), py = y + dy * float(slice - begin);
-    const int i = int(px), j = int(py);
-    const float u = px - float(i), v = py - float(j);
-    const std::int16_t *near_row = values_.data() + slices[slice] + rows[j], *far_row = values_.data() + slices[slice] + rows[j + 1];
-    const std::uint32_t c = columns[i], d = columns[i + 1];
-    const FourVoxels voxels{near_row[c], near_row[d], far_row[c], far_row[d]};
-    const Four across_row{1 - u, u, 1 - u, u}, across_rows{1 - v, 1 - v, v, v};
-    sum += across_row * across_rows * __builtin_convertvector(voxels, Four);
   }
   return float(double(sum[0] + sum[1] + sum[2] + sum[3]) * slope.cwiseProduct(spacing_mm_).norm() * 1e-3);
 }
