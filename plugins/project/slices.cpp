@@ -22,16 +22,13 @@ struct Sheared {
   int columns = 0, rows = 0;
   std::vector<float> sums;
 
+  /// Bilinear. Nothing lies beyond the first and last columns and rows: the grid has a step to spare all around.
   float at(double column, double row) const {
-    if (!(column > -1 && row > -1 && column < columns && row < rows)) return 0;
-    const int c = int(column + 1) - 1, r = int(row + 1) - 1;  // rounded down
+    if (!(column >= 0 && row >= 0 && column < columns - 1 && row < rows - 1)) return 0;
+    const int c = int(column), r = int(row);
     const float x = float(column - c), y = float(row - r);
-    if (c >= 0 && r >= 0 && c + 1 < columns && r + 1 < rows) {
-      const float *a = sums.data() + std::size_t(r) * std::size_t(columns) + std::size_t(c), *b = a + columns;
-      return (1 - y) * ((1 - x) * a[0] + x * a[1]) + y * ((1 - x) * b[0] + x * b[1]);
-    }
-    const auto value = [&](int i, int j) { return i < 0 || j < 0 || i >= columns || j >= rows ? 0.0f : sums[std::size_t(j) * std::size_t(columns) + std::size_t(i)]; };
-    return (1 - y) * ((1 - x) * value(c, r) + x * value(c + 1, r)) + y * ((1 - x) * value(c, r + 1) + x * value(c + 1, r + 1));
+    const float *a = sums.data() + std::size_t(r) * std::size_t(columns) + std::size_t(c), *b = a + columns;
+    return (1 - y) * ((1 - x) * a[0] + x * a[1]) + y * ((1 - x) * b[0] + x * b[1]);
   }
 };
 

@@ -21,7 +21,7 @@ struct Options {
   bool estimate_offset = true;
   double model_error_px = 0.4;
   bool symmetric = false;
-  double others_reach_px = 3;
+  double others_reach_px = marrow::similarity::kOthersReach_px;
   std::vector<double> weights;
 };
 

@@ -135,11 +135,10 @@ class DrrEdges : public marrow::Cost {
 
 std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
                                               const marrow::List<marrow::Pose>* others, const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  constexpr double kOthersReach_px = 3;
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
   const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, kOthersReach_px, options.direction_tolerance_deg);
+  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;

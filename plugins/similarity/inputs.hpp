@@ -30,6 +30,7 @@ std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, cons
 /// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines where they
 /// are drawn as outlines only.
 List<View> without_shadows(const List<View>& views, const std::vector<Other>& others);
+constexpr double kOthersReach_px = 3;  ///< edges as near as this to another fragment's outline are its own
 /// The edges but for those within `reach_px` of another's outline that have its direction, up to the tolerance.
 List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others, double reach_px, double tolerance_deg);
 

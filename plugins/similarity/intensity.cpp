@@ -183,14 +183,4 @@ double deviation(const std::vector<float>& values, const std::vector<char>& coun
   return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.aa - m.a * m.a / m.n) / m.n);
 }
 
-Fit fit_of(const Patch& patch) {
-  const Moments m = moments_of(patch.rendered, patch.seen, patch.counts);
-  if (m.n < 16) return {};
-  const double aa = m.aa - m.a * m.a / m.n;
-  if (!(aa > 1e-12 * std::max(m.aa, 1e-30))) return {};
-  const std::size_t at = std::size_t(std::find(patch.counts.begin(), patch.counts.end(), 1) - patch.counts.begin());
-  const double scale = (m.ab - m.a * m.b / m.n) / aa;
-  return {scale, patch.seen[at] + m.b / m.n - scale * (patch.rendered[at] + m.a / m.n)};
-}
-
 }  // namespace marrow::similarity

@@ -63,12 +63,6 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b, con
 /// The standard deviation of the values that count; 0 of fewer than 16.
 double deviation(const std::vector<float>& values, const std::vector<char>& counts);
 
-/// The factor s that makes s * rendered, but for a constant, most like seen by least squares; 0 where rendered is constant.
-struct Fit {
-  double scale = 0, offset = 0;
-};
-Fit fit_of(const Patch& patch);
-
 /// Declares the inputs, outputs and options that all of these nodes share.
 template <class Node, class Options>
 void declare(Node& node) {

@@ -249,14 +249,13 @@ std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges)
 std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field, const marrow::List<marrow::View>& views,
                                                    const marrow::List<marrow::EdgeMap>& edges, const marrow::Projector* projector, const marrow::List<marrow::Pose>* others,
                                                    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  constexpr double kOthersReach_px = 3;
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
   if (field.values_mm.size() != field.grid.count() || *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
     throw marrow::Error("the field is empty or broken: it needs 2 x 2 x 2 voxels at least and a value for each; wire that of a segmented fragment");
   if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0) throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
   const marrow::List<marrow::EdgeMap> own =
-      marrow::similarity::without_outlines(views, edges, marrow::similarity::others_of(projector, others, other_projectors), kOthersReach_px, options.direction_tolerance_deg);
+      marrow::similarity::without_outlines(views, edges, marrow::similarity::others_of(projector, others, other_projectors), marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<RayToSurface::Scene>(RayToSurface::Scene{views, {}, Distance(field), options});
   for (std::size_t i = 0; i < views.size(); ++i) scene->rays.push_back(rays_of(views[i], own[i]));
   return std::make_shared<RayToSurface>(std::move(scene), options.ray_step, options.reach_mm);

@@ -48,7 +48,7 @@ class Well : public marrow::Cost {
   double height_, length_;
 };
 
-/// A frame that is not the model's own, and a pose moved about it, in degrees and mm.
+/// A pose moved about its frame, in degrees and mm.
 inline marrow::Pose pose_at(const marrow::Pose& from, double rx, double ry, double rz, double tx, double ty, double tz) {
   marrow::Vector6d motion;
   motion << marrow::radians(rx), marrow::radians(ry), marrow::radians(rz), tx, ty, tz;
