@@ -24,7 +24,7 @@ function(marrow_add_plugin name)
   endif()
   # The command line lists and checks from manifests without loading a library, so each build writes a fresh one.
   if(TARGET marrow_cli)
-    add_dependencies(${target} marrow_cli)
+    add_dependencies(${target} marrow_cli marrow_worker)
     set(describe $<TARGET_FILE:marrow_cli>)
   else()
     set(describe $<TARGET_FILE:marrow::marrow_cli>)

@@ -8,8 +8,10 @@
 #include <fstream>
 #include <optional>
 
+#include "apart.hpp"
 #include "keys.hpp"
 #include "mapping.hpp"
+#include "named_files.hpp"
 
 namespace marrow {
 namespace {
@@ -147,8 +149,15 @@ bool Evaluation::makes_functions(std::size_t node) const {
 }
 
 void Evaluation::evaluate(std::size_t node, Call& call) {
-  const Recipe key = recipe(node, call);
-  remember(node, call, key);
+  Recipe key;
+  try {
+    key = recipe(node, call);
+    remember(node, call, key);
+  } catch (const std::exception& error) {  // a file that its options name cannot be read
+    call.result = {Status::failed, error.what(), {}};
+    report(RunEvent::Kind::failed, node, call.item, failure_text(node, call.item, error.what()));
+    return finished_(node, call);
+  }
   {
     const std::scoped_lock lock(mutex_);
     std::unique_ptr<Memo>& memo = memos_[key.key];
@@ -241,6 +250,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     if (settings_.cancelled && settings_.cancelled->load()) throw Cancelled();
     // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
+    check_unchanged(node, inputs, recipe);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);
     report(RunEvent::Kind::finished, node, item, "", 1, seconds);
@@ -271,9 +281,14 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   return result;
 }
 
-std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item, const Recipe& recipe,
-                                         std::vector<std::string>& warnings) {
-  const NodeDefinition& definition = catalogue_.load(pipeline_.nodes[node].info.name);
+/// What was read must be what the key counts, or the store would keep it for another content for ever.
+void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe) const {
+  const std::vector<std::string> paths = paths_of(pipeline_.nodes[node]);
+  if (!paths.empty() && recipe_of(pipeline_.nodes[node], inputs) != recipe.recipe)
+    throw Error(paths[0] + (paths.size() > 1 ? " or another file of the node" : "") + " changed while it was read; run it again");
+}
+
+void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value>& inputs) {
   for (std::size_t i = 0; i < inputs.size(); ++i)
     for_leaves(inputs[i], [&](Value& leaf) {
       if (leaf.data || !leaf.source) return;
@@ -284,11 +299,20 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
         throw;
       }
     });
-  const std::shared_ptr<void> options = definition.make_options();
-  for (std::size_t i = 0; i < pipeline_.nodes[node].options.size(); ++i)
-    definition.set_option[i](options.get(), pipeline_.nodes[node].options[i]);
+}
+
+std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item, const Recipe& recipe,
+                                         std::vector<std::string>& warnings) {
+  const PipelineNode& called = pipeline_.nodes[node];
+  const bool apart = runs_apart(called);
+  if (!apart || !inputs.empty()) make_inputs(catalogue_.load(called.info.name), inputs);
   report(RunEvent::Kind::started, node, item, "");
-  Context context = make_context(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
+  const Context::Hooks hooks = make_hooks(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
+  if (apart) return call_apart(catalogue_, called, inputs, hooks, settings_);
+  const NodeDefinition& definition = catalogue_.load(called.info.name);
+  const std::shared_ptr<void> options = definition.make_options();
+  for (std::size_t i = 0; i < called.options.size(); ++i) definition.set_option[i](options.get(), called.options[i]);
+  Context context(hooks);
   return definition.call(inputs, options.get(), context);
 }
 
@@ -308,7 +332,7 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
   report(RunEvent::Kind::warning, node, "", "its result is not kept for later runs: " + fault);
 }
 
-Context Evaluation::make_context(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings) {
+Context::Hooks Evaluation::make_hooks(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings) {
   Context::Hooks hooks;
   hooks.seed = seed;
   hooks.cancelled = settings_.cancelled;
@@ -322,7 +346,7 @@ Context Evaluation::make_context(std::size_t node, const std::string& item, std:
     }
     report(is_warning ? RunEvent::Kind::warning : RunEvent::Kind::message, node, item, std::string(text));
   };
-  return Context(std::move(hooks));
+  return hooks;
 }
 
 std::string Evaluation::failure_text(std::size_t index, const std::string& item, const std::string& reason) const {

@@ -5,10 +5,12 @@
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <system_error>
 #include <thread>
 
 #include "evaluation.hpp"
@@ -19,6 +21,21 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Status = NodeRecord::Status;
+
+/// Of `wanted` threads, those that can be had beside this one: at a limit of the system, TBB would end the program.
+int threads_to_be_had(int wanted) {
+  std::vector<std::thread> threads;
+  std::atomic<bool> may_end{false};
+  try {
+    while (int(threads.size()) < wanted) threads.emplace_back([&] { may_end.wait(false); });
+  } catch (const std::system_error&) {
+  }
+  may_end = true;
+  may_end.notify_all();
+  for (std::thread& thread : threads) thread.join();
+  const int had = int(threads.size());
+  return had < wanted && had > 1 ? had - 1 : had;  // at the limit, one is left for the process that reads files
+}
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -40,7 +57,9 @@ class Executor {
   RunResult run() {
     // The pool is the only source of threads: OpenCV's own loops stay on the thread of the node that calls them.
     cv::setNumThreads(1);
-    const int threads = settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+    const int wanted = settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+    const int threads = threads_to_be_had(wanted);
+    if (threads == 0) throw Error("cannot start a thread; the limit of processes is reached (ulimit -u)");
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads) + 1);
     tbb::task_arena arena(threads, 0);
     arena_ = &arena;

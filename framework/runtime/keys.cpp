@@ -1,64 +1,77 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keys.hpp"
 
-#include <algorithm>
-#include <chrono>
+#include <sys/stat.h>
+#include <time.h>
+
 #include <filesystem>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <sstream>
 
 #include "mapping.hpp"
+#include "named_files.hpp"
 
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
 
+/// What tells one state of a file from another: any write changes the time of its last change, which nobody can set.
+struct FileState {
+  dev_t device = 0;
+  ino_t number = 0;
+  off_t size = 0;
+  timespec written{}, changed{};
+  bool operator==(const FileState& other) const {
+    const auto same = [](const timespec& a, const timespec& b) { return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec; };
+    return device == other.device && number == other.number && size == other.size && same(written, other.written) &&
+           same(changed, other.changed);
+  }
+};
+
+std::optional<FileState> state_of(const fs::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return std::nullopt;
+  return FileState{status.st_dev, status.st_ino, status.st_size, status.st_mtim, status.st_ctim};
+}
+
+/// A file that was changed just now may change again within the resolution of its time.
+bool is_settled(const FileState& state) {
+  timespec now{};
+  clock_gettime(CLOCK_REALTIME, &now);
+  return now.tv_sec - state.changed.tv_sec > 2;
+}
+
 Digest digest_once(const fs::path& file) {
   struct Known {
-    std::uintmax_t size = 0;
-    fs::file_time_type changed;
+    FileState state;
     Digest digest;
   };
   static std::mutex mutex;
   static std::map<fs::path, Known> known;
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(file, error);
-  const fs::file_time_type changed = fs::last_write_time(file, error);
-  {
+  const std::optional<FileState> state = state_of(file);
+  if (state) {
     const std::scoped_lock lock(mutex);
     const auto found = known.find(file);
-    if (found != known.end() && found->second.size == size && found->second.changed == changed) return found->second.digest;
+    if (found != known.end() && found->second.state == *state) return found->second.digest;
   }
   const Digest digest = file_digest(file);
-  // A file that was changed just now may change again within the resolution of its time.
-  if (fs::file_time_type::clock::now() - changed > std::chrono::seconds(2)) {
+  if (state && is_settled(*state) && state_of(file) == state) {
     const std::scoped_lock lock(mutex);
-    known[file] = {size, changed, digest};
+    known[file] = {*state, digest};
   }
   return digest;
 }
 
 /// Hashes the content of a file, or of every file below a folder with its relative name.
 void add_path(Hasher& hasher, const std::string& text) {
-  const fs::path path(text);
-  std::error_code error;
-  if (text.empty() || !fs::exists(path, error)) {
-    hasher.add(std::string("absent"));  // the node itself says so
-    return;
-  }
-  std::vector<fs::path> files;
-  if (fs::is_directory(path, error)) {
-    for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error))
-      if (at->is_regular_file()) files.push_back(at->path());
-    std::sort(files.begin(), files.end());
-  } else {
-    files.push_back(path);
-  }
-  for (const fs::path& file : files) {
-    hasher.add(fs::relative(file, path, error).generic_string());
-    hasher.add(fs::is_regular_file(file) ? digest_once(file) : Digest{});
+  const std::vector<NamedFile> files = files_named_by(text);
+  if (files.empty()) hasher.add(std::string("absent"));  // the node itself says so
+  for (const NamedFile& file : files) {
+    hasher.add(file.name);
+    hasher.add(file.is_there ? digest_once(file.file) : Digest{});
   }
 }
 

@@ -17,7 +17,7 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
 
 /// Of the content of a file, or of all files below a folder with their names. Files are read once in a process, and again
-/// when their size or time of change is another.
+/// when they may have changed. Throws Error where a file cannot be read, and as files_named_by() does.
 Digest path_digest(const std::filesystem::path& path);
 
 /// The key of a function that a call returns.

@@ -5,9 +5,9 @@ namespace marrow {
 
 const std::vector<Kind>& kinds() {
   static const std::vector<Kind> kKinds = {
-      {"read", "value from a file", {}, {}, true, false},
-      {"simulate", "data with exact truth", {}, {}, true, false},
-      {"camera", "geometry of a view", {}, {}, true, false},
+      {"read", "value from a file", {}, {}, true, false, Kind::Apart::parses},
+      {"simulate", "data with exact truth", {}, {}, true, false, Kind::Apart::computes},
+      {"camera", "geometry of a view", {}, {}, true, false, Kind::Apart::computes},
       {"edges", "edge pixels of an X-ray view", {{"view", "view", ""}}, {{"edges", "edge_map", ""}}},
       {"shaft", "outer borders of the bone's shaft in a view",
        {{"edges", "edge_map", ""}, {"view", "view", ""}},

@@ -6,10 +6,8 @@
 #include <elf.h>
 #include <fcntl.h>
 #include <link.h>
-#include <poll.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include <chrono>
@@ -20,14 +18,16 @@
 #include <set>
 #include <sstream>
 
+#include "apart.hpp"
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
+#include "marrow/runtime/worker.hpp"
 
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr int kDescribeLimit_s = 20;
+constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
 
 /// A file that is no whole ELF library would make the dynamic loader fail obscurely or crash.
 void check_elf(const fs::path& file) {
@@ -129,7 +129,7 @@ void run_registration(Plugin& plugin, const PluginEntry& entry) {
   if (!faults.empty()) throw Error("declares its nodes wrongly: " + faults);
 }
 
-/// Runs in the child: the manifest's text, or a refusal.
+/// Runs in a worker: what the library holds, or a refusal.
 LibraryInfo describe_here(const fs::path& file) {
   LibraryInfo info;
   try {
@@ -152,20 +152,6 @@ LibraryInfo describe_here(const fs::path& file) {
     info.refused = error.what();
   }
   return info;
-}
-
-/// Reads what a child writes until it closes the pipe or the time is over; true when it closed the pipe.
-bool read_all(int pipe, std::string& text) {
-  const auto end = std::chrono::steady_clock::now() + std::chrono::seconds(kDescribeLimit_s);
-  char buffer[65536];
-  while (true) {
-    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(end - std::chrono::steady_clock::now()).count();
-    pollfd event{pipe, POLLIN, 0};
-    if (left <= 0 || poll(&event, 1, int(left)) <= 0) return false;
-    const ssize_t count = read(pipe, buffer, sizeof buffer);
-    if (count <= 0) return true;
-    text.append(buffer, std::size_t(count));
-  }
 }
 
 fs::path cache_folder() {
@@ -243,6 +229,10 @@ std::unique_ptr<Plugin> load_library(const fs::path& file) {
   }
 }
 
+nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports&) {
+  return manifest_text(describe_here(bytes_of_json(request.at("library"))));
+}
+
 LibraryInfo describe_library(const fs::path& file) {
   LibraryInfo info;
   const auto refuse = [&](const std::string& reason) {
@@ -251,31 +241,15 @@ LibraryInfo describe_library(const fs::path& file) {
   };
   try {
     check_elf(file);
-    int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) throw Error("cannot be described: no pipe");
-    const pid_t child = fork();
-    if (child == 0) {
-      signal(SIGINT, SIG_DFL);
-      const std::string text = manifest_text(describe_here(file));
-      for (std::size_t at = 0; at < text.size();) {
-        const ssize_t count = write(ends[1], text.data() + at, text.size() - at);
-        if (count <= 0) break;
-        at += std::size_t(count);
-      }
-      _exit(0);
-    }
-    close(ends[1]);
-    std::string text;
-    const bool finished = child > 0 && read_all(ends[0], text);
-    close(ends[0]);
-    if (!finished && child > 0) kill(child, SIGKILL);
-    int status = 0;
-    if (child > 0) waitpid(child, &status, 0);
-    if (!finished) refuse("did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded");
-    else if (WIFSIGNALED(status)) refuse(std::string("crashed while being loaded (") + strsignal(WTERMSIG(status)) + ")");
-    else if (text.empty()) refuse("ended the process that loaded it");
-    else info = manifest_from_text(text);
-  } catch (const Error& error) {
+    Worker worker({{worker_program().string()}});
+    worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
+    const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
+    if (end.signal) refuse(std::string("crashed while being loaded (") + strsignal(end.signal) + ")");
+    else if (!end.failed.empty() && end.is_late) refuse("did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded");
+    else if (end.died) refuse("ended the process that loaded it");
+    else if (!end.failed.empty()) refuse("cannot be described: " + end.failed);
+    else info = manifest_from_text(end.answer.get<std::string>());
+  } catch (const std::exception& error) {
     refuse(error.what());
   }
   info.file = file;

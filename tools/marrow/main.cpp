@@ -152,6 +152,10 @@ int main(int argc, char** argv) {
   conformance_command->add_option("subject", subjects, "node, kind or library (.so file)")->required();
   conformance_command->callback([&] { code = run_conformance(subjects); });
 
+  auto* check_worker_command = app.add_subcommand("check-worker", "take checks from the standard input; started by conformance");
+  check_worker_command->group("");
+  check_worker_command->callback([&] { code = check_worker(); });
+
   std::filesystem::path library;
   bool write = false;
   auto* describe_command = app.add_subcommand("describe", "load one plugin library in a child process and print its manifest");

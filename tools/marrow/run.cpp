@@ -37,6 +37,8 @@ class Progress {
       case Kind::skipped: line(where, "skipped: " + event.text); break;
       case Kind::failed: error_line("error: " + event.text); break;
       case Kind::warning: line(where, "warning: " + event.text); break;
+      case Kind::waiting:
+      case Kind::waited: line(where, event.text); break;
       case Kind::message: folder_.append_log(where + ": " + event.text); break;
       case Kind::progress: moving_line(where, event); break;
       case Kind::started:
@@ -80,7 +82,8 @@ class Progress {
   }
 
   static void print_json(const RunEvent& event) {
-    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning", "cached"};
+    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning", "cached",
+                                             "waiting", "waited"};
     json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
     if (!event.item.empty()) j["item"] = event.item;
     if (!event.text.empty()) j["text"] = event.text;

@@ -2,15 +2,17 @@
 #pragma once
 #include <atomic>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 namespace marrow::cli {
 
-/// A line of work for a worker process.
+/// Work for a worker process.
 struct Job {
-  std::string line;   ///< what the worker reads
-  std::string group;  ///< jobs of a group share results, so one worker takes them one after the other
+  nlohmann::json request;  ///< what the worker is asked
+  std::string group;       ///< jobs of a group share results, so one worker takes them one after the other
+  std::size_t number = 0;  ///< what it is to whoever gave it; the worker is not told
   int tries = 0;
 };
 
@@ -24,14 +26,14 @@ struct PoolSettings {
 
 /// How a job ended: the worker's answer, or why there is none.
 struct JobEnd {
-  std::string answer;
+  nlohmann::json answer;
   std::string failed;
   int tries = 1;
 };
 
 /// Gives the jobs to worker processes, each of which takes many. A worker that crashes, takes too long or too much memory is
 /// replaced; its job is tried once more, alone, after all others. `ended` is called by the calling thread. Returns false when
-/// it was cancelled. A worker answers each line with lines "at ...", which say what it is at, and one "end ...".
+/// it was cancelled.
 bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended);
 
 }  // namespace marrow::cli

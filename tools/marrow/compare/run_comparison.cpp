@@ -90,27 +90,21 @@ class Comparison {
     return 130;
   }
 
-  static std::string line_of(const char* what, const CellIndex& cell) {
-    return std::string(what) + " " + std::to_string(cell.variant) + " " + std::to_string(cell.case_index) + " " + std::to_string(cell.start);
-  }
-
-  static CellIndex cell_of_line(const std::string& line) {
-    CellIndex cell;
-    std::sscanf(line.c_str(), "%*s %zu %zu %zu", &cell.variant, &cell.case_index, &cell.start);
-    return cell;
+  Job job_of(const char* what, const CellIndex& cell, std::string group) const {
+    return {{{"do", what}, {"variant", cell.variant}, {"case", cell.case_index}, {"start", cell.start}}, std::move(group), number_of(cell)};
   }
 
   bool make_cases() {
     std::vector<Job> jobs;
     for (std::size_t i = 0; i < experiment_.cases.size(); ++i)
-      if (experiment_.cases[i].is_simulated) jobs.push_back({"case " + std::to_string(i), std::to_string(i)});
+      if (experiment_.cases[i].is_simulated) jobs.push_back({{{"do", "case"}, {"case", i}}, experiment_.cases[i].name, i});
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
-      const std::size_t index = std::stoul(job.group);
-      if (!end.failed.empty()) case_faults_[index] = "case '" + experiment_.cases[index].name + "' cannot be made: " + end.failed;
-      else if (end.answer != "good") case_faults_[index] = end.answer;
-      progress.done(++done, "case " + experiment_.cases[index].name);
+      const std::string& name = experiment_.cases[job.number].name;
+      if (!end.failed.empty())
+        case_faults_[job.number] = end.failed.starts_with("case '") ? end.failed : "case '" + name + "' cannot be made: " + end.failed;
+      progress.done(++done, "case " + name);
     });
   }
 
@@ -123,18 +117,29 @@ class Comparison {
       else rows_[i] = runner_.finished(cell);
       found_ += rows_[i] && fault == case_faults_.end();
       if (!rows_[i])
-        jobs.push_back({line_of("cell", cell), experiment_.cases[cell.case_index].name});
+        jobs.push_back(job_of("cell", cell, experiment_.cases[cell.case_index].name));
     }
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
-      const CellIndex cell = cell_of_line(job.line);
-      CellRow row = end.failed.empty() ? compare::row_from_json(end.answer) : failed_row(cell, end.failed, end.tries);
+      const CellIndex& cell = cells_[job.number];
+      CellRow row = row_of(cell, end);
       row.tries = end.tries;
       runner_.write(row);
       progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
-      rows_[number_of(cell)] = std::move(row);
+      rows_[job.number] = std::move(row);
     });
+  }
+
+  /// What a worker says of a cell counts only as figures of the cell that it was asked for.
+  CellRow row_of(const CellIndex& cell, const JobEnd& end) const {
+    if (!end.failed.empty()) return failed_row(cell, end.failed, end.tries);
+    try {
+      CellRow row = compare::row_from_json(end.answer.dump());
+      return row;
+    } catch (const Error& error) {
+      return failed_row(cell, std::string("its process gave no row: ") + error.what(), end.tries);
+    }
   }
 
   /// The same cases and starts for all variants, spread over all that there are, one run at a time on all threads.
@@ -144,29 +149,27 @@ class Comparison {
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t v = 0; v < variants; ++v) {
         const std::size_t row = i * places / count * variants + v;
-        if (rows[row].failed.empty()) jobs.push_back({line_of("time", cells_[row]), "times"});
+        if (rows[row].failed.empty()) jobs.push_back(job_of("time", cells_[row], "times"));
       }
     PoolSettings alone = pool_of(request_, folder_, int(std::thread::hardware_concurrency()));
     alone.workers = 1;
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, alone, [&](const Job& job, const JobEnd& end) {
-      CellRow& row = rows[number_of(cell_of_line(job.line))];
-      char* rest = nullptr;
-      const double seconds = std::strtod(end.answer.c_str(), &rest);
-      if (end.failed.empty() && rest != end.answer.c_str() && !*rest) row.seconds = seconds;
+      CellRow& row = rows[job.number];
+      if (end.answer.is_number()) row.seconds = end.answer.get<double>();
       progress.done(++done, "time of " + row.id);
     });
   }
 
   bool draw(const std::vector<CellIndex>& cells) {
     std::vector<Job> jobs;
-    for (const CellIndex& cell : cells) jobs.push_back({line_of("draw", cell), experiment_.cases[cell.case_index].name});
+    for (const CellIndex& cell : cells) jobs.push_back(job_of("draw", cell, experiment_.cases[cell.case_index].name));
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
-      const std::string id = compare::cell_id(experiment_, cell_of_line(job.line)), fault = end.failed.empty() ? end.answer : end.failed;
-      if (fault != "good") std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), fault.c_str());
+      const std::string id = compare::cell_id(experiment_, cells_[job.number]);
+      if (!end.failed.empty()) std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), end.failed.c_str());
       progress.done(++done, "pictures of " + id);
     });
   }

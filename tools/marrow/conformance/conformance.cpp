@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-// marrow conformance: runs the suite of a node's kind, each check in a process of its own, so that a node that crashes or hangs
-// fails that check and no other.
-#include <poll.h>
-#include <signal.h>
-#include <sys/wait.h>
-#include <unistd.h>
-
+// marrow conformance: runs the suite of a node's kind in a worker, so that a node that crashes or hangs fails that check and no
+// other.
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
+#include <memory>
 
 #include "commands.hpp"
 #include "conformance/suite.hpp"
+#include "marrow/runtime/worker.hpp"
 
 namespace marrow::cli {
 namespace {
 
 using conformance::Check;
 using conformance::Suite;
+using nlohmann::json;
 using OptionValues = std::map<std::string, OptionValue>;
+
+constexpr double kMemory_mb = 8192;
 
 /// Seconds that one check may take.
 int time_limit_s() {
@@ -33,7 +33,7 @@ struct Outcome {
   std::string text;
 };
 
-/// In the child: the verdict and the text after it.
+/// In the worker: the verdict and the text after it.
 std::string measured(const NodeDefinition& node, const OptionValues& options, const Check& check) {
   try {
     const double figure = check.measure(conformance::Subject(node, options));
@@ -47,46 +47,35 @@ std::string measured(const NodeDefinition& node, const OptionValues& options, co
   }
 }
 
-/// All that comes from the pipe until it ends or time is up.
-bool read_all(int descriptor, std::string& text) {
-  pollfd wait{descriptor, POLLIN, 0};
-  for (;;) {
-    if (poll(&wait, 1, time_limit_s() * 1000) <= 0) return false;
-    char buffer[4096];
-    const ssize_t count = read(descriptor, buffer, sizeof buffer);
-    if (count <= 0) return true;
-    text.append(buffer, std::size_t(count));
-  }
-}
+/// The checks of one node, one after the other in a worker.
+class Checks {
+ public:
+  explicit Checks(std::string node) : node_(std::move(node)) {}
 
-Outcome run_check(const Catalogue& catalogue, const std::string& node, const OptionValues& options, const Check& check) {
-  int ends[2];
-  if (pipe(ends) != 0) throw Error(std::string("cannot make a pipe: ") + std::strerror(errno));
-  const pid_t child = fork();
-  if (child < 0) throw Error(std::string("cannot start a process: ") + std::strerror(errno));
-  if (child == 0) {
-    close(ends[0]);
-    std::string text;
-    try {
-      text = measured(catalogue.load(node), options, check);
-    } catch (const std::exception& error) {
-      text = std::string("-") + error.what();
-    }
-    const bool written = write(ends[1], text.data(), text.size()) == ssize_t(text.size());
-    _exit(written ? 0 : 1);
+  Outcome run(std::size_t number) {
+    const bool was_fresh = !worker_;
+    WorkerEnd end = ask(number);
+    // What an earlier check did to the process is not this check's failure.
+    if (end.died && !was_fresh) end = ask(number);
+    if (end.is_late) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
+    if (end.signal) return {'-', std::string("it crashed: ") + strsignal(end.signal)};
+    if (!end.failed.empty()) return {'-', end.failed};
+    const std::string text = end.answer.get<std::string>();
+    return {text.at(0), text.substr(1)};
   }
-  close(ends[1]);
-  std::string text;
-  const bool in_time = read_all(ends[0], text);
-  close(ends[0]);
-  if (!in_time) kill(child, SIGKILL);
-  int status = 0;
-  waitpid(child, &status, 0);
-  if (!in_time) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
-  if (WIFSIGNALED(status)) return {'-', std::string("it crashed: ") + strsignal(WTERMSIG(status))};
-  if (text.empty()) return {'-', "it ended the process with exit code " + std::to_string(WEXITSTATUS(status))};
-  return {text[0], text.substr(1)};
-}
+
+ private:
+  WorkerEnd ask(std::size_t number) {
+    if (!worker_) worker_ = std::make_unique<Worker>(WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker"}});
+    worker_->ask({{"do", "check"}, {"node", node_}, {"check", number}});
+    const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, nullptr, nullptr);
+    if (end.died) worker_.reset();
+    return end;
+  }
+
+  std::string node_;
+  std::unique_ptr<Worker> worker_;
+};
 
 /// The names of the nodes meant by a node's name, a kind or a library's file.
 std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string& what) {
@@ -113,6 +102,17 @@ void print_limits(const NodeInfo& node) {
   }
 }
 
+int check_worker() {
+  const Catalogue catalogue;
+  return serve_worker({{"check", [&](const json& request, WorkerReports&) {
+                          const std::string name = request.at("node");
+                          const NodeDefinition& node = catalogue.load(name);
+                          const Suite& suite = *conformance::suite_of(node.info.kind());
+                          const OptionValues options = suite.options ? suite.options() : OptionValues{};
+                          return json(measured(node, options, conformance::checks_of(suite).at(request.at("check"))));
+                        }}});
+}
+
 int run_conformance(const std::vector<std::string>& subjects) {
   const Catalogue catalogue;
   std::map<char, int> count;
@@ -124,9 +124,11 @@ int run_conformance(const std::vector<std::string>& subjects) {
         continue;
       }
       std::printf("%s\n", name.c_str());
-      const OptionValues options = suite->options ? suite->options() : OptionValues{};
-      for (const Check& check : conformance::checks_of(*suite)) {
-        const Outcome outcome = run_check(catalogue, name, options, check);
+      const std::vector<Check> all = conformance::checks_of(*suite);
+      Checks checks(name);
+      for (std::size_t i = 0; i < all.size(); ++i) {
+        const Check& check = all[i];
+        const Outcome outcome = checks.run(i);
         ++count[outcome.verdict];
         std::printf("  %s %-26s %s\n", outcome.verdict == '+' ? "pass" : outcome.verdict == '~' ? "n/a " : "FAIL", check.name.c_str(), outcome.text.c_str());
         std::fflush(stdout);

@@ -17,7 +17,7 @@ namespace marrow {
 
 /// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names the place along the mapped axes ("lateral", "distal/final").
 struct RunEvent {
-  enum class Kind { started, progress, finished, failed, skipped, message, warning, cached };
+  enum class Kind { started, progress, finished, failed, skipped, message, warning, cached, waiting, waited };
   Kind kind = Kind::message;
   std::string node, item, text;
   double fraction = 0;
@@ -36,6 +36,8 @@ struct RunSettings {
   const Store* store = nullptr;
   std::set<std::string> made_anew = {};  ///< nodes that are called although the store may have their results; for measuring time
   bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
+  /// What reading a file may use, in a process of its own: memory in MB and seconds of processor time; 0 = by the file's size.
+  double file_memory_mb = 0, file_seconds = 0;
 };
 
 /// How one node fared.

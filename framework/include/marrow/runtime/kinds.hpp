@@ -21,6 +21,9 @@ struct Kind {
   std::vector<KindPort> inputs, outputs;
   bool open = false;        ///< its nodes choose their ports freely
   bool sees_truth = false;  ///< only such a kind may be given the truth
+  /// Nodes that name files by options are called in a process of their own, whose limits follow the size of the files: those that
+  /// only parse take little beside what they read, those that compute take their time.
+  enum class Apart { no, parses, computes } apart = Apart::no;
 };
 
 /// All kinds with a contract. A node of any other kind chooses its ports freely.

@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apart.hpp"
+
+#include <signal.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <thread>
+
+#include "manifest.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/abi.hpp"
+#include "marrow/runtime/kinds.hpp"
+#include "marrow/runtime/worker.hpp"
+#include "named_files.hpp"
+#include "packed_values.hpp"
+
+namespace marrow {
+namespace {
+
+using nlohmann::json;
+
+/// A sanitizer makes everything several times slower and larger.
+constexpr double kSlower = abi_stamp().sanitizers ? 20 : 1;
+constexpr double kMostMemory_mb = 4096;
+
+Kind::Apart apart_of(const PipelineNode& node) {
+  const Kind* kind = find_kind(node.info.kind());
+  return kind ? kind->apart : Kind::Apart::no;
+}
+
+bool has_function(const std::vector<PortInfo>& ports) {
+  return std::any_of(ports.begin(), ports.end(), [](const PortInfo& port) { return port.type.is_function; });
+}
+
+double bytes_named_by(const PipelineNode& node) {
+  double bytes = 0;
+  std::error_code error;
+  for (const std::string& path : paths_of(node))
+    for (const NamedFile& file : files_named_by(path))
+      if (file.is_there) bytes += double(std::filesystem::file_size(file.file, error));
+  return bytes;
+}
+
+json json_of_option(const OptionValue& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return json_of_bytes(*text);
+  const auto* texts = std::get_if<std::vector<std::string>>(&value);
+  if (!texts) return json_of(value);
+  json list = json::array();
+  for (const std::string& text : *texts) list.push_back(json_of_bytes(text));
+  return list;
+}
+
+json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_inputs, const Context::Hooks& hooks,
+                const CallLimits& limits) {
+  json request = {{"do", "call"},
+                  {"library", json_of_bytes(catalogue.library_of(node.info.name)->file.string())},
+                  {"node", node.info.name},
+                  {"options", json::array()},
+                  {"has_inputs", has_inputs},
+                  {"seed", hooks.seed},
+                  {"threads", limits.threads},
+                  {"memory_mb", kSlower > 1 ? 0 : limits.memory_mb},
+                  {"processor_s", limits.processor_s}};
+  for (std::size_t i = 0; i < node.options.size(); ++i)
+    request["options"].push_back({{"name", node.info.options[i].name}, {"value", json_of_option(node.options[i])}});
+  return request;
+}
+
+void pass_on(const json& report, const Context::Hooks& hooks) {
+  const std::string what = report.value("say", ""), text = report.value("text", "");
+  if (what == "progress" && hooks.progress) hooks.progress(report.value("fraction", 0.0), text);
+  if ((what == "info" || what == "warning") && hooks.log) hooks.log(text, what == "warning");
+}
+
+/// What was being read: what the worker said last, else what the node's options name.
+std::string file_of(const PipelineNode& node, const Worker& worker) {
+  if (!worker.at().empty()) return worker.at();
+  const std::vector<std::string> paths = paths_of(node);
+  return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
+}
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+std::string failure_of(const PipelineNode& node, const Worker& worker, const WorkerEnd& end, const CallLimits& limits) {
+  const std::string file = file_of(node, worker);
+  if (end.is_out_of_memory)
+    return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
+           " MB of memory, which is more than a file of its size should; where the file is good, raise the limit with "
+           "--file-memory";
+  if (end.signal == SIGXCPU)
+    return file + ": to read it takes more than " + number_text(limits.processor_s) +
+           " s, which is more than a file of its size should; where the file is good, raise the limit with --file-seconds";
+  if (end.signal)
+    return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
+           "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
+  if (end.died) return file + ": could not be read: the process that was started for it " + end.failed;
+  return end.failed;
+}
+
+}  // namespace
+
+bool runs_apart(const PipelineNode& node) {
+  return apart_of(node) != Kind::Apart::no && !paths_of(node).empty() && !has_function(node.info.inputs) &&
+         !has_function(node.info.outputs);
+}
+
+CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& settings) {
+  const double megabytes = bytes / 1e6;
+  CallLimits limits;
+  const double most_mb = std::max(kMostMemory_mb, 256 + 8 * megabytes);
+  if (apart_of(node) == Kind::Apart::parses) {
+    // No compression in use packs an image that is not empty to less than a thousandth.
+    limits.memory_mb = std::min(most_mb, 192 + 1024 * megabytes);
+    limits.processor_s = 1.5 + megabytes;
+  } else {
+    limits.memory_mb = most_mb;
+    limits.processor_s = 600 + megabytes;
+    limits.threads = settings.threads > 0 ? settings.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+  }
+  if (settings.file_memory_mb > 0) limits.memory_mb = settings.file_memory_mb;
+  if (settings.file_seconds > 0) limits.processor_s = settings.file_seconds;
+  limits.memory_mb *= kSlower;
+  limits.processor_s *= kSlower;
+  limits.seconds = 30 + 10 * limits.processor_s;  // by the clock, on a machine that has other work
+  return limits;
+}
+
+std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& node, const std::vector<Value>& inputs,
+                              const Context::Hooks& hooks, const RunSettings& settings) {
+  const SharedMemory given, made;
+  write_values(given.descriptor(), inputs);
+  const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
+  Worker worker({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true});
+  worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
+  const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
+                                    [&](const json& report) { pass_on(report, hooks); });
+  if (!end.failed.empty()) throw Error(failure_of(node, worker, end, limits));
+  worker.close();  // from here on nobody else can write to what it made
+  const auto content_of = [&](const TypeInfo& type) -> const Content* {
+    if (const Content* content = content_of_own(type)) return content;
+    for (const PortInfo& port : catalogue.load(node.info.name).info.outputs)
+      if (port.type == type) return port.type.content;
+    return nullptr;
+  };
+  std::vector<Value> outputs = read_values(made.descriptor(), content_of);
+  if (outputs.size() != node.info.outputs.size())
+    throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) + " values, expected " +
+                std::to_string(node.info.outputs.size()));
+  for (std::size_t i = 0; i < outputs.size(); ++i)
+    if (!(outputs[i].type == node.info.outputs[i].type) ||
+        (!outputs[i].is_absent() && outputs[i].axis != node.info.outputs[i].axis))
+      throw Error("the process that was started for it handed over a '" + outputs[i].type.id + "', expected a '" +
+                  node.info.outputs[i].type.id + "'");
+  return outputs;
+}
+
+}  // namespace marrow

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+// The side of a worker that gives the work.
+#include "marrow/runtime/worker.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include "json_text.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/library.hpp"
+
+namespace marrow {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::json;
+
+constexpr std::size_t kLongestLine = std::size_t(64) << 20;
+/// Time between two looks counts as no more than this: where it was longer, this process was suspended itself.
+constexpr double kLongestLook_s = 1;
+constexpr int kFirstFreeDescriptor = 64;  // above those that the worker is given
+
+[[noreturn]] void cannot_start(int code) {
+  throw Error(std::string("cannot start a process: ") + std::strerror(code) +
+              (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
+}
+
+/// An open file that closes itself, with a number that no descriptor of the worker has.
+class Descriptor {
+ public:
+  explicit Descriptor(int original) : number_(fcntl(original, F_DUPFD_CLOEXEC, kFirstFreeDescriptor)) {
+    if (number_ < 0) cannot_start(errno);
+  }
+  Descriptor(Descriptor&& other) noexcept : number_(std::exchange(other.number_, -1)) {}
+  ~Descriptor() {
+    if (number_ >= 0) close(number_);
+  }
+  int number() const { return number_; }
+  int release() { return std::exchange(number_, -1); }
+
+ private:
+  int number_;
+};
+
+/// A pipe: the end to read from and the end to write to.
+std::pair<Descriptor, Descriptor> make_pipe() {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) cannot_start(errno);
+  struct Closed {
+    int* ends;
+    ~Closed() {
+      close(ends[0]);
+      close(ends[1]);
+    }
+  } closed{ends};
+  Descriptor read_end(ends[0]);
+  return {std::move(read_end), Descriptor(ends[1])};
+}
+
+/// The environment with the number of this process: a worker that finds another parent was left behind.
+std::vector<std::string> environment_of_worker() {
+  std::vector<std::string> texts;
+  for (char** one = environ; one && *one; ++one)
+    if (std::strncmp(*one, "MARROW_PARENT=", 14) != 0) texts.emplace_back(*one);
+  texts.push_back("MARROW_PARENT=" + std::to_string(getpid()));
+  return texts;
+}
+
+std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
+  std::vector<char*> pointers;
+  for (const std::string& text : texts) pointers.push_back(const_cast<char*>(text.c_str()));
+  pointers.push_back(nullptr);
+  return pointers;
+}
+
+/// Starts the program with default signals, in a group of its own so that Ctrl-C reaches only us.
+pid_t start(const WorkerSettings& settings, int input, int output) {
+  std::vector<Descriptor> shared;
+  for (const int original : settings.shared) shared.emplace_back(original);
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, input, STDIN_FILENO);
+  posix_spawn_file_actions_adddup2(&actions, output, STDOUT_FILENO);
+  if (settings.quiet) posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, "/dev/null", O_WRONLY, 0);
+  for (std::size_t i = 0; i < shared.size(); ++i)
+    posix_spawn_file_actions_adddup2(&actions, shared[i].number(), 3 + int(i));
+  posix_spawnattr_t attributes;
+  posix_spawnattr_init(&attributes);
+  sigset_t none, all;
+  sigemptyset(&none);
+  sigfillset(&all);
+  posix_spawnattr_setsigmask(&attributes, &none);
+  posix_spawnattr_setsigdefault(&attributes, &all);
+  posix_spawnattr_setpgroup(&attributes, 0);
+  posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
+  const std::vector<std::string> environment = environment_of_worker();
+  pid_t process = -1;
+  const int fault = posix_spawn(&process, settings.command.at(0).c_str(), &actions, &attributes,
+                                pointers_to(settings.command).data(), pointers_to(environment).data());
+  posix_spawnattr_destroy(&attributes);
+  posix_spawn_file_actions_destroy(&actions);
+  if (fault) {
+    if (fault == ENOENT || fault == EACCES)
+      throw Error("cannot start " + settings.command[0] + ": " + std::strerror(fault) + "; install marrow again");
+    cannot_start(fault);
+  }
+  return process;
+}
+
+std::string number_text(const char* form, double value) {
+  char text[80];
+  std::snprintf(text, sizeof text, form, value);
+  return text;
+}
+
+}  // namespace
+
+Worker::Worker(const WorkerSettings& settings) {
+  auto input = make_pipe(), output = make_pipe();
+  process_ = start(settings, input.first.number(), output.second.number());
+  to_ = input.second.release();
+  from_ = output.first.release();
+  fcntl(from_, F_SETFL, O_NONBLOCK);
+}
+
+Worker::~Worker() {
+  close();
+  if (to_ >= 0) ::close(to_);
+  ::close(from_);
+}
+
+void Worker::close() {
+  if (process_ <= 0) return;
+  kill(process_, SIGKILL);
+  waitpid(process_, nullptr, 0);
+  process_ = -1;
+  is_busy_ = false;
+}
+
+void Worker::ask(json request) {
+  request["job"] = ++job_;
+  is_busy_ = true;
+  is_waiting_ = false;
+  at_.clear();
+  seconds_ = 0;
+  looked_ = Clock::now();
+  const std::string line = request.dump() + "\n";
+  for (std::size_t done = 0; to_ >= 0 && done < line.size();) {
+    const ssize_t count = write(to_, line.data() + done, line.size() - done);
+    if (count < 0 && errno != EINTR) ::close(std::exchange(to_, -1));  // it has ended, which the next take() shows
+    if (count > 0) done += std::size_t(count);
+  }
+}
+
+std::optional<WorkerEnd> Worker::take(const Said& said) {
+  if (is_dead()) return std::nullopt;
+  char buffer[65536];
+  ssize_t count = 0;
+  while ((count = read(from_, buffer, sizeof buffer)) > 0) {
+    text_.append(buffer, std::size_t(count));
+    if (text_.size() > kLongestLine) return ended("sent a line without end");
+    for (std::size_t newline; (newline = text_.find('\n')) != std::string::npos;) {
+      const std::string line = text_.substr(0, newline);
+      text_.erase(0, newline + 1);
+      if (auto end = understand(line, said)) return end;
+    }
+  }
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) return std::nullopt;
+  return died();
+}
+
+std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said& said) {
+  json message;
+  try {
+    message = parse_json(line, "a worker's line");
+  } catch (const Error&) {
+  }
+  if (!message.is_object() || !is_busy_ || message.value("job", json()) != json(job_))
+    return ended("sent something that is no part of its job");
+  if (message.contains("say")) {
+    const json what = message["say"];
+    if (what == "at" && message.value("place", json()).is_string()) at_ = message["place"];
+    seconds();
+    if (what == "waiting" || what == "goes on") is_waiting_ = what == "waiting";
+    if (said) said(message);
+    return std::nullopt;
+  }
+  WorkerEnd end;
+  if (message.contains("end")) {
+    end.answer = message["end"];
+  } else {
+    const json reason = message.value("failed", json());
+    end.failed = reason.is_string() && reason != "" ? reason.get<std::string>() : "gave no reason";
+    end.is_out_of_memory = message.value("out_of_memory", json()) == json(true);
+  }
+  is_busy_ = false;
+  return end;
+}
+
+WorkerEnd Worker::died() {
+  int status = 0;
+  pid_t gone = 0;
+  // Its answers have ended; where the process itself has not, it is of no use.
+  for (int i = 0; i < 100 && (gone = waitpid(process_, &status, WNOHANG)) == 0; ++i) usleep(10'000);
+  if (gone == 0) {
+    kill(process_, SIGKILL);
+    waitpid(process_, &status, 0);
+  }
+  process_ = -1;
+  is_busy_ = false;
+  WorkerEnd end;
+  end.died = true;
+  const std::string where = at_.empty() ? "" : " in " + at_;
+  if (WIFSIGNALED(status)) {
+    end.signal = WTERMSIG(status);
+    end.failed = "crashed" + where + ": " + strsignal(end.signal);
+  } else {
+    end.failed = "ended" + where + " with exit code " + std::to_string(WEXITSTATUS(status));
+  }
+  return end;
+}
+
+WorkerEnd Worker::ended(const std::string& why) {
+  close();
+  WorkerEnd end;
+  end.died = true;
+  end.failed = "its process" + (at_.empty() ? "" : " in " + at_) + " " + why;
+  return end;
+}
+
+std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
+  if (is_dead() || !is_busy_) return std::nullopt;
+  if (seconds() > limits.seconds) {
+    WorkerEnd end = ended(number_text("took longer than %g s", limits.seconds));
+    end.is_late = true;
+    return end;
+  }
+  if (memory_mb() > limits.memory_mb) {
+    WorkerEnd end = ended(number_text("used more than %g MB of memory", limits.memory_mb));
+    end.is_out_of_memory = true;
+    return end;
+  }
+  return std::nullopt;
+}
+
+WorkerEnd Worker::wait(const WorkerLimits& limits, const std::atomic<bool>* cancelled, const Said& said) {
+  for (;;) {
+    if (cancelled && cancelled->load()) {
+      ended("was stopped");
+      throw Cancelled();
+    }
+    pollfd polled{from_, POLLIN, 0};
+    poll(&polled, 1, 20);
+    if (auto end = take(said)) return *end;
+    if (auto end = check(limits)) return *end;
+  }
+}
+
+bool Worker::is_suspended() const {
+  std::ifstream stream("/proc/" + std::to_string(process_) + "/stat");
+  std::string text;
+  std::getline(stream, text);
+  const std::size_t name_end = text.rfind(") ");
+  return name_end != std::string::npos && name_end + 2 < text.size() && text[name_end + 2] == 'T';
+}
+
+double Worker::seconds() {
+  const auto now = Clock::now();
+  const double passed = std::chrono::duration<double>(now - looked_).count();
+  looked_ = now;
+  if (is_busy_ && !is_waiting_ && !is_suspended()) seconds_ += std::min(passed, kLongestLook_s);
+  return seconds_;
+}
+
+double Worker::memory_mb() const {
+  std::ifstream stream("/proc/" + std::to_string(process_) + "/statm");
+  double total = 0, resident = 0;
+  stream >> total >> resident;
+  return resident * double(sysconf(_SC_PAGESIZE)) / 1e6;
+}
+
+std::filesystem::path worker_program() { return framework_file().parent_path() / "marrow" / "marrow-worker"; }
+
+}  // namespace marrow

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: Apache-2.0
+// The side of a worker that does the work.
+#include <signal.h>
+#include <sys/prctl.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <mutex>
+#include <new>
+
+#include "json_text.hpp"
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/worker.hpp"
+
+namespace marrow {
+namespace {
+
+using nlohmann::json;
+
+/// Reads lines from the standard input, unbuffered by anything that a library could share.
+class Requests {
+ public:
+  std::optional<std::string> next() {
+    for (std::size_t newline; (newline = text_.find('\n')) == std::string::npos;) {
+      char buffer[65536];
+      const ssize_t count = read(STDIN_FILENO, buffer, sizeof buffer);
+      if (count < 0 && errno == EINTR) continue;
+      if (count <= 0) return std::nullopt;
+      text_.append(buffer, std::size_t(count));
+    }
+    const std::size_t newline = text_.find('\n');
+    std::string line = text_.substr(0, newline);
+    text_.erase(0, newline + 1);
+    return line;
+  }
+
+ private:
+  std::string text_;
+};
+
+/// Answers go to the standard output as it was at the start: what a library prints there must not pass for an answer.
+class Answers : public WorkerReports {
+ public:
+  Answers() : descriptor_(dup(STDOUT_FILENO)) { dup2(STDERR_FILENO, STDOUT_FILENO); }
+
+  void begin(const json& job) { job_ = job; }
+  void say(json report) override { send(std::move(report)); }
+  void send(json message) {
+    message["job"] = job_;
+    const std::string line = message.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
+    const std::scoped_lock lock(mutex_);
+    for (std::size_t done = 0; done < line.size();) {
+      const ssize_t count = write(descriptor_, line.data() + done, line.size() - done);
+      if (count < 0 && errno != EINTR) _exit(1);  // nobody listens any more
+      if (count > 0) done += std::size_t(count);
+    }
+  }
+
+ private:
+  int descriptor_;
+  json job_;
+  std::mutex mutex_;
+};
+
+bool is_left_behind() {
+  const char* parent = std::getenv("MARROW_PARENT");
+  return parent && std::atol(parent) != long(getppid());
+}
+
+json failure(const std::string& why) { return {{"failed", why.empty() ? "it gave no reason" : why}}; }
+
+json result_of(const WorkerTask& task, const json& request, Answers& answers) {
+  try {
+    return {{"end", task(request, answers)}};
+  } catch (const std::bad_alloc&) {
+    json failed = failure("out of memory");
+    failed["out_of_memory"] = true;
+    return failed;
+  } catch (const json::exception& error) {
+    return failure(std::string("the request cannot be understood: ") + error.what());
+  } catch (const std::exception& error) {
+    return failure(error.what());
+  } catch (...) {
+    return failure("something was thrown that is no exception");
+  }
+}
+
+}  // namespace
+
+int serve_worker(const std::map<std::string, WorkerTask>& tasks) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (is_left_behind()) return 1;
+  signal(SIGPIPE, SIG_IGN);
+  Answers answers;
+  Requests requests;
+  while (const auto line = requests.next()) {
+    const json request = parse_json(*line, "a request");
+    answers.begin(request.at("job"));
+    const auto task = tasks.find(request.at("do").get<std::string>());
+    answers.send(task == tasks.end() ? failure("there is no task '" + request.at("do").get<std::string>() + "'")
+                                     : result_of(task->second, request, answers));
+  }
+  return 0;
+}
+
+json json_of_bytes(const std::string& text) {
+  try {
+    json(text).dump();
+    return text;
+  } catch (const json::exception&) {  // not UTF-8
+    return {{"bytes", std::vector<std::uint8_t>(text.begin(), text.end())}};
+  }
+}
+
+std::string bytes_of_json(const json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (!value.is_object() || !value.contains("bytes")) throw Error("expected a text");
+  const auto bytes = value["bytes"].get<std::vector<std::uint8_t>>();
+  return std::string(bytes.begin(), bytes.end());
+}
+
+}  // namespace marrow

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// Readers run apart: whatever a file makes them do is one node's error.
+#include <signal.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <thread>
+
+#include "runtime/fixture.hpp"
+
+namespace {
+
+using marrow::NodeRecord;
+using marrow::RunEvent;
+using marrow::RunResult;
+
+class ApartTest : public testing::Test {
+ protected:
+  RunResult run(const std::string& word, const std::string& more = "") {
+    file = scratch.write("file.txt", word);
+    marrow::Diagnostics diagnostics;
+    const auto path = scratch.write(
+        "p.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: file.txt, value: 1.25}" + more +
+                      "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
+    pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    settings.threads = 2;
+    settings.observer = [this](const RunEvent& event) { events.push_back(event); };
+    return marrow::run_pipeline(pipeline, test_catalogue(), settings);
+  }
+  /// Why the reader failed, from the file's name on; everything else must have gone on.
+  std::string failure(const std::string& word, const std::string& more = "") {
+    const RunResult result = run(word, more);
+    EXPECT_EQ(value(result, 1), 5);
+    for (std::size_t i = 0; i < result.nodes.size(); ++i)
+      if (result.nodes[i].status == NodeRecord::Status::failed) {
+        const std::string reason = result.nodes[i].reason;
+        EXPECT_TRUE(reason.starts_with(file.string())) << reason;
+        return reason.substr(file.string().size());
+      }
+    return "";
+  }
+  double value(const RunResult& result, std::size_t output, std::size_t item = 0) {
+    return marrow::value_of(result, pipeline.outputs[output].source).as<marrow::Metrics>().items.at(item).value;
+  }
+  Scratch scratch;
+  std::filesystem::path file;
+  marrow::Pipeline pipeline;
+  marrow::RunSettings settings;
+  std::vector<RunEvent> events;
+};
+
+TEST_F(ApartTest, GivesWhatTheNodeGives) {
+  const RunResult result = run("hello");
+  EXPECT_NE(pid_t(value(result, 0, 1)), getpid());
+  const double drawn = value(result, 0) - 1.25;
+  EXPECT_EQ(drawn, std::floor(drawn));
+  settings.seed = 4;
+  EXPECT_NE(value(run("hello"), 0), value(result, 0));
+  const double with_input = value(run("hello", ", in: {added: other}"), 0) - 1.25;
+  EXPECT_EQ(with_input, std::floor(with_input));
+  EXPECT_GE(with_input, 5);
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
+    return event.kind == RunEvent::Kind::warning && event.text == "a warning of hello";
+  }));
+  EXPECT_TRUE(std::any_of(events.begin(), events.end(), [](const RunEvent& event) {
+    return event.kind == RunEvent::Kind::progress && event.fraction == 0.5 && event.text == "half";
+  }));
+}
+
+TEST_F(ApartTest, CrashIsOneNodesErrorThatNamesTheFile) {
+  EXPECT_EQ(failure("crash"), ": to read it crashed the process that was started for it (Segmentation fault); "
+                                              "the file is damaged, or of a kind that its reader cannot take: copy or export it again");
+  EXPECT_NE(failure("abort").find("(Aborted)"), std::string::npos);
+  EXPECT_EQ(failure("names").substr(0, 7), "/inner:");
+}
+
+TEST_F(ApartTest, EndedProcessIsOneNodesError) {
+  EXPECT_EQ(failure("exit"), ": could not be read: the process that was started for it ended with exit code 3");
+}
+
+TEST_F(ApartTest, WhatANodeRefusesIsItsOwnError) { EXPECT_EQ(failure("refuse"), ": is refused"); }
+
+TEST_F(ApartTest, MemoryIsLimitedByTheFilesSize) {
+  EXPECT_EQ(failure("memory"), ": to read it takes more than 192 MB of memory, which is more than a file of its size should; "
+                                               "where the file is good, raise the limit with --file-memory");
+}
+
+TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
+  settings.file_seconds = 0.2;
+  const auto start = std::chrono::steady_clock::now();
+  EXPECT_EQ(failure("spin"), ": to read it takes more than 0.2 s, which is more than a file of its size should; "
+                                             "where the file is good, raise the limit with --file-seconds");
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
+}
+
+TEST_F(ApartTest, WhatALibraryPrintsIsNoAnswer) { EXPECT_EQ(failure("shout"), ""); }
+
+TEST_F(ApartTest, CtrlCEndsTheProcess) {
+  std::atomic<bool> cancelled{false};
+  settings.cancelled = &cancelled;
+  std::thread stop([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+    cancelled = true;
+  });
+  const RunResult result = run("sleep");
+  stop.join();
+  EXPECT_TRUE(result.cancelled());
+}
+
+TEST_F(ApartTest, FileThatChangesWhileItIsReadGivesNoResult) {
+  const marrow::Store store(scratch.path / "store");
+  settings.store = &store;
+  EXPECT_EQ(failure("change"), " changed while it was read; run it again");
+  EXPECT_TRUE(std::none_of(store.entries().begin(), store.entries().end(), [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
+}
+
+TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
+  std::filesystem::create_directory(scratch.path / "case");
+  std::filesystem::create_directory(scratch.path / "elsewhere");
+  std::filesystem::create_directory_symlink(scratch.path / "elsewhere", scratch.path / "case" / "link");
+  settings.threads = 2;
+  const auto path = scratch.write("p2.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: case}}\noutputs: {r: r}\n");
+  marrow::Diagnostics diagnostics;
+  pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
+  const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);
+  EXPECT_EQ(result.nodes[0].reason, (scratch.path / "case" / "link").string() + ": is a link to a place outside " +
+                                        std::filesystem::canonical(scratch.path / "case").string() + "; copy it into the folder");
+}
+
+}  // namespace

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// Readers that do what a hostile file may make a reader do: the first word of the file says what.
+#include <atomic>
+#include <csignal>
+#include <cstdlib>
+#include <fstream>
+#include <thread>
+
+#include <marrow/plugin.hpp>
+#include <marrow/runtime/reading.hpp>
+
+namespace {
+using marrow::Metrics;
+
+struct Options {
+  std::filesystem::path path;
+  double value = 0;
+};
+
+Metrics number(const Options& options, const Metrics* added, marrow::Context& context) {
+  std::ifstream stream(options.path);
+  std::string word;
+  stream >> word;
+  if (word == "names") marrow::now_reading(options.path / "inner");
+  if (word == "crash" || word == "names") std::raise(SIGSEGV);
+  if (word == "abort") std::abort();
+  if (word == "exit") std::_Exit(3);
+  if (word == "refuse") throw marrow::Error(options.path.string() + ": is refused");
+  if (word == "memory") return {{{"value", double(std::vector<double>(std::size_t(1) << 33, 1.0).back()), ""}}};
+  if (word == "spin")
+    for (std::atomic<int> i{0};; ++i) {
+    }
+  if (word == "sleep") std::this_thread::sleep_for(std::chrono::hours(1));
+  if (word == "shout") std::puts("{\"job\": 1, \"end\": 7}"), std::fflush(stdout);
+  if (word == "change") std::ofstream(options.path, std::ios::app) << "more";
+  context.warn("a warning of " + word);
+  context.progress(0.5, "half");
+  return {{{"value", options.value + double(context.seed() % 1000) + (added ? added->items.at(0).value : 0), ""},
+           {"process", double(getpid()), ""}}};
+}
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.test_number", number)
+      .summary("A number, or whatever the file asks for")
+      .random()
+      .in("added", "a number")
+      .out("number", "the number")
+      .option("path", &Options::path, "a file")
+      .option("value", &Options::value, "a number");
+}
