@@ -103,6 +103,24 @@ std::string failure_of(const PipelineNode& node, const Worker& worker, const Wor
   return end.failed;
 }
 
+/// What the worker made. Large pieces are read from its memory, or where that is not allowed, from memory that both share.
+std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker, const SharedMemory& made) {
+  const auto content_of = [&](const TypeInfo& type) -> const Content* {
+    if (const Content* content = content_of_own(type)) return content;
+    for (const PortInfo& port : catalogue.load(node.info.name).info.outputs)
+      if (port.type == type) return port.type.content;
+    return nullptr;
+  };
+  try {
+    return read_values(made.descriptor(), worker.process(), content_of);
+  } catch (const NoAccess&) {
+    worker.ask({{"do", "share"}});
+    const WorkerEnd end = worker.wait({600, 1e9}, nullptr, nullptr);
+    if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
+    return read_values(made.descriptor(), worker.process(), content_of);
+  }
+}
+
 }  // namespace
 
 bool runs_apart(const PipelineNode& node) {
@@ -123,8 +141,8 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
     limits.processor_s = 600 + megabytes;
     limits.threads = settings.threads > 0 ? settings.threads : int(std::max(1u, std::thread::hardware_concurrency()));
   }
-  if (settings.file_memory_mb > 0) limits.memory_mb = settings.file_memory_mb;
-  if (settings.file_seconds > 0) limits.processor_s = settings.file_seconds;
+  if (settings.file_limits.memory_mb > 0) limits.memory_mb = settings.file_limits.memory_mb;
+  if (settings.file_limits.seconds > 0) limits.processor_s = settings.file_limits.seconds;
   limits.memory_mb *= kSlower;
   limits.processor_s *= kSlower;
   limits.seconds = 30 + 10 * limits.processor_s;  // by the clock, on a machine that has other work
@@ -134,21 +152,14 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
 std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& node, const std::vector<Value>& inputs,
                               const Context::Hooks& hooks, const RunSettings& settings) {
   const SharedMemory given, made;
-  write_values(given.descriptor(), inputs);
+  write_values(given.descriptor(), inputs, false);
   const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
   Worker worker({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true});
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
                                     [&](const json& report) { pass_on(report, hooks); });
   if (!end.failed.empty()) throw Error(failure_of(node, worker, end, limits));
-  worker.close();  // from here on nobody else can write to what it made
-  const auto content_of = [&](const TypeInfo& type) -> const Content* {
-    if (const Content* content = content_of_own(type)) return content;
-    for (const PortInfo& port : catalogue.load(node.info.name).info.outputs)
-      if (port.type == type) return port.type.content;
-    return nullptr;
-  };
-  std::vector<Value> outputs = read_values(made.descriptor(), content_of);
+  std::vector<Value> outputs = handed_over(catalogue, node, worker, made);
   if (outputs.size() != node.info.outputs.size())
     throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) + " values, expected " +
                 std::to_string(node.info.outputs.size()));

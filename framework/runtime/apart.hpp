@@ -34,6 +34,8 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
 /// to descriptor 4.
 nlohmann::json answer_call(const nlohmann::json& request, WorkerReports& reports);
 
+/// {"do": "share"}: what the last call made, all of it in the memory of descriptor 4.
+nlohmann::json answer_share(const nlohmann::json& request, WorkerReports& reports);
 /// {"do": "describe", "library": ...}: the library's manifest, as a text.
 nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports& reports);
 

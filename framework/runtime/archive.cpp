@@ -1,7 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/archive.hpp"
 
+#include <sys/mman.h>
+
 namespace marrow {
+
+void detail::use_large_pages(void* data, std::size_t size) {
+  constexpr std::uintptr_t kLargePage = 2 << 20;
+  const std::uintptr_t begin = (reinterpret_cast<std::uintptr_t>(data) + kLargePage - 1) / kLargePage * kLargePage;
+  const std::uintptr_t end = (reinterpret_cast<std::uintptr_t>(data) + size) / kLargePage * kLargePage;
+  if (size > 2 * kLargePage && end > begin) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+}
 
 void Archive::add(const cv::Mat& image) {
   add(std::int32_t(image.rows));
@@ -13,7 +22,7 @@ void Archive::add(const cv::Mat& image) {
 void Unpacker::read_container(cv::Mat& image) {
   const auto rows = get<std::int32_t>(), cols = get<std::int32_t>(), type = get<std::int32_t>();
   const std::size_t pixel = std::size_t(CV_ELEM_SIZE(type));
-  if (rows < 0 || cols < 0 || type < 0 || type > CV_MAT_TYPE_MASK || (rows && std::size_t(cols) > rest_.size() / pixel / std::size_t(rows)))
+  if (rows < 0 || cols < 0 || type < 0 || type > CV_MAT_TYPE_MASK || (rows && std::size_t(cols) > remaining_ / pixel / std::size_t(rows)))
     throw Error("the packed value holds an image of impossible size");
   image = rows && cols ? cv::Mat(rows, cols, type) : cv::Mat();
   bytes(image.data, pixel * std::size_t(rows) * std::size_t(cols));

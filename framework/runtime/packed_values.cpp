@@ -3,6 +3,7 @@
 
 #include <sys/mman.h>
 #include <sys/stat.h>
+#include <sys/uio.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -17,18 +18,32 @@ namespace {
 
 constexpr int kMostAxes = 8;
 
+constexpr std::size_t kLarge = std::size_t(1) << 20;
+
 /// At the end of the file: where the description is.
 struct Trailer {
-  std::uint64_t magic = 0x31766f727261'6d00;
+  std::uint64_t magic = 0x32766f7272616d00;
   std::uint64_t begin = 0, size = 0;
 };
 
-/// Gathers small pieces; large ones go straight to the file.
+/// A large piece of a value, in the memory of the process that made it.
+struct Piece {
+  std::uint64_t place = 0;    ///< in the value's packed data
+  std::uint64_t address = 0, size = 0;
+  static constexpr auto fields() { return std::make_tuple(&Piece::place, &Piece::address, &Piece::size); }
+};
+
+/// Gathers small pieces; larger ones go straight to the file, or are noted by their address.
 class FilePacker : public Archive {
  public:
-  explicit FilePacker(int descriptor) : descriptor_(descriptor) { gathered_.reserve(kGathered); }
+  FilePacker(int descriptor, bool in_place) : descriptor_(descriptor), in_place_(in_place) { gathered_.reserve(kGathered); }
 
   void bytes(const void* data, std::size_t size) override {
+    packed_ += size;
+    if (in_place_ && size >= kLarge) {
+      pieces_.push_back({packed_ - size, reinterpret_cast<std::uintptr_t>(data), size});
+      return;
+    }
     if (gathered_.size() + size > kGathered) flush();
     if (size >= kGathered) put(static_cast<const char*>(data), size);
     else gathered_.append(static_cast<const char*>(data), size);
@@ -38,7 +53,15 @@ class FilePacker : public Archive {
     put(gathered_.data(), gathered_.size());
     gathered_.clear();
   }
+  /// Bytes in the file.
   std::uint64_t written() const { return written_; }
+  /// Bytes of the value since begin(), and those of them that stayed in place.
+  void begin() {
+    packed_ = 0;
+    pieces_.clear();
+  }
+  std::uint64_t packed() const { return packed_; }
+  const std::vector<Piece>& pieces() const { return pieces_; }
 
  private:
   static constexpr std::size_t kGathered = std::size_t(1) << 16;
@@ -54,8 +77,63 @@ class FilePacker : public Archive {
   }
 
   int descriptor_;
+  bool in_place_;
   std::string gathered_;
-  std::uint64_t written_ = 0;
+  std::uint64_t written_ = 0, packed_ = 0;
+  std::vector<Piece> pieces_;
+};
+
+/// Reads the packed data of one value: what lies in the file, and pieces from the other process.
+class PieceUnpacker : public Unpacker {
+ public:
+  PieceUnpacker(std::string_view in_file, std::vector<Piece> pieces, std::uint64_t size, pid_t process)
+      : Unpacker(std::size_t(size)), in_file_(in_file), pieces_(std::move(pieces)), process_(process) {}
+
+ private:
+  void take(void* data, std::size_t size) override {
+    char* to = static_cast<char*>(data);
+    while (size > 0) {
+      const bool has_piece = next_ < pieces_.size();
+      const std::uint64_t until_piece = has_piece ? pieces_[next_].place - at_ : size;
+      if (until_piece > 0) {
+        const std::size_t count = std::size_t(std::min<std::uint64_t>(size, until_piece));
+        if (count > in_file_.size()) throw Error("what the other process handed over is damaged");
+        std::memcpy(to, in_file_.data(), count);
+        in_file_.remove_prefix(count);
+        advance(to, size, count);
+        continue;
+      }
+      Piece& piece = pieces_[next_];
+      const std::size_t count = std::size_t(std::min<std::uint64_t>(size, piece.size));
+      copy_from_process(to, piece.address, count);
+      piece.place += count;
+      piece.address += count;
+      piece.size -= count;
+      if (piece.size == 0) ++next_;
+      advance(to, size, count);
+    }
+  }
+  void advance(char*& to, std::size_t& size, std::size_t count) {
+    to += count;
+    size -= count;
+    at_ += count;
+  }
+  void copy_from_process(char* to, std::uint64_t address, std::size_t size) const {
+    while (size > 0) {
+      iovec here{to, size}, there{reinterpret_cast<void*>(std::uintptr_t(address)), size};
+      const ssize_t count = process_vm_readv(process_, &here, 1, &there, 1, 0);
+      if (count <= 0) throw NoAccess(std::string("the memory of another process cannot be read: ") + std::strerror(errno));
+      to += count;
+      address += std::uint64_t(count);
+      size -= std::size_t(count);
+    }
+  }
+
+  std::string_view in_file_;
+  std::vector<Piece> pieces_;
+  pid_t process_;
+  std::size_t next_ = 0;
+  std::uint64_t at_ = 0;
 };
 
 void describe(const Value& value, FilePacker& data, Packer& description) {
@@ -71,14 +149,17 @@ void describe(const Value& value, FilePacker& data, Packer& description) {
   if (!is_present) return;
   if (!value.type.content) throw Error("functions cannot be handed to another process");
   const std::uint64_t begin = data.written();
+  data.begin();
   value.type.content->pack(value.data.get(), data);
   description.add(begin);
   description.add(data.written() - begin);
+  description.add(data.packed());
+  description.add(data.pieces());
 }
 
 class Reader {
  public:
-  Reader(std::string_view bytes, const ContentOf& content_of) : bytes_(bytes), content_of_(content_of) {}
+  Reader(std::string_view bytes, pid_t process, const ContentOf& content_of) : bytes_(bytes), process_(process), content_of_(content_of) {}
 
   std::vector<Value> values() {
     Trailer trailer;
@@ -114,15 +195,43 @@ class Reader {
     value.type.content = content_of_(value.type);
     if (!value.type.content) throw Error("values of type '" + value.type.id + "' are not known here");
     const auto begin = description.get<std::uint64_t>();
-    Unpacker packed(part(begin, description.get<std::uint64_t>()));
+    const std::string_view in_file = part(begin, description.get<std::uint64_t>());
+    const auto size = description.get<std::uint64_t>();
+    auto pieces = description.get<std::vector<Piece>>();
+    check_pieces(pieces, in_file.size(), size);
+    PieceUnpacker packed(in_file, std::move(pieces), size, process_);
     value.data = value.type.content->unpack(packed);
     if (packed.remaining()) fail();
     return value;
   }
 
+  /// That the pieces lie one behind the other and, with what is in the file, are the whole.
+  static void check_pieces(const std::vector<Piece>& pieces, std::uint64_t in_file, std::uint64_t size) {
+    std::uint64_t end = 0, left = size;
+    for (const Piece& piece : pieces) {
+      if (piece.place < end || piece.place > size || piece.size > size - piece.place || piece.size == 0) fail();
+      end = piece.place + piece.size;
+      left -= piece.size;
+    }
+    if (left != in_file) fail();
+  }
+
   std::string_view bytes_;
+  pid_t process_;
   const ContentOf& content_of_;
 };
+
+/// The whole file in memory of our own: the other process may still write to it.
+std::string contents_of(int descriptor) {
+  std::string bytes(std::size_t(bytes_in(descriptor)), '\0');
+  for (std::size_t done = 0; done < bytes.size();) {
+    const ssize_t count = pread(descriptor, bytes.data() + done, bytes.size() - done, off_t(done));
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) throw Error("another process handed nothing over");
+    done += std::size_t(count);
+  }
+  return bytes;
+}
 
 }  // namespace
 
@@ -132,17 +241,19 @@ SharedMemory::SharedMemory() : descriptor_(memfd_create("marrow", MFD_CLOEXEC)) 
 
 SharedMemory::~SharedMemory() { close(descriptor_); }
 
-void write_values(int descriptor, const std::vector<Value>& values) {
-  FilePacker data(descriptor);
+void write_values(int descriptor, const std::vector<Value>& values, bool in_place) {
+  FilePacker data(descriptor, in_place);
   Packer description;
   description.add(std::uint64_t(values.size()));
   for (const Value& value : values) describe(value, data, description);
   Trailer trailer;
   trailer.begin = data.written();
   trailer.size = description.packed.size();
-  data.bytes(description.packed.data(), description.packed.size());
-  data.bytes(&trailer, sizeof trailer);
+  FilePacker end(descriptor, false);
   data.flush();
+  end.bytes(description.packed.data(), description.packed.size());
+  end.bytes(&trailer, sizeof trailer);
+  end.flush();
 }
 
 std::uint64_t bytes_in(int descriptor) {
@@ -150,12 +261,9 @@ std::uint64_t bytes_in(int descriptor) {
   return fstat(descriptor, &status) ? 0 : std::uint64_t(status.st_size);
 }
 
-std::vector<Value> read_values(int descriptor, const ContentOf& content_of) {
-  const std::size_t size = std::size_t(bytes_in(descriptor));
-  void* mapped = size ? mmap(nullptr, size, PROT_READ, MAP_PRIVATE | MAP_POPULATE, descriptor, 0) : MAP_FAILED;
-  if (mapped == MAP_FAILED) throw Error("another process handed nothing over");
-  const std::unique_ptr<void, std::function<void(void*)>> unmap(mapped, [&](void* at) { munmap(at, size); });
-  return Reader({static_cast<const char*>(mapped), size}, content_of).values();
+std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& content_of) {
+  const std::string bytes = contents_of(descriptor);
+  return Reader(bytes, process, content_of).values();
 }
 
 const Content* content_of_own(const TypeInfo& type) {

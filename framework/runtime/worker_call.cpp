@@ -2,6 +2,7 @@
 // The worker's side of a call that runs apart.
 #include <oneapi/tbb/global_control.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <cmath>
@@ -24,6 +25,8 @@ constexpr int kGivenDescriptor = 3, kMadeDescriptor = 4;
 
 /// Of the one call that this process is there for.
 std::atomic<WorkerReports*> current_reports{nullptr};
+/// What it made; kept until the process ends, since it is read from where it lies.
+std::vector<Value> made;
 
 /// Beyond it, memory cannot be had and the process is ended. A library's own use up to here is not counted as the call's time.
 void set_limits(double memory_mb, double processor_s) {
@@ -103,7 +106,7 @@ json answer_call(const json& request, WorkerReports& reports) {
   cv::setNumThreads(1);
   std::vector<Value> inputs;
   if (request.at("has_inputs")) {
-    inputs = read_values(kGivenDescriptor, [&](const TypeInfo& type) -> const Content* {
+    inputs = read_values(kGivenDescriptor, 0, [&](const TypeInfo& type) -> const Content* {
       for (const PortInfo& port : node.info.inputs)
         if (port.type == type) return port.type.content;
       return nullptr;
@@ -113,10 +116,16 @@ json answer_call(const json& request, WorkerReports& reports) {
   set_limits(request.at("memory_mb"), request.at("processor_s"));
   current_reports = &reports;
   Context context(hooks_of(request, reports));
-  const std::vector<Value> outputs = node.call(inputs, options.get(), context);
-  write_values(kMadeDescriptor, outputs);
+  made = node.call(inputs, options.get(), context);
+  write_values(kMadeDescriptor, made, true);
   current_reports = nullptr;
-  return outputs.size();
+  return made.size();
+}
+
+json answer_share(const json&, WorkerReports&) {
+  if (ftruncate(kMadeDescriptor, 0) != 0 || lseek(kMadeDescriptor, 0, SEEK_SET) != 0) throw Error("cannot share its memory");
+  write_values(kMadeDescriptor, made, false);
+  return made.size();
 }
 
 }  // namespace marrow

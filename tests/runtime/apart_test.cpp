@@ -87,7 +87,7 @@ TEST_F(ApartTest, MemoryIsLimitedByTheFilesSize) {
 }
 
 TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
-  settings.file_seconds = 0.2;
+  settings.file_limits.seconds = 0.2;
   const auto start = std::chrono::steady_clock::now();
   EXPECT_EQ(failure("spin"), ": to read it takes more than 0.2 s, which is more than a file of its size should; "
                                              "where the file is good, raise the limit with --file-seconds");

@@ -26,6 +26,7 @@ struct RunRequest {
   bool no_cache = false;
   bool quiet = false;
   bool json = false;
+  FileLimits file_limits;
 };
 
 struct RerunRequest {

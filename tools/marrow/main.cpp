@@ -16,11 +16,18 @@ void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& req
       ->take_all()->expected(1)->type_name("NODE.OPTION=VALUE");
 }
 
+void add_file_limits(CLI::App* command, marrow::FileLimits& limits) {
+  command->add_option("--file-memory", limits.memory_mb, "megabytes that reading a file may use (default: by its size)")->check(CLI::PositiveNumber);
+  command->add_option("--file-seconds", limits.seconds, "seconds of processor time that reading a file may use (default: by its size)")
+      ->check(CLI::PositiveNumber);
+}
+
 void add_compare_arguments(CLI::App* command, marrow::cli::CompareRequest& request) {
   command->add_option("experiment", request.file, "experiment file (YAML)")->required();
   command->add_option("--out", request.folder, "folder of the comparison, new or to be continued (default: runs/compare/NAME)");
   command->add_option("--threads", request.threads, "threads of each cell")->capture_default_str()->check(CLI::Range(1, 1024));
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
+  add_file_limits(command, request.file_limits);
 }
 
 }  // namespace
@@ -41,6 +48,7 @@ int main(int argc, char** argv) {
   run_command->add_flag("--no-cache", run_request.no_cache, "neither read nor keep results of nodes");
   run_command->add_flag("--quiet", run_request.quiet, "print only errors");
   run_command->add_flag("--json", run_request.json, "print events as JSON, one a line");
+  add_file_limits(run_command, run_request.file_limits);
   run_command->callback([&] { code = run(run_request); });
 
   CompareRequest compare_request;

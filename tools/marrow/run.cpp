@@ -143,6 +143,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   settings.store = store;
   settings.seed = request.seed;
   settings.threads = request.threads;
+  settings.file_limits = request.file_limits;
   settings.cancelled = &interrupted;
   settings.observer = [&](const RunEvent& event) { progress(event); };
   for (const std::string& note : pipeline.notes) {

@@ -21,6 +21,7 @@ struct CompareRequest {
   double memory_limit_mb = 4000;
   std::size_t shown = 8;         ///< cases and starts with pictures in the report
   bool dry_run = false, no_cache = false, quiet = false;
+  FileLimits file_limits;
 };
 
 int compare_variants(const CompareRequest& request);

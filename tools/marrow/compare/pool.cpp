@@ -96,7 +96,9 @@ class Pool {
   }
 
   void look_after(Member& member) {
-    auto end = member.worker.take(nullptr);
+    auto end = member.worker.take([&](const nlohmann::json& report) {
+      if (report["say"] == "waiting" && settings_.waits && member.job) settings_.waits(*member.job, member.worker.at());
+    });
     if (!end) end = member.worker.check({settings_.time_limit_s, settings_.memory_limit_mb});
     if (!end || !member.job) return;
     Job job = std::move(*std::exchange(member.job, std::nullopt));

@@ -22,6 +22,7 @@ struct PoolSettings {
   double time_limit_s = 600;         ///< of one job
   double memory_limit_mb = 4000;     ///< of one worker
   const std::atomic<bool>* cancelled = nullptr;
+  std::function<void(const Job&, const std::string& where)> waits = {};  ///< told when a job waits for another process's result
 };
 
 /// How a job ended: the worker's answer, or why there is none.

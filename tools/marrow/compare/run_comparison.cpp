@@ -53,6 +53,9 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   pool.time_limit_s = request.time_limit_s;
   pool.memory_limit_mb = request.memory_limit_mb;
   pool.cancelled = &interrupted;
+  pool.waits = [](const Job&, const std::string& where) {
+    std::fprintf(stderr, "  %s waits for another run that is making the same result\n", where.empty() ? "a cell" : where.c_str());
+  };
   pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
   return pool;

@@ -29,7 +29,8 @@ CellIndex cell_in(const Experiment& experiment, const json& request) {
 std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
   return [&reports](const RunEvent& event) {
     const std::string item = event.item.empty() ? "" : " (" + event.item + ")";
-    if (event.kind == RunEvent::Kind::started) reports.at("node '" + event.node + "'" + item);
+    if (event.kind == RunEvent::Kind::started || event.kind == RunEvent::Kind::waiting)
+      reports.at("node '" + event.node + "'" + item);
     if (event.kind == RunEvent::Kind::waiting || event.kind == RunEvent::Kind::waited)
       reports.waiting(event.kind == RunEvent::Kind::waiting);
   };

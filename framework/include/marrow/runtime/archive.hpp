@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
+#include <concepts>
 #include <cstdint>
 #include <cstring>
+#include <limits>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -24,19 +27,28 @@ namespace detail {
 template <class T>
 struct Bulk : std::bool_constant<std::is_arithmetic_v<T> && !std::is_same_v<T, bool>> {};
 template <class S, int R, int C>
-struct Bulk<Eigen::Matrix<S, R, C>> : std::bool_constant<(R > 0 && C > 0)> {};
+struct Bulk<Eigen::Matrix<S, R, C>> : std::bool_constant<(R > 0 && C > 0 && Bulk<S>::value)> {};
 template <class T, std::size_t N>
 struct Bulk<std::array<T, N>> : Bulk<T> {};
 
+/// An enum travels only with a function `bool is_valid(E)` beside it: a damaged or forged value may be any number.
 template <class T>
-concept Plain = std::is_arithmetic_v<T> || std::is_enum_v<T>;
+concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
+  { is_valid(value) } -> std::same_as<bool>;
+};
+template <class T>
+concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
 template <class T>
 concept HasFields = requires { T::fields(); };
 
+/// Of memory that is about to be filled: to touch 800 MB for the first time takes half as long in large pages.
+void use_large_pages(void* data, std::size_t size);
+
 }  // namespace detail
 
-/// Takes the bytes of values: of arithmetic types, enums, strings, containers of such, Eigen matrices, cv::Mat and structs
-/// with fields(). Lengths are part of it, so that neighbours cannot run together. Unpacker reads the same back.
+/// Takes the bytes of values: of arithmetic types, enums that have an is_valid(), strings, containers of such, Eigen matrices,
+/// cv::Mat and structs with fields(). Lengths are part of it, so that neighbours cannot run together. Unpacker reads the same
+/// back.
 class Archive {
  public:
   virtual ~Archive() = default;
@@ -106,10 +118,14 @@ class Packer : public Archive {
   std::string packed;
 };
 
-/// Reads what an Archive took, in the same order and of the same types. Throws Error where the bytes end too early.
+/// Reads what an Archive took, in the same order and of the same types. Throws Error where the bytes end too early, or are no
+/// value of the type: any bytes may be read, they cost no more memory than a small multiple of their size.
 class Unpacker {
  public:
-  explicit Unpacker(std::string_view packed) : rest_(packed) {}
+  explicit Unpacker(std::string_view packed) : remaining_(packed.size()), next_(packed.data()) {}
+  virtual ~Unpacker() = default;
+  Unpacker(const Unpacker&) = delete;
+  Unpacker& operator=(const Unpacker&) = delete;
 
   template <class T>
   T get() {
@@ -119,7 +135,12 @@ class Unpacker {
   }
   template <class T>
   void read(T& value) {
-    if constexpr (detail::Plain<T>) {
+    if constexpr (std::is_same_v<T, bool>) {
+      value = truth(get<std::uint8_t>());
+    } else if constexpr (std::is_enum_v<T>) {
+      value = T(get<std::underlying_type_t<T>>());
+      if (!is_valid(value)) throw Error("the packed value holds a choice that there is not");
+    } else if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {
       std::apply([&](auto... member) { (read(value.*member), ...); }, T::fields());
@@ -127,18 +148,31 @@ class Unpacker {
       read_container(value);
     }
   }
-  std::size_t remaining() const { return rest_.size(); }
+  std::size_t remaining() const { return remaining_; }
+
+ protected:
+  /// For bytes that come from elsewhere, by take().
+  explicit Unpacker(std::size_t size) : remaining_(size) {}
+  /// Copies the next bytes; never asked for more than remain.
+  virtual void take(void* data, std::size_t size) {
+    std::memcpy(data, next_, size);
+    next_ += size;
+  }
 
  private:
   void bytes(void* data, std::size_t size) {
-    if (size > rest_.size()) throw Error("the packed value ends too early");
-    if (size) std::memcpy(data, rest_.data(), size);
-    rest_.remove_prefix(size);
+    if (size > remaining_) throw Error("the packed value ends too early");
+    if (size) take(data, size);
+    remaining_ -= size;
+  }
+  static bool truth(std::uint8_t byte) {
+    if (byte > 1) throw Error("the packed value holds a truth value that is neither 0 nor 1");
+    return byte == 1;
   }
   /// A length that the remaining bytes can hold; a damaged one must not ask for all the memory.
   std::size_t length(std::size_t item_size) {
     const auto count = get<std::uint64_t>();
-    if (count > rest_.size() / item_size) throw Error("the packed value ends too early");
+    if (count > remaining_ / item_size) throw Error("the packed value ends too early");
     return std::size_t(count);
   }
   void read_container(std::string& text) {
@@ -148,9 +182,11 @@ class Unpacker {
   void read_container(cv::Mat& image);
   template <class S, int R, int C>
   void read_container(Eigen::Matrix<S, R, C>& matrix) {
+    static_assert(detail::Bulk<S>::value, "a matrix of numbers can be read back");
+    constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
     const auto rows = get<std::int64_t>(), cols = get<std::int64_t>();
-    if (rows < 0 || cols < 0 || (cols && std::size_t(rows) > rest_.size() / sizeof(S) / std::size_t(cols)) || (R > 0 && rows != R) ||
-        (C > 0 && cols != C))
+    if (rows < 0 || cols < 0 || rows > kMost || cols > kMost || (cols && std::size_t(rows) > remaining_ / sizeof(S) / std::size_t(cols)) ||
+        (R > 0 && rows != R) || (C > 0 && cols != C))
       throw Error("the packed value holds a matrix of another size");
     matrix.resize(rows, cols);
     bytes(matrix.data(), sizeof(S) * std::size_t(matrix.size()));
@@ -162,11 +198,18 @@ class Unpacker {
   template <class T>
   void read_container(std::vector<T>& items) {
     if constexpr (detail::Bulk<T>::value) {
-      items.resize(length(sizeof(T)));
-      bytes(items.data(), items.size() * sizeof(T));
+      const std::size_t count = length(sizeof(T));
+      items.clear();
+      items.reserve(count);
+      detail::use_large_pages(items.data(), count * sizeof(T));
+      items.resize(count);
+      bytes(items.data(), count * sizeof(T));
     } else {
-      items.resize(length(1));
-      for (T& item : items) read(item);
+      // An item may take fewer bytes here than in memory, so the memory grows with the items that are really there.
+      const std::size_t count = length(1);
+      items.clear();
+      items.reserve(std::min(count, remaining_ / sizeof(T)));
+      for (std::size_t i = 0; i < count; ++i) items.push_back(get<T>());
     }
   }
   template <class T>
@@ -188,7 +231,8 @@ class Unpacker {
     }
   }
 
-  std::string_view rest_;
+  std::size_t remaining_;
+  const char* next_ = nullptr;
 };
 
 }  // namespace marrow

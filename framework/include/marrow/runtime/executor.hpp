@@ -24,6 +24,12 @@ struct RunEvent {
   double seconds = 0;
 };
 
+/// What one call that reads a file may use, in its own process. 0 = by the file's size.
+struct FileLimits {
+  double memory_mb = 0;
+  double seconds = 0;  ///< of processor time
+};
+
 struct RunSettings {
   std::uint64_t seed = 1;
   int threads = 0;  ///< 0 = as many as the machine has
@@ -36,8 +42,7 @@ struct RunSettings {
   const Store* store = nullptr;
   std::set<std::string> made_anew = {};  ///< nodes that are called although the store may have their results; for measuring time
   bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
-  /// What reading a file may use, in a process of its own: memory in MB and seconds of processor time; 0 = by the file's size.
-  double file_memory_mb = 0, file_seconds = 0;
+  FileLimits file_limits = {};
 };
 
 /// How one node fared.

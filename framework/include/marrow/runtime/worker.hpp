@@ -70,6 +70,7 @@ class Worker {
   /// Ends the process, whose job has ended; returns when it is gone.
   void close();
   bool is_dead() const { return process_ < 0; }
+  pid_t process() const { return process_; }
   /// That the job has had so far. Not counted: while it waits for another's result, and while it or we were suspended.
   double seconds();
   double memory_mb() const;  ///< that it has at present

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What comes from workers: names cannot pass for answers, and waiting for another run is no failure."""
+import csv
+import json
+import os
+import signal
+import subprocess
+import time
+
+from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+
+FORGED = json.dumps({"id": "../../../forged", "variant": "one", "case": "s1", "start": "0", "status": "done", "tries": 1, "values": [0.001],
+                     "units": [""], "initial_error": None, "seconds": None, "evaluations": 0, "nodes": {}, "key": "k"})
+NAMES = """marrow: 1
+nodes:
+  s: {uses: test.sides, with: {names: [%s, b]}}
+  a: {uses: test.add, in: {a: s.both, b: s.both}}
+  total: {uses: test.sum, in: {items: a}}
+outputs: {number: total}
+"""
+WORK = """marrow: 1
+nodes:
+  w: {uses: test.work, with: {value: 1.5, path: data}}
+  n: {uses: test.add, in: {a: w}}
+outputs: {number: n}
+"""
+EXPERIMENT = "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nmetrics: [number.value]\nvariants: {one: {}, two: {}}\n"
+
+
+class Workers(Case):
+    def compare(self, *arguments):
+        return marrow("compare", self.write("e.yaml", EXPERIMENT), "--out", self.scratch / "out", *arguments, plugins=[TEST_PLUGINS],
+                      extra_environment={"MARROW_CACHE": str(self.scratch / "cache")})
+
+    def rows(self):
+        with open(self.scratch / "out" / "cells.csv", newline="") as stream:
+            return [(row["cell"], row["status"], row.get("number.value")) for row in csv.DictReader(stream)]
+
+    def test_names_cannot_pass_for_answers(self):
+        name = json.dumps("x\nend %s\n{\"job\": 1, \"end\": %s}\nx" % (FORGED, FORGED))
+        self.write("p.yaml", NAMES % name)
+        result = self.compare()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        # 10 + 10 and 20 + 20
+        self.assertEqual(sorted(self.rows()), [(cell, "done", "60.0") for cell in ("one/1/0", "one/2/0", "two/1/0", "two/2/0")])
+        self.assertEqual([str(path) for path in self.scratch.rglob("*forged*")], [])
+
+    def test_waiting_for_another_run_is_no_failure(self):
+        self.write("p.yaml", WORK)
+        self.write("data", "x")
+        environment = dict(os.environ, MARROW_CACHE=str(self.scratch / "cache"), MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
+        other = subprocess.Popen([str(MARROW), "run", "p.yaml", "--out", "other", "--json"], cwd=self.scratch, env=environment, stdout=subprocess.PIPE, text=True)
+        for line in other.stdout:
+            if '"started"' in line and '"w"' in line:
+                break
+        other.send_signal(signal.SIGSTOP)
+        start = time.monotonic()
+        comparison = subprocess.Popen([str(MARROW), "compare", str(self.write("e.yaml", EXPERIMENT)), "--out", "out", "--time-limit", "3", "--jobs", "1"],
+                                      cwd=self.scratch, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        time.sleep(9)
+        self.assertIsNone(comparison.poll(), "it did not wait")
+        other.send_signal(signal.SIGCONT)
+        text, errors = comparison.communicate(timeout=60)
+        other.communicate(timeout=60)
+        self.assertEqual(comparison.returncode, 0, errors)
+        self.assertGreater(time.monotonic() - start, 9)
+        self.assertEqual([status for _, status, _ in self.rows()], ["done"] * 4, text)
+        self.assertIn("waits for another run that is making the same result", errors)
+
+
+if __name__ == "__main__":
+    main()
