@@ -19,10 +19,8 @@ std::optional<KnownPoint> point_from(read::YamlFile& file, const YAML::Node& nod
     map.fault("seen_px", "seen_px: expected the point's place per view, as {frontal: [u, v]}");
     return std::nullopt;
   }
-  std::vector<std::string> views;
-  for (const auto& item : *seen) views.push_back(item.first.Scalar());
-  const read::YamlMap places(file, *seen, map.what() + ": seen_px", views);
-  for (const std::string& view : views)
+  const read::YamlMap places(file, *seen, map.what() + ": seen_px", read::FreeKeys::names);
+  for (const std::string& view : places.keys())
     if (const auto at = places.numbers(view, 2)) point.seen_px[view] = {(*at)[0], (*at)[1]};
   if (!point.world_mm && point.seen_px.size() < 2)
     map.fault("seen_px", "a point without at_mm needs to be seen in two views, from which its place follows");

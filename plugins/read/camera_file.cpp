@@ -4,8 +4,9 @@
 #include <Eigen/SVD>
 #include <charconv>
 #include <cmath>
-#include <fstream>
+#include <sstream>
 
+#include "input_file.hpp"
 #include "marrow/domain/error.hpp"
 #include "yaml_values.hpp"
 
@@ -16,14 +17,12 @@ namespace {
 class XmalabText {
  public:
   explicit XmalabText(const std::filesystem::path& path) : path_(path) {
-    std::error_code failure;
-    if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
-    if (!std::filesystem::is_regular_file(path, failure) || std::filesystem::file_size(path, failure) > 65536)
+    const InputFile file(path);
+    if (file.size() > 65536)
       throw Error(path.string() +
                   ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "
                   "matrix, rotation, translation)");
-    stream_.open(path);
-    if (!stream_) throw Error(path.string() + ": cannot be read");
+    stream_.str(file.text(0, std::size_t(file.size())));
   }
 
   /// Skips empty lines and expects a line with just this title.
@@ -66,7 +65,7 @@ class XmalabText {
   }
 
   std::filesystem::path path_;
-  std::ifstream stream_;
+  std::istringstream stream_;
   int line_number_ = 0;
 };
 

@@ -3,6 +3,8 @@
 #include <marrow/plugin.hpp>
 
 #include "camera_file.hpp"
+#include "input_file.hpp"
+#include "names.hpp"
 #include "volume_file.hpp"
 #include "yaml_values.hpp"
 
@@ -11,6 +13,8 @@ namespace {
 namespace fs = std::filesystem;
 using marrow::read::YamlFile;
 using marrow::read::YamlMap;
+
+constexpr std::size_t kMostViews = 1000;
 
 struct Options {
   fs::path path;
@@ -37,6 +41,12 @@ std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, cons
     map.fault(key, key + ": '" + *text + "' is a link to a place outside the case's folder; copy it into the folder");
     return std::nullopt;
   }
+  // What a link to a folder names can change without any file of the case changing.
+  for (fs::path part = inside; !part.empty(); part = part.parent_path())
+    if (fs::is_symlink(folder / part, failure) && fs::is_directory(folder / part, failure)) {
+      map.fault(key, key + ": '" + part.string() + "' is a link to a folder; move the folder itself there");
+      return std::nullopt;
+    }
   return folder / inside;
 }
 
@@ -89,6 +99,9 @@ std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& m
 
 void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
   const auto name = map.text("name");
+  if (name)
+    if (const std::string fault = marrow::read::fault_of_name(*name); !fault.empty())
+      return map.fault("name", "name: the name of a view " + fault + "; choose another");
   const auto image = read_image(folder, map, "image");
   const auto camera = read_camera(folder, map);
   marrow::View view;
@@ -118,6 +131,8 @@ void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result
   if (!views) return;
   if (!views->IsSequence() || views->size() == 0)
     return map.fault("views", "views: expected a list of views, each with name, image and camera");
+  if (views->size() > kMostViews)
+    return map.fault("views", "views: there are " + std::to_string(views->size()) + "; at most 1000 are read");
   for (const auto& item : *views) {
     const YamlMap view(map.file(), item, "a view", {"name", "image", "camera", "mask"});
     if (view.valid()) read_view(folder, view, result);
@@ -135,10 +150,9 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
   if (!fragments->IsMap() || fragments->size() == 0)
     return map.fault("fragments", "fragments: expected at least one fragment by name, with its seeds");
   std::vector<std::string> registered, with_start, with_truth;
-  for (const auto& item : *fragments) {
-    const std::string name = item.first.Scalar();
-    if (result.seeds.find(name)) map.file().fault(item.first.Mark(), "fragments: '" + name + "' is given twice");
-    const YamlMap fragment(map.file(), item.second, "fragment '" + name + "'", {"seeds", "register", "start", "truth"});
+  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::read::FreeKeys::names);
+  for (const std::string& name : by_name.keys()) {
+    const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'", {"seeds", "register", "start", "truth"});
     if (!fragment.valid()) continue;
     marrow::Seeds seeds = marrow::read::seeds_from(fragment, name);
     const bool wanted = seeds.wanted;

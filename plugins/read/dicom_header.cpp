@@ -1,33 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dicom_header.hpp"
 
-#include <gdcmReader.h>
-#include <gdcmSequenceOfItems.h>
-#include <gdcmStringFilter.h>
-
 #include <charconv>
 #include <cmath>
 
+#include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
-#include "samples.hpp"
 
 namespace marrow::read {
 namespace {
 
-const gdcm::Tag kSharedGroups(0x5200, 0x9229), kFrameGroups(0x5200, 0x9230);
-
-/// The element among those of a data set or, where `deep`, of the sequences in it, the outermost first.
-const gdcm::DataElement* find_element(const gdcm::DataSet& set, const gdcm::Tag& tag, bool deep) {
-  if (const gdcm::DataElement& element = set.GetDataElement(tag); set.FindDataElement(tag) && !element.IsEmpty()) return &element;
-  if (!deep) return nullptr;
-  for (const gdcm::DataElement& element : set.GetDES()) {
-    const auto sequence = element.GetValueAsSQ();
-    if (!sequence) continue;
-    for (gdcm::SequenceOfItems::SizeType i = 1; i <= sequence->GetNumberOfItems(); ++i)
-      if (const auto* found = find_element(sequence->GetItem(i).GetNestedDataSet(), tag, true)) return found;
-  }
-  return nullptr;
-}
+constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
+constexpr std::uint64_t kLongestText = 4096;
 
 }  // namespace
 
@@ -37,46 +21,48 @@ std::string DicomTag::text() const {
   return name + std::string(numbers);
 }
 
-struct DicomHeader::File {
-  gdcm::Reader reader;
-  int frame = 1;
-
-  /// The text of an element, found in the data set itself, then in the frame's own functional group, then in the shared one.
-  std::string text(const gdcm::Tag& tag) const {
-    const gdcm::DataSet& set = reader.GetFile().GetDataSet();
-    if (const auto* element = find_element(set, tag, false)) return text_of(*element);
-    for (const gdcm::Tag& groups : {kFrameGroups, kSharedGroups}) {
-      if (!set.FindDataElement(groups)) continue;
-      const auto sequence = set.GetDataElement(groups).GetValueAsSQ();
-      const gdcm::SequenceOfItems::SizeType item = groups == kFrameGroups ? gdcm::SequenceOfItems::SizeType(frame) : 1;
-      if (!sequence || item > sequence->GetNumberOfItems()) continue;
-      if (const auto* element = find_element(sequence->GetItem(item).GetNestedDataSet(), tag, true)) return text_of(*element);
-    }
-    return "";
-  }
-  std::string text_of(const gdcm::DataElement& element) const {
-    gdcm::StringFilter filter;
-    filter.SetFile(reader.GetFile());
-    return filter.ToStringPair(element).second;
-  }
-};
-
-DicomHeader::DicomHeader(const std::filesystem::path& path, int frame) : path_(path), file_(std::make_unique<File>()) {
-  check_file(path);
-  check_dicom_file(path);
-  file_->frame = frame;
-  file_->reader.SetFileName(path.c_str());
-  if (!file_->reader.ReadUpToTag(gdcm::Tag(0x7fe0, 0x0010)))
-    throw Error(path.string() + ": cannot be read as DICOM, it may be cut off or damaged; copy or export it again");
+/// The element among those of a data set, or of the sequences in it, the outermost first.
+const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std::uint32_t tag) const {
+  if (const auto* element = find_element(path(), elements, tag); element && element->value.bytes > 0) return element;
+  for (const DicomElement& element : elements)
+    for (const DicomElements& item : element.items)
+      if (const auto* found = find_inside(item, tag)) return found;
+  return nullptr;
 }
 
-DicomHeader::~DicomHeader() = default;
+/// In the data set itself, then in the frame's own functional group, then in the shared one.
+const DicomElement* DicomHeader::find(const DicomTag& tag) const {
+  if (const auto* element = find_element(path(), file_.elements(), tag.code());
+      element && (element->value.bytes > 0 || !element->items.empty()))
+    return element;
+  for (const std::uint32_t groups : {kFrameGroups, kSharedGroups}) {
+    const auto* sequence = find_element(path(), file_.elements(), groups);
+    const std::size_t item = groups == kFrameGroups ? std::size_t(frame_ - 1) : 0;
+    if (!sequence || item >= sequence->items.size()) continue;
+    if (const auto* element = find_inside(sequence->items[item], tag.code())) return element;
+  }
+  return nullptr;
+}
 
 std::optional<std::string> DicomHeader::text(const DicomTag& tag) const {
-  std::string value = file_->text(gdcm::Tag(tag.group, tag.element));
+  const DicomElement* element = find(tag);
+  if (!element || element->value.bytes == 0) return std::nullopt;
+  if (element->value.bytes > kLongestText)
+    throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(element->value.bytes) +
+                " bytes; it is damaged");
+  std::string value = file_.file().text(element->value.begin, std::size_t(element->value.bytes));
+  if (tag.kind != DicomTag::Kind::text) {
+    if (value.size() != 2)
+      throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(value.size()) +
+                  " bytes; expected 2: it is damaged");
+    const int low = std::uint8_t(value[file_.is_big_endian() ? 1 : 0]),
+              high = std::uint8_t(value[file_.is_big_endian() ? 0 : 1]);
+    const int number = high << 8 | low;
+    return std::to_string(tag.kind == DicomTag::Kind::ss && number > 0x7FFF ? number - 0x10000 : number);
+  }
   const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
   while (!value.empty() && is_padding(value.back())) value.pop_back();
-  while (!value.empty() && is_padding(value.front())) value.erase(0, 1);
+  value.erase(0, std::min(value.find_first_not_of(std::string(" \0", 2)), value.size()));
   if (value.empty()) return std::nullopt;
   return value;
 }
@@ -99,8 +85,8 @@ std::optional<std::vector<double>> DicomHeader::numbers(const DicomTag& tag, std
     ++at;
   }
   if (!good || at != end || numbers.size() != count)
-    throw Error(path_.string() + ": " + tag.text() + ": expected " + std::to_string(count) +
-                (count == 1 ? " number" : " numbers") + ", got '" + value->substr(0, 60) + "'");
+    throw Error(path().string() + ": " + tag.text() + ": expected " + std::to_string(count) +
+                (count == 1 ? " number" : " numbers") + ", got '" + shown(*value) + "'");
   return numbers;
 }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The narrow door to GDCM: the values of a DICOM file without its pixels.
+// The values of a DICOM file without its pixels.
 #include <cstdint>
-#include <filesystem>
-#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
+
+#include "dicom_file.hpp"
 
 namespace marrow::read {
 
@@ -14,29 +14,33 @@ namespace marrow::read {
 struct DicomTag {
   std::uint16_t group, element;
   const char* name;
+  /// How its value is written: as text, or as a number of 2 bytes without or with a sign.
+  enum class Kind { text, us, ss } kind = Kind::text;
+  std::uint32_t code() const { return std::uint32_t(group) << 16 | element; }
   /// "PixelSpacing (0028,0030)"
   std::string text() const;
 };
 
 class DicomHeader {
  public:
-  /// Throws Error when the file is not DICOM or is damaged. `frame` counts from 1 and picks the values that an enhanced
-  /// multi-frame file gives for each frame.
-  DicomHeader(const std::filesystem::path& path, int frame);
-  ~DicomHeader();
+  /// `frame` counts from 1 and picks the values that an enhanced multi-frame file gives for each frame.
+  DicomHeader(const DicomFile& file, int frame) : file_(file), frame_(frame) {}
 
-  const std::filesystem::path& path() const { return path_; }
-  /// The value as text without padding; none where the element is missing or empty. Elements in the functional groups of an
-  /// enhanced file are found like those of a plain one.
+  const std::filesystem::path& path() const { return file_.path(); }
+  /// The value as text without padding; none where the element is missing or empty. Elements in the functional groups
+  /// of an enhanced file are found like those of a plain one.
   std::optional<std::string> text(const DicomTag& tag) const;
   /// The values as numbers. Throws Error where they are none, or where there are not `count`.
   std::optional<std::vector<double>> numbers(const DicomTag& tag, std::size_t count) const;
   std::optional<double> number(const DicomTag& tag) const;
+  /// Whether the file has the element, in whatever form.
+  bool has(const DicomTag& tag) const { return find(tag) != nullptr; }
 
  private:
-  struct File;
-  std::filesystem::path path_;
-  std::unique_ptr<File> file_;
+  const DicomElement* find(const DicomTag& tag) const;
+  const DicomElement* find_inside(const DicomElements& elements, std::uint32_t tag) const;
+  const DicomFile& file_;
+  int frame_;
 };
 
 }  // namespace marrow::read

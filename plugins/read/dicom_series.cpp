@@ -1,14 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <itkGDCMImageIO.h>
-#include <itkMultiThreaderBase.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <map>
+#include <set>
 
-#include "itk_samples.hpp"
+#include "dicom_pixels.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::read {
@@ -16,61 +12,92 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
+constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
+constexpr DicomTag kDescription{0x0008, 0x103E, "SeriesDescription"};
+constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
+constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
+constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
+constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
+constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
+
 double dot(const Vector& a, const Vector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vector normalized(const Vector& a) {
+  const double factor = 1 / std::sqrt(dot(a, a));
+  return {factor * a[0], factor * a[1], factor * a[2]};
+}
 
 struct Slice {
-  std::filesystem::path path;
   std::string series, description, modality;
-  Samples samples;
+  DicomPixels pixels;
+  Samples samples;         ///< without bytes
   double position_mm = 0;  ///< along the normal of the slices
   bool is_placed = false;  ///< says where it lies
+  bool has_table = false;
+
+  const std::filesystem::path& path() const { return pixels.path; }
 };
 
 bool looks_like_dicom(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  char head[132] = {};
-  stream.read(head, sizeof head);
-  return stream.gcount() == sizeof head && std::equal(head + 128, head + 132, "DICM");
-}
-
-std::string tag(itk::GDCMImageIO& io, const std::string& name) {
-  std::string value;
-  io.GetValueFromTag(name, value);
-  while (!value.empty() && (value.back() == ' ' || value.back() == '\0')) value.pop_back();
-  return value;
+  const InputFile file(path);
+  return file.size() >= 132 && file.text(128, 4) == "DICM";
 }
 
 Vector column(const Samples& samples, int k) {
   return {samples.direction[k], samples.direction[3 + k], samples.direction[6 + k]};
 }
 
+/// Origin and axes; these are made orthonormal, as a header gives them with few digits.
+void place(const DicomHeader& header, Slice& slice) {
+  const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6), spacing = header.numbers(kSpacing, 2);
+  slice.is_placed = position && orientation;
+  if (!slice.is_placed) return;
+  if (!spacing) throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
+  slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // a row's distance is a pixel's height
+  std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
+  const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]}, down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
+  if (std::abs(dot(row, row) - 1) > 1e-2 || std::abs(dot(down, down) - 1) > 1e-2 || std::abs(dot(row, down)) > 1e-3)
+    throw Error(slice.path().string() + ": " + kOrientation.text() + " is no pair of axes at right angles; it is damaged");
+  const Vector z = normalized(cross(row, down)), x = normalized(cross(down, z)), y = cross(z, x);
+  for (std::size_t k = 0; k < 3; ++k) {
+    slice.samples.direction[3 * k] = x[k];
+    slice.samples.direction[3 * k + 1] = y[k];
+    slice.samples.direction[3 * k + 2] = z[k];
+  }
+  slice.position_mm = dot(slice.samples.origin_mm, z);
+}
+
 Slice read_slice(const std::filesystem::path& path) {
-  check_dicom_file(path);
-  const auto io = itk::GDCMImageIO::New();
+  const DicomFile file(path);
+  const DicomHeader header(file, 1);
   Slice slice;
-  slice.path = path;
-  slice.samples = read_through(*io, path, "DICOM");
-  slice.series = tag(*io, "0020|000e");
-  slice.description = tag(*io, "0008|103e");
-  slice.modality = tag(*io, "0008|0060");
-  const std::string what = path.string();
-  if (slice.samples.size[2] != 1)
-    throw Error(what + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
-  if (slice.samples.components != 1) throw Error(what + ": has colours; a CT slice has one value per pixel");
-  slice.is_placed = !tag(*io, "0020|0032").empty() && !tag(*io, "0020|0037").empty();
-  slice.position_mm = dot({slice.samples.origin_mm[0], slice.samples.origin_mm[1], slice.samples.origin_mm[2]},
-                          column(slice.samples, 2));
+  slice.pixels = read_dicom_pixels(file);
+  slice.series = header.text(kSeries).value_or("");
+  slice.description = header.text(kDescription).value_or("");
+  slice.modality = header.text(kModality).value_or("");
+  slice.has_table = header.has(kTable);
+  if (slice.pixels.frames != 1)
+    throw Error(path.string() + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
+  if (slice.pixels.channels != 1) throw Error(path.string() + ": has colours; a CT slice has one value per pixel");
+  slice.samples.size = {slice.pixels.columns, slice.pixels.rows, 1};
+  place(header, slice);
   return slice;
 }
 
 /// The DICOM files of a folder by series. Other files (a licence, a note) are passed over.
 std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
-  std::vector<std::filesystem::path> paths;
-  for (const auto& entry : std::filesystem::directory_iterator(folder))
-    if (entry.is_regular_file()) paths.push_back(entry.path());
-  std::sort(paths.begin(), paths.end());
+  std::set<std::filesystem::path> paths;
+  std::error_code failure;
+  for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure; entry.increment(failure)) {
+    check_stays_inside(folder, entry->path());
+    std::error_code none;
+    if (entry->is_regular_file(none) && (entry->file_size(none) > 0 || entry->path().extension() == ".dcm")) paths.insert(entry->path());
+  }
+  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
   std::map<std::string, std::vector<Slice>> series;
   for (const auto& path : paths) {
     if (path.filename() == "DICOMDIR") continue;
@@ -111,17 +138,19 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
   if (slices.size() < 2) throw Error(folder.string() + ": the series has 1 slice; a volume needs at least 2");
   for (const Slice& slice : slices) {
     if (slice.modality != "CT")
-      throw Error(slice.path.string() + ": is of modality '" + slice.modality +
+      throw Error(slice.path().string() + ": is of modality '" + slice.modality +
                   "'; expected CT, whose values are Hounsfield units");
     if (!slice.is_placed)
-      throw Error(slice.path.string() +
+      throw Error(slice.path().string() +
                   ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
+    if (slice.has_table)
+      throw Error(slice.path().string() + ": its values go through a table (" + kTable.text() + "), which is not read; export it as HU");
     bool same = slice.samples.size == first.samples.size;
     for (int i = 0; i < 9; ++i) same = same && std::abs(slice.samples.direction[i] - first.samples.direction[i]) < 1e-4;
     for (int i = 0; i < 2; ++i)
       same = same && std::abs(slice.samples.spacing_mm[i] - first.samples.spacing_mm[i]) < 1e-5;
     if (!same)
-      throw Error(slice.path.string() + ": has another size, spacing or direction than " + first.path.string());
+      throw Error(slice.path().string() + ": has another size, spacing or direction than " + first.path().string());
   }
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
@@ -129,7 +158,7 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   const double usual = sorted[sorted.size() / 2];
   for (std::size_t i = 0; i < gaps.size(); ++i) {
-    const std::string between = slices[i].path.filename().string() + " and " + slices[i + 1].path.filename().string();
+    const std::string between = slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
     if (gaps[i] < 1e-3)
       throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
     if (std::abs(gaps[i] - usual) > 0.01 * usual + 1e-3)
@@ -146,21 +175,21 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
 
 }  // namespace
 
-DicomSeries read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
-  itk::MultiThreaderBase::SetGlobalDefaultNumberOfThreads(1);
+VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
   std::vector<Slice> slices = choose_series(folder, series_uid);
   std::stable_sort(slices.begin(), slices.end(),
                    [](const Slice& a, const Slice& b) { return a.position_mm < b.position_mm; });
   check_slices(folder, slices);
-  DicomSeries series;
+  VolumeSamples series;
   series.geometry = slices[0].samples;
-  series.geometry.bytes.clear();
   series.geometry.dimensions = 3;
   series.geometry.size[2] = int(slices.size());
   series.geometry.spacing_mm[2] = (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
-  for (const Slice& slice : slices) {
-    const std::vector<float> values = to_float(slice.samples);
-    series.values.insert(series.values.end(), values.begin(), values.end());
+  const std::size_t pixels = slices[0].samples.count();
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    const Samples slice = read_dicom_frame(slices[k].pixels, 1);
+    if (series.values.empty()) series.values.resize(pixels * slices.size());
+    scaled_values(slices[k].pixels, slice, series.values.data() + k * pixels);
   }
   return series;
 }

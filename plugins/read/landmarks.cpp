@@ -6,27 +6,16 @@
 namespace {
 
 using namespace marrow;
-using read::YamlFile, read::YamlMap;
+using read::FreeKeys, read::YamlFile, read::YamlMap;
 
 struct Options {
   std::filesystem::path path;
 };
 
-/// The keys of a map whose keys are names that its author chose.
-std::vector<std::string> names_in(const YAML::Node& node) {
-  std::vector<std::string> names;
-  if (node.IsMap())
-    for (const auto& item : node)
-      if (item.first.IsScalar()) names.push_back(item.first.Scalar());
-  return names;
-}
-
 /// Notes a fault where a point that is seen or tracked is none of the CT's.
-void check_known(const Landmarks& landmarks, const YamlMap& map, const std::string& name) {
-  std::vector<std::string> known;
-  for (const Landmarks::Point& point : landmarks.points) known.push_back(point.name);
-  if (std::find(known.begin(), known.end(), name) != known.end()) return;
-  const std::string near = read::nearest(name, known);
+void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
+  if (places.has(name)) return;
+  const std::string near = map.file().is_full() ? "" : read::nearest(name, places.keys());
   map.fault(name, "the points have no '" + name + "'; " + (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
 }
 
@@ -34,27 +23,26 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
   Landmarks landmarks;
   const auto points = fragment.required("points");
   if (!points) return landmarks;
-  const YamlMap places(file, *points, fragment.what() + ", points", names_in(*points));
-  for (const std::string& name : names_in(*points)) {
+  const YamlMap places(file, *points, fragment.what() + ", points", FreeKeys::labels);
+  for (const std::string& name : places.keys()) {
     const auto place = places.vector3(name);
     landmarks.points.push_back({name, place.value_or(Eigen::Vector3d::Zero())});
   }
   if (places.valid() && landmarks.points.empty()) fragment.fault("points", "points: expected places [x, y, z] in mm by name, got none");
   if (const YAML::Node seen = fragment.node("seen"); seen.IsDefined()) {
-    const YamlMap views(file, seen, fragment.what() + ", seen", names_in(seen));
-    for (const std::string& view : names_in(seen)) {
-      const YAML::Node node = views.node(view);
-      const YamlMap pixels(file, node, fragment.what() + ", seen, view '" + view + "'", names_in(node));
-      for (const std::string& name : names_in(node)) {
-        check_known(landmarks, pixels, name);
+    const YamlMap views(file, seen, fragment.what() + ", seen", FreeKeys::names);
+    for (const std::string& view : views.keys()) {
+      const YamlMap pixels(file, views.node(view), fragment.what() + ", seen, view '" + view + "'", FreeKeys::labels);
+      for (const std::string& name : pixels.keys()) {
+        check_known(places, pixels, name);
         if (const auto pixel = pixels.numbers(name, 2)) landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
       }
     }
   }
   if (const YAML::Node tracked = fragment.node("tracked"); tracked.IsDefined()) {
-    const YamlMap found(file, tracked, fragment.what() + ", tracked", names_in(tracked));
-    for (const std::string& name : names_in(tracked)) {
-      check_known(landmarks, found, name);
+    const YamlMap found(file, tracked, fragment.what() + ", tracked", FreeKeys::labels);
+    for (const std::string& name : found.keys()) {
+      check_known(places, found, name);
       if (const auto place = found.vector3(name)) landmarks.tracked.push_back({name, *place});
     }
   }
@@ -67,9 +55,9 @@ List<Landmarks> landmarks(const Options& options) {
   read::check_version(map, "marrow-landmarks");
   List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
-    const YamlMap by_name(file, *fragments, "fragments", names_in(*fragments));
-    if (by_name.valid() && fragments->size() == 0) map.fault("fragments", "fragments: expected fragments by name, got none");
-    for (const std::string& name : names_in(*fragments))
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys::names);
+    if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name, got none");
+    for (const std::string& name : by_name.keys())
       landmarks.add(name, landmarks_of(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"points", "seen", "tracked"}), file));
   }
   file.finish();

@@ -4,13 +4,14 @@
 
 #include <csetjmp>
 #include <cstring>
-#include <fstream>
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
 
 namespace marrow::read {
 namespace {
+
+constexpr std::uint64_t kLargestFile = 1 << 30;
 
 struct Source {
   std::string bytes;
@@ -37,6 +38,10 @@ struct Reader {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
     info = png_create_info_struct(png);
     png_set_read_fn(png, &source, take);
+    // Notes and colour profiles, which are unpacked too, are of no use here: not many, and none that is large.
+    png_set_chunk_malloc_max(png, 4 << 20);
+    png_set_chunk_cache_max(png, 16);
+    png_set_user_limits(png, 100000, 100000);
   }
   ~Reader() { png_destroy_read_struct(&png, &info, nullptr); }
   png_structp png = nullptr;
@@ -67,8 +72,7 @@ bool read_rows(Reader& reader, png_bytepp rows) {
 Samples read_png(const std::filesystem::path& path) {
   const std::string what = path.string();
   Source source;
-  std::ifstream stream(path, std::ios::binary);
-  source.bytes.assign(std::istreambuf_iterator<char>(stream), {});
+  source.bytes = read_bytes(path, kLargestFile);
   if (source.bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(source.bytes.data()), 0, 8))
     throw Error(what + ": is not a PNG file, or is damaged at its start");
   const auto fail = [&] {
@@ -84,7 +88,7 @@ Samples read_png(const std::filesystem::path& path) {
   samples.components = png_get_channels(reader.png, reader.info);
   samples.type = png_get_bit_depth(reader.png, reader.info) == 16 ? Samples::Type::u16 : Samples::Type::u8;
   const std::size_t row_bytes = png_get_rowbytes(reader.png, reader.info);
-  check_claim(what, samples, double(row_bytes) * samples.size[1], double(source.bytes.size()));
+  check_size(what, {samples.size[0], samples.size[1], samples.components}, source.bytes.size());
   samples.bytes.resize(row_bytes * std::size_t(samples.size[1]));
   std::vector<png_bytep> rows;
   for (int v = 0; v < samples.size[1]; ++v)

@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The narrow door to ITK: its headers bring an Eigen of their own, so they stay in the .cpp files behind this one.
+// Grids of samples as files hold them: what the readers of the formats have in common.
 #include <array>
 #include <cstddef>
 #include <filesystem>
 #include <string>
 #include <vector>
+
+#include "input_file.hpp"
 
 namespace marrow::read {
 
@@ -23,39 +25,44 @@ struct Samples {
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
 };
 
-enum class Format { meta, nrrd, nifti, tiff, dicom };
+std::size_t bytes_each(Samples::Type type);
 
-/// Reads a whole file. Throws Error when it is damaged, is not of this format, or its header claims more samples than
-/// the file can hold.
-Samples read_samples(const std::filesystem::path& path, Format format);
-Samples read_png(const std::filesystem::path& path);
-
-/// Throws Error unless there is a regular file with something in it.
-void check_file(const std::filesystem::path& path);
-/// Throws Error where numbers of a MetaImage's header cannot be; MetaIO trusts them.
-void check_meta_header(const std::filesystem::path& path);
-/// Throws Error unless a MetaImage holds this many bytes of samples.
-void check_meta_data(const std::filesystem::path& path, double sample_bytes);
-/// Throws Error unless an NRRD file whose samples are not compressed holds this many bytes of them.
-void check_nrrd_data(const std::filesystem::path& path, double sample_bytes, double samples);
-/// Throws Error unless a NIfTI-1 file holds the samples that its header claims.
-void check_nifti_data(const std::filesystem::path& path);
-/// Throws Error when pages of a TIFF are missing at its end, differ in size, or claim more than the file holds.
-void check_tiff_pages(const std::filesystem::path& path);
-/// Throws Error when the file is not DICOM, or an element of it claims more than the file holds.
-void check_dicom_file(const std::filesystem::path& path);
-/// Throws Error when a file of `stored_bytes` cannot hold the `claimed_bytes` of samples that its header claims.
-void check_claim(const std::string& what, const Samples& samples, double claimed_bytes, double stored_bytes);
-
-/// The samples as float.
-std::vector<float> to_float(const Samples& samples);
-
-/// A CT series: all slices of one series in a folder, sorted by position and checked for gaps, as HU. `series_uid`
-/// picks one where the folder holds several; empty = there must be just one. Throws Error.
-struct DicomSeries {
+/// A volume: its grid, and its samples as float.
+struct VolumeSamples {
   Samples geometry;  ///< without bytes
   std::vector<float> values;
 };
-DicomSeries read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
+
+VolumeSamples read_meta_image(const std::filesystem::path& path, bool folder_is_named);
+VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named);
+VolumeSamples read_nifti(const std::filesystem::path& path);
+/// A CT series: all slices of one series in a folder, sorted by position and checked for gaps, as HU. `series_uid`
+/// picks one where the folder holds several; empty = there must be just one. Throws Error.
+VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
+
+/// All pages of a TIFF. Where it has colours, `components` says so and there are no bytes.
+Samples read_tiff(const std::filesystem::path& path);
+Samples read_png(const std::filesystem::path& path);
+
+/// Throws Error where a size of the header is none of a volume or image, or where a file of `stored_bytes` cannot hold
+/// so many samples: this comes before any memory is taken for them.
+void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes);
+
+/// Where a file holds the samples of a volume, and how.
+struct StoredSamples {
+  std::uint64_t begin = 0;
+  bool is_packed = false;  ///< a zlib or gzip stream begins there
+  std::uint64_t skip = 0;  ///< bytes of what it unpacks to that are none
+  Samples::Type type = Samples::Type::u8;
+  bool big_endian = false;
+  std::size_t count = 0;
+  double slope = 1, intercept = 0;
+  bool may_hold_more = false;  ///< some bytes of filling behind the packed samples
+};
+/// Throws Error unless all of them are there.
+std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored);
+
+/// The samples as float.
+std::vector<float> to_float(const Samples& samples);
 
 }  // namespace marrow::read

@@ -1,32 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "strict_yaml.hpp"
 
+#include <yaml-cpp/eventhandler.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <fstream>
-#include <map>
 #include <numeric>
+#include <sstream>
 
+#include "input_file.hpp"
 #include "marrow/domain/error.hpp"
+#include "names.hpp"
 
 namespace marrow::read {
 namespace {
 
-constexpr std::uintmax_t kLargestFile = 16 << 20;
+constexpr std::uint64_t kLargestFile = 16 << 20;
+constexpr std::size_t kMostNodes = 1'000'000, kMostFreeKeys = 1000, kLongestWord = 64, kMostCompared = 1000;
 
-std::string read_text(const std::filesystem::path& path) {
-  std::error_code failure;
-  if (!std::filesystem::exists(path, failure)) throw Error(path.string() + ": there is no such file");
-  if (!std::filesystem::is_regular_file(path, failure))
-    throw Error(path.string() + ": expected a YAML file, this is none");
-  if (std::filesystem::file_size(path, failure) > kLargestFile)
-    throw Error(path.string() + ": expected a YAML file of at most 16 MB; this is larger");
-  std::ifstream stream(path, std::ios::binary);
-  std::string text((std::istreambuf_iterator<char>(stream)), {});
-  if (!stream) throw Error(path.string() + ": cannot be read");
-  return text;
-}
+struct Refusal : YAML::Exception {
+  using YAML::Exception::Exception;
+};
+
+/// What is looked at before a tree is made of a file: its nodes cost some hundred bytes each.
+class Census final : public YAML::EventHandler {
+ public:
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { count(mark, anchor); }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { refuse(mark); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string&) override { count(mark, anchor); }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
+    count(mark, anchor);
+  }
+  void OnSequenceEnd() override {}
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { count(mark, anchor); }
+  void OnMapEnd() override {}
+
+ private:
+  [[noreturn]] static void refuse(const YAML::Mark& mark) {
+    throw Refusal(mark, "anchors and aliases (&name, *name) are not read; write the value out");
+  }
+  void count(const YAML::Mark& mark, YAML::anchor_t anchor) {
+    if (anchor != 0) refuse(mark);
+    if (++nodes_ > kMostNodes) throw Refusal(mark, "it has more than 1000000 values");
+  }
+  std::size_t nodes_ = 0;
+};
 
 std::vector<std::string> split_lines(const std::string& text) {
   std::vector<std::string> lines(1);
@@ -63,8 +84,11 @@ std::string got(const YAML::Node& node) {
 
 std::string nearest(const std::string& word, const std::vector<std::string>& known) {
   std::string best;
+  if (word.size() > kLongestWord) return best;
   std::size_t best_distance = std::max<std::size_t>(2, word.size() / 3) + 1;
-  for (const std::string& candidate : known) {
+  for (std::size_t n = 0; n < std::min(known.size(), kMostCompared); ++n) {
+    const std::string& candidate = known[n];
+    if (candidate.size() > kLongestWord) continue;
     std::vector<std::size_t> row(candidate.size() + 1);
     std::iota(row.begin(), row.end(), 0);
     for (std::size_t i = 0; i < word.size(); ++i) {
@@ -83,16 +107,21 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 }
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = read_text(path_);
+  const std::string text = read_bytes(path_, kLargestFile);
   lines_ = split_lines(text);
   if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1)
-      throw Error(path_.string() + ": expected one YAML document, got " + std::to_string(documents.size()));
-    if (!documents.empty()) root_ = documents[0];
+    std::istringstream stream(text);
+    Census census;
+    YAML::Parser parser(stream);
+    int documents = 0;
+    while (parser.HandleNextDocument(census)) ++documents;
+    if (documents > 1) throw Error(path_.string() + ": expected one YAML document, got " + std::to_string(documents));
+    if (documents == 1) root_ = YAML::Load(text);
+  } catch (const Refusal& refusal) {
+    throw Error(describe(refusal.mark, refusal.msg));
   } catch (const YAML::Exception& error) {
-    throw Error(describe(error.mark, "not YAML: " + error.msg));
+    throw Error(describe(error.mark, "not YAML: " + error.msg.substr(0, 200)));
   }
   if (!root_.IsMap()) throw Error(path_.string() + ": expected a YAML map of keys and values, got " + got(root_));
 }
@@ -107,37 +136,62 @@ std::string YamlFile::describe(const YAML::Mark& mark, const std::string& text) 
 }
 
 void YamlFile::fault(const YAML::Mark& mark, const std::string& text) {
-  faults_.push_back(describe(mark, text));
+  if (is_full())
+    ++more_faults_;
+  else
+    faults_.push_back(describe(mark, text));
 }
 
 void YamlFile::finish() const {
   if (faults_.empty()) return;
   std::string all;
   for (const std::string& fault : faults_) all += (all.empty() ? "" : "\n") + fault;
+  if (more_faults_ > 0) all += "\n... and " + std::to_string(more_faults_) + " more";
   throw Error(all);
 }
 
 YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const std::vector<std::string>& known_keys)
     : file_(file), node_(node), what_(std::move(what)) {
-  if (!node_.IsMap()) {
-    file_.fault(node_.Mark(), what_ + ": expected keys and values, got " + got(node_));
-    return;
-  }
-  std::map<std::string, int> line_of;
-  for (const auto& item : node_) {
-    const std::string key = item.first.IsScalar() ? item.first.Scalar() : "";
-    if (const auto before = line_of.find(key); before != line_of.end())
-      file_.fault(item.first.Mark(),
-                  what_ + ": key '" + key + "' is already given in line " + std::to_string(before->second));
-    line_of.emplace(key, item.first.Mark().line + 1);
-    if (std::find(known_keys.begin(), known_keys.end(), key) != known_keys.end()) continue;
+  take_keys([&](const std::string& key, const YAML::Mark& mark) {
+    if (std::find(known_keys.begin(), known_keys.end(), key) != known_keys.end()) return;
     std::string advice;
-    if (const std::string near = nearest(key, known_keys); !near.empty()) {
+    if (const std::string near = file_.is_full() ? "" : nearest(key, known_keys); !near.empty()) {
       advice = "; did you mean '" + near + "'?";
     } else {
       for (const std::string& known : known_keys) advice += (advice.empty() ? "; known are " : ", ") + known;
     }
-    file_.fault(item.first.Mark(), what_ + ": unknown key '" + key + "'" + advice);
+    file_.fault(mark, what_ + ": unknown key '" + key.substr(0, 100) + "'" + advice);
+  });
+}
+
+YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys keys)
+    : file_(file), node_(node), what_(std::move(what)) {
+  take_keys([&](const std::string& key, const YAML::Mark& mark) {
+    const std::string fault = keys == FreeKeys::names ? fault_of_name(key) : fault_of_label(key);
+    if (!fault.empty()) file_.fault(mark, what_ + ": a name " + fault + "; choose another");
+    if (keys_.size() == kMostFreeKeys + 1) file_.fault(mark, what_ + ": there are more than 1000 of them");
+  });
+  keys_.resize(std::min(keys_.size(), kMostFreeKeys));
+}
+
+template <class Check>
+void YamlMap::take_keys(Check check) {
+  if (!node_.IsMap()) {
+    file_.fault(node_.Mark(), what_ + ": expected keys and values, got " + got(node_));
+    return;
+  }
+  std::unordered_map<std::string, int> line_of;
+  for (const auto& item : node_) {
+    const std::string key = item.first.IsScalar() ? item.first.Scalar() : "";
+    const YAML::Mark mark = item.first.Mark();
+    const auto [before, is_new] = line_of.emplace(key, mark.line + 1);
+    if (!is_new) {
+      file_.fault(mark, what_ + ": key '" + key.substr(0, 100) + "' is already given in line " + std::to_string(before->second));
+      continue;
+    }
+    keys_.push_back(key);
+    values_.emplace(key, item.second);
+    check(key, mark);
   }
 }
 
@@ -146,10 +200,8 @@ bool YamlMap::has(const std::string& key) const {
 }
 
 YAML::Node YamlMap::node(const std::string& key) const {
-  if (node_.IsMap())
-    for (const auto& item : node_)
-      if (item.first.IsScalar() && item.first.Scalar() == key) return item.second;
-  return YAML::Node(YAML::NodeType::Undefined);
+  const auto found = values_.find(key);
+  return found == values_.end() ? YAML::Node(YAML::NodeType::Undefined) : found->second;
 }
 
 void YamlMap::fault(const std::string& key, const std::string& text) const {

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <unordered_map>
 #include <vector>
 
 namespace marrow::read {
@@ -15,7 +16,8 @@ namespace marrow::read {
 /// A parsed file and the faults found in it so far.
 class YamlFile {
  public:
-  /// Throws Error when the file cannot be opened or is not YAML.
+  /// Throws Error when the file cannot be opened or is not YAML, or refers from one place to another (aliases), by which a small file
+  /// could stand for a huge one.
   explicit YamlFile(std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
@@ -23,17 +25,27 @@ class YamlFile {
   /// Notes a fault at a place, or at the top of the file where the mark is null.
   void fault(const YAML::Mark& mark, const std::string& text);
   bool has_faults() const { return !faults_.empty(); }
-  /// Throws one Error that holds every fault, each as file:line:column with the source line; returns when there are
-  /// none.
+  /// Whether so many faults are noted that more are only counted, so that they need no advice.
+  bool is_full() const { return faults_.size() >= kMostFaults; }
+  /// Throws one Error that holds the faults, each as file:line:column with the source line; returns when there are none. Of more
+  /// than 50 the rest is counted.
   void finish() const;
 
  private:
+  static constexpr std::size_t kMostFaults = 50;
   std::string describe(const YAML::Mark& mark, const std::string& text) const;
 
   std::filesystem::path path_;
   std::vector<std::string> lines_;
   YAML::Node root_;
   std::vector<std::string> faults_;
+  std::size_t more_faults_ = 0;
+};
+
+/// What the keys of a map are that its author chose.
+enum class FreeKeys {
+  names,  ///< of views or fragments, which become part of file names
+  labels  ///< of points
 };
 
 /// One map of a file, whose keys are all known: unknown and repeated keys are faults. A getter whose key is missing or
@@ -43,11 +55,15 @@ class YamlMap {
  public:
   /// `what` names the map in messages, as in "a view".
   YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const std::vector<std::string>& known_keys);
+  /// A map of which each key is good that can be a name.
+  YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys keys);
 
   YamlFile& file() const { return file_; }
   const std::string& what() const { return what_; }
   bool valid() const { return node_.IsMap(); }
   bool has(const std::string& key) const;
+  /// The keys in the order of the file, each once; at most 1000 of a map whose keys are free.
+  const std::vector<std::string>& keys() const { return keys_; }
   /// The value of a key, or a node that is not defined.
   YAML::Node node(const std::string& key) const;
   YAML::Mark mark() const { return node_.Mark(); }
@@ -69,12 +85,19 @@ class YamlMap {
   std::vector<std::string> texts_or_none(const std::string& key) const;
 
  private:
+  /// Takes up the keys; those that are there already, or no texts, are faults. `check` is called for each other one.
+  template <class Check>
+  void take_keys(Check check);
+
   YamlFile& file_;
   YAML::Node node_;
   std::string what_;
+  std::vector<std::string> keys_;
+  std::unordered_map<std::string, YAML::Node> values_;
 };
 
-/// The known word nearest to `word` by edit distance, or "" where none is near.
+/// The known word nearest to `word` by edit distance, or "" where none is near. Long words, and more than 1000 known ones, are not
+/// compared.
 std::string nearest(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace marrow::read

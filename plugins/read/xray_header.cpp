@@ -4,7 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
-#include "dicom_header.hpp"
+#include "dicom_pixels.hpp"
 #include "marrow/domain/error.hpp"
 #include "plugins/camera/carm_geometry.hpp"
 
@@ -24,9 +24,9 @@ constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
 constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
-constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign"};
-constexpr DicomTag kRows{0x0028, 0x0010, "Rows"};
-constexpr DicomTag kColumns{0x0028, 0x0011, "Columns"};
+constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign", DicomTag::Kind::ss};
+constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
+constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
 
 /// Collects what is missing, so that one message names all.
 class Wanted {
@@ -167,7 +167,9 @@ void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
 }  // namespace
 
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
-  const DicomHeader header(path, frame);
+  const DicomFile file(path);
+  read_dicom_pixels(file);  // whether the header agrees with itself and the file
+  const DicomHeader header(file, frame);
   check_modality(header);
   check_motion(header, frame);
   XrayGeometry geometry;
@@ -204,7 +206,8 @@ XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, co
 }
 
 XrayPixels read_xray_pixels(const std::filesystem::path& path) {
-  const DicomHeader header(path, 1);
+  const DicomFile file(path);
+  const DicomHeader header(file, 1);
   XrayPixels pixels;
   const auto sign = header.number(kIntensitySign);
   pixels.inverted = sign && *sign < 0;

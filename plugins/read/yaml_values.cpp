@@ -134,14 +134,10 @@ List<Seeds> read_seeds_file(const std::filesystem::path& path) {
   check_version(map, "marrow-seeds");
   List<Seeds> seeds;
   if (const auto fragments = map.required("fragments")) {
-    if (!fragments->IsMap() || fragments->size() == 0)
-      map.fault("fragments", "fragments: expected fragments by name");
-    else
-      for (const auto& item : *fragments) {
-        const std::string name = item.first.Scalar();
-        if (seeds.find(name)) file.fault(item.first.Mark(), "fragment '" + name + "' is given twice");
-        seeds.add(name, seeds_from(YamlMap(file, item.second, "fragment '" + name + "'", {"seeds", "register"}), name));
-      }
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys::names);
+    if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name");
+    for (const std::string& name : by_name.keys())
+      seeds.add(name, seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));
   }
   file.finish();
   return seeds;

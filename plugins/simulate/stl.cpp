@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "stl.hpp"
 
+#include <cmath>
 #include <cstring>
 #include <fstream>
 #include <iterator>
@@ -39,6 +40,8 @@ void read_ascii(const std::string& content, const std::string& name, Welder& wel
     if (word != "vertex") continue;
     auto& place = corners[corner];
     if (!(words >> place[0] >> place[1] >> place[2])) throw Error(name + ": a 'vertex' is not followed by three numbers");
+    if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2]))
+      throw Error(name + ": a 'vertex' is not followed by three finite numbers");
     if (++corner == 3) {
       welder.add(corners);
       corner = 0;
@@ -51,8 +54,11 @@ void read_ascii(const std::string& content, const std::string& name, Welder& wel
 
 Mesh read_stl(const std::filesystem::path& path) {
   const std::string name = "surface file " + path.string();
-  std::ifstream file(path, std::ios::binary);
-  if (!file || std::filesystem::is_directory(path)) throw Error(name + ": cannot be read; give the path of an STL file");
+  // A pipe would be waited for, a device read for ever.
+  std::error_code failure;
+  std::ifstream file;
+  if (std::filesystem::is_regular_file(path, failure)) file.open(path, std::ios::binary);
+  if (!file.is_open()) throw Error(name + ": cannot be read; give the path of an STL file");
   const std::string content((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   Welder welder;
   std::uint32_t count = 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Damaged files of every kind that is read: cut off at random places, bytes of the header flipped, sizes that lie. Each is refused with
-// an error that names it, or read; never a crash, and never more memory than the file could need.
+// Damaged files of every kind that is read: cut off at random places, bytes of the header flipped, sizes that lie. Of each kind a hundred
+// copies are refused with an error that names them, or read, within 64 MB; files made to harm are in hostile_*_test.cpp.
 #include <gtest/gtest.h>
 
 #include <cstdio>

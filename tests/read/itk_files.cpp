@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "itk_files.hpp"
 
+#include <gdcmImageChangeTransferSyntax.h>
+#include <gdcmImageReader.h>
+#include <gdcmImageWriter.h>
 #include <itkGDCMImageIO.h>
 #include <itkMetaDataObject.h>
 #include <itkMetaImageIO.h>
@@ -83,6 +86,21 @@ void write_dicom(const std::filesystem::path& path, const DicomSlice& slice) {
   io->SetNumberOfComponents(1);
   io->SetPixelType(itk::IOPixelEnum::SCALAR);
   write_all(*io, path, slice.values.data());
+}
+
+void compress_dicom(const std::filesystem::path& from, const std::filesystem::path& to, const std::string& transfer_syntax) {
+  gdcm::ImageReader reader;
+  reader.SetFileName(from.c_str());
+  if (!reader.Read()) throw std::runtime_error("GDCM does not read " + from.string());
+  gdcm::ImageChangeTransferSyntax change;
+  change.SetTransferSyntax(gdcm::TransferSyntax(gdcm::TransferSyntax::GetTSType(transfer_syntax.c_str())));
+  change.SetInput(reader.GetImage());
+  if (!change.Change()) throw std::runtime_error("GDCM does not compress to " + transfer_syntax);
+  gdcm::ImageWriter writer;
+  writer.SetFile(reader.GetFile());
+  writer.SetImage(change.GetOutput());
+  writer.SetFileName(to.c_str());
+  if (!writer.Write()) throw std::runtime_error("GDCM does not write " + to.string());
 }
 
 }  // namespace marrow::test

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include <ctime>
+
 #include "read/files.hpp"
 #include "shipped.hpp"
 
@@ -63,6 +65,24 @@ fragments:
                            "l.yaml:9:13: fragment 'proximal': key 'points' is missing"})
     EXPECT_NE(said.find(part), std::string::npos) << part << "\nit said:\n" << said;
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 13) << "7 faults, a line of the file under each:\n" << said;
+}
+
+// Many points, none of which is known: what is wrong with the first fifty is said, without comparing all names with each other.
+TEST(ReadLandmarks, ManyNamesTakeNoLongTime) {
+  const TemporaryFolder folder;
+  std::string points, tracked;
+  for (int i = 0; i < 9000; ++i) {
+    const std::string number = std::to_string(i);
+    points += (i ? ", p" : "p") + number + ": [1, 2, 3]";
+    tracked += (i ? ", q" : "q") + number + ": [1, 2, 3]";
+  }
+  put(folder / "l.yaml", "marrow-landmarks: 1\nfragments: {a: {points: {" + points + "}, tracked: {" + tracked + "}}}\n");
+  const std::clock_t begin = std::clock();
+  const std::string said = shipped::refusal("read.landmarks", {}, at(folder / "l.yaml"));
+  EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 2);
+  EXPECT_NE(said.find("there are more than 1000 of them"), std::string::npos) << said.substr(0, 1000);
+  EXPECT_NE(said.find(" more"), std::string::npos);
+  EXPECT_LT(said.size(), 20000u);
 }
 
 TEST(ReadLandmarks, RefusesFilesOfAnotherKind) {

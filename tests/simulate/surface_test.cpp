@@ -65,6 +65,9 @@ TEST(SimulateSurface, BadFilesAreExplained) {
   const fs::path folder = testing::TempDir();
   EXPECT_EQ(message(reading(folder / "missing.stl")),
             "surface file " + (folder / "missing.stl").string() + ": cannot be read; give the path of an STL file");
+  fs::create_directories(folder / "pipe");
+  for (const char* none : {"pipe", "/dev/zero"})
+    EXPECT_EQ(message(reading(folder / none)), "surface file " + (folder / none).string() + ": cannot be read; give the path of an STL file");
   const Mesh box = test::box({0, 0, 0}, {10, 10, 100});
   const fs::path truncated = write_stl("truncated.stl", box, false);
   fs::resize_file(truncated, 300);

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes whose headers lie: sizes, types, fields, places, and files that lie elsewhere.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <zlib.h>
+
+#include <cstring>
+
+#include "plugins/read/volume_file.hpp"
+#include "read/files.hpp"
+#include "read/hostile.hpp"
+#include "read/itk_files.hpp"
+
+namespace {
+
+using namespace marrow::test;
+using Path = std::filesystem::path;
+
+marrow::Volume volume_at(const Path& path) {
+  marrow::read::VolumeReading reading;
+  if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
+  return marrow::read::read_volume_file(path, reading);
+}
+
+ItkGrid<std::int16_t> stack() {
+  ItkGrid<std::int16_t> grid{.size = {8, 6, 5}};
+  for (int i = 0; i < 240; ++i) grid.samples.push_back(std::int16_t(i * 13 - 1000));
+  return grid;
+}
+
+template <class T>
+std::string number(T value) {
+  return {reinterpret_cast<const char*>(&value), sizeof value};
+}
+
+std::string replaced(std::string bytes, std::size_t at, const std::string& by) {
+  return bytes.replace(at, by.size(), by);
+}
+
+class Hostile : public testing::Test {
+ protected:
+  std::string good(const std::string& name) {
+    write_itk(folder / name, stack());
+    return bytes_of(folder / name);
+  }
+  void expect(const std::string& name, const std::string& bytes, const std::string& text) {
+    put(folder / name, bytes);
+    EXPECT_REFUSED(volume_at(folder / name), name, text);
+  }
+  TemporaryFolder folder;
+};
+
+TEST_F(Hostile, NiftiWhoseTypeAndBitsDisagree) {
+  const std::string bytes = good("a.nii");
+  expect("b.nii", replaced(bytes, 70, number<std::int16_t>(16)),
+         "says that samples are of type 16, which have 32 bits, and that they have 16 bits");
+  expect("b.nii", replaced(bytes, 72, number<std::int16_t>(8)),
+         "type 4, which have 16 bits, and that they have 8 bits");
+  expect("b.nii", replaced(bytes, 70, number<std::int16_t>(1536)), "of type 1536, which is not read");
+  expect("b.nii", replaced(bytes, 70, number<std::int16_t>(32)), "of type 32, which is not read");
+}
+
+TEST_F(Hostile, NiftiWhosePlacesAndLengthsAreNone) {
+  const std::string bytes = good("a.nii");
+  for (const float place : {std::nanf(""), HUGE_VALF, -1.f, 0.f, 352.5f, 1e30f})
+    expect("b.nii", replaced(bytes, 108, number(place)), "samples begin at byte");
+  expect("b.nii", replaced(bytes, 80, number(std::nanf(""))), "is not a positive length");
+  expect("b.nii", replaced(bytes, 80, number(-1.f)), "is not a positive length");
+  expect("b.nii", replaced(bytes, 112, number(HUGE_VALF)), "scales samples by a number that is not finite");
+  expect("b.nii", replaced(bytes, 42, number<std::int16_t>(-8)), "gives a size of -8");
+  expect("b.nii", replaced(bytes, 40, number<std::int16_t>(9)), "tells of 9 dimensions");
+  expect("b.nii", replaced(bytes, 46, number<std::int16_t>(6)),
+         "is cut off or damaged: 576 bytes of samples expected, got 480");
+  expect("b.nii", replaced(bytes, 344, "ni1"), "is not a NIfTI-1 file with its samples in it");
+}
+
+TEST_F(Hostile, NiftiSaysWhereItLies) {
+  std::string bytes = replaced(good("a.nii"), 254, number<std::int16_t>(0));  // no sform: by its quaternion
+  put(folder / "b.nii", bytes);
+  EXPECT_LT((volume_at(folder / "b.nii").grid.direction - Eigen::Matrix3d::Identity()).norm(), 1e-6);
+  bytes = replaced(replaced(good("a.nii"), 252, number<std::int16_t>(0)), 284, number(0.5f));  // sform alone, sheared
+  expect("b.nii", bytes, "by a matrix that is sheared or damaged");
+}
+
+TEST_F(Hostile, BombIsRefusedBeforeItIsUnpacked) {
+  std::string header = good("a.nii").substr(0, 352);
+  header = replaced(replaced(header, 70, number<std::int16_t>(2)), 72, number<std::int16_t>(8));
+  for (const int at : {42, 44, 46}) header = replaced(header, std::size_t(at), number<std::int16_t>(400));
+  const gzFile file = gzopen((folder / "bomb.nii.gz").c_str(), "wb9");
+  gzwrite(file, header.data(), unsigned(header.size()));
+  const std::vector<char> zeros(1 << 20);
+  for (int i = 0; i < 62; ++i) gzwrite(file, zeros.data(), unsigned(zeros.size()));
+  gzclose(file);
+  ASSERT_LT(std::filesystem::file_size(folder / "bomb.nii.gz"), 70000u);
+  EXPECT_REFUSED(volume_at(folder / "bomb.nii.gz"), "bomb.nii.gz",
+                 "its header claims 400 x 400 x 400 samples, but the file has only");
+}
+
+TEST_F(Hostile, PackedSamplesAreVerifiedToTheirEnd) {
+  for (const char* name : {"a.nii.gz", "a.mha", "a.nrrd"}) {
+    write_itk(folder / name, stack(), true);
+    std::string bytes = bytes_of(folder / name);
+    bytes[bytes.size() - 3] = char(bytes[bytes.size() - 3] ^ 1);  // in the checksum or the length
+    expect(name, bytes, "compressed samples do not unpack");
+  }
+}
+
+TEST_F(Hostile, NrrdFieldsAreReadStrictly) {
+  const std::string bytes = good("a.nrrd");
+  expect("b.nrrd", with(bytes, "space origin: (0,0,0)", "space origin: (0" + std::string(2000, '7') + ",0,0)"),
+         "'space origin'");
+  expect("b.nrrd", with(bytes, "kinds: domain", "kinds: " + std::string(2000, 'k') + " domain"), "'kinds'");
+  expect("b.nrrd", with(bytes, "endian: little", "endian: little\nendian: little"), "gives 'endian' twice");
+  expect("b.nrrd", with(bytes, "endian: little", "ending: little"),
+         ": expected a field of a NRRD header, got 'ending: little'");
+  expect("b.nrrd", with(bytes, "encoding: raw", "encoding: hex"), "expected raw or gzip");
+  expect("b.nrrd", with(bytes, "sizes: 8 6 5", "sizes: 8 6"), "expected 3 numbers");
+  expect("b.nrrd", with(bytes, "sizes: 8 6 5", "sizes: 8 6 nan"), "expected 3 numbers");
+  expect("b.nrrd", with(bytes, "left-posterior-superior", "scanner-xyz"), "expected left-posterior-superior");
+  expect("b.nrrd", with(bytes, "encoding: raw", "space units: \"um\" \"um\" \"um\"\nencoding: raw"), "expected mm");
+  expect("b.nrrd", bytes.substr(0, 8) + "\n" + std::string(70000, 'x'), "is longer than");
+}
+
+TEST_F(Hostile, NrrdOfOtherSpacesIsTurnedToLps) {
+  const std::string bytes = good("a.nrrd");
+  put(folder / "b.nrrd", with(with(bytes, "left-posterior-superior", "right-anterior-superior"),
+                              "space origin: (0,0,0)", "space origin: (1,2,3)"));
+  EXPECT_EQ(volume_at(folder / "b.nrrd").grid.origin_mm, Eigen::Vector3d(-1, -2, 3));
+  put(folder / "b.nrrd", with(with(with(bytes, "left-posterior-superior", "LAS"), "(0,1,0)", "(0,-1,0)"),
+                              "space origin: (0,0,0)", "space origin: (1,2,3)"));
+  const marrow::Volume volume = volume_at(folder / "b.nrrd");
+  EXPECT_EQ(volume.grid.origin_mm, Eigen::Vector3d(1, -2, 3));
+  EXPECT_TRUE(volume.grid.direction.isIdentity(0));
+}
+
+TEST_F(Hostile, MetaImageFieldsAreReadStrictly) {
+  const std::string bytes = good("a.mha");
+  expect("b.mha", with(bytes, "DimSize = 8 6 5", "DimSize = 8 6 5\nDimSize = 8 6 5"), "gives 'dimsize' twice");
+  expect("b.mha", with(bytes, "DimSize = 8 6 5", "DimSize = 8 6 5.5"), "expected whole numbers");
+  expect("b.mha", with(bytes, "MET_SHORT", "MET_STRING"), "expected a kind of number");
+  expect("b.mha", with(bytes, "BinaryData = True", "BinaryData = False"), "written as text, which is not read");
+  expect("b.mha", with(bytes, "BinaryData = True", "BinaryData = perhaps"), "expected True or False");
+  put(folder / "b.mha", with(with(bytes, "DimSize", "dimsize"), "ElementDataFile", "# a remark\nELEMENTDATAFILE"));
+  EXPECT_EQ(volume_at(folder / "b.mha").values[9], 9 * 13 - 1000);
+}
+
+// A header in any spelling names no file outside the folder.
+TEST_F(Hostile, NothingOutsideTheFolderIsOpened) {
+  const TemporaryFolder elsewhere;
+  write_itk(elsewhere / "a.mhd", stack());
+  write_itk(elsewhere / "a.nhdr", stack());
+  const std::string mhd = bytes_of(elsewhere / "a.mhd"), nhdr = bytes_of(elsewhere / "a.nhdr"),
+                    raw = (elsewhere / "a.raw").string();
+  ASSERT_TRUE(std::filesystem::exists(raw));
+  const auto refused = [&](const std::string& name, const std::string& text, const std::string& header) {
+    const TemporaryFolder ct;
+    std::filesystem::copy(raw, ct / "a.raw");
+    put(ct / name, header);
+    EXPECT_SAYS(volume_at(ct.path()), text);
+  };
+  refused("a.mhd", "expected one file that lies beside it",
+          with(mhd, "ElementDataFile = a.raw", "elementdatafile = " + raw));
+  refused("a.mhd", "expected one file that lies beside it",
+          with(mhd, "ElementDataFile = a.raw", "ELEMENTDATAFILE : ../x/a.raw"));
+  std::string remarks;
+  for (int i = 0; i < 300; ++i) remarks += "Comment" + std::to_string(i) + " = x\n";
+  refused("a.mhd", "expected one file that lies beside it",
+          remarks + with(mhd, "ElementDataFile = a.raw", "ElementDataFile = " + raw));
+  refused("a.mhd", "names several files for its samples",
+          with(mhd, "ElementDataFile = a.raw", "ElementDataFile = LIST\n" + raw));
+  refused("a.mhd", "names several files for its samples",
+          with(mhd, "ElementDataFile = a.raw", "ElementDataFile = LIST 2\n" + raw));
+  refused("a.mhd", "names several files for its samples",
+          with(mhd, "ElementDataFile = a.raw", "ElementDataFile = /tmp/a%d.raw 1 5 1"));
+  refused("a.nhdr", "expected one file that lies beside it", with(nhdr, "data file: a.raw", "DATA FILE: " + raw));
+  refused("a.nhdr", "names several files for its samples", with(nhdr, "data file: a.raw", "data file: LIST\n" + raw));
+  refused("a.nhdr", "names several files for its samples",
+          with(nhdr, "data file: a.raw", "datafile: a%02d.raw 1 5 1 2"));
+  refused("a.mhd", "'gone.raw' for its samples, which is not there", with(mhd, "a.raw", "gone.raw"));
+}
+
+TEST_F(Hostile, LinksOutOfTheFolderAreRefused) {
+  const TemporaryFolder elsewhere;
+  write_itk(elsewhere / "a.mhd", stack());
+  std::filesystem::create_directory(folder / "mhd");
+  std::filesystem::copy(elsewhere / "a.mhd", folder / "mhd/a.mhd");
+  std::filesystem::create_symlink(elsewhere / "a.raw", folder / "mhd/a.raw");
+  EXPECT_SAYS(volume_at(folder / "mhd"), "a.raw: is a link to a place outside the folder; copy the file itself");
+  std::filesystem::remove(folder / "mhd/a.mhd");
+  std::filesystem::create_symlink(elsewhere / "a.mhd", folder / "mhd/a.mhd");
+  EXPECT_SAYS(volume_at(folder / "mhd"), "a.mhd: is a link to a place outside the folder");
+  for (int k = 0; k < 3; ++k) {
+    DicomSlice slice;
+    slice.position = {0, 0, double(k)};
+    slice.values.assign(12, std::int16_t(k));
+    std::filesystem::create_directories(folder / "series");
+    write_dicom((k == 1 ? elsewhere / "s1.dcm" : folder / ("series/s" + std::to_string(k) + ".dcm")), slice);
+  }
+  std::filesystem::create_symlink(elsewhere / "s1.dcm", folder / "series/s1.dcm");
+  EXPECT_SAYS(volume_at(folder / "series"), "s1.dcm: is a link to a place outside the folder");
+  std::filesystem::remove(folder / "series/s1.dcm");
+  std::filesystem::create_symlink("s1.dcm", folder / "series/s1.dcm");
+  EXPECT_SAYS(volume_at(folder / "series"), "s1.dcm: is a link that leads nowhere");
+  std::filesystem::remove(folder / "series/s1.dcm");
+  std::filesystem::copy(elsewhere / "s1.dcm", folder / "series/real");
+  std::filesystem::create_symlink("real", folder / "series/s1.dcm");
+  EXPECT_SAYS(volume_at(folder / "series"), "lie at the same place");  // a link inside the folder is followed
+}
+
+TEST_F(Hostile, PipesDevicesAndLinksToThemselvesAreNoFiles) {
+  for (const char* name : {"a.mha", "a.nrrd", "a.nii", "a.nii.gz", "a.tif"}) {
+    ASSERT_EQ(::mkfifo((folder / name).c_str(), 0600), 0);
+    EXPECT_REFUSED(volume_at(folder / name), name, "expected a file, this is none");
+  }
+  std::filesystem::create_symlink("/dev/zero", folder / "z.nii");
+  EXPECT_REFUSED(volume_at(folder / "z.nii"), "z.nii", "expected a file, this is none");
+}
+
+std::string tiff_entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
+  return number(std::uint16_t(tag)) + number(std::uint16_t(type)) + number(count) + number(value);
+}
+
+std::string tiff_directory(std::uint32_t next) {
+  return number<std::uint16_t>(8) + tiff_entry(256, 4, 1, 2) + tiff_entry(257, 4, 1, 2) + tiff_entry(258, 4, 1, 8) +
+         tiff_entry(259, 4, 1, 1) + tiff_entry(262, 4, 1, 1) + tiff_entry(273, 4, 1, 4) + tiff_entry(278, 4, 1, 2) +
+         tiff_entry(279, 4, 1, 4) + number(next);
+}
+
+TEST_F(Hostile, TiffWhosePagesRunInACircle) {
+  const std::string start = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(8);
+  const std::uint32_t page = std::uint32_t(tiff_directory(0).size());
+  put(folder / "a.tif", start + tiff_directory(8 + page) + tiff_directory(0));
+  EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2}));
+  expect("a.tif", start + tiff_directory(8), "its pages run in a circle");
+  expect("a.tif", start + tiff_directory(8 + page) + tiff_directory(8), "its pages run in a circle");
+}
+
+// 5000 entries a page, all of whose values are the same 60000 bytes.
+TEST_F(Hostile, TiffWhosePagesShareTheirBytes) {
+  std::string bytes = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(60008) + std::string(60000, '\1');
+  for (std::uint32_t pages = 0; pages < 100; ++pages) {
+    bytes += number<std::uint16_t>(40) + tiff_entry(256, 4, 1, 2) + tiff_entry(257, 4, 1, 2);
+    for (int i = 0; i < 38; ++i) bytes += tiff_entry(278, 3, 30000, 8);
+    bytes += number(pages == 99 ? 0u : std::uint32_t(bytes.size() + 4));
+  }
+  expect("a.tif", bytes, "its pages lie over each other");
+}
+
+}  // namespace
