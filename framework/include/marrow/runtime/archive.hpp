@@ -46,9 +46,9 @@ void use_large_pages(void* data, std::size_t size);
 
 }  // namespace detail
 
-/// Takes the bytes of values: of arithmetic types, enums that have an is_valid(), strings, containers of such, Eigen matrices,
-/// cv::Mat and structs with fields(). Lengths are part of it, so that neighbours cannot run together. Unpacker reads the same
-/// back.
+/// Takes the bytes of values: of arithmetic types, enums that have an is_valid(), strings, containers of such, Eigen
+/// matrices, cv::Mat and structs with fields(). Lengths are part of it, so that neighbours cannot run together.
+/// Unpacker reads the same back.
 class Archive {
  public:
   virtual ~Archive() = default;
@@ -118,8 +118,8 @@ class Packer : public Archive {
   std::string packed;
 };
 
-/// Reads what an Archive took, in the same order and of the same types. Throws Error where the bytes end too early, or are no
-/// value of the type: any bytes may be read, they cost no more memory than a small multiple of their size.
+/// Reads what an Archive took, in the same order and of the same types. Throws Error where the bytes end too early, or
+/// are no value of the type: any bytes may be read, what they claim to be costs no memory until it is there.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view packed) : remaining_(packed.size()), next_(packed.data()) {}
@@ -185,8 +185,8 @@ class Unpacker {
     static_assert(detail::Bulk<S>::value, "a matrix of numbers can be read back");
     constexpr std::int64_t kMost = std::numeric_limits<std::int32_t>::max();
     const auto rows = get<std::int64_t>(), cols = get<std::int64_t>();
-    if (rows < 0 || cols < 0 || rows > kMost || cols > kMost || (cols && std::size_t(rows) > remaining_ / sizeof(S) / std::size_t(cols)) ||
-        (R > 0 && rows != R) || (C > 0 && cols != C))
+    if (rows < 0 || cols < 0 || rows > kMost || cols > kMost || (R > 0 && rows != R) || (C > 0 && cols != C) ||
+        (cols && std::size_t(rows) > remaining_ / sizeof(S) / std::size_t(cols)))
       throw Error("the packed value holds a matrix of another size");
     matrix.resize(rows, cols);
     bytes(matrix.data(), sizeof(S) * std::size_t(matrix.size()));
