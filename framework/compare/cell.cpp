@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/cell.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -14,6 +12,7 @@
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
 #include "runtime/keys.hpp"
+#include "runtime/store_folder.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -86,10 +85,52 @@ int evaluations_in(const Value& value) {
   return sum;
 }
 
+/// A case lies beside the hash of its content, which is written last: one that is not whole is made again.
+std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
+
+bool is_whole_case(const fs::path& folder, const fs::path& outputs) {
+  std::string content;
+  std::getline(std::ifstream(folder / "content.txt") >> std::ws, content);
+  try {
+    return !content.empty() && content == content_of_case(outputs);
+  } catch (const std::exception&) {  // it cannot even be read
+    return false;
+  }
+}
+
+/// A folder that is removed unless it was given another name.
+struct TemporaryFolder {
+  explicit TemporaryFolder(const fs::path& final) : path(new_folder_beside(final)) {}
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder&) = delete;
+  TemporaryFolder& operator=(const TemporaryFolder&) = delete;
+  fs::path path;
+};
+
+/// The time that a cell took, where the store knows it.
+std::optional<double> kept_seconds(const Store& store, const Digest& key) {
+  try {
+    const auto kept = store.find(key);
+    if (!kept) return std::nullopt;
+    const Value& value = kept->outputs.at(0);
+    if (value.source && !value.is_list()) return value.as<Metrics>().items.at(0).value;
+  } catch (const std::exception&) {  // not what was kept: it is measured again
+  }
+  store.drop(key);
+  return std::nullopt;
+}
+
 }  // namespace
 
 CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder, int threads)
-    : experiment_(experiment), catalogue_(catalogue), store_(store), folder_(std::move(folder)), threads_(threads) {}
+    : experiment_(experiment),
+      catalogue_(catalogue),
+      store_(store && store->fault().empty() ? store : nullptr),
+      folder_(std::move(folder)),
+      threads_(threads) {}
 
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
@@ -117,11 +158,10 @@ fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
   if (!one.is_simulated) return one.folder;
   fs::path& place = case_folders_[index];
-  if (!place.empty()) return place;
-  const fs::path outputs = case_place(index), folder = outputs.parent_path().parent_path();
-  if (!fs::exists(outputs)) simulate(index, folder);
+  const fs::path outputs = place.empty() ? case_place(index) : place, folder = outputs.parent_path().parent_path();
+  if (place.empty() && !is_whole_case(folder, outputs)) simulate(index, folder);
   std::error_code ignored;
-  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now
+  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now: what a cell needs is removed last
   return place = outputs;
 }
 
@@ -131,17 +171,24 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   RunSettings settings;
   settings.seed = one.seed;
   settings.threads = threads_;
-  const fs::path temporary = folder.string() + ".tmp-" + std::to_string(getpid()) + "-0";
-  fs::remove_all(temporary);
+  if (const std::string fault = store_ ? store_->prepare() : ""; !fault.empty())
+    throw Error("case '" + one.name + "' cannot be written: " + fault);
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
-  RunFolder written(temporary, pipeline);
+  const TemporaryFolder temporary(folder);
+  RunFolder written(temporary.path, pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
     if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
+  const fs::path outputs = fs::path("outputs") / experiment_.simulation_output;
+  std::ofstream(temporary.path / "content.txt") << content_of_case(temporary.path / outputs) << '\n';
   std::error_code error;
-  fs::rename(temporary, folder, error);
-  if (error) fs::remove_all(temporary);  // another process was quicker
-  if (!fs::exists(folder)) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
+  fs::rename(temporary.path, folder, error);
+  if (!error || is_whole_case(folder, folder / outputs)) return;  // another process may have been quicker
+  const TemporaryFolder damaged(folder);
+  fs::rename(folder, damaged.path, error);
+  fs::rename(temporary.path, folder, error);
+  if (!is_whole_case(folder, folder / outputs))
+    throw Error("case '" + one.name + "' cannot be written to " + folder.string() + ": " + error.message());
 }
 
 Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_folder, Depth depth) const {
@@ -274,7 +321,7 @@ double CellRunner::time(const CellIndex& cell) {
   hasher.add(std::int64_t(threads_));
   for (const std::string& id : settings.made_anew) hasher.add(id);  // another experiment's variants may share more or less
   const Digest key = hasher.digest();
-  if (const auto known = store_ ? store_->find(key) : std::nullopt) return known->outputs.at(0).as<Metrics>().items.at(0).value;
+  if (const auto known = store_ ? kept_seconds(*store_, key) : std::nullopt) return *known;
 
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error(reason_of(pipeline, result));

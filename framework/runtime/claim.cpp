@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who makes a result: one byte of one file is locked for each key, so there is nothing to clean up, and the kernel gives the
-// lock back when its holder dies.
+// Who makes a result: one byte of one file is locked for each key, so there is nothing to clean up, and the kernel
+// gives the lock back when its holder dies.
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <thread>
@@ -11,26 +13,67 @@
 #include "marrow/runtime/store.hpp"
 
 namespace marrow {
+namespace {
 
-Store::Claim::~Claim() {
-  if (descriptor_ >= 0) close(descriptor_);
+using Clock = std::chrono::steady_clock;
+
+constexpr auto kQuiet = std::chrono::seconds(5);  // waiting that is not worth a word
+
+/// Says that a wait is long, and that it has ended.
+class Waiting {
+ public:
+  explicit Waiting(const std::function<void(bool)>& on_wait) : on_wait_(on_wait) {}
+  ~Waiting() {
+    if (is_said_) on_wait_(false);
+  }
+  void goes_on() {
+    if (is_said_ || !on_wait_ || Clock::now() - start_ < kQuiet) return;
+    is_said_ = true;
+    on_wait_(true);
+  }
+
+ private:
+  const std::function<void(bool)>& on_wait_;
+  Clock::time_point start_ = Clock::now();
+  bool is_said_ = false;
+};
+
+struct flock one_byte(short type, off_t place) {
+  struct flock lock {};
+  lock.l_type = type;
+  lock.l_whence = SEEK_SET;
+  lock.l_start = place;
+  lock.l_len = 1;
+  return lock;
 }
 
-Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled) const {
-  std::error_code ignored;
-  std::filesystem::create_directories(folder_, ignored);
+}  // namespace
+
+Store::Claim::~Claim() {
+  if (descriptor_ < 0) return;
+  // A child that was forked meanwhile shares the lock with its copy of the descriptor: closing ours would not give it
+  // back.
+  struct flock lock = one_byte(F_UNLCK, 0);
+  lock.l_len = 0;  // to the end
+  fcntl(descriptor_, F_OFD_SETLK, &lock);
+  close(descriptor_);
+}
+
+Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled,
+                          const std::function<void(bool)>& on_wait) const {
+  if (!prepare().empty()) return Claim();
   // A description of the file of its own: two threads of one process exclude each other too.
-  const int descriptor = open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
+  const int descriptor =
+      open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
   if (descriptor < 0) return Claim();
+  fchmod(descriptor, 0600);  // whatever the umask
   Claim claim(descriptor);
-  struct flock lock {};
-  lock.l_type = F_WRLCK;
-  lock.l_whence = SEEK_SET;
-  lock.l_start = off_t(key.low >> 2);
-  lock.l_len = 1;
+  Waiting waiting(on_wait);
+  struct flock lock = one_byte(F_WRLCK, off_t(key.low >> 2));
   auto pause = std::chrono::milliseconds(1);
   while (fcntl(descriptor, F_OFD_SETLK, &lock) != 0) {
     if ((errno != EAGAIN && errno != EACCES && errno != EINTR) || (cancelled && cancelled->load())) return Claim();
+    waiting.goes_on();
     std::this_thread::sleep_for(pause);
     pause = std::min(2 * pause, std::chrono::milliseconds(50));
   }

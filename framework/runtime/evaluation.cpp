@@ -28,6 +28,14 @@ void for_leaves(V& value, const Visit& visit) {
   for (auto& item : value.items) for_leaves(item, visit);
 }
 
+/// Whether a stored value is one that the output gives: by its own account, it may come from another build or be damaged.
+bool is_of(const Value& value, const PortInfo& output) {
+  if (value.type != output.type || (value.is_list() && value.axis != output.axis)) return false;
+  if (!output.axis.empty() && !value.is_list()) return value.is_absent();
+  return std::all_of(value.items.begin(), value.items.end(),
+                     [&](const Value& item) { return item.type == output.type && !item.is_list(); });
+}
+
 /// Thrown where an input cannot be made because its own node failed.
 struct MissingInput {
   Status status;
@@ -176,7 +184,11 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
   if (makes_functions(node)) {
     defer(node, call, key);
   } else if (!read_back(node, call, key)) {
-    const Store::Claim claim = settings_.store ? settings_.store->claim(key.key, settings_.cancelled) : Store::Claim();
+    const auto on_wait = [&](bool waits) {
+      report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item,
+             waits ? "waits for another run that is making the same result" : "goes on after waiting for another run");
+    };
+    const Store::Claim claim = settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
     // Another process may have made it in the meantime.
     if (!read_back(node, call, key)) call.result = perform(node, call.inputs, call.item, key);
   }
@@ -209,7 +221,12 @@ void Evaluation::defer(std::size_t node, Call& call, const Recipe& recipe) {
 bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
   if (!settings_.store || settings_.made_anew.contains(pipeline_.nodes[node].id)) return false;
   std::optional<StoredResult> stored = settings_.store->find(recipe.key);
-  if (!stored || stored->outputs.size() != pipeline_.nodes[node].info.outputs.size()) return false;
+  if (!stored) return false;
+  const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
+  if (!std::equal(stored->outputs.begin(), stored->outputs.end(), outputs.begin(), outputs.end(), is_of)) {
+    settings_.store->drop(recipe.key);
+    return false;
+  }
   const auto deferred = std::make_shared<Deferred>(*this, node, call, recipe);
   std::size_t leaf = 0;
   for (Value& output : stored->outputs)
@@ -329,7 +346,7 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
     const std::scoped_lock lock(mutex_);
     if (std::exchange(store_complained_, true)) return;
   }
-  report(RunEvent::Kind::warning, node, "", "its result is not kept for later runs: " + fault);
+  report(RunEvent::Kind::warning, node, "", "results are not kept: " + fault);
 }
 
 Context::Hooks Evaluation::make_hooks(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings) {

@@ -149,6 +149,32 @@ class Compare(Case):
         self.assertLess(seconds["one"], 0.3, "both share it")
         self.assertGreater(seconds["two"], 0.3, "the same cell, and the other variant makes another one")
 
+    def test_a_simulated_case_that_is_not_whole_is_made_again(self):
+        self.write("p.yaml", PIPELINE.replace("0.05", "0"))
+        self.write("s.yaml", "marrow: 1\nnodes:\n  s: {uses: test.sides}\noutputs: {case: s.both}\n")
+        path = self.write("e.yaml", HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: 1..3}") + "variants: {a: {}}\n")
+        self.assertEqual(self.compare(path, "--out", self.scratch / "one").returncode, 0)
+        files = sorted((self.scratch / "cache" / "cases").glob("*/outputs/case/a.json"))
+        self.assertEqual(len(files), 3)
+        whole = files[0].read_text()
+        files[0].write_text(whole[:-5])
+        files[1].unlink()
+        shutil.rmtree(files[2].parent)
+        result = self.compare(path, "--out", self.scratch / "two")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual([file.read_text() for file in files], [whole] * 3)
+        self.assertEqual([name for name in os.listdir(self.scratch / "cache" / "cases") if "tmp" in name], [])
+        self.assertEqual(self.results("two"), self.results("one"))
+
+    def test_a_store_that_cannot_be_used_is_one_sentence(self):
+        path = self.experiment({"a": "{}"}, cases=1)
+        (self.scratch / "cache").mkdir()
+        self.write("cache/mine", "")
+        result = self.compare(path, "--out", self.scratch / "out")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr.count("marrow: note: results are not kept: the folder %s holds other things" % (self.scratch / "cache")), 1, result.stderr)
+        self.assertEqual(os.listdir(self.scratch / "cache"), ["mine"])
+
     def test_one_cell_by_itself(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
         environment = {"MARROW_CACHE": str(self.scratch / "cache")}

@@ -41,7 +41,7 @@ Value many(std::size_t count) {
 fs::path only_file(const fs::path& folder) {
   fs::path found;
   for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file() && entry.path().filename() != "claims" && entry.path().parent_path().filename() != "last") found = entry.path();
+    if (entry.is_regular_file() && entry.path().parent_path() != folder && entry.path().parent_path().filename() != "last") found = entry.path();
   return found;
 }
 
@@ -266,6 +266,51 @@ TEST_F(StoreTest, AKilledProcessGivesItsClaimsBack) {
   const Store::Claim claim = store.claim(key, nullptr);
 }
 
+TEST_F(StoreTest, AForkedChildDoesNotKeepAClaim) {
+  const Digest key = marrow::hash_of(1);
+  pid_t child = 0;
+  {
+    const Store::Claim claim = store.claim(key, nullptr);
+    child = fork();
+    if (child == 0) {
+      std::this_thread::sleep_for(std::chrono::hours(1));
+      _exit(0);
+    }
+  }
+  std::atomic<bool> is_over{false};
+  std::thread limit([&] {
+    for (int i = 0; i < 200 && !is_over; ++i) std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    if (!is_over) kill(child, SIGKILL);
+  });
+  { const Store::Claim claim = store.claim(key, nullptr); }
+  is_over = true;
+  limit.join();
+  EXPECT_EQ(kill(child, SIGKILL), 0);
+  int status = 0;
+  EXPECT_EQ(waitpid(child, &status, WNOHANG), 0) << "the claim came back only when the child was killed";
+  waitpid(child, &status, 0);
+}
+
+TEST_F(StoreTest, WaitingForAnotherIsSaidAndIsCancelled) {
+  const Digest key = marrow::hash_of(1);
+  const pid_t child = claimer(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });
+  std::atomic<bool> cancelled{false};
+  std::string said;
+  const auto start = std::chrono::steady_clock::now();
+  {
+    const Store::Claim none = store.claim(key, &cancelled, [&](bool waits) {
+      said += waits ? "waits " : "goes on";
+      cancelled = true;
+    });
+  }
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  EXPECT_EQ(said, "waits goes on");
+  EXPECT_GE(seconds, 5);
+  EXPECT_LT(seconds, 6);
+  kill(child, SIGKILL);
+  waitpid(child, nullptr, 0);
+}
+
 TEST_F(StoreTest, FullDiskDoesNotEndTheRun) {
   const pid_t child = fork();  // a limit on file size stands for the full disk
   if (child == 0) {
@@ -290,7 +335,7 @@ TEST_F(StoreTest, AFolderThatCannotBeWrittenIsAWarning) {
     if (event.kind == marrow::RunEvent::Kind::warning) messages += event.text;
   };
   EXPECT_FALSE(marrow::run_pipeline(pipeline, test_catalogue(), settings).failed());
-  EXPECT_NE(messages.find("its result is not kept for later runs: cannot write"), std::string::npos) << messages;
+  EXPECT_NE(messages.find("results are not kept: cannot use the folder"), std::string::npos) << messages;
 }
 
 TEST_F(StoreTest, TheLeastRecentlyUsedGoFirst) {

@@ -13,12 +13,24 @@ struct Share {
   double seconds = 0;
 };
 
+/// The command's exit code; says what is at fault, where anything is.
+int code_after(const std::string& fault) {
+  if (!fault.empty()) std::fprintf(stderr, "marrow: error: %s\n", fault.c_str());
+  return fault.empty() ? 0 : 2;
+}
+
 double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
 
 }  // namespace
 
+bool can_keep_results(const std::string& fault_of_store, bool quiet) {
+  if (!fault_of_store.empty() && !quiet) std::fprintf(stderr, "marrow: note: results are not kept: %s\n", fault_of_store.c_str());
+  return fault_of_store.empty();
+}
+
 int cache_info() {
   const Store store;
+  if (const int code = code_after(store.fault())) return code;
   std::map<std::string, Share> shares;
   Share all;
   for (const Store::Entry& entry : store.entries())
@@ -38,6 +50,7 @@ int cache_info() {
 
 int cache_why(const std::string& key) {
   const Store store;
+  if (const int code = code_after(store.fault())) return code;
   int found = 0;
   for (const Store::Entry& entry : store.entries()) {
     const auto is_meant = [&](const Digest& digest) { return digest.hex().starts_with(key); };
@@ -56,11 +69,13 @@ int cache_why(const std::string& key) {
   return found ? 0 : 2;
 }
 
-int cache_collect(double keep_gb) {
+int cache_collect(const std::string& keep_gb) {
+  const auto keep_bytes = bytes_of_gigabytes(keep_gb);
+  if (!keep_bytes) return code_after("--keep-gb is '" + keep_gb + "', but must be a number of gigabytes from 0 to 1000000; nothing is removed");
   const Store store;
-  const Store::Freed freed = store.collect(std::uint64_t(keep_gb * 1e9));
-  std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
-  return 0;
+  const Store::Freed freed = store.collect(*keep_bytes);
+  if (freed.fault.empty() || freed.entries) std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
+  return code_after(freed.fault);
 }
 
 }  // namespace marrow::cli

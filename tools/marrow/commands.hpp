@@ -44,7 +44,7 @@ int diff(const std::filesystem::path& before, const std::filesystem::path& now, 
 int plan(const PipelineRequest& request, std::uint64_t seed);
 int cache_info();
 int cache_why(const std::string& key);
-int cache_collect(double keep_gb);
+int cache_collect(const std::string& keep_gb);
 int check(const PipelineRequest& request, bool json);
 int list(const std::string& kind, bool json);
 int inspect(const std::string& node, bool yaml, bool json);
@@ -59,6 +59,8 @@ int check_worker();
 void print_limits(const NodeInfo& node);
 int describe(const std::filesystem::path& library, bool write);
 
+/// Whether results can be kept. Says why not, unless `quiet`.
+bool can_keep_results(const std::string& fault_of_store, bool quiet);
 /// Splits name=value texts. Throws Error for one without '='.
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline; prints all its faults and returns false when there are any.

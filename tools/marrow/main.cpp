@@ -112,15 +112,15 @@ int main(int argc, char** argv) {
   plan_command->callback([&] { code = plan(plan_request, plan_seed); });
 
   std::string cache_key;
-  double keep_gb = 10;
-  auto* cache_command = app.add_subcommand("cache", "look at the store of results, and tidy it up");
+  std::string keep_gb = "10";
+  auto* cache_command = app.add_subcommand("cache", "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store), and tidy it up");
   cache_command->require_subcommand(1);
   cache_command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&] { code = cache_info(); });
   auto* why_command = cache_command->add_subcommand("why", "what a kept result was made from");
   why_command->add_option("key", cache_key, "key of a result or of one of its outputs (run.json shows those), or its first digits")->required();
   why_command->callback([&] { code = cache_why(cache_key); });
   auto* gc_command = cache_command->add_subcommand("gc", "remove the least recently used results");
-  gc_command->add_option("--keep-gb", keep_gb, "size to keep, in gigabytes")->capture_default_str()->check(CLI::NonNegativeNumber);
+  gc_command->add_option("--keep-gb", keep_gb, "size to keep, in gigabytes")->capture_default_str();
   gc_command->callback([&] { code = cache_collect(keep_gb); });
 
   std::string kind;

@@ -28,6 +28,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, true)) return 2;
   const Store store;
+  can_keep_results(store.fault(), false);
   RunSettings settings;
   settings.seed = seed;
   settings.store = &store;

@@ -140,22 +140,26 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   std::signal(SIGTERM, on_interrupt);
   Progress progress(request, folder);
   RunSettings settings;
-  settings.store = store;
   settings.seed = request.seed;
   settings.threads = request.threads;
   settings.file_limits = request.file_limits;
   settings.cancelled = &interrupted;
   settings.observer = [&](const RunEvent& event) { progress(event); };
-  for (const std::string& note : pipeline.notes) {
-    folder.append_log("note: " + note);
-    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", note.c_str());
-  }
+  const auto note = [&](const std::string& text) {
+    folder.append_log("note: " + text);
+    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", text.c_str());
+  };
+  for (const std::string& text : pipeline.notes) note(text);
+  const std::string fault = store ? store->prepare() : "";
+  if (!fault.empty()) note("results are not kept: " + fault);
+  else settings.store = store;
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
   outcome.written = folder.write_outputs(pipeline, outcome.result, catalogue);
   folder.write_record(pipeline, outcome.result, settings, catalogue, arguments, outcome.written);
-  if (settings.store) settings.store->tidy();
+  const std::string untidy = settings.store ? settings.store->tidy() : "";
+  if (!untidy.empty()) note("the store of results is not tidied up: " + untidy);
   outcome.is_faulty = outcome.result.failed();
   for (const RunFolder::Written& output : outcome.written) {
     if (output.fault.empty()) continue;

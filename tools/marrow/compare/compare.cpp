@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <fstream>
 
+#include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
 
@@ -43,17 +44,20 @@ void open_folder(const fs::path& folder, const Experiment& experiment) {
 
 }  // namespace
 
-int compare_variants(const CompareRequest& request) {
+int compare_variants(const CompareRequest& asked) {
+  CompareRequest request = asked;
   const Catalogue catalogue;
   Experiment experiment;
   if (!load(request, catalogue, experiment)) return 2;
   if (request.dry_run) {
     const Store store;
+    can_keep_results(store.fault(), request.no_cache);
     print_plan(experiment, catalogue, request.no_cache ? nullptr : &store, folder_of(request, experiment));
     return 0;
   }
   const fs::path folder = folder_of(request, experiment);
   open_folder(folder, experiment);
+  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   return run_comparison(request, catalogue, experiment, folder);
 }
 
@@ -71,7 +75,8 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   const fs::path folder = folder_of(request, experiment);
   open_folder(folder, experiment);
   const Store store;
-  CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, folder, request.threads);
+  const bool is_kept = !request.no_cache && can_keep_results(store.prepare(), false);
+  CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads);
   const CellRow row = runner.run(*cell);
   runner.write(row);
   if (row.failed.empty()) runner.draw(*cell);

@@ -78,7 +78,8 @@ class Comparison {
     write_tables(experiment_, rows, answer, folder_);
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
-    if (!request_.no_cache) store_.tidy();
+    const std::string untidy = request_.no_cache ? "" : store_.tidy();
+    if (!untidy.empty()) std::fprintf(stderr, "marrow: note: the store of results is not tidied up: %s\n", untidy.c_str());
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());

@@ -2,10 +2,11 @@
 #pragma once
 #include <atomic>
 #include <filesystem>
+#include <functional>
 #include <map>
-#include <mutex>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -42,37 +43,53 @@ class DamagedEntry : public Error {
   using Error::Error;
 };
 
-/// Results of nodes on disk, by key: one file a result. Several processes may use one folder at once. A file is written under
-/// a temporary name and then renamed, so an entry is whole or absent, whenever the process is killed and however full the
-/// disk is. The content hash of each value is checked when it is read. Safe to use from several threads.
+/// Results of nodes on disk, by key: one file a result. Several processes of one user may use one folder at once. A
+/// file is written under a temporary name and then renamed, so an entry is whole or absent, whenever the process is
+/// killed and however full the disk is. What it was written for and the content hash of each value are checked when it
+/// is read; so nothing waits until it is on the disk itself: after a power failure, an entry that is not whole counts
+/// as absent. Safe to use from several threads.
+///
+/// A store is a folder of this user that marrow made, or found empty, and marked with a file `marrow-store`. Any other
+/// folder is never written to, nor removed from. Only its owner can look into it: results are patients' data.
 class Store {
  public:
   explicit Store(std::filesystem::path folder = default_folder());
-  /// MARROW_CACHE, or marrow/results in XDG_CACHE_HOME or ~/.cache.
+  /// MARROW_CACHE, or marrow/store in XDG_CACHE_HOME, ~/.cache or .cache in the home that the system knows of the user.
+  /// Empty where there is none of these: then nothing is kept.
   static std::filesystem::path default_folder();
   const std::filesystem::path& folder() const { return folder_; }
 
-  /// Nothing where there is no entry, or none that is whole; a damaged one is removed.
+  /// Why the folder is not used: it holds other things, belongs to another user, cannot be written to. Empty for a
+  /// store, and where one can be made. The members below then find nothing and keep nothing.
+  std::string fault() const;
+  /// Makes the store where there is none yet, as save() and all others that write do. Returns why it cannot be used.
+  std::string prepare() const;
+
+  /// Nothing where there is no entry, or none that is whole and was written for this key; such a one is removed.
   std::optional<StoredResult> find(const Digest& key) const;
-  /// Keeps what can be kept: data, absent items and lists of them. Returns why it was not kept, or an empty text: a full disk
-  /// must not end a run.
+  /// Keeps what can be kept: data, absent items and lists of them. Returns why it was not kept, or an empty text: a
+  /// full disk must not end a run.
   std::string save(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance) const;
   /// The right to make one result. Others that want the same one wait until the holder has kept it, or is gone.
   class Claim {
    public:
     explicit Claim(int descriptor = -1) : descriptor_(descriptor) {}
     Claim(Claim&& other) noexcept : descriptor_(std::exchange(other.descriptor_, -1)) {}
+    /// Gives it back, also where a process that was forked meanwhile still has the file open.
     ~Claim();
 
    private:
     int descriptor_;
   };
   /// Waits for it; look the result up again then. Comes back empty-handed where the folder cannot be written or when
-  /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back.
-  Claim claim(const Digest& key, const std::atomic<bool>* cancelled) const;
+  /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back. After five seconds of
+  /// waiting `on_wait(true)` is called, and `on_wait(false)` when that waiting has ended, however it did.
+  Claim claim(const Digest& key, const std::atomic<bool>* cancelled,
+              const std::function<void(bool waits)>& on_wait = {}) const;
   /// Removes an entry that turned out to be damaged.
   void drop(const Digest& key) const;
-  /// Folders of simulated cases, by key; made by whoever needs one, and collected like entries.
+  /// Folders of simulated cases, named by their keys; made by whoever needs one, as KEY.tmp-PROCESS-NUMBER and then
+  /// renamed, and collected like entries.
   std::filesystem::path cases() const { return folder_ / "cases"; }
 
   /// What a node of a pipeline last came to, for saying why it runs again. `place` names pipeline, node and item.
@@ -88,7 +105,7 @@ class Store {
     Digest key;
     std::uint64_t bytes = 0;
     std::filesystem::file_time_type used;
-    Provenance provenance;
+    Provenance provenance;        ///< empty for an entry that is not whole
     std::vector<Digest> outputs;  ///< content hashes
   };
   /// All entries, the least recently used first.
@@ -96,23 +113,28 @@ class Store {
   struct Freed {
     std::size_t entries = 0;
     std::uint64_t bytes = 0;
+    std::string fault;  ///< of the first that could not be removed
   };
-  /// Removes the least recently used entries and simulated cases until the rest is at most `keep_bytes`, and what killed
-  /// processes left behind.
+  /// Removes the least recently used entries and simulated cases until the rest is at most `keep_bytes`, and what
+  /// killed processes left behind. Touches only what bears a name that the store itself gives, and follows no link.
   Freed collect(std::uint64_t keep_bytes) const;
-  /// The same with MARROW_CACHE_GB (20 where it is not set), once a day at most: after a run, so that the store does not fill
-  /// the disk.
-  void tidy() const;
+  /// The same with MARROW_CACHE_GB (20 where it is not set), once a day at most: after a run, so that the store does
+  /// not fill the disk. Returns what is wrong with MARROW_CACHE_GB, in which case nothing is removed, or what could not
+  /// be removed.
+  std::string tidy() const;
 
  private:
+  bool is_there() const;
   std::filesystem::path file_of(const Digest& key) const;
-  std::string write_whole(const std::filesystem::path& file, const std::vector<std::string_view>& parts) const;
 
   std::filesystem::path folder_;
-  mutable std::atomic<std::uint64_t> written_{0};
+  mutable std::atomic<bool> is_checked_{false};
 };
 
 /// The key that a text of 32 hexadecimal digits names; nothing for any other text.
 std::optional<Digest> digest_of_hex(const std::string& text);
+
+/// The size that a number of gigabytes from 0 to 1000000 means; nothing for any other text.
+std::optional<std::uint64_t> bytes_of_gigabytes(std::string_view text);
 
 }  // namespace marrow

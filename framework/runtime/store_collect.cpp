@@ -1,0 +1,145 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the store holds, and how it stays within its size.
+#include <signal.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <chrono>
+#include <cstdlib>
+
+#include "store_entry.hpp"
+#include "store_folder.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+using Kind = StoreItem::Kind;
+using Clock = fs::file_time_type::clock;
+
+constexpr auto kDay = std::chrono::hours(24);
+
+std::uint64_t bytes_of(const fs::path& path) {
+  std::error_code error;
+  if (!fs::is_directory(path, error)) {
+    const std::uintmax_t size = fs::file_size(path, error);
+    return error ? 0 : size;
+  }
+  std::uint64_t sum = 0;
+  for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error)) {
+    std::error_code gone;
+    const bool is_file = fs::is_regular_file(at->symlink_status(gone));
+    const std::uintmax_t size = is_file ? at->file_size(gone) : 0;
+    if (!gone) sum += size;
+  }
+  return sum;
+}
+
+/// Whether the process that writes a temporary file has ended. Another may have been given its number since.
+bool is_abandoned(const StoreItem& item) {
+  std::error_code error;
+  const auto changed = fs::last_write_time(item.path, error);
+  return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && Clock::now() - changed > kDay);
+}
+
+/// Returns false with the reason where something of it is left. A folder gets another name first, so that no one takes
+/// half of it for the whole.
+bool remove_item(const StoreItem& item, std::error_code& error) {
+  error.clear();
+  fs::path path = item.path;
+  if (item.kind == Kind::simulated_case) {
+    path = temporary_beside(item.path);
+    fs::rename(item.path, path, error);
+  }
+  if (!error) fs::remove_all(path, error);
+  return !error;
+}
+
+void list_keys(const std::vector<Leaf>& leaves, std::vector<Digest>& keys) {
+  for (const Leaf& leaf : leaves)
+    if (leaf.present) keys.push_back(leaf.key);
+}
+
+}  // namespace
+
+std::vector<Store::Entry> Store::entries() const {
+  std::vector<Entry> entries;
+  if (!is_there()) return entries;
+  for (const StoreItem& item : items_of_store(folder_)) {
+    if (item.kind != Kind::entry) continue;
+    const StoreFile file(item.path);
+    if (!file.is_open()) continue;
+    Entry entry{item.key, file.size(), {}, {}, {}};
+    std::error_code ignored;
+    entry.used = fs::last_write_time(item.path, ignored);
+    try {
+      ReadEntry read = read_entry(file, item.key);
+      entry.provenance = std::move(read.description.provenance);
+      list_keys(read.description.leaves, entry.outputs);
+    } catch (const Error&) {  // listed all the same, so that it can be collected
+    }
+    entries.push_back(std::move(entry));
+  }
+  std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
+  return entries;
+}
+
+Store::Freed Store::collect(std::uint64_t keep_bytes) const {
+  struct Kept {
+    StoreItem item;
+    std::uint64_t bytes = 0;
+    fs::file_time_type used;
+  };
+  Freed freed;
+  if (!is_there()) {
+    freed.fault = fault();
+    return freed;
+  }
+  std::vector<Kept> all;
+  std::error_code error;
+  const auto remove = [&](const StoreItem& item) {
+    if (remove_item(item, error)) return true;
+    if (error != std::errc::no_such_file_or_directory && freed.fault.empty())
+      freed.fault = "cannot remove " + item.path.string() + ": " + error.message();
+    return false;
+  };
+  std::uint64_t total = 0;
+  for (StoreItem& item : items_of_store(folder_)) {
+    if (item.kind == Kind::temporary) {
+      if (is_abandoned(item)) remove(item);
+      continue;
+    }
+    Kept kept{item, bytes_of(item.path), fs::last_write_time(item.path, error)};
+    if (error) continue;  // another process has just removed it
+    total += kept.bytes;
+    all.push_back(std::move(kept));
+  }
+  std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.used < b.used; });
+  for (const Kept& one : all) {
+    if (total <= keep_bytes) break;
+    const bool is_removed = remove(one.item);
+    if (is_removed || error == std::errc::no_such_file_or_directory) total -= one.bytes;
+    if (!is_removed) continue;
+    freed.bytes += one.bytes;
+    ++freed.entries;
+  }
+  return freed;
+}
+
+std::string Store::tidy() const {
+  const char* text = std::getenv("MARROW_CACHE_GB");
+  const auto limit = bytes_of_gigabytes(text && *text ? text : "20");
+  if (!limit)
+    return "MARROW_CACHE_GB is '" + std::string(text) +
+           "', but must be a number of gigabytes from 0 to 1000000; nothing is removed";
+  if (!is_there()) return "";
+  const fs::path mark = folder_ / "tidied";
+  std::error_code error;
+  const auto age = Clock::now() - fs::last_write_time(mark, error);
+  if (!error && age >= Clock::duration::zero() && age < kDay) return "";  // a mark from the future says nothing
+  constexpr std::string_view kText = "when the store was last brought back to its size\n";
+  write_whole(mark, [&](Archive& out) { out.bytes(kText.data(), kText.size()); });
+  return collect(*limit).fault;
+}
+
+}  // namespace marrow

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// One entry of the store: a preamble, a description of the outputs, and their packed values one after the other.
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/store.hpp"
+#include "store_file.hpp"
+
+namespace marrow {
+
+/// An output, or an item of a list. A list is followed by its items, one for each name.
+struct Leaf {
+  std::string type;
+  std::int32_t version = 0;
+  std::uint64_t type_size = 0;
+  bool present = false;
+  Digest key;
+  std::uint64_t offset = 0, size = 0;  // of the packed value, after the description
+  std::string axis;
+  std::vector<std::string> names;
+  static constexpr auto fields() {
+    return std::make_tuple(&Leaf::type, &Leaf::version, &Leaf::type_size, &Leaf::present, &Leaf::key, &Leaf::offset,
+                           &Leaf::size, &Leaf::axis, &Leaf::names);
+  }
+};
+
+struct EntryDescription {
+  Digest key;  ///< under which it was kept: a file that was given another's name is not that result
+  Provenance provenance;
+  std::vector<Leaf> leaves;
+  std::uint64_t payload = 0;  ///< bytes of all packed values
+  static constexpr auto fields() {
+    return std::make_tuple(&EntryDescription::key, &EntryDescription::provenance, &EntryDescription::leaves,
+                           &EntryDescription::payload);
+  }
+};
+
+/// Throws Error for what cannot be stored.
+EntryDescription describe_entry(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance);
+void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs);
+
+struct ReadEntry {
+  EntryDescription description;
+  std::uint64_t begin = 0;  ///< of the payload
+};
+/// Throws Error for a file that is not the whole entry of that key.
+ReadEntry read_entry(const StoreFile& file, const Digest& key);
+/// The outputs, whose data are read from the file when they are first needed. Throws Error where the description is no
+/// description of outputs.
+std::vector<Value> outputs_of(const ReadEntry& entry, const std::filesystem::path& file);
+
+}  // namespace marrow

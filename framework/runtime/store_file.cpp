@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "store_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+
+#include "store_folder.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t kBuffer = 64 * 1024;
+constexpr std::size_t kPiece = 256 * 1024;  // read and hashed while it is in the processor's cache
+
+/// Writes to a file, small pieces together. Keeps the first fault.
+class FileWriter : public Archive {
+ public:
+  explicit FileWriter(int descriptor) : descriptor_(descriptor) {}
+  void bytes(const void* data, std::size_t size) override {
+    if (buffer_.size() + size > kBuffer) flush();
+    if (size > kBuffer)
+      write_all(static_cast<const char*>(data), size);
+    else
+      buffer_.append(static_cast<const char*>(data), size);
+  }
+  /// 0, or the number of what went wrong.
+  int flush() {
+    write_all(buffer_.data(), buffer_.size());
+    buffer_.clear();
+    return fault_;
+  }
+
+ private:
+  void write_all(const char* data, std::size_t size) {
+    while (size > 0 && !fault_) {
+      const ssize_t count = write(descriptor_, data, size);
+      if (count == 0 || (count < 0 && errno != EINTR)) fault_ = count ? errno : EIO;
+      if (count > 0) {
+        data += count;
+        size -= std::size_t(count);
+      }
+    }
+  }
+
+  int descriptor_;
+  int fault_ = 0;
+  std::string buffer_;
+};
+
+/// A new file beside `file`; its name goes to `temporary`. -1 with errno where it cannot be made.
+int open_temporary(const fs::path& file, fs::path& temporary) {
+  constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
+  int descriptor = -1;
+  do {
+    temporary = temporary_beside(file);
+    descriptor = open(temporary.c_str(), kMode, 0600);
+    if (descriptor < 0 && errno == ENOENT && make_private_folder(file.parent_path()).empty())
+      descriptor = open(temporary.c_str(), kMode, 0600);
+  } while (descriptor < 0 && (errno == EEXIST || errno == EINTR));
+  if (descriptor >= 0) fchmod(descriptor, 0600);  // whatever the umask
+  return descriptor;
+}
+
+}  // namespace
+
+StoreFile::StoreFile(const fs::path& path)
+    : descriptor_(open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY)) {
+  struct stat status {};
+  if (descriptor_ >= 0 && fstat(descriptor_, &status) == 0 && S_ISREG(status.st_mode)) {
+    size_ = std::uint64_t(status.st_size);
+  } else if (descriptor_ >= 0) {
+    close(descriptor_);
+    descriptor_ = -1;
+  }
+}
+
+StoreFile::~StoreFile() {
+  if (descriptor_ >= 0) close(descriptor_);
+}
+
+bool StoreFile::read(void* data, std::size_t size, std::uint64_t offset) const {
+  for (std::size_t done = 0; done < size;) {
+    const ssize_t count = pread(descriptor_, static_cast<char*>(data) + done, size - done, off_t(offset + done));
+    if (count == 0 || (count < 0 && errno != EINTR)) return false;
+    if (count > 0) done += std::size_t(count);
+  }
+  return true;
+}
+
+void StoreFile::mark_as_used() const {
+  futimens(descriptor_, nullptr);
+}
+
+FileUnpacker::FileUnpacker(const StoreFile& file, std::uint64_t offset, std::uint64_t size)
+    : Unpacker(std::size_t(size)),
+      file_(file),
+      offset_(offset),
+      unread_(size),
+      buffer_(std::size_t(std::min<std::uint64_t>(size, kBuffer))) {}
+
+void FileUnpacker::read(char* data, std::size_t size) {
+  if (!file_.read(data, size, offset_)) throw Error("the file cannot be read, or has become shorter");
+  hasher_.bytes(data, size);
+  offset_ += size;
+  unread_ -= size;
+}
+
+void FileUnpacker::take(void* data, std::size_t size) {
+  char* to = static_cast<char*>(data);
+  while (size > 0) {
+    std::size_t count = 0;
+    if (next_ == end_ && size >= buffer_.size()) {
+      count = std::min(size, kPiece);
+      read(to, count);
+    } else {
+      if (next_ == end_) {
+        next_ = 0;
+        end_ = std::size_t(std::min<std::uint64_t>(unread_, buffer_.size()));
+        read(buffer_.data(), end_);
+      }
+      count = std::min(size, end_ - next_);
+      std::memcpy(to, buffer_.data() + next_, count);
+      next_ += count;
+    }
+    to += count;
+    size -= count;
+  }
+}
+
+std::string write_whole(const fs::path& file, const std::function<void(Archive&)>& fill, bool is_durable) {
+  fs::path temporary;
+  const auto fault_of = [&](int number) { return "cannot write " + file.string() + ": " + std::strerror(number); };
+  const int descriptor = open_temporary(file, temporary);
+  if (descriptor < 0) return fault_of(errno);
+  std::string fault;
+  try {
+    FileWriter writer(descriptor);
+    fill(writer);
+    if (const int number = writer.flush()) fault = fault_of(number);
+  } catch (const std::exception& error) {
+    fault = error.what();
+  }
+  if (fault.empty() && is_durable && fsync(descriptor)) fault = fault_of(errno);
+  // Some file systems tell only now that there is no space. After EINTR it is closed all the same.
+  if (close(descriptor) && errno != EINTR && fault.empty()) fault = fault_of(errno);
+  if (fault.empty() && std::rename(temporary.c_str(), file.c_str())) fault = fault_of(errno);
+  if (!fault.empty()) unlink(temporary.c_str());
+  return fault;
+}
+
+}  // namespace marrow

@@ -1,0 +1,109 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The store of results as a person meets it: where it is, what it refuses to touch, and that waiting is no failure."""
+import fcntl
+import os
+import re
+import stat
+import struct
+import subprocess
+import time
+
+from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+
+NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
+WRONG_NUMBERS = ("abc", "inf", "nan", "-5", "0,5", "1e12", "")
+
+
+class Cache(Case):
+    def setUp(self):
+        super().setUp()
+        self.cache = self.scratch / "cache"
+        self.pipeline = self.write("p.yaml", NUMBER)
+        self.runs = 0
+
+    def marrow(self, *arguments, **environment):
+        return marrow(*arguments, plugins=[TEST_PLUGINS], cwd=self.scratch, extra_environment={"MARROW_CACHE": str(self.cache), **environment})
+
+    def run_pipeline(self, **environment):
+        self.runs += 1
+        return self.marrow("run", self.pipeline, "--out", self.scratch / ("out-%d" % self.runs), **environment)
+
+    def kept(self):
+        """How many results are kept."""
+        result = self.marrow("cache", "info")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return int(re.search(r"^all +(\d+)", result.stdout, re.M).group(1))
+
+    def files(self, folder):
+        return sorted(str(path.relative_to(folder)) for path in folder.rglob("*"))
+
+    def test_gc_takes_no_number_for_another(self):
+        self.assertEqual(self.run_pipeline().returncode, 0)
+        for wrong in WRONG_NUMBERS:
+            result = self.marrow("cache", "gc", "--keep-gb=" + wrong)
+            self.assertEqual(result.returncode, 2, wrong)
+            if wrong:
+                self.assertIn("--keep-gb is '%s', but must be a number of gigabytes from 0 to 1000000; nothing is removed" % wrong, result.stderr)
+            self.assertEqual(self.kept(), 1, wrong)
+        self.assertIn("0 results removed", self.marrow("cache", "gc", "--keep-gb", "1e6").stdout)
+        self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
+
+    def test_a_wrong_limit_is_said_and_removes_nothing(self):
+        for wrong in WRONG_NUMBERS[:-1]:
+            (self.cache / "tidied").unlink(missing_ok=True)
+            result = self.run_pipeline(MARROW_CACHE_GB=wrong)
+            self.assertEqual(result.returncode, 0)
+            self.assertIn("MARROW_CACHE_GB is '%s', but must be a number of gigabytes" % wrong, result.stderr)
+            self.assertEqual(self.kept(), 1, wrong)
+
+    def test_a_folder_of_other_things_is_left_alone(self):
+        for name in ("photos.tmp-0/a.jpg", "0123456789abcdef0123456789abcdef/letter.txt", "note"):
+            (self.cache / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.cache / name).write_text("mine")
+        before = self.files(self.cache)
+        sentence = "the folder %s holds other things and is no store of marrow; set MARROW_CACHE to a new or empty folder" % self.cache
+        result = self.run_pipeline()
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(result.stderr.count("results are not kept: " + sentence), 1, result.stderr)
+        self.assertIn(sentence, (self.scratch / "out-1" / "log.txt").read_text())
+        for command in (["gc", "--keep-gb", "0"], ["info"], ["why", "0"]):
+            result = self.marrow("cache", *command)
+            self.assertEqual(result.returncode, 2, command)
+            self.assertIn(sentence, result.stderr)
+        self.assertIn(sentence, self.marrow("plan", self.pipeline).stderr)
+        self.assertEqual(self.files(self.cache), before)
+
+    def test_empty_variables_count_as_not_set(self):
+        result = self.run_pipeline(MARROW_CACHE="", XDG_CACHE_HOME="", HOME=str(self.scratch / "home"))
+        self.assertEqual(result.returncode, 0, result.stderr)
+        store = self.scratch / "home" / ".cache" / "marrow" / "store"
+        self.assertIn("marrow-store", os.listdir(store))
+        self.assertEqual(sorted(os.listdir(self.scratch)), ["home", "out-1", "p.yaml"])
+        for path in [store, *store.rglob("*")]:
+            self.assertEqual(stat.S_IMODE(path.stat().st_mode), 0o700 if path.is_dir() else 0o600, path)
+
+    def test_looking_makes_no_store(self):
+        for command in (["cache", "info"], ["cache", "gc"], ["plan", self.pipeline]):
+            self.assertEqual(self.marrow(*command).returncode, 0)
+        self.assertFalse(self.cache.exists())
+
+    def test_waiting_for_another_run_is_said_and_is_no_failure(self):
+        self.assertEqual(self.run_pipeline().returncode, 0)
+        self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
+        out = self.scratch / "waits"
+        with open(self.cache / "claims", "r+b") as claims:
+            fcntl.fcntl(claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0))  # F_OFD_SETLK: another run makes all there is
+            environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.cache))
+            process = subprocess.Popen([str(MARROW), "run", str(self.pipeline), "--out", str(out)], env=environment, text=True,
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            time.sleep(2)
+            self.assertIsNone(process.poll(), "it does not wait")
+            time.sleep(4.5)
+        self.assertEqual(process.wait(timeout=60), 0)
+        said = [" ".join(line.split()) for line in process.stderr.read().splitlines()]
+        self.assertEqual(said[:2], ["c waits for another run that is making the same result", "c goes on after waiting for another run"])
+        self.assertIn("c: waits for another run that is making the same result", (out / "log.txt").read_text())
+
+
+if __name__ == "__main__":
+    main()
