@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/runtime/reading.hpp"
 
 namespace marrow::read {
 namespace {
@@ -32,6 +33,7 @@ InputFile::InputFile(std::filesystem::path path) : path_(std::move(path)) {
   const bool is_known = ::fstat(descriptor_, &status) == 0;
   if (is_known && S_ISREG(status.st_mode) && status.st_size > 0) {
     size_ = std::uint64_t(status.st_size);
+    now_reading(path_);
     return;
   }
   ::close(descriptor_);
