@@ -8,6 +8,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <exception>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <system_error>
@@ -71,8 +72,9 @@ class Executor {
     std::vector<std::size_t> ready;
     for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i)
       if (needed_[i] && states_[i].waiting_for == 0) ready.push_back(i);
-    for (std::size_t i : ready) arena.enqueue([this, i] { start_node(i); });
+    for (std::size_t i : ready) enqueue([this, i] { start_node(i); });
     watch();
+    if (fault_) std::rethrow_exception(fault_);
     arena.execute([&] { make_outputs(); });
     arena.terminate();
     result_.seconds = seconds_since(start_);
@@ -151,10 +153,28 @@ class Executor {
     return int(std::unique(sources.begin(), sources.end()) - sources.begin());
   }
 
-  /// The main thread samples memory until all nodes have ended.
+  /// Gives the pool some work. What a node throws is its own failure; anything else that goes wrong ends the run.
+  template <class Work>
+  void enqueue(Work work) {
+    ++at_work_;
+    arena_->enqueue([this, work] {
+      try {
+        if (!is_broken_) work();
+      } catch (...) {
+        const std::scoped_lock lock(mutex_);
+        if (!fault_) fault_ = std::current_exception();
+        is_broken_ = true;
+      }
+      const std::scoped_lock lock(mutex_);
+      if (--at_work_ == 0) all_done_.notify_all();
+    });
+  }
+
+  /// The main thread samples memory until all nodes have ended, and nothing of the run is at work any more.
   void watch() {
     std::unique_lock lock(mutex_);
-    while (!all_done_.wait_for(lock, std::chrono::milliseconds(20), [&] { return unfinished_ == 0; })) sample_memory();
+    const auto is_over = [&] { return (unfinished_ == 0 || is_broken_) && at_work_ == 0; };
+    while (!all_done_.wait_for(lock, std::chrono::milliseconds(20), is_over)) sample_memory();
   }
 
   void sample_memory() {
@@ -187,7 +207,7 @@ class Executor {
       return;
     }
     state.unfinished = state.calls.size();
-    for (std::size_t c = 0; c < state.calls.size(); ++c) arena_->enqueue([this, index, c] { evaluate(index, c); });
+    for (std::size_t c = 0; c < state.calls.size(); ++c) enqueue([this, index, c] { evaluate(index, c); });
   }
 
   /// Gathers the inputs and spreads them over the mapped axes.
@@ -338,10 +358,10 @@ class Executor {
       for (std::size_t user = 0; user < pipeline_.nodes.size(); ++user)
         if (needed_[user] && uses(user, index) && --states_[user].waiting_for == 0) ready.push_back(user);
     }
-    for (std::size_t user : ready) arena_->enqueue([this, user] { start_node(user); });
+    for (std::size_t user : ready) enqueue([this, user] { start_node(user); });
     state.calls.clear();
     const std::scoped_lock lock(mutex_);
-    if (--unfinished_ == 0) all_done_.notify_all();
+    --unfinished_;
   }
 
   void assemble(std::size_t index) {
@@ -397,6 +417,9 @@ class Executor {
   std::size_t unfinished_ = 0;
   std::mutex mutex_;
   std::condition_variable all_done_;
+  std::atomic<int> at_work_{0};
+  std::atomic<bool> is_broken_{false};
+  std::exception_ptr fault_;
   tbb::task_arena* arena_ = nullptr;
   Clock::time_point start_ = Clock::now();
   Evaluation evaluation_;
