@@ -2,25 +2,36 @@
 #include "marrow/runtime/diagnostics.hpp"
 
 #include <algorithm>
-#include <numeric>
+#include <array>
+#include <set>
 #include <sstream>
 #include <tuple>
+
+#include "printable.hpp"
 
 namespace marrow {
 namespace {
 
-/// Edit distance with neighbour swaps (optimal string alignment).
+constexpr std::size_t kMostKept = 1000, kMostShown = 50;
+constexpr std::size_t kMostInMessage = 1000;  // bytes
+constexpr std::size_t kMostInLine = 200;      // bytes of a source line
+constexpr std::size_t kMostInName = 100;      // of a name that is looked for among others
+
+/// Edit distance with neighbour swaps (optimal string alignment) of names of at most kMostInName bytes.
 std::size_t edit_distance(const std::string& a, const std::string& b) {
-  std::vector<std::vector<std::size_t>> cost(a.size() + 1, std::vector<std::size_t>(b.size() + 1));
-  for (std::size_t i = 0; i <= a.size(); ++i) cost[i][0] = i;
-  for (std::size_t j = 0; j <= b.size(); ++j) cost[0][j] = j;
-  for (std::size_t i = 1; i <= a.size(); ++i)
+  using Row = std::array<std::size_t, kMostInName + 1>;
+  Row rows[3];
+  Row *before_last = &rows[0], *last = &rows[1], *now = &rows[2];
+  for (std::size_t j = 0; j <= b.size(); ++j) (*last)[j] = j;
+  for (std::size_t i = 1; i <= a.size(); ++i) {
+    (*now)[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
-      cost[i][j] = std::min({cost[i - 1][j] + 1, cost[i][j - 1] + 1, cost[i - 1][j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
-        cost[i][j] = std::min(cost[i][j], cost[i - 2][j - 2] + 1);
+      (*now)[j] = std::min({(*last)[j] + 1, (*now)[j - 1] + 1, (*last)[j - 1] + (a[i - 1] != b[j - 1])});
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) (*now)[j] = std::min((*now)[j], (*before_last)[j - 2] + 1);
     }
-  return cost[a.size()][b.size()];
+    std::tie(before_last, last, now) = std::tuple(last, now, before_last);
+  }
+  return (*last)[b.size()];
 }
 
 std::string line_of(const std::string& text, int line) {
@@ -28,19 +39,50 @@ std::string line_of(const std::string& text, int line) {
   std::string content;
   for (int i = 0; i < line; ++i)
     if (!std::getline(stream, content)) return "";
+  if (content.ends_with('\r')) content.pop_back();
   return content;
+}
+
+/// The line, and a caret below what is at the column, which counts bytes; of a long line what is around that.
+std::string quoted_line(const std::string& line, int column) {
+  const std::size_t at = std::min(std::size_t(std::max(0, column - 1)), line.size());
+  const auto is_inside = [&](std::size_t i) { return i < line.size() && (static_cast<unsigned char>(line[i]) & 0xC0) == 0x80; };
+  std::size_t begin = line.size() > kMostInLine && at > kMostInLine / 2 ? at - kMostInLine / 2 : 0;
+  std::size_t end = std::min(line.size(), begin + kMostInLine);
+  while (is_inside(begin)) ++begin;
+  while (is_inside(end)) ++end;
+  const auto shown = [&](std::size_t first, std::size_t last) {
+    std::string part = line.substr(first, last - first);
+    std::replace(part.begin(), part.end(), '\t', ' ');
+    return printable(part);
+  };
+  const std::string before = (begin ? "\u2026" : "") + shown(begin, at);
+  const auto is_first_byte = [](unsigned char c) { return (c & 0xC0) != 0x80; };
+  const auto width = std::size_t(std::count_if(before.begin(), before.end(), is_first_byte));
+  return "  " + before + shown(at, end) + (end < line.size() ? "\u2026" : "") + "\n  " + std::string(width, ' ') + "^\n";
 }
 
 }  // namespace
 
+bool Diagnostics::is_full() const { return items_.size() >= kMostKept; }
+
 void Diagnostics::add(Place place, std::string message, std::string hint) {
-  items_.push_back({std::move(place), std::move(message), std::move(hint)});
+  if (is_full()) ++not_kept_;
+  else items_.push_back({std::move(place), cut(message, kMostInMessage), cut(hint, kMostInMessage)});
 }
 
 void Diagnostics::add_all(const Diagnostics& other) {
   const auto key = [](const Diagnostic& item) { return std::tie(item.place.file, item.place.line, item.place.column, item.message); };
-  for (const Diagnostic& item : other.items_)
-    if (std::none_of(items_.begin(), items_.end(), [&](const Diagnostic& known) { return key(known) == key(item); })) items_.push_back(item);
+  const auto is_before = [&](const Diagnostic* a, const Diagnostic* b) { return key(*a) < key(*b); };
+  items_.reserve(items_.size() + other.items_.size());  // what is known points into it
+  std::set<const Diagnostic*, decltype(is_before)> known(is_before);
+  for (const Diagnostic& item : items_) known.insert(&item);
+  for (const Diagnostic& item : other.items_) {
+    if (known.contains(&item)) continue;
+    add(item.place, item.message, item.hint);
+    if (!is_full()) known.insert(&items_.back());
+  }
+  not_kept_ += other.not_kept_;
   sources_.insert(other.sources_.begin(), other.sources_.end());
 }
 
@@ -54,24 +96,27 @@ std::vector<Diagnostic> Diagnostics::sorted() const {
 
 std::string Diagnostics::text() const {
   std::ostringstream out;
-  for (const Diagnostic& item : sorted()) {
-    out << item.place.file;
+  const std::vector<Diagnostic> items = sorted();
+  for (std::size_t i = 0; i < items.size() && i < kMostShown; ++i) {
+    const Diagnostic& item = items[i];
+    out << cut(printable(item.place.file), kMostInMessage);
     if (item.place.line) out << ':' << item.place.line << ':' << item.place.column;
-    out << ": error: " << item.message << '\n';
+    out << ": error: " << printable_lines(item.message) << '\n';
     const auto source = sources_.find(item.place.file);
-    if (item.place.line && source != sources_.end()) {
-      const std::string line = line_of(source->second, item.place.line);
-      out << "  " << line << "\n  " << std::string(std::size_t(std::max(0, item.place.column - 1)), ' ') << "^\n";
-    }
-    if (!item.hint.empty()) out << "  hint: " << item.hint << '\n';
+    if (item.place.line && source != sources_.end()) out << quoted_line(line_of(source->second, item.place.line), item.place.column);
+    if (!item.hint.empty()) out << "  hint: " << printable_lines(item.hint) << '\n';
   }
+  if (size() > kMostShown) out << "and " << size() - kMostShown << (size() == kMostShown + 1 ? " more fault\n" : " more faults\n");
   return out.str();
 }
 
 std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known) {
   std::string best;
   std::size_t least = std::max<std::size_t>(2, wrong.size() / 3) + 1;
+  if (wrong.size() > kMostInName) return best;
   for (const std::string& name : known) {
+    const std::size_t longer = std::max(name.size(), wrong.size()), shorter = std::min(name.size(), wrong.size());
+    if (longer > kMostInName || longer - shorter >= least) continue;  // the distance is at least the difference of lengths
     const std::size_t distance = edit_distance(wrong, name);
     if (distance < least) {
       least = distance;
@@ -86,8 +131,8 @@ std::string suggestion(const std::string& wrong, const std::vector<std::string>&
   if (!nearest.empty()) return "did you mean '" + nearest + "'?";
   if (known.empty()) return "there are none";
   const std::size_t shown = std::min<std::size_t>(known.size(), 20);
-  std::string list = std::accumulate(known.begin() + 1, known.begin() + std::ptrdiff_t(shown), known[0],
-                                     [](const std::string& a, const std::string& b) { return a + ", " + b; });
+  std::string list;
+  for (std::size_t i = 0; i < shown; ++i) list += (i ? ", " : "") + cut(known[i]);
   return "known: " + list + (shown < known.size() ? ", ..." : "");
 }
 

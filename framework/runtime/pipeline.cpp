@@ -8,8 +8,12 @@
 #include <set>
 #include <sstream>
 
+#include "file_names.hpp"
+#include "input_texts.hpp"
 #include "marrow/runtime/kinds.hpp"
+#include "pipeline_order.hpp"
 #include "pipeline_text.hpp"
+#include "printable.hpp"
 
 namespace marrow {
 namespace {
@@ -43,14 +47,18 @@ std::string joined(const std::vector<std::string>& list, const char* separator) 
 class Resolver {
  public:
   Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics)
-      : written_(written), catalogue_(catalogue), diagnostics_(diagnostics) {}
+      : written_(written), catalogue_(catalogue), diagnostics_(diagnostics), input_texts_(written, diagnostics) {}
 
   Pipeline resolve() {
-    pipeline_.name = written_.name.empty() ? written_.file.stem().string() : written_.name;
+    pipeline_.name = written_.name;
     pipeline_.help = written_.help;
     pipeline_.file = written_.file;
     pipeline_.notes = written_.notes;
-    for (const WrittenNode& node : written_.nodes) resolve_node(node);
+    for (const WrittenNode& node : written_.nodes) {
+      index_.emplace(node.id, ids_.size());
+      ids_.push_back(node.id);
+      resolve_node(node);
+    }
     for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
     point_at_renamed();
@@ -70,18 +78,33 @@ class Resolver {
       node.info = *info;
       resolve_options(written, node);
     } else if (!written.uses.empty()) {
-      const std::vector<std::string> names = catalogue_.node_names();
+      const std::vector<std::string>& names = node_names();
       const std::string kind = written.uses.substr(0, written.uses.find('.'));
       std::vector<std::string> siblings;
       for (const std::string& name : names)
         if (name.starts_with(kind + ".")) siblings.push_back(name);
-      std::string hint = suggestion(written.uses, siblings.empty() ? names : siblings);
+      std::string hint = suggested(written.uses, siblings.empty() ? names : siblings);
       for (const LibraryInfo& library : catalogue_.libraries())
         if (!library.refused.empty() && library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
           hint += "; " + library.file.filename().string() + " was refused: it " + library.refused;
-      diagnostics_.add(written.uses_place, "unknown node '" + written.uses + "'", hint);
+      diagnostics_.add(written.uses_place, "unknown node " + in_quotes(written.uses), hint);
     }
     pipeline_.nodes.push_back(std::move(node));
+  }
+
+  const std::vector<std::string>& node_names() {
+    if (node_names_.empty()) node_names_ = catalogue_.node_names();
+    return node_names_;
+  }
+
+  const std::vector<PortInfo>& ports_of_kind(const std::string& kind) {
+    const auto found = ports_.find(kind);
+    return found != ports_.end() ? found->second : ports_.emplace(kind, catalogue_.ports_of_kind(kind)).first->second;
+  }
+
+  /// A suggestion as long as faults are kept: thousands of unknown names among thousands of known ones take long.
+  std::string suggested(const std::string& wrong, const std::vector<std::string>& known) const {
+    return diagnostics_.is_full() ? "" : suggestion(wrong, known);
   }
 
   StrictYaml yaml_of(const WrittenValue& value) {
@@ -92,53 +115,21 @@ class Resolver {
     const std::vector<std::string> known = names_of(node.info.options);
     for (const auto& [name, value] : written.options)
       if (!contains(known, name))
-        diagnostics_.add(value.place, "'" + node.info.name + "' has no option '" + name + "'", suggestion(name, known));
+        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name), suggested(name, known));
     for (const OptionInfo& option : node.info.options) {
       OptionValue result = option.default_value;
       const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
       if (given != written.options.end()) {
         const WrittenValue& value = given->second;
         StrictYaml yaml = yaml_of(value);
-        const auto substitute = [&](const std::string& text, const Place& place) { return substituted(text, place.line ? place : value.place); };
-        const auto converted = yaml.option(value.value, value.place, option, "option '" + option.name + "' of " + node.info.name, substitute);
+        const auto substitute = [&](const std::string& text, const Place& place) { return input_texts_.put_into(text, place.line ? place : value.place); };
+        const auto converted = yaml.option(value.value, value.place, option, "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
         if (converted) result = in_folder(*converted, option.type, value.folder);
       } else if (option.required) {
-        diagnostics_.add(written.place, "node '" + node.id + "': option '" + option.name + "' of " + node.info.name + " must be given", option.help);
+        diagnostics_.add(written.place, "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name + " must be given", option.help);
       }
       node.options.push_back(std::move(result));
     }
-  }
-
-  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none. $$ is a dollar.
-  std::optional<std::string> substituted(const std::string& text, const Place& place) {
-    std::string result;
-    bool known = true;
-    for (std::size_t i = 0; i < text.size(); ++i) {
-      const bool doubled = text[i] == '$' && i + 1 < text.size() && text[i + 1] == '$';
-      if (text[i] != '$' || doubled) {
-        result += text[i];
-        i += doubled;
-        continue;
-      }
-      std::size_t end = i + 1;
-      while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
-      const std::string name = text.substr(i + 1, end - i - 1);
-      used_inputs_.insert(name);
-      const auto input = written_.inputs.find(name);
-      if (input != written_.inputs.end()) {
-        result += input->second;
-      } else if (contains(written_.missing_inputs, name)) {
-        known = false;
-      } else {
-        known = false;
-        std::vector<std::string> names = written_.missing_inputs;
-        for (const auto& [known, value] : written_.inputs) names.push_back(known);
-        diagnostics_.add(place, "the pipeline has no input '" + name + "'", suggestion(name, names));
-        unknown_inputs_.insert(name);
-      }
-      i = end - 1;
-    }
-    return known ? std::optional(result) : std::nullopt;
   }
 
   static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
@@ -153,13 +144,13 @@ class Resolver {
     const WrittenNode& written = written_.nodes[index];
     PipelineNode& node = pipeline_.nodes[index];
     if (node.info.name.empty()) return;
-    const std::vector<PortInfo> of_kind = catalogue_.ports_of_kind(node.info.kind());
+    const std::vector<PortInfo>& of_kind = ports_of_kind(node.info.kind());
     for (const auto& [name, value] : written.wires) {
       const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
       const bool own = port != node.info.inputs.end();
       const auto sibling = std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
       if (!own && sibling == of_kind.end()) {
-        diagnostics_.add(value.place, "'" + node.info.name + "' has no input '" + name + "'", suggestion(name, names_of(of_kind)));
+        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name), suggested(name, names_of(of_kind)));
         continue;
       }
       // A port that only siblings use is checked like any other, and then left unwired.
@@ -169,7 +160,7 @@ class Resolver {
     }
     for (const PortInfo& port : node.info.inputs)
       if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(), [&](const auto& wire) { return wire.first == port.name; }))
-        diagnostics_.add(written.place, "node '" + node.id + "': input '" + port.name + "' of " + node.info.name + " is not wired",
+        diagnostics_.add(written.place, "node " + in_quotes(node.id) + ": input " + in_quotes(port.name) + " of " + node.info.name + " is not wired",
                          "add  in: {" + port.name + ": ...}  with a " + port.type.id + " (" + port.help + ")");
   }
 
@@ -177,7 +168,7 @@ class Resolver {
     Wire wire;
     const auto add = [&](const YAML::Node& text, const Place& place) {
       if (!text.IsScalar()) {
-        diagnostics_.add(place, "input '" + port.name + "' must name a node", "write it as  " + port.name + ": node  or  node.output");
+        diagnostics_.add(place, "input " + in_quotes(port.name) + " must name a node", "write it as  " + port.name + ": node  or  node.output");
         return;
       }
       Reference source = resolve_reference(text.Scalar(), place, &port.type);
@@ -190,7 +181,7 @@ class Resolver {
     }
     wire.is_list_literal = true;
     if (port.axis.empty()) {
-      diagnostics_.add(value.place, "input '" + port.name + "' of " + node.info.name + " takes one " + port.type.id + ", not a list");
+      diagnostics_.add(value.place, "input " + in_quotes(port.name) + " of " + node.info.name + " takes one " + port.type.id + ", not a list");
       return wire;
     }
     const StrictYaml yaml = yaml_of(value);
@@ -200,16 +191,16 @@ class Resolver {
 
   Reference resolve_reference(const std::string& text, const Place& place, const TypeInfo* type) {
     Reference source{text, place, -1, -1, {}};
-    std::vector<std::string> parts = split(text), ids;
-    for (const PipelineNode& node : pipeline_.nodes) ids.push_back(node.id);
-    const auto found = std::find(ids.begin(), ids.end(), parts.empty() ? "" : parts[0]);
-    used_nodes_.insert(parts.empty() ? text : parts[0]);
-    if (found == ids.end()) {
-      unknown_nodes_.insert(parts.empty() ? text : parts[0]);
-      diagnostics_.add(place, "there is no node '" + (parts.empty() ? text : parts[0]) + "'", suggestion(parts.empty() ? text : parts[0], ids));
+    const std::vector<std::string> parts = split(text);
+    const std::string id = parts.empty() ? text : parts[0];
+    const auto found = index_.find(id);
+    used_nodes_.insert(id);
+    if (found == index_.end()) {
+      unknown_nodes_.insert(id);
+      diagnostics_.add(place, "there is no node " + in_quotes(id), suggested(id, ids_));
       return source;
     }
-    const std::size_t index = std::size_t(found - ids.begin());
+    const std::size_t index = found->second;
     const std::vector<PortInfo>& outputs = pipeline_.nodes[index].info.outputs;
     if (outputs.empty()) return source;  // its node is unknown, which has been said
     std::size_t used = 1;
@@ -223,9 +214,9 @@ class Resolver {
     }
     if (output < 0) {
       if (parts.size() > 1)
-        diagnostics_.add(place, "node '" + parts[0] + "' has no output '" + parts[1] + "'", suggestion(parts[1], names_of(outputs)));
+        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]), suggested(parts[1], names_of(outputs)));
       else
-        diagnostics_.add(place, "node '" + parts[0] + "' has several outputs" + (type ? " and not just one " + type->id : ""),
+        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has several outputs" + (type ? " and not just one " + type->id : ""),
                          "say which: " + parts[0] + "." + joined(names_of(outputs), ", " ));
       return source;
     }
@@ -260,17 +251,16 @@ class Resolver {
     } else if (contract_only ? output.type.id != port.type.id : output.type != port.type) {
       const bool layout = output.type.id == port.type.id;
       diagnostics_.add(source.place,
-                       "input '" + port.name + "' of " + node.info.name + " expects " + port.type.id + ", but '" + source.text + "' is " +
+                       "input " + in_quotes(port.name) + " of " + node.info.name + " expects " + port.type.id + ", but " + in_quotes(source.text) + " is " +
                            output.type.id + " (" + output.help + ")",
                        layout ? "the two plugins were built with different versions of this type; rebuild both" : "");
     }
   }
 
   void resolve_output(const std::string& name, const WrittenValue& value) {
-    if (name.find('/') != std::string::npos || name.empty() || name[0] == '.')
-      diagnostics_.add(value.place, "an output's name becomes a file name: '" + name + "' cannot be one");
+    check_file_name(diagnostics_, value.place, name, "an output's name");
     if (!value.value.IsScalar()) {
-      diagnostics_.add(value.place, "output '" + name + "' must name a node or one of its outputs");
+      diagnostics_.add(value.place, "output " + in_quotes(name) + " must name a node or one of its outputs");
       return;
     }
     pipeline_.outputs.push_back({name, resolve_reference(value.value.Scalar(), value.place, nullptr)});
@@ -281,7 +271,7 @@ class Resolver {
     std::map<std::string, Place> nodes;
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
     point_at_renamed("node", nodes, used_nodes_, unknown_nodes_);
-    point_at_renamed("input", written_.input_places, used_inputs_, unknown_inputs_);
+    point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
   }
 
   void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined, const std::set<std::string>& used,
@@ -289,41 +279,30 @@ class Resolver {
     std::vector<std::string> names;
     for (const auto& [name, place] : defined) names.push_back(name);
     for (const std::string& wanted : unknown) {
+      if (diagnostics_.is_full()) return;
       const std::string nearest = nearest_name(wanted, names);
       if (!nearest.empty() && !used.contains(nearest))
-        diagnostics_.add(defined.at(nearest), "nothing uses " + what + " '" + nearest + "'",
-                         "'" + wanted + "' is used, but is not there: is this it?");
+        diagnostics_.add(defined.at(nearest), "nothing uses " + what + " " + in_quotes(nearest),
+                         in_quotes(wanted) + " is used, but is not there: is this it?");
     }
   }
 
   /// Sources before users, in the file's order otherwise.
   void sort_nodes() {
     std::vector<PipelineNode>& nodes = pipeline_.nodes;
-    std::vector<int> place_of(nodes.size(), -1);
-    std::vector<PipelineNode> sorted;
-    for (bool moved = true; moved && sorted.size() < nodes.size();) {
-      moved = false;
-      for (std::size_t i = 0; i < nodes.size(); ++i) {
-        if (place_of[i] >= 0) continue;
-        bool ready = true;
-        for (const Wire& wire : nodes[i].wires)
-          for (const Reference& source : wire.sources) ready = ready && place_of[std::size_t(source.node)] >= 0;
-        if (!ready) continue;
-        place_of[i] = int(sorted.size());
-        sorted.push_back(nodes[i]);
-        moved = true;
-      }
-    }
-    if (sorted.size() < nodes.size()) {
-      std::vector<std::string> stuck;
-      std::size_t first = nodes.size();
-      for (std::size_t i = 0; i < nodes.size(); ++i)
-        if (place_of[i] < 0) {
-          stuck.push_back(nodes[i].id);
-          first = std::min(first, i);
-        }
-      diagnostics_.add(nodes[first].place, "these nodes wait for each other in a circle: " + joined(stuck, ", "));
+    std::vector<std::size_t> stuck;
+    const std::vector<std::size_t> order = pipeline_order(nodes, stuck);
+    if (!stuck.empty()) {
+      std::vector<std::string> names;
+      for (const std::size_t i : stuck) names.push_back(nodes[i].id);
+      diagnostics_.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names, ", "));
       return;
+    }
+    std::vector<int> place_of(nodes.size());
+    std::vector<PipelineNode> sorted;
+    for (const std::size_t i : order) {
+      place_of[i] = int(sorted.size());
+      sorted.push_back(std::move(nodes[i]));
     }
     for (PipelineNode& node : sorted)
       for (Wire& wire : node.wires)
@@ -336,7 +315,7 @@ class Resolver {
     const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
     const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
     if (source.items.size() > axes)
-      diagnostics_.add(source.place, "'" + source.text + "' picks '" + source.items[axes] + "', but " +
+      diagnostics_.add(source.place, in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
                                          (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
   }
 
@@ -349,7 +328,7 @@ class Resolver {
         if (!diagnostics_.empty()) return;
         for (const std::string& axis : pipeline_.axes_of(source)) {
           if (axis == consumed && wire.is_list_literal)
-            diagnostics_.add(source.place, "'" + source.text + "' is already a list over '" + axis + "'", "pick one item of it");
+            diagnostics_.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis), "pick one item of it");
           else if (axis != consumed && !contains(node.mapped_axes, axis))
             node.mapped_axes.push_back(axis);
         }
@@ -357,7 +336,7 @@ class Resolver {
     }
     for (const PortInfo& output : node.info.outputs)
       if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
-        diagnostics_.add(node.place, "node '" + node.id + "' is called for each item along '" + output.axis + "', but its output '" +
+        diagnostics_.add(node.place, "node " + in_quotes(node.id) + " is called for each item along " + in_quotes(output.axis) + ", but its output '" +
                                          output.name + "' is itself a list over it", "pick one item of its input");
   }
 
@@ -369,7 +348,11 @@ class Resolver {
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
   Pipeline pipeline_;
-  std::set<std::string> used_nodes_, unknown_nodes_, used_inputs_, unknown_inputs_;  ///< by references
+  std::vector<std::string> ids_, node_names_;
+  std::map<std::string, std::size_t> index_;  ///< of nodes, by their ids
+  std::map<std::string, std::vector<PortInfo>> ports_;
+  InputTexts input_texts_;
+  std::set<std::string> used_nodes_, unknown_nodes_;  ///< by references
 };
 
 }  // namespace

@@ -2,8 +2,10 @@
 #include "pipeline_text.hpp"
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
+#include <set>
+
+#include "file_names.hpp"
+#include "printable.hpp"
 
 namespace marrow {
 namespace {
@@ -19,15 +21,9 @@ class Reader {
   }
 
   WrittenPipeline read() {
-    std::ifstream stream(pipeline_.file, std::ios::binary);
-    if (!stream || fs::is_directory(pipeline_.file)) {
-      diagnostics_.add({pipeline_.file.string()}, "the pipeline file cannot be read", "check the path");
-      return pipeline_;
-    }
-    std::ostringstream text;
-    text << stream.rdbuf();
-    diagnostics_.remember(pipeline_.file.string(), text.str());
-    const YAML::Node root = yaml_.parse(text.str());
+    const auto text = read_source(pipeline_.file, "the pipeline file", diagnostics_);
+    if (!text) return pipeline_;
+    const YAML::Node root = yaml_.parse(*text);
     if (!diagnostics_.empty()) return pipeline_;
     read_root(root);
     for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
@@ -38,7 +34,7 @@ class Reader {
   void read_root(const YAML::Node& root) {
     static const std::vector<std::string> kKeys{"marrow", "name", "help", "inputs", "nodes", "outputs"};
     const Place start{pipeline_.file.string(), 1, 1};
-    bool versioned = false, has_nodes = false, has_outputs = false;
+    bool versioned = false, has_name = false, has_nodes = false, has_outputs = false;
     for (const YamlEntry& entry : yaml_.map(root, start, "the pipeline", &kKeys)) {
       if (entry.key == "marrow") {
         versioned = true;
@@ -46,7 +42,11 @@ class Reader {
         if (version && *version != 1)
           yaml_.fault(entry.place, "this file is of format " + std::to_string(*version) + ", this program reads format 1");
       }
-      if (entry.key == "name") pipeline_.name = yaml_.text(entry.value, entry.place, "name").value_or("");
+      if (entry.key == "name") {
+        has_name = true;
+        pipeline_.name = yaml_.text(entry.value, entry.place, "name").value_or("");
+        if (entry.value.IsScalar()) check_file_name(diagnostics_, entry.place, pipeline_.name, "a pipeline's name");
+      }
       if (entry.key == "help") pipeline_.help = yaml_.text(entry.value, entry.place, "help").value_or("");
       if (entry.key == "inputs") read_inputs(entry);
       if (entry.key == "nodes") {
@@ -60,10 +60,18 @@ class Reader {
       }
     }
     if (!root.IsMap()) return;
+    if (!has_name) name_after_file(start);
     if (!versioned) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
     if (!has_nodes) yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
+    else if (pipeline_.nodes.empty() && diagnostics_.empty()) yaml_.fault(start, "the pipeline has no nodes", "name them under  nodes:");
     if (!has_outputs) yaml_.fault(start, "the key 'outputs' is missing", "name what the pipeline is to compute, as  outputs: {name: node}");
     check_given_inputs();
+  }
+
+  void name_after_file(const Place& start) {
+    pipeline_.name = pipeline_.file.stem().string();
+    if (const std::string fault = fault_of_name(pipeline_.name); !fault.empty())
+      yaml_.fault(start, "the pipeline takes its name from its file, and " + in_quotes(pipeline_.name) + " cannot name a folder, " + fault, "add  name: ...");
   }
 
   void read_inputs(const YamlEntry& section) {
@@ -82,14 +90,14 @@ class Reader {
         value.value.reset(node);
         value.folder = folder;
       };
-      for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input '" + input.key + "'", &kKeys)) {
+      for (const YamlEntry& entry : yaml_.map(input.value, input.place, "input " + in_quotes(input.key), &kKeys)) {
         if (entry.key == "help") yaml_.text(entry.value, entry.place, "help");
         if (entry.key == "default") give(entry.place, entry.value, folder_);
         if (entry.key != "type") continue;
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
         if (std::find(kTypes.begin(), kTypes.end(), *type) == kTypes.end())
-          yaml_.fault(entry.place, "unknown type '" + *type + "' of input '" + input.key + "'", suggestion(*type, kTypes));
+          yaml_.fault(entry.place, "unknown type " + in_quotes(*type) + " of input " + in_quotes(input.key), suggestion(*type, kTypes));
         if (*type == "path") info.type = OptionType::path;
         if (*type == "number") info.type = OptionType::number;
         if (*type == "integer") info.type = OptionType::integer;
@@ -105,11 +113,11 @@ class Reader {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
-        yaml_.fault(input.place, "input '" + input.key + "' has no value", "give it on the command line as  " + input.key + "=VALUE");
+        yaml_.fault(input.place, "input " + in_quotes(input.key) + " has no value", "give it on the command line as  " + input.key + "=VALUE");
       return;
     }
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
-    if (!yaml_.option(value->value, value->place, info, "input '" + input.key + "'", no_names)) return;
+    if (!yaml_.option(value->value, value->place, info, "input " + in_quotes(input.key), no_names)) return;
     std::string text = value->value.Scalar();
     if (info.type == OptionType::path) text = (value->folder / text).lexically_normal().string();
     pipeline_.inputs[input.key] = text;
@@ -118,7 +126,7 @@ class Reader {
   void check_given_inputs() {
     for (const InputValue& one : arguments_.inputs)
       if (std::find(declared_.begin(), declared_.end(), one.name) == declared_.end())
-        diagnostics_.add(place_of(one), "the pipeline has no input '" + one.name + "'", suggestion(one.name, declared_));
+        diagnostics_.add(place_of(one), "the pipeline has no input " + in_quotes(one.name), suggestion(one.name, declared_));
   }
 
   static Place place_of(const InputValue& one) { return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place; }
@@ -131,20 +139,20 @@ class Reader {
     node.place = entry.place;
     node.uses_place = entry.place;
     if (entry.key.find('.') != std::string::npos)
-      yaml_.fault(entry.place, "the node's name '" + entry.key + "' has a dot", "dots are for outputs, as in case.views");
+      yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a dot", "dots are for outputs, as in case.views");
     bool has_uses = false;
-    for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node '" + entry.key + "'", &kKeys)) {
+    for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys)) {
       if (part.key == "uses") {
         has_uses = true;
         node.uses_place = yaml_.place(part.value);
         node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
       } else {
         auto& target = part.key == "with" ? node.options : node.wires;
-        for (const YamlEntry& item : yaml_.map(part.value, part.place, "'" + part.key + "' of node '" + node.id + "'"))
+        for (const YamlEntry& item : yaml_.map(part.value, part.place, in_quotes(part.key) + " of node " + in_quotes(node.id)))
           target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
       }
     }
-    if (!has_uses && entry.value.IsMap()) yaml_.fault(entry.place, "node '" + entry.key + "' does not say what it uses", "add  uses: kind.name");
+    if (!has_uses && entry.value.IsMap()) yaml_.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses", "add  uses: kind.name");
     pipeline_.nodes.push_back(std::move(node));
   }
 
@@ -160,7 +168,7 @@ class Reader {
       return;
     }
     if (node == pipeline_.nodes.end()) {
-      diagnostics_.add(place, "the pipeline has no node '" + key.substr(0, dot) + "'", suggestion(key.substr(0, dot), ids));
+      diagnostics_.add(place, "the pipeline has no node " + in_quotes(key.substr(0, dot)), suggestion(key.substr(0, dot), ids));
       return;
     }
     const std::string what = key.substr(dot + 1);
@@ -169,7 +177,7 @@ class Reader {
       // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for this run, in any order.
       const auto of_file = [](const auto& option) { return !option.second.is_override; };
       if (text != node->uses && std::erase_if(node->options, of_file) > 0)
-        pipeline_.notes.push_back("node '" + node->id + "': the options written for " + node->uses + " are not used by " + text);
+        pipeline_.notes.push_back("node " + in_quotes(node->id) + ": the options written for " + node->uses + " are not used by " + text);
       node->uses = text;
       node->uses_place = place;
       return;

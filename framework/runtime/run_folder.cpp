@@ -1,16 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/run_folder.hpp"
 
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <ctime>
 #include <fstream>
 #include <set>
 #include <thread>
 
+#include "file_names.hpp"
 #include "keys.hpp"
 #include "manifest.hpp"
 #include "mapping.hpp"
 #include "marrow/domain/error.hpp"
+#include "printable.hpp"
+#include "text_file.hpp"
 
 namespace marrow {
 namespace {
@@ -18,24 +27,17 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-void write_file(const fs::path& file, const std::string& text) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
-}
+constexpr const char* kAdvice = "; choose another with --out";
 
-/// An item's name becomes a file name.
-std::string file_name(std::string name) {
-  for (char& c : name)
-    if (c == '/' || c == '\\' || c == '\0') c = '_';
-  return name.empty() || name[0] == '.' ? "_" + name : name;
+[[noreturn]] void refuse(const fs::path& folder) {
+  throw Error("the output folder " + folder.string() + " is already there and not empty" + kAdvice + ", or remove it");
 }
 
 void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue, RunFolder::Written& written) {
   if (value.is_list()) {
+    const std::vector<std::string> names = distinct_names(value.names);
     for (std::size_t i = 0; i < value.items.size(); ++i)
-      write_value(value.items[i], stem / file_name(value.names[i]), root, catalogue, written);
+      write_value(value.items[i], stem / file_name_of(names[i]), root, catalogue, written);
     return;
   }
   if (value.is_absent()) {
@@ -48,12 +50,18 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
     return;
   }
   const fs::path file = stem.string() + writer->extension;
+  if (fs::exists(fs::symlink_status(file))) {
+    written.fault = file.string() + " holds another output already; give one of them another name";
+    return;
+  }
   try {
     fs::create_directories(file.parent_path());  // a list without any item that was made leaves no folder
     catalogue.load_writer(value.type).write(value.data.get(), file.string());
-    written.files.push_back(fs::relative(file, root).string());
+    written.files.push_back(file.lexically_relative(root).string());
   } catch (const std::exception& error) {
     written.fault = error.what();
+    std::error_code ignored;
+    fs::remove_all(file, ignored);  // half of it is worse than nothing
   }
 }
 
@@ -66,13 +74,15 @@ std::string utc_now() {
   return text;
 }
 
-/// The keys of the single items of a list, each with its place along the axes, in the order in which files are written.
+/// The keys of the single items of a list, each with its place along the axes, in the order in which files are written. The
+/// place is written as the file's path is, so that no two items have the same.
 void add_items(const Value& value, const std::string& place, json& items) {
   if (!value.is_list()) {
     items.push_back({place, value.key.hex()});
     return;
   }
-  for (std::size_t i = 0; i < value.items.size(); ++i) add_items(value.items[i], place.empty() ? value.names[i] : place + "/" + value.names[i], items);
+  const std::vector<std::string> names = distinct_names(value.names);
+  for (std::size_t i = 0; i < value.items.size(); ++i) add_items(value.items[i], (place.empty() ? "" : place + "/") + file_name_of(names[i]), items);
 }
 
 json items_of(const Value& value) {
@@ -176,12 +186,44 @@ std::string cpu_level() {
 
 RunFolder::RunFolder(const fs::path& folder, const Pipeline& pipeline) : folder_(folder) {
   std::error_code error;
-  if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error)))
-    throw Error("the output folder " + folder.string() + " is already there and not empty; choose another with --out, or remove it");
-  fs::create_directories(folder / "outputs", error);
-  if (error) throw Error("cannot make the output folder " + folder.string() + ": " + error.message() + "; choose another with --out");
-  write_file(folder / "pipeline.yaml", resolved_yaml(pipeline));
-  write_file(folder / "log.txt", "");
+  if (fs::exists(folder, error) && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error))) refuse(folder);
+  fs::create_directories(folder, error);
+  if (error) throw Error("cannot make the output folder " + folder.string() + ": " + error.message() + kAdvice);
+  if (take(pipeline)) return;
+  throw Error("the output folder " + folder.string() + " was taken by another run just now" + kAdvice);
+}
+
+RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeline) {
+  std::error_code error;
+  if (base.has_parent_path()) fs::create_directories(base.parent_path(), error);
+  for (int i = 1;; ++i) {
+    RunFolder run;
+    run.folder_ = i == 1 ? base : fs::path(base.string() + "-" + std::to_string(i));
+    if (::mkdir(run.folder_.c_str(), 0777) == 0 && run.take(pipeline)) return run;
+    if (errno != EEXIST) throw Error("cannot make the output folder " + run.folder_.string() + ": " + std::strerror(errno) + kAdvice);
+  }
+}
+
+bool RunFolder::take(const Pipeline& pipeline) {
+  const fs::path log = folder_ / "log.txt";
+  const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);  // succeeds for one process alone
+  if (file < 0 && errno == EEXIST) return false;
+  if (file < 0) throw Error("cannot write to the output folder " + folder_.string() + ": " + std::strerror(errno) + kAdvice);
+  ::close(file);
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
+    if (entry.path() != log) {
+      fs::remove(log, error);
+      refuse(folder_);
+    }
+  try {
+    write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline));
+    fs::create_directory(folder_ / "outputs");
+    return true;
+  } catch (const std::exception& fault) {
+    for (const char* name : {"log.txt", "pipeline.yaml"}) fs::remove(folder_ / name, error);  // so that a second try finds it empty
+    throw Error(fault.what());
+  }
 }
 
 std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue) {
@@ -199,8 +241,12 @@ std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipelin
 }
 
 void RunFolder::append_log(const std::string& line) {
+  errno = 0;
   std::ofstream stream(folder_ / "log.txt", std::ios::app);
-  stream << line << '\n';
+  stream << printable_lines(line) << '\n';
+  stream.close();
+  if (!stream && log_fault_.empty())
+    log_fault_ = "lines are missing in " + (folder_ / "log.txt").string() + (errno ? std::string(": ") + std::strerror(errno) : "");
 }
 
 void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings, const Catalogue& catalogue,
@@ -235,16 +281,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     }
     record["outputs"].push_back(std::move(output));
   }
-  write_file(folder_ / "run.json", record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
-}
-
-fs::path RunFolder::free_name(const fs::path& base) {
-  std::error_code error;
-  if (!fs::exists(base, error)) return base;
-  for (int i = 2;; ++i) {
-    const fs::path candidate = base.string() + "-" + std::to_string(i);
-    if (!fs::exists(candidate, error)) return candidate;
-  }
+  write_text_file(folder_ / "run.json", record.dump(1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace marrow

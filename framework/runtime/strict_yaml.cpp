@@ -4,9 +4,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <map>
 #include <sstream>
 
+#include "marrow/domain/error.hpp"
+#include "printable.hpp"
+#include "text_file.hpp"
 #include "unclosed.hpp"
+#include "yaml_survey.hpp"
 
 namespace marrow {
 namespace {
@@ -15,7 +20,7 @@ std::string describe(const YAML::Node& node) {
   if (!node.IsDefined() || node.IsNull()) return "nothing";
   if (node.IsMap()) return "a map";
   if (node.IsSequence()) return "a list";
-  return "'" + node.Scalar() + "'";
+  return in_quotes(node.Scalar());
 }
 
 /// A quoted scalar is a text even when it looks like a number.
@@ -31,6 +36,7 @@ std::string show(double value) {
 
 YAML::Node StrictYaml::parse(const std::string& text) {
   try {
+    survey_yaml(text);
     return YAML::Load(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
@@ -56,27 +62,26 @@ std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& wher
     fault(where, what + " must be a map, got " + describe(node), "write it as  key: value  lines");
     return entries;
   }
+  std::map<std::string, int> lines;  ///< of the keys so far
   for (const auto& item : node) {
     const Place key_place = place(item.first);
     if (!item.first.IsScalar()) {
       fault(key_place, "a key in " + what + " must be a name, got " + describe(item.first));
       continue;
     }
-    const std::string key = item.first.Scalar();
+    const std::string& key = item.first.Scalar();
+    const auto [twin, is_new] = lines.try_emplace(key, key_place.line);
     if (key == "<<") {
       fault(key_place, "merge keys (<<) are not supported", "repeat the entries");
-      continue;
+    } else if (!is_new) {
+      fault(key_place, in_quotes(key) + " is given twice in " + what, "the first is at line " + std::to_string(twin->second));
+    } else if (printable(key) != key) {
+      fault(key_place, "the key " + in_quotes(key) + " in " + what + " holds a control character", "write it without");
+    } else if (known && std::find(known->begin(), known->end(), key) == known->end()) {
+      fault(key_place, "unknown key " + in_quotes(key) + " in " + what, suggestion(key, *known));
+    } else {
+      entries.push_back({key, key_place, item.second});
     }
-    const auto twin = std::find_if(entries.begin(), entries.end(), [&](const YamlEntry& entry) { return entry.key == key; });
-    if (twin != entries.end()) {
-      fault(key_place, "'" + key + "' is given twice in " + what, "the first is at line " + std::to_string(twin->place.line));
-      continue;
-    }
-    if (known && std::find(known->begin(), known->end(), key) == known->end()) {
-      fault(key_place, "unknown key '" + key + "' in " + what, suggestion(key, *known));
-      continue;
-    }
-    entries.push_back({key, key_place, item.second});
   }
   return entries;
 }
@@ -163,7 +168,7 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
       const auto value = text(node, where, what);
       if (!value) return std::nullopt;
       if (!info.choices.empty() && std::find(info.choices.begin(), info.choices.end(), *value) == info.choices.end()) {
-        fault(where, what + ": '" + *value + "' is not one of its choices", suggestion(*value, info.choices));
+        fault(where, what + ": " + in_quotes(*value) + " is not one of its choices", suggestion(*value, info.choices));
         return std::nullopt;
       }
       return *value;
@@ -197,6 +202,19 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
   }
   if (info.type == OptionType::numbers) return numbers;
   return texts;
+}
+
+std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what, Diagnostics& diagnostics) {
+  try {
+    std::string text = read_text_file(file, kMostSourceBytes, Kinds::files_and_pipes);
+    diagnostics.remember(file.string(), text);
+    return text;
+  } catch (const Error& error) {
+    const std::string fault = error.what();  // begins with the file's name, which the place says
+    const bool is_there = fault.find(" is longer than ") != std::string::npos;
+    diagnostics.add({file.string()}, what + fault.substr(file.string().size()), is_there ? "" : "check the path");
+    return std::nullopt;
+  }
 }
 
 }  // namespace marrow

@@ -56,4 +56,8 @@ class StrictYaml {
   std::optional<Place> only_;
 };
 
+/// The text of a file that people write, kept for showing its lines; `what` names it in the fault ("the pipeline file") where
+/// it cannot be read or is longer than 4 MB, and nothing is given.
+std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what, Diagnostics& diagnostics);
+
 }  // namespace marrow

@@ -42,18 +42,30 @@ void view(const marrow::View& view, const std::string& path) {
   });
 }
 
-/// A view's name as the name of its files.
-std::string file_stem(const std::string& name, std::size_t index) {
-  const bool plain = !name.empty() && std::all_of(name.begin(), name.end(), [](unsigned char c) {
+bool is_plain(const std::string& name) {
+  return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char c) {
     return std::isalnum(c) || c == '_' || c == '-';
   });
-  return plain ? name : "view-" + std::to_string(index + 1);
+}
+
+/// The views' names as the names of their files; where one cannot be, a number that no other view has.
+std::vector<std::string> file_stems(const std::vector<std::string>& names) {
+  std::vector<std::string> stems, taken = names;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    std::string stem = names[i];
+    for (std::size_t number = i + 1; !is_plain(names[i]) && (stem == names[i] || std::count(taken.begin(), taken.end(), stem)); ++number)
+      stem = "view-" + std::to_string(number);
+    taken.push_back(stem);
+    stems.push_back(stem);
+  }
+  return stems;
 }
 
 std::string views_text(const marrow::Case& value, const fs::path& folder) {
   std::string text = "views:\n";
+  const std::vector<std::string> stems = file_stems(value.views.names());
   for (std::size_t i = 0; i < value.views.size(); ++i) {
-    const ViewFiles files = write_view_files(value.views[i], folder, file_stem(value.views.name(i), i));
+    const ViewFiles files = write_view_files(value.views[i], folder, stems[i]);
     text += "  - name: " + quoted(value.views.name(i)) + "\n    image: " + files.image +
             "\n    camera: " + files.camera + "\n";
     if (!files.mask.empty()) text += "    mask: " + files.mask + "\n";
@@ -78,6 +90,13 @@ std::string fragments_text(const marrow::Case& value) {
 void check_case(const marrow::Case& value, const std::string& path) {
   if (value.views.empty()) throw marrow::Error(path + ": the case has no view");
   if (value.seeds.empty()) throw marrow::Error(path + ": the case has no fragment with seeds");
+  const auto check_distinct = [&](const std::vector<std::string>& names, const std::string& what) {
+    for (std::size_t i = 0; i < names.size(); ++i)
+      if (std::find(names.begin(), names.begin() + std::ptrdiff_t(i), names[i]) != names.begin() + std::ptrdiff_t(i))
+        throw marrow::Error(path + ": two " + what + " are named '" + names[i] + "'");
+  };
+  check_distinct(value.views.names(), "views");
+  check_distinct(value.seeds.names(), "fragments");
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
       if (!value.seeds.find(name))

@@ -15,9 +15,16 @@ void append(std::string& bytes, const T& value) {
   bytes.append(first, sizeof value);
 }
 
+/// A name in one line of the header: a line break in it would begin another one.
+std::string in_one_line(std::string name) {
+  for (char& c : name)
+    if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
+  return name;
+}
+
 /// Binary PLY with double coordinates, so that what is read back is the same to the last bit.
 void mesh(const marrow::Mesh& mesh, const std::string& path) {
-  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + mesh.frame +
+  std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + in_one_line(mesh.frame) +
                       "\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
                       "\nproperty double x\nproperty double y\nproperty double z\nelement face " +
                       std::to_string(mesh.triangles.size()) + "\nproperty list uchar int vertex_indices\nend_header\n";

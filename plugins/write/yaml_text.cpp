@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "yaml_text.hpp"
 
+#include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <cstdio>
@@ -10,6 +12,18 @@ namespace {
 
 std::string segment(const LineSegment& line) {
   return "{from_px: " + vector(line.from_px) + ", to_px: " + vector(line.to_px) + "}";
+}
+
+/// Plain where it is a word, else in quotes: a name may be yes, 1, or hold a colon or a line break.
+std::string name(const std::string& text) {
+  const auto is_of_word = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
+  static const char* const kNoTexts[] = {"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
+  std::string small = text;
+  for (char& c : small) c = char(std::tolower(static_cast<unsigned char>(c)));
+  const bool is_word = !text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) &&
+                       std::all_of(text.begin(), text.end(), is_of_word) &&
+                       std::find(std::begin(kNoTexts), std::end(kNoTexts), small) == std::end(kNoTexts);
+  return is_word ? text : quoted(text);
 }
 
 /// Standard deviations as people read them: degrees about and mm along the fragment's axes.
@@ -63,8 +77,9 @@ std::string transform(const RigidTransform& t, const std::string& indent) {
   Eigen::Matrix4d whole = Eigen::Matrix4d::Identity();
   whole.topLeftCorner<3, 3>() = t.rotation;
   whole.topRightCorner<3, 1>() = t.translation_mm;
-  return indent + "target: " + t.target + "\n" + indent + "source: " + t.source + "\n" + indent + "matrix:  # " +
-         t.target + "_from_" + t.source + ", mm\n" + matrix(whole, indent + "  ");
+  const std::string target = name(t.target), source = name(t.source);
+  return indent + "target: " + target + "\n" + indent + "source: " + source + "\n" + indent + "matrix:  # " + target +
+         "_from_" + source + ", mm\n" + matrix(whole, indent + "  ");
 }
 
 std::string camera(const Camera& camera) {

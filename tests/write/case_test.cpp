@@ -79,6 +79,18 @@ TEST(WriteCase, ReplacesAnEarlierOneAndWritesTheSameBytes) {
   EXPECT_EQ(folders, 2) << "nothing temporary is left";
 }
 
+TEST(WriteCase, EachViewHasFilesOfItsOwn) {
+  EXPECT_EQ(file_stems({"frontal", "view-2", "a/b", "a b", "view-3", "", std::string(300, 'x')}),
+            (std::vector<std::string>{"frontal", "view-2", "view-4", "view-5", "view-3", "view-6", "view-7"}));
+  const TemporaryFolder folder;
+  marrow::Case written = example_case();
+  written.views = {};
+  for (const char* name : {"view-2", "a/b", "a b", "a\nb: c"})
+    written.views.add(name, example_view(name, CV_16U, double(written.views.size())));
+  write_case(written, (folder / "case").string());
+  EXPECT_EQ(marrow::hash_of(read_back(folder / "case").views), marrow::hash_of(written.views));
+}
+
 TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   const TemporaryFolder folder;
   const std::string path = (folder / "case").string();
@@ -88,6 +100,12 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   value = example_case();
   value.views = {};
   EXPECT_SAYS((write_case(value, path), 0), "case: the case has no view");
+  value = example_case();
+  value.views.add("frontal", example_view("frontal", CV_8U, 0));
+  EXPECT_SAYS((write_case(value, path), 0), "case: two views are named 'frontal'");
+  value = example_case();
+  value.seeds.add("distal", {"distal", {{1, 2, 3}}, false});
+  EXPECT_SAYS((write_case(value, path), 0), "case: two fragments are named 'distal'");
   value = example_case();
   value.ct.values.pop_back();
   EXPECT_SAYS((write_case(value, path), 0), "ct.mha: 24 samples expected from the grid's size, got 23");

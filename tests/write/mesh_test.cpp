@@ -20,6 +20,14 @@ TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
   EXPECT_EQ(marrow::hash_of(marrow::read::read_mesh_file(folder / "m.ply", 1)), marrow::hash_of(example()));
 }
 
+TEST(WriteMesh, NameOfTheFrameAddsNothingToTheHeader) {
+  const marrow::test::TemporaryFolder folder;
+  marrow::Mesh value = example();
+  value.frame = "ct\nelement vertex 1000000\r\x1b[2J";
+  mesh(value, (folder / "m.ply").string());
+  EXPECT_EQ(marrow::read::read_mesh_file(folder / "m.ply", 1).vertices_mm.size(), 4u);
+}
+
 TEST(WriteMesh, FullDisk) {
   const marrow::test::TemporaryFolder folder;
   for (const rlim_t bytes : {0, 100, 300})

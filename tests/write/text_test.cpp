@@ -2,6 +2,7 @@
 #include "plugins/write/text.cpp"
 
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <limits>
 
@@ -37,6 +38,17 @@ TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
   EXPECT_NE(text.find("target: world\nsource: ct\nmatrix:  # world_from_ct, mm\n"), std::string::npos) << text;
   EXPECT_NE(text.find("predicted_deviation:"), std::string::npos);
   EXPECT_NE(text.find(", 0.35"), std::string::npos) << "degrees about the long axis\n" << text;
+}
+
+TEST(WriteText, FramesOfAnyNameReadBack) {
+  marrow::Truth value;
+  for (const char* name : {"yes", "1", "a: b", "# no comment", "line\nbreak: 1", "", "~"}) {
+    value.world_from_model.source = name;
+    const YAML::Node read = YAML::Load(marrow::write::truth(value));
+    EXPECT_EQ(read["source"].Scalar(), name);
+    EXPECT_EQ(read["source"].Tag(), "!") << "a text, whatever it looks like";
+    EXPECT_EQ(read.size(), 4u) << marrow::write::truth(value);
+  }
 }
 
 TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {

@@ -9,6 +9,7 @@
 #include "marrow/runtime/diagnostics.hpp"
 #include "marrow/runtime/kinds.hpp"
 #include "marrow/runtime/library.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -52,35 +53,35 @@ void print_ports(const char* title, const std::vector<PortInfo>& ports, bool inp
   if (ports.empty()) return;
   std::printf("\n%s\n", title);
   for (const PortInfo& port : ports)
-    std::printf("  %-14s %-28s %s%s\n", port.name.c_str(), port_text(port).c_str(), inputs && port.optional ? "(optional) " : "", port.help.c_str());
+    std::printf("  %-14s %-28s %s%s\n", printable(port.name).c_str(), printable(port_text(port)).c_str(), inputs && port.optional ? "(optional) " : "", printable(port.help).c_str());
 }
 
 void print_snippet(const NodeInfo& node) {
-  std::printf("  %s:\n    uses: %s  # %s\n", node.name.substr(node.name.find('.') + 1).c_str(), node.name.c_str(), node.summary.c_str());
+  std::printf("  %s:\n    uses: %s  # %s\n", printable(node.name.substr(node.name.find('.') + 1)).c_str(), printable(node.name).c_str(), printable(node.summary).c_str());
   if (!node.inputs.empty()) {
     std::printf("    in:\n");
     for (const PortInfo& port : node.inputs)
-      std::printf("      %s%s: %s  # %s%s: %s\n", port.optional ? "# " : "", port.name.c_str(), "NODE", port.optional ? "optional " : "", port_text(port).c_str(), port.help.c_str());
+      std::printf("      %s%s: %s  # %s%s: %s\n", port.optional ? "# " : "", printable(port.name).c_str(), "NODE", port.optional ? "optional " : "", printable(port_text(port)).c_str(), printable(port.help).c_str());
   }
   if (node.options.empty()) return;
   std::printf("    with:\n");
   for (const OptionInfo& option : node.options)
-    std::printf("      %s: %s  # %s (%s)\n", option.name.c_str(), option.required ? "VALUE" : yaml_text(option.default_value).c_str(), option.help.c_str(), range_text(option).c_str());
+    std::printf("      %s: %s  # %s (%s)\n", printable(option.name).c_str(), option.required ? "VALUE" : printable(yaml_text(option.default_value)).c_str(), printable(option.help).c_str(), printable(range_text(option)).c_str());
 }
 
 void print_node(const NodeInfo& node, const LibraryInfo& library) {
-  std::printf("%s\n  %s\n", node.name.c_str(), node.summary.c_str());
+  std::printf("%s\n  %s\n", printable(node.name).c_str(), printable(node.summary).c_str());
   if (const Kind* kind = find_kind(node.kind())) std::printf("\nKind\n  %s: %s\n", kind->name.c_str(), kind->help.c_str());
   print_ports("Inputs", node.inputs, true);
   print_ports("Outputs", node.outputs, false);
   if (!node.options.empty()) std::printf("\nOptions\n");
   for (const OptionInfo& option : node.options) {
-    std::printf("  %-26s %s\n", option.name.c_str(), option.help.c_str());
-    std::printf("  %-26s %s; %s\n", "", range_text(option).c_str(), option.required ? "must be given" : ("default " + yaml_text(option.default_value)).c_str());
+    std::printf("  %-26s %s\n", printable(option.name).c_str(), printable(option.help).c_str());
+    std::printf("  %-26s %s; %s\n", "", printable(range_text(option)).c_str(), option.required ? "must be given" : printable("default " + yaml_text(option.default_value)).c_str());
   }
   if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
   print_limits(node);
-  std::printf("\nLibrary\n  %s\n  build id %s\n", library.file.c_str(), library.build_id.hex().c_str());
+  std::printf("\nLibrary\n  %s\n  build id %s\n", printable(library.file.string()).c_str(), library.build_id.hex().c_str());
 }
 
 }  // namespace
@@ -133,21 +134,21 @@ int list(const std::string& kind, bool as_json) {
     }
     if (node.kind() != previous) {
       const Kind* contract = find_kind(node.kind());
-      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", node.kind().c_str(), contract ? ": " : "", contract ? contract->help.c_str() : "");
+      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", printable(node.kind()).c_str(), contract ? ": " : "", contract ? contract->help.c_str() : "");
       previous = node.kind();
     }
-    std::printf("  %-34s %s\n", name.c_str(), node.summary.c_str());
+    std::printf("  %-34s %s\n", printable(name).c_str(), printable(node.summary).c_str());
   }
-  if (as_json) std::printf("%s\n", all.dump(1).c_str());
+  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
   if (!kind.empty() && shown == 0) {
     std::vector<std::string> kinds_known;
     for (const Kind& one : kinds()) kinds_known.push_back(one.name);
-    std::fprintf(stderr, "marrow: error: no node of kind '%s'; %s\n", kind.c_str(), suggestion(kind, kinds_known).c_str());
+    std::fprintf(stderr, "marrow: error: no node of kind '%s'; %s\n", printable(kind).c_str(), printable(suggestion(kind, kinds_known)).c_str());
     return 2;
   }
   if (!as_json)
     for (const LibraryInfo& library : catalogue.libraries())
-      if (!library.refused.empty()) std::fprintf(stderr, "marrow: note: %s was refused (see 'marrow doctor')\n", library.file.filename().c_str());
+      if (!library.refused.empty()) std::fprintf(stderr, "marrow: note: %s was refused (see 'marrow doctor')\n", printable(library.file.filename().string()).c_str());
   return 0;
 }
 
@@ -155,11 +156,11 @@ int inspect(const std::string& name, bool yaml, bool as_json) {
   const Catalogue catalogue;
   const NodeInfo* node = catalogue.find(name);
   if (!node) {
-    std::fprintf(stderr, "marrow: error: there is no node '%s'; %s\n", name.c_str(), suggestion(name, catalogue.node_names()).c_str());
+    std::fprintf(stderr, "marrow: error: there is no node '%s'; %s\n", printable(name).c_str(), printable(suggestion(name, catalogue.node_names())).c_str());
     return 2;
   }
   if (yaml) print_snippet(*node);
-  else if (as_json) std::printf("%s\n", node_json(*node).dump(1).c_str());
+  else if (as_json) std::printf("%s\n", node_json(*node).dump(1, ' ', false, json::error_handler_t::replace).c_str());
   else print_node(*node, *catalogue.library_of(name));
   return 0;
 }
@@ -187,11 +188,11 @@ int doctor(bool as_json) {
     for (const WriterInfo& writer : library.writers) text += (text.empty() ? "writes " : ", writes ") + writer.type.id;
     all["libraries"].push_back({{"file", library.file.string()}, {"refused", library.refused}, {"note", library.note}, {"nodes", nodes}, {"build_id", library.build_id.hex()}});
     if (as_json) continue;
-    if (library.refused.empty()) std::printf("  good     %s: %s\n", library.file.filename().c_str(), text.c_str());
-    else std::printf("  REFUSED  %s: it %s\n", library.file.c_str(), library.refused.c_str());
-    if (!library.note.empty()) std::printf("           note: %s\n", library.note.c_str());
+    if (library.refused.empty()) std::printf("  good     %s: %s\n", printable(library.file.filename().string()).c_str(), printable(text).c_str());
+    else std::printf("  REFUSED  %s: it %s\n", printable(library.file.string()).c_str(), printable(library.refused).c_str());
+    if (!library.note.empty()) std::printf("           note: %s\n", printable(library.note).c_str());
   }
-  if (as_json) std::printf("%s\n", all.dump(1).c_str());
+  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
   else std::printf("\n%zu libraries, %d refused, %zu nodes\n", catalogue.libraries().size(), refused, catalogue.node_names().size());
   return refused ? 1 : 0;
 }
@@ -199,7 +200,7 @@ int doctor(bool as_json) {
 int describe(const std::filesystem::path& file, bool write) {
   const LibraryInfo info = describe_library(file);
   if (!info.refused.empty()) {
-    std::fprintf(stderr, "marrow: error: %s %s\n", file.c_str(), info.refused.c_str());
+    std::fprintf(stderr, "marrow: error: %s %s\n", printable(file.string()).c_str(), printable(info.refused).c_str());
     return 1;
   }
   if (write) {
@@ -208,7 +209,7 @@ int describe(const std::filesystem::path& file, bool write) {
   }
   json all = json::array();
   for (const NodeInfo& node : info.nodes) all.push_back(node_json(node));
-  std::printf("%s\n", all.dump(1).c_str());
+  std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
   return 0;
 }
 

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "commands.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -10,6 +11,16 @@ std::string axes_text(const std::vector<std::string>& axes) {
   std::string text;
   for (const std::string& axis : axes) text += (text.empty() ? "" : " x ") + axis;
   return text;
+}
+
+/// Between the quotes of a DOT file.
+std::string dot_text(const std::string& text) {
+  std::string result;
+  for (const char c : printable(text)) {
+    if (c == '"' || c == '\\') result += '\\';
+    result += c;
+  }
+  return result;
 }
 
 void print_text(const Pipeline& pipeline) {
@@ -21,33 +32,34 @@ void print_text(const Pipeline& pipeline) {
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
-      std::printf("    %s <- %s\n", node.info.inputs[std::size_t(wire.port)].name.c_str(), sources.c_str());
+      std::printf("    %s <- %s\n", node.info.inputs[std::size_t(wire.port)].name.c_str(), printable(sources).c_str());
     }
   }
   std::printf("outputs\n");
   for (const PipelineOutput& output : pipeline.outputs) {
     const std::vector<std::string> axes = pipeline.axes_of(output.source);
-    std::printf("    %s <- %s%s\n", output.name.c_str(), output.source.text.c_str(), axes.empty() ? "" : ("  (a list over " + axes_text(axes) + ")").c_str());
+    std::printf("    %s <- %s%s\n", output.name.c_str(), printable(output.source.text).c_str(), axes.empty() ? "" : ("  (a list over " + axes_text(axes) + ")").c_str());
   }
 }
 
 void print_dot(const Pipeline& pipeline) {
-  std::printf("digraph \"%s\" {\n  rankdir=LR; node [shape=box, style=rounded, fontname=\"sans-serif\"];\n", pipeline.name.c_str());
+  std::printf("digraph \"%s\" {\n  rankdir=LR; node [shape=box, style=rounded, fontname=\"sans-serif\"];\n", dot_text(pipeline.name).c_str());
   for (const PipelineNode& node : pipeline.nodes) {
     const std::string axes = node.mapped_axes.empty() ? "" : "\\nfor each " + axes_text(node.mapped_axes);
-    std::printf("  \"%s\" [label=\"%s\\n%s%s\"];\n", node.id.c_str(), node.id.c_str(), node.info.name.c_str(), axes.c_str());
+    const std::string id = dot_text(node.id);
+    std::printf("  \"%s\" [label=\"%s\\n%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(), axes.c_str());
   }
   const auto edge = [&](const Reference& source, const std::string& target, const std::string& port) {
     const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
     const PortInfo& output = from.info.outputs[std::size_t(source.output)];
     // Functions travel along dashed edges, data along solid ones.
-    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", from.id.c_str(), target.c_str(), port.c_str(), output.type.is_function ? ", style=dashed" : "");
+    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", dot_text(from.id).c_str(), dot_text(target).c_str(), dot_text(port).c_str(), output.type.is_function ? ", style=dashed" : "");
   };
   for (const PipelineNode& node : pipeline.nodes)
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) edge(source, node.id, node.info.inputs[std::size_t(wire.port)].name);
   for (const PipelineOutput& output : pipeline.outputs) {
-    std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", output.name.c_str(), output.name.c_str());
+    std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", dot_text(output.name).c_str(), dot_text(output.name).c_str());
     edge(output.source, "output " + output.name, "");
   }
   std::printf("}\n");

@@ -6,6 +6,7 @@
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
 #include "report/report.hpp"
+#include "runtime/printable.hpp"
 
 namespace {
 
@@ -42,7 +43,7 @@ int main(int argc, char** argv) {
   RunRequest run_request;
   auto* run_command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
   add_pipeline_arguments(run_command, run_request.pipeline);
-  run_command->add_option("--out", run_request.folder, "folder to write; new or empty (default: runs/NAME)");
+  run_command->add_option("--out", run_request.folder, "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
   run_command->add_option("--seed", run_request.seed, "seed of all randomness")->capture_default_str();
   run_command->add_option("--threads", run_request.threads, "threads to use (default: all)")->check(CLI::Range(1, 1024));
   run_command->add_flag("--no-cache", run_request.no_cache, "neither read nor keep results of nodes");
@@ -78,7 +79,7 @@ int main(int argc, char** argv) {
   RerunRequest rerun_request;
   auto* rerun_command = app.add_subcommand("rerun", "repeat a run from its folder, computing everything anew, and say whether the results are the same");
   rerun_command->add_option("run", rerun_request.run, "folder of the run, or of a cell of a comparison")->required();
-  rerun_command->add_option("--out", rerun_request.folder, "folder to write; new or empty (default: runs/NAME-rerun)");
+  rerun_command->add_option("--out", rerun_request.folder, "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... where that is there)");
   rerun_command->add_flag("--quiet", rerun_request.quiet, "no progress");
   rerun_command->add_flag("--json", rerun_request.json, "print the differences as JSON");
   rerun_command->callback([&] { code = rerun(rerun_request); });
@@ -94,7 +95,7 @@ int main(int argc, char** argv) {
   std::filesystem::path shown_run, shown_file;
   auto* show_command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
   show_command->add_option("run", shown_run, "folder of the run")->required();
-  show_command->add_option("--out", shown_file, "HTML file to write (default: RUN/report.html)");
+  show_command->add_option("--out", shown_file, "HTML file to write; one that is there is replaced (default: RUN/report.html)");
   show_command->callback([&] { code = show(shown_run, shown_file); });
 
   PipelineRequest check_request;
@@ -147,7 +148,7 @@ int main(int argc, char** argv) {
 
   std::filesystem::path schema_file;
   auto* schema_command = app.add_subcommand("schema", "print the JSON Schema of pipelines, by which editors complete and check");
-  schema_command->add_option("--out", schema_file, "write it to this file");
+  schema_command->add_option("--out", schema_file, "write it to this file; one that is there is replaced");
   schema_command->callback([&] { code = schema(schema_file); });
 
   bool doctor_json = false;
@@ -177,8 +178,10 @@ int main(int argc, char** argv) {
     const int status = app.exit(error);
     return status == 0 ? 0 : 2;
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "marrow: error: %s\n", error.what());
+    std::fprintf(stderr, "marrow: error: %s\n", marrow::printable_lines(error.what()).c_str());
     return 2;
   }
-  return code;
+  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
+  std::fprintf(stderr, "marrow: error: what was to be printed could not be written; is the disk full?\n");
+  return code ? code : 2;
 }

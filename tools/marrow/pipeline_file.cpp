@@ -4,6 +4,7 @@
 
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -22,7 +23,7 @@ void print_json(const Diagnostics& diagnostics) {
   nlohmann::json list = nlohmann::json::array();
   for (const Diagnostic& item : diagnostics.sorted())
     list.push_back({{"file", item.place.file}, {"line", item.place.line}, {"column", item.place.column}, {"message", item.message}, {"hint", item.hint}});
-  std::printf("%s\n", list.dump(1).c_str());
+  std::printf("%s\n", list.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
 }  // namespace
@@ -49,7 +50,7 @@ int check(const PipelineRequest& request, bool json) {
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, false, json)) return 2;
   if (json) return 0;
-  std::printf("%s: good; %zu nodes, %zu outputs\n", request.file.c_str(), pipeline.nodes.size(), pipeline.outputs.size());
+  std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(), pipeline.outputs.size());
   for (const PipelineNode& node : pipeline.nodes) {
     std::string axes;
     for (const std::string& axis : node.mapped_axes) axes += (axes.empty() ? "" : " and ") + axis;
@@ -58,7 +59,7 @@ int check(const PipelineRequest& request, bool json) {
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
     if (!needed[i]) std::printf("  note: %s feeds no output and is not run\n", pipeline.nodes[i].id.c_str());
-  for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", note.c_str());
+  for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", printable(note).c_str());
   return 0;
 }
 

@@ -2,6 +2,7 @@
 #include <cstdio>
 
 #include "commands.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -37,7 +38,7 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   int counts[5] = {};
   double seconds = 0;
   for (std::size_t i = 0; i < planned.size(); ++i) {
-    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), text_of(planned[i]).c_str());
+    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), printable(text_of(planned[i])).c_str());
     ++counts[int(planned[i].what)];
     seconds += planned[i].seconds;
   }

@@ -11,7 +11,8 @@ int rerun(const RerunRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load({request.run / "pipeline.yaml", {}, {}}, catalogue, pipeline, true)) return 2;
-  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / (pipeline.name + "-rerun")) : request.folder, pipeline);
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / (pipeline.name + "-rerun"), pipeline)
+                                            : RunFolder(request.folder, pipeline);
   RunRequest how;
   how.seed = before.seed;
   how.threads = before.threads;
@@ -23,7 +24,7 @@ int rerun(const RerunRequest& request) {
   for (const NodeRecord& node : outcome.result.nodes)
     for (const Value& output : node.outputs) values.add(output);
   const Findings findings = find_differences(std::move(before), read_run(folder.path()), values);
-  if (request.json) std::printf("%s\n", json_of(findings).dump(1).c_str());
+  if (request.json) std::printf("%s\n", json_of(findings).dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
   else print(findings);
   return findings.identical() && !outcome.is_faulty ? 0 : 1;
 }

@@ -11,6 +11,7 @@
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -30,7 +31,7 @@ class Progress {
   Progress(const RunRequest& request, RunFolder& folder) : request_(request), folder_(folder), is_terminal_(isatty(STDERR_FILENO)) {}
 
   void operator()(const RunEvent& event) {
-    const std::string where = event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+    const std::string where = printable(event.item.empty() ? event.node : event.node + " (" + event.item + ")");
     if (request_.json) print_json(event);
     switch (event.kind) {
       case Kind::finished: line(where, seconds_text(event.seconds)); break;
@@ -63,13 +64,13 @@ class Progress {
     folder_.append_log(where + ": " + text);
     if (silent()) return;
     clear();
-    std::fprintf(stderr, "  %-32s %s\n", where.c_str(), text.c_str());
+    std::fprintf(stderr, "  %-32s %s\n", where.c_str(), printable_lines(text).c_str());
   }
 
   void error_line(const std::string& text) {
     folder_.append_log(text);
     clear();
-    std::fprintf(stderr, "marrow: %s\n", text.c_str());
+    std::fprintf(stderr, "marrow: %s\n", printable_lines(text).c_str());
   }
 
   /// On a terminal at most ten times a second; in a log file every five seconds.
@@ -78,7 +79,7 @@ class Progress {
     if (silent() || now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))) return;
     last_ = now;
     clear();
-    std::fprintf(stderr, "  %-32s %3.0f %% %s%s", where.c_str(), 100 * event.fraction, event.text.c_str(), is_terminal_ ? "" : "\n");
+    std::fprintf(stderr, "  %-32s %3.0f %% %s%s", where.c_str(), 100 * event.fraction, printable(event.text).c_str(), is_terminal_ ? "" : "\n");
   }
 
   static void print_json(const RunEvent& event) {
@@ -113,14 +114,14 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed) continue;
     std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls,
-                status_text(record).c_str(), record.reason.empty() ? "" : ": ", record.reason.c_str());
+                status_text(record).c_str(), record.reason.empty() ? "" : ": ", printable_lines(record.reason).c_str());
   }
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);
-  std::printf("results in %s\n", folder.path().c_str());
+  std::printf("results in %s\n", printable(folder.path().string()).c_str());
   for (const RunFolder::Written& output : written) {
-    for (const std::string& file : output.files) std::printf("  %s\n", file.c_str());
-    if (!output.fault.empty()) std::printf("  %s: %s\n", output.output.c_str(), output.fault.c_str());
+    for (const std::string& file : output.files) std::printf("  %s\n", printable(file).c_str());
+    if (!output.fault.empty()) std::printf("  %s: %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
   }
 }
 
@@ -147,7 +148,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   settings.observer = [&](const RunEvent& event) { progress(event); };
   const auto note = [&](const std::string& text) {
     folder.append_log("note: " + text);
-    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", text.c_str());
+    if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
   };
   for (const std::string& text : pipeline.notes) note(text);
   const std::string fault = store ? store->prepare() : "";
@@ -163,10 +164,11 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   outcome.is_faulty = outcome.result.failed();
   for (const RunFolder::Written& output : outcome.written) {
     if (output.fault.empty()) continue;
-    if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), output.fault.c_str());
+    if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
     outcome.is_faulty = true;
   }
-  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", folder.path().c_str());
+  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", printable(folder.path().string()).c_str());
+  if (!folder.log_fault().empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(folder.log_fault()).c_str());
   return outcome;
 }
 
@@ -174,7 +176,7 @@ int run(const RunRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
-  RunFolder folder(request.folder.empty() ? RunFolder::free_name(std::filesystem::path("runs") / pipeline.name) : request.folder, pipeline);
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline) : RunFolder(request.folder, pipeline);
   const Store store;
   const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline), request.no_cache ? nullptr : &store, folder);
   if (request.json) print_json_summary(outcome.result, outcome.written, folder);

@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // The JSON Schema (draft 7) of pipeline files, made from exactly the nodes that are installed here.
 #include <cstdio>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
 #include "commands.hpp"
-#include "marrow/domain/error.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -107,10 +106,7 @@ int schema(const std::filesystem::path& file) {
     std::fputs(text.c_str(), stdout);
     return 0;
   }
-  std::ofstream stream(file);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error("cannot write " + file.string());
+  write_text_file(file, text);
   return 0;
 }
 

@@ -3,7 +3,9 @@
 
 #include <algorithm>
 #include <cstdarg>
+#include <cstdint>
 #include <cstdio>
+#include <fstream>
 #include <map>
 
 #include "difference/numbers.hpp"
@@ -270,6 +272,14 @@ void compare_as_any_of(const Value& before, const Value& now, Amount& amount) {
   ((before.type == TypeInfo::of<T>() && (compare(before.as<T>(), now.as<T>(), amount), true)) || ...);
 }
 
+Amount amount_of_counts(std::uintmax_t before, std::uintmax_t now, std::uintmax_t differ, const std::string& what) {
+  Amount amount;
+  amount.facts = {{"bytes", {before, now}}, {"bytes_differ", differ}};
+  if (before == now) amount.lines.push_back(text("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
+  else amount.lines.push_back(text("%s of %ju bytes, were %ju", what.c_str(), now, before));
+  return amount;
+}
+
 }  // namespace
 
 Amount amount_of(const Value& before, const Value& now) {
@@ -280,14 +290,25 @@ Amount amount_of(const Value& before, const Value& now) {
 }
 
 Amount amount_of_bytes(const std::string& before, const std::string& now, const std::string& what) {
-  Amount amount;
-  const std::size_t common = std::min(before.size(), now.size());
   std::size_t differ = 0;
-  for (std::size_t i = 0; i < common; ++i) differ += before[i] != now[i];
-  amount.facts = {{"bytes", {before.size(), now.size()}}, {"bytes_differ", differ}};
-  if (before.size() == now.size()) amount.lines.push_back(text("%zu of %zu bytes of %s differ", differ, common, what.c_str()));
-  else amount.lines.push_back(text("%s of %zu bytes, were %zu", what.c_str(), now.size(), before.size()));
-  return amount;
+  for (std::size_t i = 0; i < before.size() && i < now.size(); ++i) differ += before[i] != now[i];
+  return amount_of_counts(before.size(), now.size(), differ, what);
+}
+
+Amount amount_of_files(const std::filesystem::path& before, const std::filesystem::path& now) {
+  std::ifstream files[2] = {std::ifstream(before, std::ios::binary), std::ifstream(now, std::ios::binary)};
+  std::vector<char> blocks[2] = {std::vector<char>(1 << 16), std::vector<char>(1 << 16)};
+  std::uintmax_t sizes[2] = {}, differ = 0;
+  for (bool is_more = true; is_more;) {
+    std::streamsize counts[2];
+    for (int k = 0; k < 2; ++k) {
+      files[k].read(blocks[k].data(), std::streamsize(blocks[k].size()));
+      sizes[k] += std::uintmax_t(counts[k] = files[k].gcount());
+    }
+    for (std::streamsize i = 0; i < std::min(counts[0], counts[1]); ++i) differ += blocks[0][std::size_t(i)] != blocks[1][std::size_t(i)];
+    is_more = counts[0] > 0 || counts[1] > 0;
+  }
+  return amount_of_counts(sizes[0], sizes[1], differ, "the file");
 }
 
 }  // namespace marrow::cli

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // By how much two values differ, in the terms of the field: degrees and mm, figures of merit, samples.
+#include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
@@ -19,5 +20,7 @@ Amount amount_of(const Value& before, const Value& now);
 
 /// Of values of which nothing is known but their bytes: `what` names those.
 Amount amount_of_bytes(const std::string& before, const std::string& now, const std::string& what);
+/// The same of two files, which may be larger than the memory.
+Amount amount_of_files(const std::filesystem::path& before, const std::filesystem::path& now);
 
 }  // namespace marrow::cli

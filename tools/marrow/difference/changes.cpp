@@ -52,11 +52,15 @@ std::string file_or_folder(const std::string& path) {
   return (fs::is_directory(path, error) ? "the folder " : fs::exists(path, error) ? "the file " : "") + path;
 }
 
+constexpr std::size_t kMostFunctions = 1000;  // that a node calls; more would only be in a record that somebody made up
+
 class Comparer {
  public:
   Comparer(const RunRecord& before, const RunRecord& now) : before_(before), now_(now) {
     for (const RecordedNode& node : before.nodes)
       if (const RecordedNode* other = now.find(node.id); other && came_out_otherwise(node, *other)) differing_.insert(node.id);
+    for (const RecordedNode& node : now.nodes)  // in an order in which sources come before users
+      if (const RecordedNode* old = before.find(node.id); old && takes_differing(*old, node)) following_.insert(node.id);
   }
 
   RunDifference compare() {
@@ -68,7 +72,7 @@ class Comparer {
         result.only_before.push_back(node.id);
       } else if (!differing_.contains(node.id)) {
         result.same += node.makes_data() || !functions_differ(node, *other);
-      } else if (follows(node, *other)) {
+      } else if (following_.contains(node.id)) {
         result.in_consequence.push_back(node.id);
       } else {
         result.roots.push_back({&node, other, reasons_of(node, *other)});
@@ -130,22 +134,24 @@ class Comparer {
   }
 
   /// Whether data that the node takes, itself or through functions that it calls, differ.
-  bool follows(const RecordedNode& before, const RecordedNode& now) const {
+  bool takes_differing(const RecordedNode& before, const RecordedNode& now) const {
     bool result = false;
-    for_changed_inputs(before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
-      result = result || differing_.contains(from_now.id) || (!from_now.makes_data() && follows(from_before, from_now));
+    for_changed_inputs(before, now, [&](const std::string&, const RecordedNode&, const RecordedNode& from) {
+      result = result || differing_.contains(from.id) || (!from.makes_data() && following_.contains(from.id));
     });
     return result;
   }
 
   std::vector<Change> reasons_of(const RecordedNode& before, const RecordedNode& now) const {
     std::vector<Change> why;
-    add_reasons(before, now, "", why);
+    std::set<std::string> seen;
+    add_reasons(before, now, "", seen, why);
     if (why.empty()) why.push_back(unknown(now.id));
     return why;
   }
 
-  void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through, std::vector<Change>& why) const {
+  /// `seen` are the functions that were looked at.
+  void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through, std::set<std::string>& seen, std::vector<Change>& why) const {
     const auto add = [&](Change change) {
       change.text = through + change.text;
       why.push_back(std::move(change));
@@ -153,8 +159,8 @@ class Comparer {
     for (Change& change : own_changes(before, now, true)) add(std::move(change));
     for (Change& change : other_wires(before, now, true)) add(std::move(change));
     for_changed_inputs(before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
-      const auto is_named = std::any_of(why.begin(), why.end(), [&](const Change& change) { return change.node == from_now.id; });
-      if (!from_now.makes_data() && !is_named) add_reasons(from_before, from_now, "the function of node '" + from_now.id + "', which it calls: ", why);
+      if (from_now.makes_data() || seen.size() >= kMostFunctions || !seen.insert(from_now.id).second) return;
+      add_reasons(from_before, from_now, "the function of node '" + from_now.id + "', which it calls: ", seen, why);
     });
   }
 
@@ -257,6 +263,7 @@ class Comparer {
   const RunRecord& before_;
   const RunRecord& now_;
   std::set<std::string> differing_;  ///< nodes in both runs whose data or fate differ
+  std::set<std::string> following_;  ///< nodes in both runs that take data which differ
 };
 
 }  // namespace

@@ -18,9 +18,9 @@ const T* named(const std::vector<T>& list, const std::string& name) {
 /// Where the values of a run are to be found.
 class Places {
  public:
-  explicit Places(const RunRecord& run) {
+  explicit Places(const RunRecord& run) : folder_(run.folder) {
     for (const RecordedResult& result : run.results)
-      for (const RecordedItem& item : result.items) files_.emplace(item.key, result.file_of(run.folder, item.place));
+      for (const RecordedItem& item : result.items) files_.emplace(item.key, std::pair(&result, item.place));
     for (const RecordedNode& node : run.nodes)
       for (const RecordedOutput& output : node.outputs)
         for (const RecordedItem& item : output.items) makers_.emplace(item.key, node.uses);
@@ -28,11 +28,12 @@ class Places {
   ValueOfRun of(const std::string& key) const {
     const auto file = files_.find(key);
     const auto maker = makers_.find(key);
-    return {key, file == files_.end() ? fs::path() : file->second, maker == makers_.end() ? "" : maker->second};
+    return {key, file == files_.end() ? fs::path() : file->second.first->file_of(folder_, file->second.second), maker == makers_.end() ? "" : maker->second};
   }
 
  private:
-  std::map<std::string, fs::path> files_;
+  fs::path folder_;
+  std::map<std::string, std::pair<const RecordedResult*, std::string>> files_;  ///< an output and the place of an item in it
   std::map<std::string, std::string> makers_;
 };
 

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "difference/findings.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -12,24 +13,24 @@ namespace {
 std::string joined(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
+  return printable(text);
 }
 
 void print_fate(const char* which, const RecordedNode& node) {
   if (node.went_well()) std::printf("  %s it was done\n", which);
-  else std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(), node.reason.empty() ? "" : ": ", node.reason.c_str());
+  else std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(), node.reason.empty() ? "" : ": ", printable_lines(node.reason).c_str());
 }
 
 void print_amount(const std::string& label, std::size_t width, const std::vector<std::string>& lines) {
   if (lines.size() == 1) {
-    std::printf("  %-*s  %s\n", int(width), label.c_str(), lines[0].c_str());
+    std::printf("  %-*s  %s\n", int(width), printable(label).c_str(), printable_lines(lines[0]).c_str());
     return;
   }
-  std::printf("  %s\n", label.c_str());
-  for (const std::string& line : lines) std::printf("      %s\n", line.c_str());
+  std::printf("  %s\n", printable(label).c_str());
+  for (const std::string& line : lines) std::printf("      %s\n", printable(line).c_str());
 }
 
-std::string label_of(const OutputDifference& output, const ItemDifference& item) { return item.place.empty() ? output.name : output.name + " " + item.place; }
+std::string label_of(const OutputDifference& output, const ItemDifference& item) { return printable(item.place.empty() ? output.name : output.name + " " + item.place); }
 
 /// What became of a node, where that is another thing than in the other run.
 std::string fate_of(const Findings& findings, const std::string& id) {
@@ -80,12 +81,12 @@ void print_outputs(const std::vector<OutputDifference>& outputs, std::set<std::p
 void print_roots(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
   bool is_first = true;
   for (const Root& root : findings.difference.roots) {
-    std::printf(is_first ? "First difference: node '%s' (%s)\n" : "Node '%s' (%s) differs by itself, too\n", root.now->id.c_str(), root.now->uses.c_str());
+    std::printf(is_first ? "First difference: node '%s' (%s)\n" : "Node '%s' (%s) differs by itself, too\n", printable(root.now->id).c_str(), printable(root.now->uses).c_str());
     if (!root.before->went_well() || !root.now->went_well()) {
       print_fate("in the first run", *root.before);
       print_fate("in the second run", *root.now);
     }
-    for (const Change& change : root.why) std::printf("  why: %s\n", change.text.c_str());
+    for (const Change& change : root.why) std::printf("  why: %s\n", printable_lines(change.text).c_str());
     if (is_first) print_outputs(root.before->went_well() && root.now->went_well() ? findings.first : partly_there(findings.first), shown);
     is_first = false;
   }
@@ -98,7 +99,7 @@ void print_other_changes(const Findings& findings) {
   for (const Change& change : difference.others) {
     const RecordedNode* node = findings.now.find(change.node);
     const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) != difference.in_consequence.end();
-    std::printf("Also changed: %s%s%s\n", node ? ("node '" + change.node + "': ").c_str() : "", change.text.c_str(),
+    std::printf("Also changed: %s%s%s\n", node ? printable("node '" + change.node + "': ").c_str() : "", printable_lines(change.text).c_str(),
                 node && node->makes_data() && !differs ? " (with the same result)" : "");
   }
   if (difference.rebuilt.empty()) return;
@@ -137,11 +138,11 @@ bool has_unknown_amount(const std::vector<OutputDifference>& outputs) {
 void print(const Findings& findings) {
   const RunDifference& difference = findings.difference;
   const std::string nodes = std::to_string(difference.same) + " node" + (difference.same == 1 ? "" : "s");
-  std::printf("first run (was): %s\nsecond run (is): %s\n\n", findings.before.folder.c_str(), findings.now.folder.c_str());
+  std::printf("first run (was): %s\nsecond run (is): %s\n\n", printable(findings.before.folder.string()).c_str(), printable(findings.now.folder.string()).c_str());
   if (findings.identical()) {
     std::printf("identical: %s came out the same\n", difference.same == 1 ? "the only node" : ("all " + nodes).c_str());
     for (const RecordedNode& node : findings.now.nodes)
-      if (!node.went_well() && node.status != "skipped") std::printf("node '%s' %s in both: %s\n", node.id.c_str(), node.status.c_str(), node.reason.c_str());
+      if (!node.went_well() && node.status != "skipped") std::printf("node '%s' %s in both: %s\n", printable(node.id).c_str(), node.status.c_str(), printable_lines(node.reason).c_str());
     print_other_changes(findings);
     return;
   }
@@ -154,7 +155,7 @@ void print(const Findings& findings) {
   print_results(findings, shown);
   if (has_unknown_amount(findings.first) || has_unknown_amount(findings.results))
     std::printf("\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  marrow run %s --seed %llu\n",
-                (findings.before.folder / "pipeline.yaml").c_str(), static_cast<unsigned long long>(findings.before.seed));
+                printable((findings.before.folder / "pipeline.yaml").string()).c_str(), static_cast<unsigned long long>(findings.before.seed));
 }
 
 }  // namespace marrow::cli

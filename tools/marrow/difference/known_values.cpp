@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "difference/known_values.hpp"
 
-#include <png.h>
 #include <yaml-cpp/yaml.h>
 
-#include <fstream>
 #include <nlohmann/json.hpp>
-#include <sstream>
 
 #include "marrow/runtime/types.hpp"
+#include "run_files.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/text_file.hpp"
+#include "runtime/yaml_survey.hpp"
 
 namespace marrow::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string text_of_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 Metrics metrics_of(const json& file) {
   Metrics metrics;
@@ -50,32 +45,26 @@ Pose pose_of(const YAML::Node& file) {
 
 /// Of 8 bits; nothing for a PNG of 16.
 std::optional<Picture> picture_of(const fs::path& file) {
-  png_image image{};
-  image.version = PNG_IMAGE_VERSION;
-  if (!png_image_begin_read_from_file(&image, file.c_str())) return std::nullopt;
-  const bool is_wide = image.format & PNG_FORMAT_FLAG_LINEAR;
-  image.format = PNG_FORMAT_RGB;
-  Picture picture{cv::Mat(int(image.height), int(image.width), CV_8UC3)};
-  if (is_wide || !png_image_finish_read(&image, nullptr, picture.pixels.data, 0, nullptr)) {
-    png_image_free(&image);
-    return std::nullopt;
-  }
-  return picture;
+  RgbPixels pixels = read_png(file);
+  if (pixels.is_wide) return std::nullopt;
+  return Picture{cv::Mat(pixels.height_px, pixels.width_px, CV_8UC3, pixels.bytes.data()).clone()};
 }
 
 /// The value that a file of outputs/ holds, where this program can read it.
 std::optional<Value> value_of_file(const fs::path& file) {
   const std::string extension = file.extension().string();
   try {
-    if (extension == ".json") return Value::of(std::make_shared<const Metrics>(metrics_of(json::parse(text_of_file(file)))));
+    if (extension == ".json")
+      return Value::of(std::make_shared<const Metrics>(metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
     if (extension == ".yaml") {
-      const YAML::Node yaml = YAML::LoadFile(file.string());
+      const std::string text = read_text_file(file, kMostSourceBytes);
+      survey_yaml(text);
+      const YAML::Node yaml = YAML::Load(text);
       if (yaml["marrow-pose"]) return Value::of(std::make_shared<const Pose>(pose_of(yaml)));
     }
     if (extension == ".png")
       if (auto picture = picture_of(file)) return Value::of(std::make_shared<const Picture>(std::move(*picture)));
-  } catch (const json::exception&) {  // of another kind, or damaged: its bytes are compared
-  } catch (const YAML::Exception&) {
+  } catch (const std::exception&) {  // of another kind, or damaged: its bytes are compared
   }
   return std::nullopt;
 }
@@ -157,7 +146,7 @@ Amount KnownValues::amount(const ValueOfRun& before, const ValueOfRun& now) {
   if (read_before && read_now)
     if (auto amount = amount_of_values(*read_before, *read_now, before, now)) return with_source(std::move(*amount), "files");
   if (is_file(before.file) && is_file(now.file))
-    return with_source(amount_of_bytes(text_of_file(before.file), text_of_file(now.file), "the file"), "files");
+    return with_source(amount_of_files(before.file, now.file), "files");
   Amount unknown;
   const char* whose = !value_before && !value_now ? "of both runs" : value_before ? "of the second run" : "of the first run";
   unknown.lines = {std::string("by how much is not known: the store no longer has the value ") + whose};

@@ -4,23 +4,19 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <nlohmann/json.hpp>
-#include <sstream>
+#include <set>
 
 #include "marrow/domain/error.hpp"
+#include "run_files.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/printable.hpp"
+#include "runtime/strict_yaml.hpp"
 
 namespace marrow::cli {
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
-
-std::string text_of_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 /// A scalar as it is written, a list as [a, b].
 std::string text_of(const YAML::Node& value) {
@@ -40,64 +36,115 @@ RecordedWire wire_of(const YAML::Node& value) {
   return wire;
 }
 
+/// A key, or a content: 32 hexadecimal digits.
+std::string digest_of(const json& value) {
+  const std::string text = value;
+  if (text.size() != 32 || text.find_first_not_of("0123456789abcdef") != std::string::npos) throw Error("a key in it has not 32 hexadecimal digits");
+  return text;
+}
+
+/// Of a plugin or the framework; empty where a node has none.
+std::string build_id_of(const json& object, const char* name) {
+  return object.contains(name) ? digest_of(object[name]) : "";
+}
+
+std::string status_of(const json& object) {
+  static const std::set<std::string> kKnown{"not needed", "done", "skipped", "failed", "not run", "cancelled"};
+  const std::string status = object.at("status");
+  if (!kKnown.contains(status)) throw Error("it says 'status': " + in_quotes(printable(status)));
+  return status;
+}
+
+std::uint64_t seed_of(const json& seed) {
+  if (!seed.is_number_unsigned()) throw Error("its 'seed' is no whole number of 0 or more");
+  return seed;
+}
+
+json list_in(const json& object, const char* name) {
+  const json list = object.value(name, json::array());
+  if (!list.is_array()) throw Error("its '" + std::string(name) + "' is no list");
+  return list;
+}
+
+json map_in(const json& object, const char* name) {
+  const json map = object.value(name, json::object());
+  if (!map.is_object()) throw Error("its '" + std::string(name) + "' is no object");
+  return map;
+}
+
 std::vector<RecordedItem> items_of(const json& list) {
   std::vector<RecordedItem> items;
-  for (const json& item : list) items.push_back({item.at(0), item.at(1)});
+  for (const json& item : list) items.push_back({item.at(0), digest_of(item.at(1))});
   return items;
 }
 
 void add_record(const json& recorded, RecordedNode& node) {
-  node.status = recorded.at("status");
+  node.status = status_of(recorded);
   node.reason = recorded.value("reason", "");
   node.library = recorded.value("library", "");
-  node.build_id = recorded.value("build_id", "");
+  node.build_id = build_id_of(recorded, "build_id");
   node.random = recorded.value("random", false);
-  const json functions = recorded.value("functions", json::array()), items = recorded.value("items", json::object());
-  const json inputs = recorded.value("inputs", json::object()), files = recorded.value("files", json::object());
+  const json functions = list_in(recorded, "functions"), items = map_in(recorded, "items");
+  const json inputs = map_in(recorded, "inputs"), files = map_in(recorded, "files");
   for (const auto& [name, key] : recorded.at("keys").items()) {
     const bool is_function = std::find(functions.begin(), functions.end(), name) != functions.end();
-    node.outputs.push_back({name, key, is_function, items_of(items.value(name, json::array()))});
+    node.outputs.push_back({name, digest_of(key), is_function, items_of(list_in(items, name.c_str()))});
   }
-  for (const auto& [port, key] : inputs.items()) node.input_keys[port] = key;
+  for (const auto& [port, key] : inputs.items()) node.input_keys[port] = digest_of(key);
   for (const auto& [option, content] : files.items())
-    node.files[option] = content.is_null() ? std::nullopt : std::optional(content.get<std::string>());
+    node.files[option] = content.is_null() ? std::nullopt : std::optional(digest_of(content));
+}
+
+/// The resolved pipeline that the run wrote, read with all that could bring a reader down refused.
+YAML::Node pipeline_of(const fs::path& file) {
+  Diagnostics faults;
+  YAML::Node pipeline;
+  if (const auto text = read_source(file, "the pipeline", faults)) pipeline = StrictYaml(file.string(), faults).parse(*text);
+  if (!faults.empty()) throw Error(file.string() + " is not what 'marrow run' wrote: " + faults.sorted()[0].message + "; run it again");
+  return pipeline;
 }
 
 /// The nodes of the resolved pipeline that the run's record speaks of.
-void read_nodes(const fs::path& file, const json& record, RunRecord& run) {
-  const YAML::Node pipeline = YAML::LoadFile(file.string());
+void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
+  std::map<std::string, const json*> recorded;
+  for (const json& one : record.at("nodes")) recorded.emplace(one.at("id"), &one);
   for (const auto& entry : pipeline["nodes"]) {
     RecordedNode node;
     node.id = entry.first.Scalar();
-    const auto recorded = std::find_if(record.at("nodes").begin(), record.at("nodes").end(), [&](const json& one) { return one.at("id") == node.id; });
-    if (recorded == record.at("nodes").end()) continue;
+    const auto found = recorded.find(node.id);
+    if (found == recorded.end()) continue;
     node.uses = entry.second["uses"].Scalar();
     for (const auto& wire : entry.second["in"]) node.wires[wire.first.Scalar()] = wire_of(wire.second);
     for (const auto& option : entry.second["with"]) node.options[option.first.Scalar()] = text_of(option.second);
-    add_record(*recorded, node);
-    if (!recorded->contains("items"))
-      throw Error((run.folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
-                  std::to_string(run.seed));
+    add_record(*found->second, node);
+    run.places.emplace(node.id, run.nodes.size());
     run.nodes.push_back(std::move(node));
   }
 }
 
-RunRecord from_json(const fs::path& folder, const json& record) {
+void check_age(const fs::path& folder, const json& record) {
+  const json nodes = record.contains("nodes") ? record["nodes"] : json();
+  if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), [](const json& node) { return node.contains("items"); })) return;
+  throw Error((folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
+              (record.contains("seed") && record["seed"].is_number() ? record["seed"].dump() : "1"));
+}
+
+RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const json& record) {
   RunRecord run;
   run.folder = folder;
   run.pipeline = record.at("pipeline");
-  run.status = record.at("status");
-  run.framework = record.value("framework", "");
+  run.status = status_of(record);
+  run.framework = build_id_of(record, "framework");
   run.cpu_level = record.value("cpu_level", "");
-  run.seed = record.at("seed");
-  run.threads = record.value("threads", 0);
-  const json inputs = record.value("inputs", json::object());
+  run.seed = seed_of(record.at("seed"));
+  run.threads = int(integer_of(record.value("threads", json(0)), 0, 1024, "its 'threads'"));
+  const json inputs = map_in(record, "inputs");
   for (const auto& [name, value] : inputs.items()) run.arguments.inputs.emplace_back(name, value);
-  for (const std::string text : record.value("overrides", json::array())) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
-  for (const json& plugin : record.value("plugins", json::array())) run.plugins[plugin.at("file")] = plugin.at("build_id");
-  for (const json& output : record.value("outputs", json::array()))
-    run.results.push_back({output.at("name"), output.value("fault", ""), items_of(output.value("items", json::array())), output.value("files", std::vector<std::string>())});
-  read_nodes(folder / "pipeline.yaml", record, run);
+  for (const std::string text : list_in(record, "overrides")) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
+  for (const json& plugin : list_in(record, "plugins")) run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
+  for (const json& output : list_in(record, "outputs"))
+    run.results.push_back({output.at("name"), output.value("fault", ""), items_of(list_in(output, "items")), output.value("files", std::vector<std::string>())});
+  read_nodes(pipeline, record, run);
   return run;
 }
 
@@ -116,15 +163,15 @@ fs::path RecordedResult::file_of(const fs::path& folder, const std::string& plac
   if (present != files.size()) return {};  // one of them could not be written
   for (const RecordedItem& item : items) {
     if (item.is_absent()) continue;
-    if (item.place == place) return folder / files[at];
+    if (item.place == place) return file_of_run(folder, files[at]).value_or(fs::path());
     ++at;
   }
   return {};
 }
 
 const RecordedNode* RunRecord::find(const std::string& id) const {
-  const auto found = std::find_if(nodes.begin(), nodes.end(), [&](const RecordedNode& node) { return node.id == id; });
-  return found == nodes.end() ? nullptr : &*found;
+  const auto found = places.find(id);
+  return found == places.end() ? nullptr : &nodes[found->second];
 }
 
 RunRecord read_run(const fs::path& folder) {
@@ -137,10 +184,15 @@ RunRecord read_run(const fs::path& folder) {
     throw Error(folder.string() + " is not the folder of a run: it has no run.json" + advice);
   }
   if (!has_pipeline) throw Error(folder.string() + " is not the whole folder of a run: it has a run.json, but no pipeline.yaml" + advice);
+  const json record = read_record(folder);
+  const YAML::Node pipeline = pipeline_of(folder / "pipeline.yaml");
+  check_age(folder, record);
   try {
-    return from_json(folder, json::parse(text_of_file(folder / "run.json")));
-  } catch (const json::exception& fault) {
-    throw Error((folder / "run.json").string() + " is not what 'marrow run' wrote: " + fault.what() + "; run it again");
+    return from_json(folder, pipeline, record);
+  } catch (const Error& fault) {
+    refuse_record(folder, fault.what());
+  } catch (const json::exception&) {
+    refuse_record(folder, "what it should say is missing in it, or of another type");
   } catch (const YAML::Exception& fault) {
     throw Error((folder / "pipeline.yaml").string() + " is not what 'marrow run' wrote: " + fault.what() + "; run it again");
   }

@@ -60,6 +60,7 @@ struct RunRecord {
   PipelineArguments arguments;
   std::map<std::string, std::string> plugins;  ///< file name -> build id
   std::vector<RecordedNode> nodes;             ///< that took part, in the pipeline's order
+  std::map<std::string, std::size_t> places;   ///< in it, by the nodes' ids
   std::vector<RecordedResult> results;
 
   const RecordedNode* find(const std::string& id) const;

@@ -3,7 +3,9 @@
 #include <sstream>
 #include <thread>
 
+#include "marrow/domain/error.hpp"
 #include "report/report.hpp"
+#include "run_files.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -120,9 +122,13 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   data["scenes"] = std::move(material.scenes);
   data["graph"] = pipeline_graph(experiment, runner);
 
-  json record;
-  if (!shown.empty()) record = json::parse(text_of_file(runner.pictures_of(shown.front()) / "run.json"), nullptr, false);
-  if (!record.is_object()) record = json::object();
+  material.print_left_out();
+
+  json record = json::object();
+  try {
+    if (!shown.empty()) record = read_record(runner.pictures_of(shown.front()));
+  } catch (const Error&) {  // the report does without
+  }
   data["marrow"] = record.value("marrow", "");
   data["experiment"]["machine"] = machine_of(record);
   data["experiment"]["finished"] = record.value("finished", "");

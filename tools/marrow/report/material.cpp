@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the files of a run's folder give a report. Files are told apart by what they say of themselves.
+#include <cstdio>
 #include <fstream>
 #include <sstream>
 #include <thread>
@@ -7,6 +8,10 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/hash.hpp"
 #include "report/report.hpp"
+#include "run_files.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/printable.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -15,12 +20,6 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr int kPictureSize = 1000;
-
-std::string text_of_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
-}
 
 std::string id_of(const std::string& content) {
   Hasher hasher;
@@ -46,64 +45,93 @@ json landscape_of(const json& file) {
   return profiles;
 }
 
+/// The files that a run's record names.
+std::vector<std::string> files_in(const json& record) {
+  std::vector<std::string> files;
+  for (const json& output : record.value("outputs", json::array()))
+    for (const json& file : output.value("files", json::array())) files.push_back(file);
+  return files;
+}
+
 }  // namespace
 
+void ReportMaterial::add_json(const json& file, json& cell) {
+  if (file.contains("marrow-landscape") && !cell.contains("landscape")) cell["landscape"] = landscape_of(file);
+  if (!file.contains("marrow-scene")) return;
+  json scene = file;
+  for (json& mesh : scene["meshes"]) {
+    json geometry = {{"vertices", mesh["vertices"]}, {"triangles", mesh["triangles"]}};
+    const std::string id = id_of(geometry.dump());
+    geometries[id] = std::move(geometry);
+    mesh = {{"name", mesh["name"]}, {"geometry", id}};
+  }
+  for (json& view : scene["views"]) {
+    const std::string image = view["image"];
+    if (!image.starts_with("data:image/")) throw Error("an image of the scene is not in the file itself");  // an address would be fetched
+    view["image"] = id_of(image);
+    pictures[id_of(image)] = image;
+  }
+  const std::string id = id_of(scene.dump());
+  scenes[id] = std::move(scene);
+  cell["scene"] = id;
+}
+
+void ReportMaterial::add_file(const fs::path& path, const std::string& name, json& cell) {
+  const std::string extension = path.extension().string();
+  if (extension == ".png") {
+    const std::string url = picture_url(path, kPictureSize), id = id_of(url);
+    pictures[id] = url;
+    cell["pictures"].push_back({{"name", fs::path(name).lexically_relative("outputs").replace_extension().string()}, {"picture", id}});
+  } else if (extension == ".json") {
+    add_json(parse_json(read_text_file(path, kMostRecordBytes), name), cell);
+  } else if (extension == ".yaml" && !cell.contains("convergence")) {
+    const json steps = convergence_of(read_text_file(path, kMostRecordBytes));
+    if (!steps.empty()) cell["convergence"] = steps;
+  }
+}
+
 void ReportMaterial::add_run(const fs::path& run_folder, json& cell) {
-  const json record = json::parse(text_of_file(run_folder / "run.json"), nullptr, false);
-  if (!record.is_object() || !record.contains("outputs")) return;
-  const auto add_json = [&](const json& file) {
-    if (file.contains("marrow-landscape") && !cell.contains("landscape")) cell["landscape"] = landscape_of(file);
-    if (!file.contains("marrow-scene")) return;
-    json scene = file;
-    for (json& mesh : scene["meshes"]) {
-      json geometry = {{"vertices", mesh["vertices"]}, {"triangles", mesh["triangles"]}};
-      const std::string id = id_of(geometry.dump());
-      geometries[id] = std::move(geometry);
-      mesh = {{"name", mesh["name"]}, {"geometry", id}};
+  std::vector<std::string> names;
+  try {
+    names = files_in(read_record(run_folder));
+  } catch (const std::exception&) {  // the run was stopped, or its record is damaged
+  }
+  for (const std::string& name : names) {
+    const auto path = file_of_run(run_folder, name);
+    if (!path && leads_outside(run_folder, name)) left_out.push_back(name + " is not shown: it lies outside the run's folder " + run_folder.string());
+    try {
+      if (path) add_file(*path, name, cell);
+    } catch (const std::exception&) {  // a picture of 16 bits as TIFF, a damaged file: the report shows the others
     }
-    for (json& view : scene["views"]) {
-      const std::string image = view["image"];
-      view["image"] = id_of(image);
-      pictures[id_of(image)] = image;
-    }
-    const std::string id = id_of(scene.dump());
-    scenes[id] = std::move(scene);
-    cell["scene"] = id;
-  };
-  for (const json& output : record["outputs"])
-    for (const json& file : output.value("files", json::array())) {
-      const fs::path path = run_folder / file.get<std::string>();
-      const std::string extension = path.extension().string();
-      try {
-        if (extension == ".png") {
-          const std::string url = picture_url(path, kPictureSize), id = id_of(url);
-          pictures[id] = url;
-          cell["pictures"].push_back({{"name", fs::path(file.get<std::string>()).lexically_relative("outputs").replace_extension().string()}, {"picture", id}});
-        } else if (extension == ".json") {
-          add_json(json::parse(text_of_file(path)));
-        } else if (extension == ".yaml" && !cell.contains("convergence")) {
-          const json steps = convergence_of(text_of_file(path));
-          if (!steps.empty()) cell["convergence"] = steps;
-        }
-      } catch (const std::exception&) {  // a picture of 16 bits as TIFF, a damaged file: the report shows the others
-      }
-    }
+  }
+}
+
+void ReportMaterial::print_left_out() const {
+  for (const std::string& line : left_out) std::fprintf(stderr, "marrow: warning: %s\n", printable(line).c_str());
 }
 
 void ReportMaterial::prepare(const fs::path& run_folder) {
   ReportMaterial material;
   json cell = json::object();
   material.add_run(run_folder, cell);
-  std::ofstream(run_folder / "report.json") << json{{"cell", cell}, {"pictures", material.pictures}, {"geometries", material.geometries}, {"scenes", material.scenes}};
+  const json all = {{"cell", cell}, {"pictures", material.pictures}, {"geometries", material.geometries}, {"scenes", material.scenes}, {"left_out", material.left_out}};
+  write_text_file(run_folder / "report.json", all.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
 void ReportMaterial::add_prepared(const fs::path& run_folder, json& cell) {
-  const json prepared = json::parse(text_of_file(run_folder / "report.json"), nullptr, false);
-  if (!prepared.is_object()) return add_run(run_folder, cell);
-  cell.update(prepared.at("cell"));
-  pictures.update(prepared.at("pictures"));
-  geometries.update(prepared.at("geometries"));
-  scenes.update(prepared.at("scenes"));
+  json prepared;
+  try {
+    prepared = parse_json(read_text_file(run_folder / "report.json", kMostRecordBytes), "report.json");
+    for (const char* part : {"cell", "pictures", "geometries", "scenes"})
+      if (!prepared.at(part).is_object()) throw Error("damaged");
+  } catch (const std::exception&) {  // not there, or damaged
+    return add_run(run_folder, cell);
+  }
+  cell.update(prepared["cell"]);
+  pictures.update(prepared["pictures"]);
+  geometries.update(prepared["geometries"]);
+  scenes.update(prepared["scenes"]);
+  for (const std::string line : prepared.value("left_out", json::array())) left_out.push_back(line);
 }
 
 json machine_of(const json& run_record) {

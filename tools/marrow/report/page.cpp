@@ -1,11 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <unistd.h>
-
-#include <cstdlib>
-#include <fstream>
-
-#include "marrow/domain/error.hpp"
 #include "report/report.hpp"
+#include "runtime/text_file.hpp"
 
 // The page without its data, put together by tools/report/assemble.py when marrow is built.
 asm(".section .rodata\n"
@@ -29,15 +24,8 @@ void write_page(const nlohmann::json& data, const std::filesystem::path& file) {
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
-  const std::filesystem::path temporary = file.string() + ".tmp-" + std::to_string(getpid());
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << page.substr(0, at) << "<script type=\"application/json\" id=\"data\">" << safe << "</script>" << page.substr(at + kMarker.size());
-  stream.close();
-  std::error_code error;
-  if (stream) std::filesystem::rename(temporary, file, error);
-  if (stream && !error) return;
-  std::filesystem::remove(temporary, error);
-  throw Error("cannot write " + file.string() + "; is the disk full?");
+  write_text_file(file, std::string(page.substr(0, at)) + "<script type=\"application/json\" id=\"data\">" + safe + "</script>" +
+                            std::string(page.substr(at + kMarker.size())));
 }
 
 }  // namespace marrow::cli

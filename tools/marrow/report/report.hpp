@@ -16,6 +16,8 @@ struct ReportMaterial {
   nlohmann::json pictures = nlohmann::json::object();
   nlohmann::json geometries = nlohmann::json::object();
   nlohmann::json scenes = nlohmann::json::object();
+  std::vector<std::string> left_out;  ///< sentences about files that a record names outside its run's folder
+  void print_left_out() const;
 
   /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left out.
   void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
@@ -23,6 +25,10 @@ struct ReportMaterial {
   static void prepare(const std::filesystem::path& run_folder);
   /// The same as add_run(), from what prepare() kept where it is there.
   void add_prepared(const std::filesystem::path& run_folder, nlohmann::json& cell);
+
+ private:
+  void add_file(const std::filesystem::path& file, const std::string& name, nlohmann::json& cell);
+  void add_json(const nlohmann::json& file, nlohmann::json& cell);
 };
 
 /// The file as a data URL: a PNG at most `size_px` long, as WebP. Throws Error for a file that is no PNG.

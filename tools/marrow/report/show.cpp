@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
-#include <fstream>
-#include <sstream>
+#include <optional>
 
 #include "marrow/domain/error.hpp"
 #include "report/report.hpp"
+#include "run_files.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/printable.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -12,10 +15,19 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-std::string text_of_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
+/// The figures of merit in a file; nothing for one of another kind.
+std::optional<json> metrics_in(const fs::path& folder, const std::string& name) {
+  const auto path = file_of_run(folder, name);
+  if (!path || path->extension() != ".json") return std::nullopt;
+  try {
+    const json file = parse_json(read_text_file(*path, kMostRecordBytes), name);
+    json metrics = json::array();
+    for (const json& metric : file.at("metrics"))
+      metrics.push_back({{"name", metric.at("name").get<std::string>()}, {"unit", metric.value("unit", "")}, {"value", metric.contains("value") ? metric["value"] : json()}});
+    return metrics;
+  } catch (const std::exception&) {  // of another kind, or damaged
+    return std::nullopt;
+  }
 }
 
 /// The figures of merit that the run wrote: a table for each folder of files, a column for each file in it.
@@ -24,22 +36,22 @@ json figures_of(const fs::path& folder, const json& record) {
   for (const json& output : record.value("outputs", json::array()))
     for (const json& file : output.value("files", json::array())) {
       const fs::path path = file.get<std::string>();
-      const json figures = path.extension() == ".json" ? json::parse(text_of_file(folder / path), nullptr, false) : json();
-      if (!figures.is_object() || !figures.contains("metrics")) continue;
+      const auto metrics = metrics_in(folder, path.string());
+      if (!metrics) continue;
       const std::string name = path.parent_path().lexically_relative("outputs").string();
       if (tables.empty() || tables.back()["name"] != name) tables.push_back({{"name", name}, {"columns", json::array()}, {"rows", json::array()}});
       json& table = tables.back();
       table["columns"].push_back(path.stem().string());
-      for (const json& metric : figures["metrics"]) {
+      for (const json& metric : *metrics) {
         json* row = nullptr;
         for (json& one : table["rows"])
-          if (one["name"] == metric.value("name", "")) row = &one;
+          if (one["name"] == metric["name"]) row = &one;
         if (!row) {
-          table["rows"].push_back({{"name", metric.value("name", "")}, {"unit", metric.value("unit", "")}, {"values", json::array()}});
+          table["rows"].push_back({{"name", metric["name"]}, {"unit", metric["unit"]}, {"values", json::array()}});
           row = &table["rows"].back();
         }
         while ((*row)["values"].size() + 1 < table["columns"].size()) (*row)["values"].push_back(nullptr);
-        (*row)["values"].push_back(metric.contains("value") ? metric["value"] : json());
+        (*row)["values"].push_back(metric["value"]);
       }
     }
   return tables;
@@ -58,13 +70,15 @@ std::string reason_of(const json& record) {
   return "it was stopped before it was done";
 }
 
-}  // namespace
+std::string pipeline_text_of(const fs::path& folder) {
+  try {
+    return read_text_file(folder / "pipeline.yaml", kMostSourceBytes);
+  } catch (const Error&) {
+    return "";  // the page does without
+  }
+}
 
-int show(const fs::path& folder, fs::path file) {
-  const json record = json::parse(text_of_file(folder / "run.json"), nullptr, false);
-  if (!record.is_object() || !record.contains("nodes"))
-    throw Error(folder.string() + " is not the folder of a run: it has no run.json that can be read; give the folder that marrow run wrote");
-  if (file.empty()) file = folder / "report.html";
+json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
   const std::string name = fs::absolute(folder / ".").parent_path().filename().string();
   json cell = {{"id", name}, {"variant", 0}, {"case", 0}, {"start", 0}, {"tries", 1}, {"values", json::array()}, {"seconds", record.value("seconds", 0.0)},
                {"status", record.value("status", "") == "done" ? "done" : "failed"}, {"success", nullptr}, {"folder", fs::absolute(folder).lexically_normal().string()}};
@@ -72,7 +86,6 @@ int show(const fs::path& folder, fs::path file) {
   json data = {{"marrow", record.value("marrow", "")}, {"format", 1}, {"kind", "run"}, {"metrics", json::array()}, {"cases", {name}}, {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
   data["figures"] = figures_of(folder, record);
-  ReportMaterial material;
   material.add_run(folder, cell);
   data["cells"] = {cell};
   data["pictures"] = std::move(material.pictures);
@@ -82,11 +95,28 @@ int show(const fs::path& folder, fs::path file) {
   if (graph.is_object()) data["graph"] = graph;
   json plugins = json::array();
   for (const json& plugin : record.value("plugins", json::array())) plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
-  data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", text_of_file(folder / "pipeline.yaml")}, {"seed", record.value("seed", 1)},
+  data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", pipeline_text_of(folder)}, {"seed", record.contains("seed") ? record["seed"] : json(1)},
                         {"finished", record.value("finished", "")}, {"command", "marrow rerun " + folder.string()}, {"folder", cell["folder"]},
                         {"machine", machine_of(record)}, {"plugins", plugins}};
-  write_page(data, file);
-  std::printf("%s\n", fs::absolute(file).lexically_normal().c_str());
+  return data;
+}
+
+}  // namespace
+
+int show(const fs::path& folder, fs::path file) {
+  std::error_code error;
+  if (!fs::exists(folder / "run.json", error))
+    throw Error(folder.string() + " is not the folder of a run: it has no run.json; give the folder that marrow run wrote");
+  const json record = read_record(folder);
+  if (file.empty()) file = folder / "report.html";
+  ReportMaterial material;
+  try {
+    write_page(page_of(folder, record, material), file);
+  } catch (const json::exception&) {
+    refuse_record(folder, "what it should say is missing in it, or of another type");
+  }
+  material.print_left_out();
+  std::printf("%s\n", printable(fs::absolute(file).lexically_normal().string()).c_str());
   return 0;
 }
 

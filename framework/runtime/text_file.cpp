@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "text_file.hpp"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// An open file, closed at the end of its scope.
+class Descriptor {
+ public:
+  Descriptor(const fs::path& file, int flags) : number_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {}
+  ~Descriptor() {
+    if (number_ >= 0) ::close(number_);
+  }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  operator int() const { return number_; }
+  /// Some file systems say only now that there was no room.
+  bool close() { return ::close(std::exchange(number_, -1)) == 0; }
+
+ private:
+  int number_;
+};
+
+std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
+
+bool write_all(int descriptor, const std::string& text) {
+  for (std::size_t done = 0; done < text.size();) {
+    const ssize_t count = ::write(descriptor, text.data() + done, text.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    done += std::size_t(count);
+  }
+  return true;
+}
+
+/// A name beside the file that no other thread or process writes to, as long as none on another machine has this number.
+fs::path free_temporary(const fs::path& file) {
+  static std::atomic<int> count{0};
+  for (struct stat info{};;) {
+    const fs::path name = file.parent_path() / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count));
+    if (::lstat(name.c_str(), &info) != 0) return name;
+  }
+}
+
+}  // namespace
+
+std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes, Kinds kinds) {
+  const auto unreadable = [&](const std::string& why) { return Error(file.string() + " cannot be read: " + why); };
+  const auto too_long = [&] { return Error(file.string() + " is longer than " + std::to_string(most_bytes / 1'000'000) + " MB"); };
+  Descriptor descriptor(file, kinds == Kinds::files ? O_RDONLY | O_NONBLOCK : O_RDONLY);
+  struct stat info{};
+  if (descriptor < 0 || ::fstat(descriptor, &info) != 0) throw unreadable(reason());
+  if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
+  if (kinds == Kinds::files && !S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
+  if (S_ISREG(info.st_mode) && std::uintmax_t(info.st_size) > most_bytes) throw too_long();
+  std::string text;
+  for (std::string block(1 << 16, '\0');;) {
+    const ssize_t count = ::read(descriptor, block.data(), block.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) throw unreadable(reason());
+    if (count == 0) return text;
+    text.append(block, 0, std::size_t(count));
+    if (text.size() > most_bytes) throw too_long();
+  }
+}
+
+void write_text_file(const fs::path& file, const std::string& text) {
+  const auto unwritten = [&](const std::string& why) { return Error("cannot write " + file.string() + ": " + why); };
+  struct stat info{};
+  if (::lstat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISLNK(info.st_mode) && !S_ISDIR(info.st_mode)) {
+    Descriptor device(file, O_WRONLY);
+    if (device < 0 || !write_all(device, text) || !device.close()) throw unwritten(reason());
+    return;
+  }
+  const fs::path temporary = free_temporary(file);
+  Descriptor descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
+  if (descriptor < 0) throw unwritten(reason());
+  if (write_all(descriptor, text) && descriptor.close() && ::rename(temporary.c_str(), file.c_str()) == 0) return;
+  const std::string why = reason();
+  ::unlink(temporary.c_str());
+  throw unwritten(why);
+}
+
+}  // namespace marrow

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whole files: what is not read, and that no half one stands under its name.
+#include "framework/runtime/text_file.hpp"
+
+#include <sys/stat.h>
+
+#include <thread>
+
+#include "marrow/domain/error.hpp"
+#include "runtime/fixture.hpp"
+#include "write/full_disk.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using marrow::read_text_file;
+using marrow::write_text_file;
+
+std::string fault_of(const std::function<void()>& act) {
+  try {
+    act();
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+class TextFileTest : public testing::Test {
+ protected:
+  std::string fault_in_reading(const fs::path& file, std::uintmax_t most = 100) {
+    const std::string fault = fault_of([&] { read_text_file(file, most); });
+    return fault.starts_with(file.string()) ? fault.substr(file.string().size()) : fault;
+  }
+  std::size_t files() const { return std::size_t(std::distance(fs::directory_iterator(scratch.path), fs::directory_iterator())); }
+  Scratch scratch;
+};
+
+TEST_F(TextFileTest, ReadsBackWhatItWrote) {
+  for (const std::string& text : {std::string(), std::string("a\0\r\n\xff", 5), std::string(300000, 'x')}) {
+    write_text_file(scratch.path / "file", text);
+    EXPECT_EQ(read_text_file(scratch.path / "file", 300000), text);
+    EXPECT_EQ(files(), 1u) << "nothing temporary is left";
+  }
+}
+
+TEST_F(TextFileTest, SaysWhyItDoesNotRead) {
+  EXPECT_EQ(fault_in_reading(scratch.path / "none"), " cannot be read: No such file or directory");
+  EXPECT_EQ(fault_in_reading(scratch.path), " cannot be read: it is a folder");
+  scratch.write("long", std::string(3000001, 'x'));
+  EXPECT_EQ(fault_in_reading(scratch.path / "long", 3000000), " is longer than 3 MB");
+  EXPECT_EQ(fault_in_reading("/dev/zero", 1000000), " cannot be read: it is no regular file");
+  EXPECT_NE(fault_of([] { read_text_file("/dev/zero", 1000000, marrow::Kinds::files_and_pipes); }).find("longer than 1 MB"), std::string::npos);
+}
+
+TEST_F(TextFileTest, WaitsForNoPipeUnlessAsked) {
+  const fs::path pipe = scratch.path / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(fault_in_reading(pipe), " cannot be read: it is no regular file");
+  std::thread writer([&] { std::ofstream(pipe) << "text"; });
+  EXPECT_EQ(read_text_file(pipe, 100, marrow::Kinds::files_and_pipes), "text");
+  writer.join();
+}
+
+TEST_F(TextFileTest, FullDiskLeavesTheOldFile) {
+  const fs::path file = scratch.write("file", "old");
+  {
+    const marrow::test::FullDisk full(1000);
+    EXPECT_NE(fault_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "), std::string::npos);
+    EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "new", std::string(5000, 'x')); }), "none");
+  }
+  EXPECT_EQ(read_text_file(file, 100), "old");
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(TextFileTest, WhereItCannotWrite) {
+  EXPECT_EQ(fault_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }), "cannot write " + (scratch.path / "no" / "file").string() + ": No such file or directory");
+  fs::create_directory(scratch.path / "folder");
+  EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "folder", "x"); }).find("directory"), std::string::npos);
+  EXPECT_EQ(fault_of([] { write_text_file("/dev/full", "x"); }), "cannot write /dev/full: the disk is full");
+  write_text_file("/dev/null", "x");
+  EXPECT_TRUE(fs::is_character_file("/dev/null"));
+  EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(TextFileTest, LinkIsReplacedAndWhatItNamesStays) {
+  const fs::path other = scratch.write("other", "mine"), link = scratch.path / "link";
+  fs::create_symlink(other, link);
+  write_text_file(link, "new");
+  EXPECT_EQ(read_text_file(other, 100), "mine");
+  EXPECT_EQ(read_text_file(link, 100), "new");
+}
+
+TEST_F(TextFileTest, ManyWritersLeaveOneWholeFile) {
+  std::vector<std::thread> writers;
+  for (int k = 0; k < 8; ++k)
+    writers.emplace_back([&, k] {
+      for (int i = 0; i < 50; ++i) write_text_file(scratch.path / "file", std::string(20000, char('a' + k)));
+    });
+  for (std::thread& writer : writers) writer.join();
+  const std::string text = read_text_file(scratch.path / "file", 20000);
+  EXPECT_EQ(text, std::string(20000, text[0]));
+  EXPECT_EQ(files(), 1u);
+}
+
+}  // namespace

@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "run_files.hpp"
+
+#include <png.h>
+
+#include <algorithm>
+
+#include "marrow/domain/error.hpp"
+#include "runtime/json_text.hpp"
+#include "runtime/text_file.hpp"
+
+namespace marrow::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint64_t kMostPixels = 40'000'000;
+
+/// Where a name below the folder leads, with all links followed; empty where it leads nowhere.
+fs::path target_of(const fs::path& folder, const std::string& name) {
+  std::error_code error;
+  const fs::path target = fs::canonical(folder / name, error);
+  return error ? fs::path() : target;
+}
+
+bool is_inside(const fs::path& folder, const fs::path& target) {
+  std::error_code error;
+  const fs::path whole = fs::canonical(folder, error);
+  return !error && std::mismatch(whole.begin(), whole.end(), target.begin(), target.end()).first == whole.end();
+}
+
+}  // namespace
+
+void refuse_record(const fs::path& folder, const std::string& why) {
+  throw Error((folder / "run.json").string() + " is not what 'marrow run' wrote: " + why + "; run it again");
+}
+
+nlohmann::json read_record(const fs::path& folder) {
+  const fs::path file = folder / "run.json";
+  nlohmann::json record;
+  try {
+    record = parse_json(read_text_file(file, kMostRecordBytes), file.string());
+  } catch (const Error& fault) {
+    const std::string text = fault.what();
+    refuse_record(folder, text.starts_with(file.string()) ? "it" + text.substr(file.string().size()) : text);
+  }
+  if (!record.is_object()) refuse_record(folder, "it holds no object");
+  return record;
+}
+
+std::optional<fs::path> file_of_run(const fs::path& folder, const std::string& name) {
+  const fs::path target = target_of(folder, name);
+  std::error_code error;
+  if (target.empty() || !is_inside(folder, target) || !fs::is_regular_file(target, error)) return std::nullopt;
+  return folder / name;
+}
+
+bool leads_outside(const fs::path& folder, const std::string& name) {
+  const fs::path target = target_of(folder, name);
+  return !target.empty() && !is_inside(folder, target);
+}
+
+RgbPixels read_png(const fs::path& file) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  const auto refuse = [&](const std::string& why) {
+    png_image_free(&image);
+    throw Error(file.string() + ": " + why);
+  };
+  if (!png_image_begin_read_from_file(&image, file.c_str())) refuse(image.message);
+  RgbPixels pixels{int(image.width), int(image.height), (image.format & PNG_FORMAT_FLAG_LINEAR) != 0, {}};
+  if (std::uint64_t(image.width) * image.height > kMostPixels)
+    refuse("a picture of " + std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels, at most " + std::to_string(kMostPixels / 1'000'000) + " million are read");
+  image.format = PNG_FORMAT_RGB;
+  pixels.bytes.resize(PNG_IMAGE_SIZE(image));
+  if (!png_image_finish_read(&image, nullptr, pixels.bytes.data(), 0, nullptr)) refuse(image.message);
+  return pixels;
+}
+
+}  // namespace marrow::cli
