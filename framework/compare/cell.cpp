@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <fstream>
 #include <set>
 #include <sstream>
@@ -13,6 +12,7 @@
 #include "marrow/runtime/types.hpp"
 #include "runtime/keys.hpp"
 #include "runtime/store_folder.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -125,18 +125,15 @@ std::optional<double> kept_seconds(const Store& store, const Digest& key) {
 
 }  // namespace
 
-CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder, int threads)
-    : experiment_(experiment),
-      catalogue_(catalogue),
-      store_(store && store->fault().empty() ? store : nullptr),
-      folder_(std::move(folder)),
-      threads_(threads) {}
+CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder, int threads,
+                       const FileLimits& file_limits)
+    : experiment_(experiment), catalogue_(catalogue), store_(store), folder_(std::move(folder)), threads_(threads), file_limits_(file_limits) {}
 
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
 Pipeline CellRunner::simulation_of(std::size_t index) const {
-  Pipeline pipeline = checked(experiment_.simulation, simulation_arguments_of(experiment_, index), catalogue_);
-  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation_output; });
+  Pipeline pipeline = checked(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, index), catalogue_);
+  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation.output; });
   return pipeline;
 }
 
@@ -151,7 +148,7 @@ fs::path CellRunner::case_place(std::size_t index) const {
   Hasher hasher;
   add_pipeline(hasher, simulation_of(index), catalogue_);
   hasher.add(one.seed);
-  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" / experiment_.simulation_output;
+  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" / experiment_.simulation.output;
 }
 
 fs::path CellRunner::case_folder(std::size_t index) {
@@ -171,6 +168,7 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   RunSettings settings;
   settings.seed = one.seed;
   settings.threads = threads_;
+  settings.file_limits = file_limits_;
   if (const std::string fault = store_ ? store_->prepare() : ""; !fault.empty())
     throw Error("case '" + one.name + "' cannot be written: " + fault);
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
@@ -179,7 +177,7 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   RunFolder written(temporary.path, pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
     if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
-  const fs::path outputs = fs::path("outputs") / experiment_.simulation_output;
+  const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
   std::ofstream(temporary.path / "content.txt") << content_of_case(temporary.path / outputs) << '\n';
   std::error_code error;
   fs::rename(temporary.path, folder, error);
@@ -205,91 +203,98 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
   return pipeline;
 }
 
-std::string CellRunner::key_of(const CellIndex& cell) {
+std::string CellRunner::key_of(const CellIndex& cell, const Pipeline& pipeline) {
   Hasher hasher;
-  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   add_pipeline(hasher, pipeline, catalogue_);
   hasher.add(seed_of(cell.case_index));
-  std::string& content = case_keys_[cell.case_index];
   const ExperimentCase& one = experiment_.cases[cell.case_index];
-  if (content.empty() && (one.is_simulated || !one.folder.empty())) content = path_digest(case_folder(cell.case_index)).hex();
-  hasher.add(content);
+  hasher.add(one.is_simulated || !one.folder.empty() ? path_digest(case_folder(cell.case_index)).hex() : "");
   for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
   hasher.add(experiment_.initial_error);
   return hasher.digest().hex();
 }
 
 std::optional<CellRow> CellRunner::finished(const CellIndex& cell) {
-  std::ifstream stream(folder_of(cell) / "cell.json", std::ios::binary);
-  if (!stream) return std::nullopt;
-  std::ostringstream text;
-  text << stream.rdbuf();
   try {
-    CellRow row = row_from_json(text.str());
-    if (row.key == key_of(cell) && row.failed.empty()) return row;
-  } catch (const Error&) {  // half a file is no file
+    CellRow row = row_from_json(read_text_file(folder_of(cell) / "cell.json", kMostSourceBytes), experiment_);
+    if (!row.failed.empty() || row.key != key_of(cell, pipeline_of(cell, case_folder(cell.case_index), Depth::figures))) return std::nullopt;
+    name_row(row, experiment_, cell);
+    return row;
+  } catch (const std::exception&) {  // not there, or no row: the cell runs, and says what is wrong
+    return std::nullopt;
   }
-  return std::nullopt;
 }
 
-RunResult CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
-                               const std::function<void(const RunEvent&)>& observer) {
-  fs::remove_all(folder);
+CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
+                                      const std::function<void(const RunEvent&)>& observer) {
+  std::error_code error;
+  fs::remove_all(folder, error);
+  if (error) throw Error("the folder " + folder.string() + " cannot be emptied: " + error.message());
   RunFolder written(folder, pipeline);
   RunSettings settings;
   settings.threads = threads_;
+  settings.file_limits = file_limits_;
   settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
   settings.observer = observer;
-  RunResult result = run_pipeline(pipeline, catalogue_, settings);
-  const auto outputs = written.write_outputs(pipeline, result, catalogue_);
-  written.write_record(pipeline, result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
-  return result;
+  Done done{run_pipeline(pipeline, catalogue_, settings), ""};
+  const auto outputs = written.write_outputs(pipeline, done.result, catalogue_);
+  written.write_record(pipeline, done.result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
+  done.fault = reason_of(pipeline, done.result);
+  for (const RunFolder::Written& output : outputs)
+    if (done.fault.empty() && !output.fault.empty() && !output.fault.starts_with("not made")) done.fault = "output '" + output.output + "': " + output.fault;
+  return done;
 }
 
 CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   CellRow row;
-  row.id = cell_id(experiment_, cell);
-  row.variant = experiment_.variants[cell.variant].name;
-  row.case_name = experiment_.cases[cell.case_index].name;
-  row.start = experiment_.starts[cell.start].name;
   try {
     const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
-    row.key = key_of(cell);
-    const RunResult result = run_into(folder_of(cell), pipeline, cell, observer);
-    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-      const NodeRecord& node = result.nodes[i];
-      if (!node.calls && !node.cached) continue;
-      row.nodes[pipeline.nodes[i].id] = {node.calls, node.cached, node.seconds + node.cached_seconds};
-    }
-    row.failed = reason_of(pipeline, result);
-    for (const PipelineOutput& output : pipeline.outputs) row.evaluations += evaluations_in(value_of(result, output.source));
-    for (const MetricChoice& metric : experiment_.metrics) {
-      if (!row.failed.empty()) break;
-      const Metric found = figure(pipeline, result, metric.path);
-      row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
-      row.units.push_back(found.unit);
-    }
-    if (row.failed.empty() && !experiment_.initial_error.empty()) row.initial_error = figure(pipeline, result, experiment_.initial_error).value;
+    row.key = key_of(cell, pipeline);
+    const Done done = run_into(folder_of(cell), pipeline, cell, observer);
+    fill(row, pipeline, done);
+    if (row.failed.empty() && row.key != key_of(cell, pipeline)) row.failed = "the case changed while the cell ran; run it again";
   } catch (const std::exception& error) {
     row.failed = error.what();
   }
+  if (!row.failed.empty()) row.values.clear();
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
+  name_row(row, experiment_, cell);
   return row;
+}
+
+/// Throws Error for a figure that is not there.
+void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) const {
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    const NodeRecord& node = done.result.nodes[i];
+    if (!node.calls && !node.cached) continue;
+    row.nodes[pipeline.nodes[i].id] = {node.calls, node.cached, node.seconds + node.cached_seconds};
+  }
+  row.failed = done.fault;
+  for (const PipelineOutput& output : pipeline.outputs) row.evaluations += evaluations_in(value_of(done.result, output.source));
+  if (!row.failed.empty()) return;
+  for (const MetricChoice& metric : experiment_.metrics) {
+    const Metric found = figure(pipeline, done.result, metric.path);
+    row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
+    row.units.push_back(found.unit);
+  }
+  if (!experiment_.initial_error.empty()) row.initial_error = figure(pipeline, done.result, experiment_.initial_error).value;
 }
 
 fs::path CellRunner::pictures_of(const CellIndex& cell) const { return folder_ / "pictures" / cell_id(experiment_, cell); }
 
 bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   const fs::path folder = pictures_of(cell);
-  const std::string key = key_of(cell) + " " + file_digest(experiment_.file).hex();
+  const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::pictures);
+  const std::string key = key_of(cell, pipeline);
   std::string found;
-  std::getline(std::ifstream(folder / "key.txt") >> std::ws, found);
+  std::getline(std::ifstream(folder / "key.txt"), found);
   if (found == key) return false;
-  run_into(folder, pipeline_of(cell, case_folder(cell.case_index), Depth::pictures), cell, observer);
-  std::ofstream(folder / "key.txt") << key << '\n';
+  const Done done = run_into(folder, pipeline, cell, observer);
+  if (!done.fault.empty()) throw Error(done.fault);
+  write_text_file(folder / "key.txt", key + "\n");
   return true;
 }
 
@@ -311,13 +316,14 @@ double CellRunner::time(const CellIndex& cell) {
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
   RunSettings settings;
   settings.threads = threads_;
+  settings.file_limits = file_limits_;
   settings.seed = seed_of(cell.case_index);
   settings.store = store_;
   settings.remember = false;
   settings.made_anew = own_nodes(cell, pipeline);
   Hasher hasher;
   hasher.add(std::string("seconds"));
-  hasher.add(key_of(cell));
+  hasher.add(key_of(cell, pipeline));
   hasher.add(std::int64_t(threads_));
   for (const std::string& id : settings.made_anew) hasher.add(id);  // another experiment's variants may share more or less
   const Digest key = hasher.digest();
@@ -331,14 +337,18 @@ double CellRunner::time(const CellIndex& cell) {
   return result.seconds;
 }
 
-void CellRunner::write(const CellRow& row) const {
-  const fs::path file = folder_ / "cells" / row.id / "cell.json", temporary = file.string() + ".tmp";
-  fs::create_directories(file.parent_path());
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << to_json(row) << '\n';
-  stream.close();
-  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
-  fs::rename(temporary, file);
+void CellRunner::write(const CellIndex& cell, CellRow& row) const {
+  try {
+    const fs::path folder = folder_of(cell);
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw Error("the folder " + folder.string() + " cannot be made: " + error.message());
+    write_text_file(folder / "cell.json", to_json(row) + "\n");
+  } catch (const Error& error) {
+    if (!row.failed.empty()) return;  // that is the better reason
+    const int tries = row.tries;
+    row = failed_row(experiment_, cell, error.what(), tries);
+  }
 }
 
 }  // namespace marrow::compare

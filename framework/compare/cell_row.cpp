@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <climits>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 #include "marrow/compare/cell.hpp"
+#include "runtime/json_text.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -10,7 +11,21 @@ namespace {
 using nlohmann::json;
 
 json of(const std::optional<double>& value) { return value ? json(*value) : json(); }
-std::optional<double> number(const json& j) { return j.is_number() ? std::optional(j.get<double>()) : std::nullopt; }
+
+/// Nothing for null. Throws Error for what is no number.
+std::optional<double> number(const json& j, const std::string& what) {
+  if (j.is_null()) return std::nullopt;
+  if (!j.is_number() || !std::isfinite(j.get<double>())) throw Error(what + " is no number");
+  return j.get<double>();
+}
+
+int count(const json& j, const std::string& what) { return int(integer_of(j, 0, INT_MAX, what)); }
+
+const json& list_of(const json& row, const char* key, std::size_t size) {
+  const json& list = row.at(key);
+  if (!list.is_array() || list.size() != size) throw Error(std::string("'") + key + "' must be a list of " + std::to_string(size));
+  return list;
+}
 
 }  // namespace
 
@@ -32,27 +47,47 @@ std::string to_json(const CellRow& row) {
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
-CellRow row_from_json(const std::string& text) {
+CellRow row_from_json(const std::string& text, const Experiment& experiment) {
   try {
-    const json j = json::parse(text);
+    const json j = parse_json(text, "a cell's row");
+    const std::size_t metrics = experiment.metrics.size();
     CellRow row;
-    row.id = j.at("id");
-    row.variant = j.at("variant");
-    row.case_name = j.at("case");
-    row.start = j.at("start");
-    row.failed = j.value("reason", "");
-    row.tries = j.at("tries");
-    for (const json& value : j.at("values")) row.values.push_back(number(value));
-    row.units = j.at("units").get<std::vector<std::string>>();
-    row.initial_error = number(j.at("initial_error"));
-    row.seconds = number(j.at("seconds"));
-    row.evaluations = j.at("evaluations");
-    for (const auto& [name, calls] : j.at("nodes").items()) row.nodes[name] = {calls.at("made"), calls.at("cached"), calls.at("seconds")};
+    if (j.contains("reason")) row.failed = j.at("reason");
+    if (row.failed.empty() != (j.at("status") == "done")) throw Error("'status' and 'reason' do not agree");
+    row.tries = count(j.at("tries"), "'tries'");
+    for (const json& value : list_of(j, "values", metrics)) {
+      row.values.push_back(number(value, "an item of 'values'"));
+      if (row.failed.empty() != row.values.back().has_value()) throw Error("a cell that is done has all values, one that failed has none");
+    }
+    for (const json& unit : list_of(j, "units", metrics)) row.units.push_back(unit);
+    row.initial_error = number(j.at("initial_error"), "'initial_error'");
+    if (row.failed.empty() && row.initial_error.has_value() == experiment.initial_error.empty()) throw Error("'initial_error' is there where the experiment has none, or is not there");
+    row.seconds = number(j.at("seconds"), "'seconds'");
+    row.evaluations = count(j.at("evaluations"), "'evaluations'");
+    for (const auto& [name, calls] : j.at("nodes").items())
+      row.nodes[name] = {count(calls.at("made"), "'made'"), count(calls.at("cached"), "'cached'"), number(calls.at("seconds"), "'seconds'").value_or(0)};
     row.key = j.at("key");
     return row;
-  } catch (const json::exception& error) {
+  } catch (const std::exception& error) {
     throw Error(std::string("not a cell's row: ") + error.what());
   }
+}
+
+void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell) {
+  row.id = cell_id(experiment, cell);
+  row.variant = experiment.variants[cell.variant].name;
+  row.case_name = experiment.cases[cell.case_index].name;
+  row.start = experiment.starts[cell.start].name;
+}
+
+CellRow failed_row(const Experiment& experiment, const CellIndex& cell, const std::string& reason, int tries) {
+  CellRow row;
+  name_row(row, experiment, cell);
+  row.failed = reason;
+  row.tries = tries;
+  row.values.resize(experiment.metrics.size());
+  row.units.resize(experiment.metrics.size());
+  return row;
 }
 
 }  // namespace marrow::compare

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What an experiment draws at random, from its seeds alone: the same on any machine.
-#include <array>
 #include <string>
 #include <vector>
 
@@ -11,13 +10,6 @@ namespace marrow::compare {
 
 /// A number as it is written on the command line.
 std::string number_text(double value);
-
-/// An input of the simulation that is drawn uniformly.
-struct DrawnInput {
-  std::string name;
-  std::array<double, 2> range{};
-  Place place;
-};
 
 /// The values of the drawn inputs, in their order.
 std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::uint64_t seed);

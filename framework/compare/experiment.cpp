@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/experiment.hpp"
 
+#include <algorithm>
+
 #include "draw.hpp"
 #include "experiment_check.hpp"
 
@@ -13,10 +15,17 @@ std::string list_text(const std::array<double, 3>& values) {
   return "[" + number_text(values[0]) + ", " + number_text(values[1]) + ", " + number_text(values[2]) + "]";
 }
 
+template <class Named>
+std::optional<std::size_t> place_of_name(const std::vector<Named>& all, const std::string& name) {
+  const auto found = std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
+  return found == all.end() ? std::nullopt : std::optional(std::size_t(found - all.begin()));
+}
+
 }  // namespace
 
 std::vector<CellIndex> cells_of(const Experiment& experiment) {
   std::vector<CellIndex> cells;
+  cells.reserve(experiment.cell_count());
   for (std::size_t c = 0; c < experiment.cases.size(); ++c)
     for (std::size_t s = 0; s < experiment.starts.size(); ++s)
       for (std::size_t v = 0; v < experiment.variants.size(); ++v) cells.push_back({v, c, s});
@@ -28,9 +37,13 @@ std::string cell_id(const Experiment& experiment, const CellIndex& cell) {
 }
 
 std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string& id) {
-  for (const CellIndex& cell : cells_of(experiment))
-    if (cell_id(experiment, cell) == id) return cell;
-  return std::nullopt;
+  const std::size_t first = id.find('/'), second = id.find('/', first + 1);  // no name has a slash
+  if (first == std::string::npos || second == std::string::npos) return std::nullopt;
+  const auto variant = place_of_name(experiment.variants, id.substr(0, first));
+  const auto one = place_of_name(experiment.cases, id.substr(first + 1, second - first - 1));
+  const auto start = place_of_name(experiment.starts, id.substr(second + 1));
+  if (!variant || !one || !start) return std::nullopt;
+  return CellIndex{*variant, *one, *start};
 }
 
 PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const fs::path& case_folder) {
@@ -51,7 +64,12 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
 }
 
 PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index) {
-  return {experiment.cases[case_index].inputs, experiment.simulation_changes};
+  const CaseSimulation& simulation = experiment.simulation;
+  const std::uint64_t seed = experiment.cases[case_index].seed;
+  PipelineArguments arguments{simulation.inputs, simulation.changes};
+  for (InputValue& input : draw_inputs(simulation.drawn, seed)) arguments.inputs.push_back(std::move(input));
+  for (const auto& [name, place] : simulation.seed_inputs) arguments.inputs.push_back({name, std::to_string(seed), place});
+  return arguments;
 }
 
 Experiment read_experiment(const fs::path& file, const Catalogue& catalogue, Diagnostics& diagnostics) {

@@ -1,23 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <glob.h>
+#include <charconv>
+#include <cmath>
+#include <map>
 
-#include <cstdio>
-
-#include "draw.hpp"
 #include "experiment_text.hpp"
+#include "folder_search.hpp"
+#include "marrow/domain/error.hpp"
+#include "runtime/file_names.hpp"
 
 namespace marrow::compare {
 namespace {
 
 namespace fs = std::filesystem;
 
-/// As the section 'simulate' says how.
-struct Simulation {
-  std::vector<std::uint64_t> seeds;
-  std::vector<InputValue> inputs;
-  std::vector<DrawnInput> drawn;
-  PlacedTexts seed_inputs;
-};
+constexpr std::uint64_t kMostSeeds = 100000;
+
+/// "1..20", and nothing else.
+bool read_range_of_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last) {
+  const char* const end = text.data() + text.size();
+  const auto begin = std::from_chars(text.data(), end, first);
+  if (begin.ec != std::errc() || end - begin.ptr < 3 || begin.ptr[0] != '.' || begin.ptr[1] != '.') return false;
+  const auto rest = std::from_chars(begin.ptr + 2, end, last);
+  return rest.ec == std::errc() && rest.ptr == end && last <= std::uint64_t(INT64_MAX);
+}
 
 class CaseReader {
  public:
@@ -35,55 +40,76 @@ class CaseReader {
       if (entry.key == "input") experiment_.case_input = yaml_.text(entry.value, entry.place, "input").value_or("");
       if (entry.key == "folders")
         for (const auto& [pattern, place] : texts_of(yaml_, entry)) add_folders(pattern, place);
-      if (entry.key == "seeds")
-        for (const std::uint64_t seed : read_seeds(entry)) add({"seed-" + std::to_string(seed), {}, false, seed, {}}, entry.place);
+      if (entry.key == "seeds") add_seeds(read_seeds(entry), false, entry.place);
       if (entry.key == "simulate") read_simulation(entry);
     }
   }
 
  private:
-  void add(ExperimentCase one, const Place& place) {
-    for (const ExperimentCase& other : experiment_.cases)
-      if (other.name == one.name) {
-        yaml_.fault(place, "two cases are named '" + one.name + "'",
-                    one.folder.empty() ? "give each seed once" : other.folder.empty() ? "rename the folder" : "they are " + other.folder.string() + " and " + one.folder.string());
-        return;
-      }
-    experiment_.cases.push_back(std::move(one));
+  /// False, with a fault, for a case that cannot be added: its others are not worth looking at.
+  bool add(ExperimentCase one, const Place& place) {
+    if (!check_name(yaml_, one.name, place, "a case's name")) return false;
+    if (experiment_.cases.size() == kMostCells) {
+      yaml_.fault(place, "there are more than " + std::to_string(kMostCells) + " cases", "take fewer, or make several experiments of them");
+      return false;
+    }
+    const auto [known, is_new] = known_.emplace(in_small_letters(one.name), experiment_.cases.size());
+    if (is_new) {
+      experiment_.cases.push_back(std::move(one));
+      return true;
+    }
+    const ExperimentCase& other = experiment_.cases[known->second];
+    const std::string names = "'" + one.name + "'" + (other.name == one.name ? "" : " and '" + other.name + "', which is one folder to some file systems");
+    yaml_.fault(place, "two cases are named " + names,
+                one.folder.empty() ? "give each seed once" : other.folder.empty() ? "rename the folder" : "they are " + other.folder.string() + " and " + one.folder.string());
+    return false;
+  }
+
+  void add_seeds(const std::vector<std::uint64_t>& seeds, bool are_simulated, const Place& place) {
+    for (const std::uint64_t seed : seeds)
+      if (!add({"seed-" + std::to_string(seed), {}, are_simulated, seed}, place)) return;
   }
 
   void add_folders(const std::string& pattern, const Place& place) {
-    glob_t found{};
-    bool any = false;
-    const int status = glob((folder_ / pattern).lexically_normal().c_str(), 0, nullptr, &found);
-    for (std::size_t i = 0; status == 0 && i < found.gl_pathc; ++i) {
-      fs::path folder = found.gl_pathv[i];
-      if (folder.filename() == "case.yaml" || folder.filename().empty()) folder = folder.parent_path();
-      std::error_code error;
-      if (!fs::is_directory(folder, error)) continue;  // what else lies among the cases
-      any = true;
-      add({folder.filename().string(), folder, false, 1, {}}, place);
+    std::vector<fs::path> found;
+    try {
+      found = search_.matches((folder_ / pattern).lexically_normal());
+    } catch (const Error& error) {
+      return yaml_.fault(place, "the cases at '" + pattern + "' cannot be found: " + error.what());
     }
-    globfree(&found);
+    bool any = false;
+    for (fs::path& folder : found) {
+      if (folder.filename() == "case.yaml") folder = folder.parent_path();
+      std::error_code error;
+      if (fs::is_directory(folder, error)) {
+        any = true;
+        const std::string name = folder.filename().string();
+        if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder, false, 1}, place)) return;
+      } else if (fs::is_symlink(folder, error)) {  // not what else lies among the cases: it may have been one
+        if (fs::exists(folder, error)) continue;
+        return yaml_.fault(place, "the link " + folder.string() + " leads nowhere", "remove it, or put its target back");
+      }
+    }
     if (!any) yaml_.fault(place, "there is no folder at '" + pattern + "'", "the path starts at the experiment's file");
   }
 
   void read_simulation(const YamlEntry& section) {
     static const std::vector<std::string> kKeys{"pipeline", "output", "set", "seeds", "inputs", "draw", "seed_input"};
-    Simulation simulation;
+    CaseSimulation& simulation = experiment_.simulation;
+    std::vector<std::uint64_t> seeds;
     bool has_pipeline = false, has_seeds = false;
-    experiment_.simulation_output = "case";
+    simulation.output = "case";
     written_.simulation_place = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'simulate'", &kKeys)) {
       has_pipeline |= entry.key == "pipeline";
       has_seeds |= entry.key == "seeds";
-      if (entry.key == "pipeline") experiment_.simulation = file_of(yaml_, entry, folder_);
+      if (entry.key == "pipeline") simulation.pipeline = file_of(yaml_, entry, folder_);
       if (entry.key == "output") {
-        experiment_.simulation_output = yaml_.text(entry.value, entry.place, "output").value_or("");
+        simulation.output = yaml_.text(entry.value, entry.place, "output").value_or("");
         written_.simulation_place = entry.place;
       }
-      if (entry.key == "set") experiment_.simulation_changes = patches_of(yaml_, entry, "'set'");
-      if (entry.key == "seeds") simulation.seeds = read_seeds(entry);
+      if (entry.key == "set") simulation.changes = patches_of(yaml_, entry, "'set'");
+      if (entry.key == "seeds") seeds = read_seeds(entry);
       if (entry.key == "inputs") simulation.inputs = inputs_of(yaml_, entry);
       if (entry.key == "draw")
         for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'")) simulation.drawn.push_back({range.key, read_range(range), range.place});
@@ -92,26 +118,16 @@ class CaseReader {
     if (!section.value.IsMap()) return;
     if (!has_pipeline) yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
-    for (const std::uint64_t seed : simulation.seeds) add_simulated(simulation, seed, section.place);
-  }
-
-  void add_simulated(const Simulation& simulation, std::uint64_t seed, const Place& place) {
-    ExperimentCase one{"seed-" + std::to_string(seed), {}, true, seed, simulation.inputs};
-    for (InputValue& input : draw_inputs(simulation.drawn, seed)) one.inputs.push_back(std::move(input));
-    for (const auto& [name, where] : simulation.seed_inputs) one.inputs.push_back({name, std::to_string(seed), where});
-    add(std::move(one), place);
+    add_seeds(seeds, true, section.place);
   }
 
   /// "1..20" or a list of integers.
   std::vector<std::uint64_t> read_seeds(const YamlEntry& entry) {
     std::vector<std::uint64_t> seeds;
     if (entry.value.IsScalar()) {
-      long long first = 0, last = 0;
-      int used = 0;
-      const std::string text = entry.value.Scalar();
-      const bool is_range = std::sscanf(text.c_str(), "%lld..%lld%n", &first, &last, &used) == 2 && used == int(text.size());
-      if (is_range && first >= 0 && first <= last && last - first < 100000) {
-        for (long long seed = first; seed <= last; ++seed) seeds.push_back(std::uint64_t(seed));
+      std::uint64_t first = 0, last = 0;
+      if (read_range_of_seeds(entry.value.Scalar(), first, last) && first <= last && last - first < kMostSeeds) {
+        for (std::uint64_t seed = first; seed <= last; ++seed) seeds.push_back(seed);
         return seeds;
       }
     } else if (entry.value.IsSequence() && entry.value.size() > 0) {
@@ -134,6 +150,7 @@ class CaseReader {
     }
     for (std::size_t i = 0; i < 2; ++i) range[i] = yaml_.number(entry.value[i], yaml_.place(entry.value[i]), entry.key).value_or(0);
     if (range[0] > range[1]) yaml_.fault(entry.place, "the range of '" + entry.key + "' ends before it begins");
+    if (!std::isfinite(range[1] - range[0])) yaml_.fault(entry.place, "the range of '" + entry.key + "' is too wide for a number to be drawn from it");
     return range;
   }
 
@@ -141,6 +158,8 @@ class CaseReader {
   const fs::path& folder_;
   WrittenExperiment& written_;
   Experiment& experiment_;
+  std::map<std::string, std::size_t> known_;  ///< cases by their names in small letters
+  FolderSearch search_;
 };
 
 }  // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "experiment_check.hpp"
 
+#include <set>
+
 namespace marrow::compare {
 namespace {
 
@@ -15,7 +17,9 @@ class Checker {
       Diagnostics faults;
       const Pipeline pipeline = read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
       diagnostics_.add_all(faults);  // what is wrong in every variant is said once
-      if (v == 0 && faults.empty()) check_names(pipeline);
+      if (!faults.empty()) continue;
+      if (v == 0) check_names(pipeline);
+      else check_figures_of(experiment_.variants[v], pipeline);
     }
   }
 
@@ -24,9 +28,9 @@ class Checker {
     for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
       if (!experiment_.cases[c].is_simulated) continue;
       Diagnostics faults;
-      const Pipeline pipeline = read_pipeline(experiment_.simulation, simulation_arguments_of(experiment_, c), catalogue_, faults, true);
+      const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c), catalogue_, faults, true);
       diagnostics_.add_all(faults);
-      if (faults.empty()) find_output(pipeline, experiment_.simulation_output, written_.simulation_place);
+      if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place);
       return;  // the others differ in numbers alone
     }
   }
@@ -37,14 +41,26 @@ class Checker {
     for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
   }
 
+  /// A variant may use a node whose output is something else. The outputs' names are the same in all.
+  void check_figures_of(const Variant& variant, const Pipeline& pipeline) {
+    for (const PipelineOutput& output : pipeline.outputs)
+      if (const PortInfo& port = port_of(pipeline, output); figures_.contains(output.name) && port.type.id != "metrics")
+        diagnostics_.add(variant.place, "in variant '" + variant.name + "' output '" + output.name + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
+  }
+
+  static const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output) {
+    return pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
+  }
+
   void check_figure(const Pipeline& pipeline, const std::string& path, const Place& place) {
     const std::string output = path.substr(0, path.find('.'));
     const PipelineOutput* found = find_output(pipeline, output, place);
     if (!found) return;
-    const PortInfo& port = pipeline.nodes[std::size_t(found->source.node)].info.outputs[std::size_t(found->source.output)];
+    const PortInfo& port = port_of(pipeline, *found);
     if (port.type.id != "metrics")
-      diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
-    else if (path.find('.') == std::string::npos)
+      return diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
+    figures_.insert(output);
+    if (path.find('.') == std::string::npos)
       diagnostics_.add(place, "'" + path + "' does not say which figure", "write it as  " + path + ".mtre_mm, with the items of its lists between");
   }
 
@@ -62,6 +78,7 @@ class Checker {
   const Experiment& experiment_;
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
+  std::set<std::string> figures_;  ///< outputs that metrics and the initial error are taken from
 };
 
 }  // namespace

@@ -2,11 +2,14 @@
 #include "experiment_text.hpp"
 
 #include <algorithm>
-#include <fstream>
+#include <map>
 #include <set>
-#include <sstream>
 
 #include "draw.hpp"
+#include "marrow/domain/error.hpp"
+#include "runtime/file_names.hpp"
+#include "runtime/printable.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -22,14 +25,12 @@ class Reader {
 
   WrittenExperiment read() {
     const fs::path& file = experiment_.file;
-    std::ifstream stream(file, std::ios::binary);
-    if (!stream || fs::is_directory(file)) {
-      diagnostics_.add({file.string()}, "the experiment file cannot be read", "check the path");
+    try {
+      experiment_.text = read_text_file(file, kMostSourceBytes);
+    } catch (const Error& error) {
+      diagnostics_.add({file.string()}, "the experiment file" + std::string(error.what()).substr(file.string().size()), "check the path");
       return written_;
     }
-    std::ostringstream text;
-    text << stream.rdbuf();
-    experiment_.text = text.str();
     diagnostics_.remember(file.string(), experiment_.text);
     const YAML::Node root = yaml_.parse(experiment_.text);
     if (diagnostics_.empty()) read_root(root);
@@ -43,8 +44,8 @@ class Reader {
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
-    experiment_.name = experiment_.file.stem().string();
     for (const YamlEntry& entry : entries) read_entry(entry);
+    if (experiment_.name.empty() && name_of_file_is_good(start)) experiment_.name = experiment_.file.stem().string();
     const auto need = [&](const std::string& key, const std::string& hint) {
       if (std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) { return e.key == key; })) yaml_.fault(start, "the key '" + key + "' is missing", hint);
     };
@@ -59,8 +60,29 @@ class Reader {
       yaml_.fault(start, "there are no variants", "name at least one under  variants:  or options under  matrix:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
     set_baseline();
+    if (is_too_large(start)) return;
     if (experiment_.protocol) experiment_.starts = draw_starts(*experiment_.protocol);
     else experiment_.starts.push_back({"0", {}, {}});
+  }
+
+  bool name_of_file_is_good(const Place& start) {
+    const std::string name = experiment_.file.stem().string(), fault = fault_of_name(name);
+    if (!fault.empty()) yaml_.fault(start, "the experiment is named after its file, which becomes a folder's name: " + in_quotes(name) + " cannot be one, " + fault, "give it another, as  name: edges");
+    return fault.empty();
+  }
+
+  bool is_too_large(const Place& start) {
+    const std::size_t variants = experiment_.variants.size(), cases = experiment_.cases.size(), starts = experiment_.protocol ? experiment_.protocol->count : 1;
+    if (variants > kMostVariants) {
+      yaml_.fault(variants_place_, "there are " + std::to_string(variants) + " variants, at most " + std::to_string(kMostVariants) + " can be compared", "make several experiments of them");
+      return true;
+    }
+    if (double(variants) * double(cases) * double(starts) <= double(kMostCells)) return false;
+    char cells[40];
+    std::snprintf(cells, sizeof cells, "%.0f", double(variants) * double(cases) * double(starts));
+    yaml_.fault(start, std::to_string(variants) + " variants, " + std::to_string(cases) + " cases and " + std::to_string(starts) + " starts are " + cells +
+                " cells, at most " + std::to_string(kMostCells) + " can be compared", "take fewer of them, or make several experiments");
+    return true;
   }
 
   void read_entry(const YamlEntry& entry) {
@@ -72,7 +94,7 @@ class Reader {
     }
     if (entry.key == "name") {
       experiment_.name = text();
-      if (entry.value.IsScalar()) check_name(yaml_, experiment_.name, entry.place, "an experiment's name");
+      if (!entry.value.IsScalar() || !check_name(yaml_, experiment_.name, entry.place, "an experiment's name")) experiment_.name = "?";
     }
     if (entry.key == "help") experiment_.help = text();
     if (entry.key == "pipeline") experiment_.pipeline = file_of(yaml_, entry, folder_);
@@ -103,13 +125,18 @@ class Reader {
   }
 
   void read_variants(const YamlEntry& section) {
+    variants_place_ = section.place;
+    std::map<std::string, std::string> seen;  // by small letters
     for (const YamlEntry& variant : yaml_.map(section.value, section.place, "'variants'")) {
-      check_name(yaml_, variant.key, variant.place, "a variant's name");
+      if (!check_name(yaml_, variant.key, variant.place, "a variant's name")) continue;
+      const auto [other, is_new] = seen.emplace(in_small_letters(variant.key), variant.key);
+      if (!is_new) yaml_.fault(variant.place, "the variants '" + other->second + "' and '" + variant.key + "' are one folder to some file systems", "rename one of them");
       experiment_.variants.push_back({variant.key, variant.place, patches_of(yaml_, variant, "variant '" + variant.key + "'")});
     }
   }
 
   void read_matrix(const YamlEntry& section) {
+    matrix_place_ = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'matrix'")) {
       if (!entry.value.IsSequence() || entry.value.size() == 0) {
         yaml_.fault(entry.place, "'" + entry.key + "' in the matrix must be a list of values", "write it as  " + entry.key + ": [a, b]");
@@ -123,7 +150,7 @@ class Reader {
 
   /// Every variant in every combination of the matrix.
   void apply_matrix() {
-    if (matrix_.empty()) return;
+    if (matrix_.empty() || matrix_is_too_large()) return;
     std::vector<Variant> combined = experiment_.variants;
     if (combined.empty()) combined.push_back({"", matrix_[0][0].place, {}});
     for (const std::vector<Override>& column : matrix_) {
@@ -139,18 +166,54 @@ class Reader {
         }
       combined = std::move(next);
     }
-    std::set<std::string> seen;
-    for (Variant& variant : combined) {
-      while (!seen.insert(variant.name).second) variant.name += "_";
-      check_name(yaml_, variant.name, variant.place, "a variant's name");
-    }
+    make_names_distinct(combined);
+    for (const Variant& variant : combined)
+      if (!check_name(yaml_, variant.name, variant.place, "a variant's name")) break;  // the others are much the same
     experiment_.variants = std::move(combined);
+  }
+
+  /// The number and the names of the combinations are those of the columns: known before any is made.
+  bool matrix_is_too_large() {
+    double count = double(std::max<std::size_t>(1, experiment_.variants.size()));
+    std::size_t longest = 0;
+    for (const Variant& variant : experiment_.variants) longest = std::max(longest, variant.name.size() + 1);
+    for (const std::vector<Override>& column : matrix_) {
+      count *= double(column.size());
+      std::size_t most = 0;
+      for (const Override& one : column) most = std::max(most, short_value(one.value).size());
+      longest += most + (&column == &matrix_.front() ? 0 : 1);
+    }
+    if (count > double(kMostVariants)) {
+      char variants[40];
+      std::snprintf(variants, sizeof variants, count < 1e15 ? "%.0f" : "%.0e", count);
+      yaml_.fault(matrix_place_, std::string("the matrix makes ") + variants + " variants, at most " + std::to_string(kMostVariants) + " can be compared",
+                  "leave values out, or name the combinations that matter under  variants:");
+      return true;
+    }
+    if (longest <= kMostNameBytes) return false;
+    yaml_.fault(matrix_place_, "the matrix makes a variant's name of " + std::to_string(longest) + " bytes of its values; as a folder's name it may have " + std::to_string(kMostNameBytes),
+                "name the combinations under  variants:");
+    return true;
+  }
+
+  /// Values may be written alike in a name: -2, -3 and so on tell them apart.
+  static void make_names_distinct(std::vector<Variant>& variants) {
+    std::set<std::string> taken;
+    std::map<std::string, int> last;
+    for (const Variant& variant : variants) last[in_small_letters(variant.name)] = 1;
+    for (Variant& variant : variants) {
+      if (taken.insert(in_small_letters(variant.name)).second) continue;
+      const std::string name = variant.name;
+      int& number = last[in_small_letters(name)];
+      do variant.name = name + "-" + std::to_string(++number);
+      while (last.contains(in_small_letters(variant.name)) || !taken.insert(in_small_letters(variant.name)).second);
+    }
   }
 
   /// The part of a value that names it best: of a node, what follows its kind.
   static std::string short_value(std::string value) {
     const std::size_t dot = value.find('.');
-    if (dot != std::string::npos && dot + 1 < value.size() && std::isalpha(static_cast<unsigned char>(value[dot + 1]))) value = value.substr(dot + 1);
+    if (dot != std::string::npos && dot < kMostNameBytes && dot + 1 < value.size() && std::isalpha(static_cast<unsigned char>(value[dot + 1]))) value = value.substr(dot + 1);
     for (char& c : value)
       if (std::string("/\\ \t\n").find(c) != std::string::npos) c = '_';
     return value;
@@ -249,7 +312,7 @@ class Reader {
   std::vector<std::vector<Override>> matrix_;
   std::vector<std::tuple<std::string, double, Place>> success_;
   std::string baseline_;
-  Place baseline_place_;
+  Place baseline_place_, variants_place_, matrix_place_;
 };
 
 }  // namespace

@@ -4,6 +4,8 @@
 #include <algorithm>
 
 #include "draw.hpp"
+#include "runtime/file_names.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::compare {
 
@@ -63,9 +65,16 @@ double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most) {
   return 0;
 }
 
-void check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what) {
-  if (name.empty() || name[0] == '.' || name.find_first_of("/\\ \t\n") != std::string::npos)
-    yaml.fault(place, what + " becomes a file name: '" + name + "' cannot be one", "use letters, digits, '-' and '_'");
+bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what) {
+  const std::string fault = fault_of_name(name);
+  if (!fault.empty()) yaml.fault(place, what + " becomes a file name: " + in_quotes(name) + " cannot be one, " + fault, kNameHint);
+  return fault.empty();
+}
+
+std::string in_small_letters(std::string name) {
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  return name;
 }
 
 fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {

@@ -28,8 +28,11 @@ std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t le
 /// A number from 0 to `most`; 0 where it is none.
 double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most);
 
-/// A name that can be part of a cell's name and of a file's.
-void check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what);
+inline constexpr std::size_t kMostNameBytes = 100;
+/// Whether a name can be part of a cell's name and be a folder's; a fault where not.
+bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what);
+/// The same for names that differ by the case of their letters alone: to some file systems they are one.
+std::string in_small_letters(std::string name);
 /// The file that a key names, from the experiment's folder. Empty where there is none.
 std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry, const std::filesystem::path& folder);
 

@@ -2,19 +2,23 @@
 #include "marrow/compare/cell.hpp"
 
 namespace marrow::compare {
+namespace {
+
+bool names_a_path(const NodeInfo& info) {
+  for (const OptionInfo& option : info.options)
+    if (option.type == OptionType::path || option.type == OptionType::paths) return true;
+  return false;
+}
+
+}  // namespace
 
 std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name) {
   std::vector<Digest> result;
   for (const PipelineNode& node : pipeline.nodes) {
     Hasher hasher;
     hasher.add(node.info.name);
-    bool names_a_path = false;
-    for (std::size_t i = 0; i < node.options.size(); ++i) {
-      const OptionType type = node.info.options[i].type;
-      names_a_path |= type == OptionType::path || type == OptionType::paths;
-      std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
-    }
-    if (names_a_path || node.info.random) hasher.add(case_name);
+    for (const OptionValue& option : node.options) std::visit([&](const auto& value) { hasher.add(value); }, option);
+    if (names_a_path(node.info) || node.info.random) hasher.add(case_name);
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
         hasher.add(node.info.inputs[std::size_t(wire.port)].name);
@@ -23,6 +27,22 @@ std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_
         hasher.add(source.items);
       }
     result.push_back(hasher.digest());
+  }
+  return result;
+}
+
+std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& experiment) {
+  const StartProtocol* protocol = experiment.protocol ? &*experiment.protocol : nullptr;
+  std::vector<Dependence> result;
+  for (const PipelineNode& node : pipeline.nodes) {
+    Dependence own{names_a_path(node.info) || node.info.random,
+                   protocol && protocol->node == node.id && (protocol->rotation_deg > 0 || protocol->translation_mm > 0 || protocol->distance_mm > 0)};
+    for (const Wire& wire : node.wires)
+      for (const Reference& source : wire.sources) {
+        own.on_case |= result[std::size_t(source.node)].on_case;
+        own.on_start |= result[std::size_t(source.node)].on_start;
+      }
+    result.push_back(own);
   }
   return result;
 }

@@ -186,7 +186,7 @@ class Compare(Case):
         self.assertIn("1 were there already", whole.stdout)
         wrong = marrow("cell", path, "b/l/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment)
         self.assertEqual(wrong.returncode, 2)
-        self.assertIn("the experiment has no cell 'b/l/0'; did you mean", wrong.stderr)
+        self.assertIn("the experiment has no cell 'b/l/0': there is no case 'l'; did you mean", wrong.stderr)
 
     def test_dry_run_says_what_there_is_to_do(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})

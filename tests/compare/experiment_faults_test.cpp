@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Every fault of an experiment file, with its text and its line.
 #include "experiment_files.hpp"
+#include "framework/runtime/file_names.hpp"
 
 namespace {
 
@@ -35,7 +36,7 @@ const char* const kStartsHere = "the path starts at the experiment's file";
 TEST_F(ExperimentFaults, NoFile) {
   marrow::compare::read_experiment(scratch.path / "none.yaml", test_catalogue(), diagnostics);
   ASSERT_EQ(diagnostics.size(), 1u);
-  EXPECT_NE(diagnostics.text().find("none.yaml: error: the experiment file cannot be read\n  hint: check the path"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(diagnostics.text().find("none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path"), std::string::npos) << diagnostics.text();
 }
 
 TEST_F(ExperimentFaults, NoYaml) {
@@ -57,7 +58,7 @@ TEST_F(ExperimentFaults, HeadOfTheFile) {
   expect_fault_of("metrics: [other.value]", "'metrics' is given twice in the experiment", "the first is at line 7");
   expect_fault("experiment: 2\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1, "this file is of format 2, this program reads format 1");
   expect_fault("experiment: one\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1, "experiment: expected an integer, got 'one'");
-  expect_fault_of("name: my/edges", "an experiment's name becomes a file name: 'my/edges' cannot be one", "use letters, digits, '-' and '_'");
+  expect_fault_of("name: my/edges", "an experiment's name becomes a file name: 'my/edges' cannot be one, it holds '/'", marrow::kNameHint);
   expect_fault_of("name: [edges]", "name: expected a text, got a list");
   expect_fault_of("help: {}", "help: expected a text, got a map");
   expect_fault("experiment: 1\npipeline: q.yaml\n" + kGood.substr(kStart.find("cases")), 2, "there is no file 'q.yaml'", kStartsHere);
@@ -87,7 +88,7 @@ TEST_F(ExperimentFaults, Patches) {
 TEST_F(ExperimentFaults, Variants) {
   const auto variants = [](const std::string& lines) { return kStart + kMetrics + lines + "\n"; };
   expect_fault(variants("variants: [one]"), 5, "'variants' must be a map, got a list", kMapHint);
-  expect_fault(variants("variants:\n  a/b: {}"), 6, "a variant's name becomes a file name: 'a/b' cannot be one", "use letters, digits, '-' and '_'");
+  expect_fault(variants("variants:\n  a/b: {}"), 6, "a variant's name becomes a file name: 'a/b' cannot be one, it holds '/'", marrow::kNameHint);
   expect_fault(variants("variants:\n  one: {}\n  one: {}"), 7, "'one' is given twice in 'variants'", "the first is at line 6");
   expect_fault(variants("variants:\n  one: c.value"), 6, "variant 'one' must be a map, got 'c.value'", kMapHint);
   expect_fault(variants("variants:\n  one: {}\n  two: {c.vlaue: 2}"), 7, "'test.constant' has no option 'vlaue'", "did you mean 'value'?");
@@ -100,7 +101,7 @@ TEST_F(ExperimentFaults, Matrix) {
   expect_fault(matrix("matrix: {c.value: 1}"), 5, "'c.value' in the matrix must be a list of values", "write it as  c.value: [a, b]");
   expect_fault(matrix("matrix: {c.value: []}"), 5, "'c.value' in the matrix must be a list of values", "write it as  c.value: [a, b]");
   expect_fault(matrix("matrix:\n  c.value: [1,\n   2000]"), 7, "option 'value' of test.constant: 2000 is above the most allowed, 1000");
-  expect_fault(matrix("matrix: {c.path: [../a]}"), 5, "a variant's name becomes a file name: '.._a' cannot be one", "use letters, digits, '-' and '_'");
+  expect_fault(matrix("matrix: {c.path: [../a]}"), 5, "a variant's name becomes a file name: '.._a' cannot be one, it begins with a dot", marrow::kNameHint);
 }
 
 TEST_F(ExperimentFaults, FaultOfThePipelineIsSaidOnce) {

@@ -32,7 +32,11 @@ const Cells = (() => {
   }
 
   function csv(data, cells) {
-    const quoted = (value) => (value === null || value === undefined ? "" : /[",\n]/.test(String(value)) ? '"' + String(value).replaceAll('"', '""') + '"' : String(value));
+    const asText = (text) => (/^[=+@\t\r\n-]/.test(text) && !Number.isFinite(Number(text)) ? "'" + text : text); // what a spreadsheet would compute
+    const quoted = (value) => {
+      const text = value === null || value === undefined ? "" : typeof value === "string" ? asText(value) : String(value);
+      return /[",\r\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
+    };
     const head = ["id", "variant", "case", "start", "outcome", "reason", "initial_mtre_mm", ...data.metrics.map((metric) => metric.name), "seconds", "evaluations", "folder"];
     const rows = cells.map((cell) => [cell.id, data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start], Data.outcome(cell), cell.reason, cell.initial_mtre_mm,
       ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations, cell.folder]);

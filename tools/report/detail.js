@@ -36,7 +36,8 @@ const Detail = (() => {
   function command(data, cell) {
     if (data.is_run) return null;
     const file = data.experiment.file || (data.experiment.name || "experiment") + ".yaml";
-    return el("div", {}, el("h3", {}, "Run just this cell"), Dom.command("marrow cell " + Dom.shellWord(file) + " " + Dom.shellWord(String(cell.id))));
+    const id = String(cell.id), rest = id.startsWith("-") ? " -- " : " "; // no option either
+    return el("div", {}, el("h3", {}, "Run just this cell"), Dom.command("marrow cell " + Dom.shellPath(file) + rest + Dom.shellWord(id)));
   }
 
   const reason = (cell) => (cell.status === "failed" ? el("div", {}, el("h3", {}, "Why it failed"), el("pre", { class: "reason" }, cell.reason || "no reason given")) : null);

@@ -81,7 +81,9 @@ const Dom = (() => {
     return el("div", { class: "command" }, el("pre", { tabindex: 0 }, code), copy);
   }
 
-  const shellWord = (text) => (/^[\w@%+=:,.\/-]+$/.test(text) ? text : "'" + String(text).replaceAll("'", "'\\''") + "'");
+  // One word of a POSIX shell's command line; a path is never taken for an option.
+  const shellWord = (text) => (/^[\w@%+:,.\/-]+$/.test(text) ? text : "'" + String(text).replaceAll("'", "'\\''") + "'");
+  const shellPath = (path) => shellWord(path.startsWith("-") ? "./" + path : path);
 
   // The box that says more about what the pointer is on: any element with data-tip.
   function startTooltip() {
@@ -107,5 +109,5 @@ const Dom = (() => {
     document.addEventListener("scroll", () => (box.hidden = true), { passive: true });
   }
 
-  return { el, svg, number, percent, probability, withUnit, select, choice, checkbox, slider, button, command, shellWord, startTooltip };
+  return { el, svg, number, percent, probability, withUnit, select, choice, checkbox, slider, button, command, shellWord, shellPath, startTooltip };
 })();

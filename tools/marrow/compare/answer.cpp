@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "compare/comparison.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -22,12 +23,24 @@ VariantFigure figure_of(const std::vector<double>& values, bool higher_is_better
   return figure;
 }
 
-VariantSummary summary_of(const Experiment& experiment, const std::string& variant, const std::vector<CellRow>& rows) {
+using Rows = std::vector<const CellRow*>;
+
+/// The rows of each variant, in the experiment's order.
+std::vector<Rows> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
+  std::map<std::string, std::size_t> places;
+  for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
+  std::vector<Rows> result(experiment.variants.size());
+  for (const CellRow& row : rows)
+    if (const auto place = places.find(row.variant); place != places.end()) result[place->second].push_back(&row);
+  return result;
+}
+
+VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
   VariantSummary summary;
   std::vector<std::vector<double>> values(experiment.metrics.size());
   std::vector<double> seconds, evaluations;
-  for (const CellRow& row : rows) {
-    if (row.variant != variant) continue;
+  for (const CellRow* one : rows) {
+    const CellRow& row = *one;
     ++summary.runs;
     summary.successes += row.is_success(experiment);
     if (!row.failed.empty()) {
@@ -56,10 +69,10 @@ StartErrors start_errors(const std::vector<CellRow>& rows) {
   return errors;
 }
 
-void add_capture(const Experiment& experiment, const std::string& variant, const std::vector<CellRow>& rows, const StartErrors& errors, VariantSummary& summary) {
+void add_capture(const Experiment& experiment, const Rows& rows, const StartErrors& errors, VariantSummary& summary) {
   std::vector<compare::StartOutcome> outcomes;
-  for (const CellRow& row : rows) {
-    if (row.variant != variant) continue;
+  for (const CellRow* one : rows) {
+    const CellRow& row = *one;
     const auto known = errors.find({row.case_name, row.start});
     if (row.initial_error || known != errors.end())
       outcomes.push_back({std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment)});
@@ -70,16 +83,14 @@ void add_capture(const Experiment& experiment, const std::string& variant, const
 }
 
 /// The cells that both variants did, in one figure.
-std::vector<compare::Pair> pairs_of(const Experiment& experiment, std::size_t variant, std::size_t metric, const std::vector<CellRow>& rows) {
+std::vector<compare::Pair> pairs_of(const Rows& baseline, const Rows& variant, std::size_t metric) {
   std::map<std::pair<std::string, std::string>, double> reference;
-  for (const CellRow& row : rows)
-    if (row.variant == experiment.variants[experiment.baseline].name && row.failed.empty() && row.values[metric])
-      reference[{row.case_name, row.start}] = *row.values[metric];
+  for (const CellRow* row : baseline)
+    if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
   std::vector<compare::Pair> pairs;
-  for (const CellRow& row : rows) {
-    const auto found = reference.find({row.case_name, row.start});
-    if (row.variant == experiment.variants[variant].name && row.failed.empty() && row.values[metric] && found != reference.end())
-      pairs.push_back({row.case_name, found->second, *row.values[metric]});
+  for (const CellRow* row : variant) {
+    const auto found = reference.find({row->case_name, row->start});
+    if (row->failed.empty() && row->values[metric] && found != reference.end()) pairs.push_back({row->case_name, found->second, *row->values[metric]});
   }
   return pairs;
 }
@@ -99,7 +110,7 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
     unknown += summary.unknown_starts;
   }
   if (longest.empty()) return "";
-  std::string text = "\nCapture range: success over " + experiment.initial_error + ", with 95 % intervals\n";
+  std::string text = "\nCapture range: success over " + printable(experiment.initial_error) + ", with 95 % intervals\n";
   char part[100];
   const auto row = [&](const std::string& head, const auto& cell) {
     std::snprintf(part, sizeof part, "%-16s", head.c_str());
@@ -137,16 +148,17 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
 Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows) {
   Answer answer;
   const StartErrors errors = start_errors(rows);
-  for (const compare::Variant& variant : experiment.variants) {
-    answer.variants.push_back(summary_of(experiment, variant.name, rows));
-    if (!experiment.initial_error.empty()) add_capture(experiment, variant.name, rows, errors, answer.variants.back());
+  const std::vector<Rows> of_variant = rows_by_variant(experiment, rows);
+  for (const Rows& own : of_variant) {
+    answer.variants.push_back(summary_of(experiment, own));
+    if (!experiment.initial_error.empty()) add_capture(experiment, own, errors, answer.variants.back());
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) answer.units.push_back(unit_of(rows, m));
   std::vector<double> p;
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
       if (v == experiment.baseline) continue;
-      const std::vector<compare::Pair> pairs = pairs_of(experiment, v, m, rows);
+      const std::vector<compare::Pair> pairs = pairs_of(of_variant[experiment.baseline], of_variant[v], m);
       if (pairs.empty()) continue;
       answer.findings.push_back({v, m, compare::compare_pairs(pairs, kBootstrapSeed), 1, ""});
       p.push_back(answer.findings.back().comparison.test.p);
@@ -181,8 +193,8 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
     const compare::MetricChoice& metric = experiment.metrics[m];
     const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") + (metric.label == metric.path ? "" : ", " + metric.path);
-    std::snprintf(line, sizeof line, "\n%s\n%-*s %9s %9s %9s %9s %9s\n", title.c_str(), int(width), "", "median", "25 %", "75 %", "95 %", "worst");
-    out << line;
+    std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s\n", int(width), "", "median", "25 %", "75 %", "95 %", "worst");
+    out << '\n' << printable(title) << '\n' << line;
     for (std::size_t v = 0; v < answer.variants.size(); ++v) {
       const VariantFigure& figure = answer.variants[v].figures[m];
       if (figure.count)
@@ -196,7 +208,7 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   out << capture_text(experiment, answer);
   out << "\n* the baseline";
   if (experiment.variants.size() > 1) out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
-  for (const Finding& finding : answer.findings) out << "  " << finding.sentence << "\n";
+  for (const Finding& finding : answer.findings) out << "  " << printable(finding.sentence) << "\n";
   return out.str();
 }
 

@@ -1,10 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <cstdio>
-#include <fstream>
+#include <map>
 
 #include "commands.hpp"
 #include "compare/comparison.hpp"
+#include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
+#include "runtime/printable.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -28,18 +32,37 @@ fs::path folder_of(const CompareRequest& request, const Experiment& experiment) 
   return request.folder.empty() ? fs::path("runs") / "compare" / experiment.name : request.folder;
 }
 
-/// The folder of this experiment, new or to be continued. Throws Error for one that holds anything else.
-void open_folder(const fs::path& folder, const Experiment& experiment) {
-  std::error_code error;
-  const bool is_ours = fs::exists(folder / "experiment.yaml", error);
-  if (fs::exists(folder, error) && !is_ours && (!fs::is_directory(folder, error) || !fs::is_empty(folder, error)))
-    throw Error("the folder " + folder.string() + " holds something else than a comparison; choose another with --out, or remove it");
-  fs::create_directories(folder / "cells", error);
-  if (error) throw Error("cannot make the folder " + folder.string() + ": " + error.message() + "; choose another with --out");
-  std::ofstream stream(folder / "experiment.yaml", std::ios::binary);
-  stream << experiment.text;
-  stream.close();
-  if (!stream) throw Error("cannot write to " + folder.string() + "; is the disk full?");
+/// The files that say what is run, with what they hold.
+std::map<fs::path, std::string> sources_of(const Experiment& experiment) {
+  std::map<fs::path, std::string> sources{{experiment.file, experiment.text}};
+  for (const fs::path& file : {experiment.pipeline, experiment.simulation.pipeline})
+    if (!file.empty()) sources[file] = read_text_file(file, kMostSourceBytes);
+  return sources;
+}
+
+/// Each process of a comparison reads them for itself.
+void check_unchanged(const std::map<fs::path, std::string>& sources) {
+  for (const auto& [file, text] : sources)
+    if (read_text_file(file, kMostSourceBytes) != text)
+      throw Error(file.string() + " was changed while the comparison ran: its tables may mix the old with the new; give the same command again, which runs again what that concerns");
+}
+
+/// The part of a cell's name that is none of the experiment's, and what is near.
+template <class Named>
+std::string fault_of_part(const std::string& what, const std::string& part, const std::vector<Named>& all) {
+  std::vector<std::string> names;
+  for (const Named& one : all) names.push_back(one.name);
+  if (std::find(names.begin(), names.end(), part) != names.end()) return "";
+  return "no " + what + " '" + part + "'; " + suggestion(part, names);
+}
+
+std::string fault_of_id(const Experiment& experiment, const std::string& id) {
+  const std::size_t first = id.find('/'), second = id.find('/', first + 1);
+  if (first == std::string::npos || second == std::string::npos) return "write it as VARIANT/CASE/START, for example " + compare::cell_id(experiment, {0, 0, 0});
+  std::string fault = fault_of_part("variant", id.substr(0, first), experiment.variants);
+  if (fault.empty()) fault = fault_of_part("case", id.substr(first + 1, second - first - 1), experiment.cases);
+  if (fault.empty()) fault = fault_of_part("start", id.substr(second + 1), experiment.starts);
+  return "there is " + fault;
 }
 
 }  // namespace
@@ -56,9 +79,12 @@ int compare_variants(const CompareRequest& asked) {
     return 0;
   }
   const fs::path folder = folder_of(request, experiment);
-  open_folder(folder, experiment);
   request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
-  return run_comparison(request, catalogue, experiment, folder);
+  const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
+  const auto sources = sources_of(experiment);
+  const int code = run_comparison(request, catalogue, experiment, folder);
+  check_unchanged(sources);
+  return code;
 }
 
 int run_cell(const CompareRequest& request, const std::string& id) {
@@ -67,21 +93,25 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   if (!load(request, catalogue, experiment)) return 2;
   const auto cell = compare::cell_of(experiment, id);
   if (!cell) {
-    std::vector<std::string> names;
-    for (const CellIndex& one : compare::cells_of(experiment)) names.push_back(compare::cell_id(experiment, one));
-    std::fprintf(stderr, "marrow: error: the experiment has no cell '%s'; %s\n", id.c_str(), suggestion(id, names).c_str());
+    std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(), printable(fault_of_id(experiment, id)).c_str());
     return 2;
   }
   const fs::path folder = folder_of(request, experiment);
-  open_folder(folder, experiment);
+  ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::with_others);
+  kept.take_cell(id);
   const Store store;
   const bool is_kept = !request.no_cache && can_keep_results(store.prepare(), false);
-  CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads);
-  const CellRow row = runner.run(*cell);
-  runner.write(row);
-  if (row.failed.empty()) runner.draw(*cell);
+  CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads, request.file_limits);
+  CellRow row = runner.run(*cell);
+  runner.write(*cell, row);
   std::printf("%s\n", compare::to_json(row).c_str());
-  return row.failed.empty() ? 0 : 1;
+  if (!row.failed.empty()) return 1;
+  try {
+    runner.draw(*cell);
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), error.what());
+  }
+  return 0;
 }
 
 }  // namespace marrow::cli

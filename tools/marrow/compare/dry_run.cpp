@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <set>
 
@@ -12,9 +14,30 @@ using compare::CellIndex;
 using compare::CellRunner;
 using compare::Experiment;
 
+/// Reading a cell's pipeline takes some milliseconds: of more cells than these, some are looked at and stand for the others.
+constexpr std::size_t kMostCells = 1000;
+
+/// Some of a number of things, evenly spread.
+struct Sample {
+  std::size_t all = 0, taken = 0;
+  std::size_t at(std::size_t i) const { return i * all / taken; }
+  double weight() const { return double(all) / double(taken); }
+};
+
+std::pair<Sample, Sample> cases_and_starts(const Experiment& experiment) {
+  Sample cases{experiment.cases.size(), experiment.cases.size()}, starts{experiment.starts.size(), experiment.starts.size()};
+  const std::size_t places = std::max<std::size_t>(1, kMostCells / experiment.variants.size());
+  if (cases.all * starts.all > places) {
+    cases.taken = std::min(cases.all, std::max(std::size_t(std::sqrt(double(places))), places / starts.all));
+    starts.taken = std::clamp<std::size_t>(places / cases.taken, 1, starts.all);
+  }
+  return {cases, starts};
+}
+
+/// How many there are, by the cells that were looked at.
 struct Counts {
-  long all = 0, shared = 0, cached = 0;
-  std::map<std::string, long> to_make;  ///< by what the node uses
+  double all = 0, shared = 0, cached = 0;
+  std::map<std::string, double> to_make;  ///< by what the node uses
 };
 
 bool makes_functions(const PipelineNode& node) {
@@ -23,28 +46,60 @@ bool makes_functions(const PipelineNode& node) {
   return true;
 }
 
-void count_cell(const Experiment& experiment, const CellRunner& runner, const CellIndex& cell, const Catalogue& catalogue, const Store* store,
-                std::set<Digest>& seen, Counts& counts) {
-  const fs::path place = runner.case_place(cell.case_index);
-  const Pipeline pipeline = runner.pipeline_of(cell, place, CellRunner::Depth::figures);
-  const std::vector<Digest> keys = compare::histories(pipeline, experiment.cases[cell.case_index].name);
-  std::vector<PlannedNode> planned;
-  if (store && (place.empty() || fs::exists(place))) {
-    RunSettings settings;
-    settings.store = store;
-    settings.seed = runner.seed_of(cell.case_index);
-    settings.remember = false;
-    planned = plan_pipeline(pipeline, catalogue, settings);
+class Plan {
+ public:
+  Plan(const Experiment& experiment, const Catalogue& catalogue, const Store* store, const fs::path& folder)
+      : experiment_(experiment), catalogue_(catalogue), store_(store), runner_(experiment, catalogue, store, folder, 1),
+        samples_(cases_and_starts(experiment)) {
+    const auto& [cases, starts] = samples_;
+    for (std::size_t c = 0; c < cases.taken; ++c) {
+      const fs::path place = runner_.case_place(cases.at(c));
+      const bool is_there = place.empty() || fs::exists(place);
+      if (experiment.cases[cases.at(c)].is_simulated && !is_there) cases_to_make_ += cases.weight();
+      for (std::size_t s = 0; s < starts.taken; ++s)
+        for (std::size_t v = 0; v < experiment.variants.size(); ++v) count_cell({v, cases.at(c), starts.at(s)}, place, is_there);
+    }
   }
-  const std::vector<bool> needed = pipeline.needed();
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    if (!needed[i] || makes_functions(pipeline.nodes[i])) continue;
-    ++counts.all;
-    if (!seen.insert(keys[i]).second) ++counts.shared;
-    else if (!planned.empty() && planned[i].what == PlannedNode::What::cached) ++counts.cached;
-    else ++counts.to_make[pipeline.nodes[i].info.name];
+
+  void print() const;
+
+ private:
+  void count_cell(const CellIndex& cell, const fs::path& place, bool is_there) {
+    const Pipeline pipeline = runner_.pipeline_of(cell, place, CellRunner::Depth::figures);
+    const std::vector<Digest> keys = compare::histories(pipeline, experiment_.cases[cell.case_index].name);
+    const std::vector<compare::Dependence> dependences = compare::dependences(pipeline, experiment_);
+    std::vector<PlannedNode> planned;
+    if (store_ && is_there) {
+      RunSettings settings;
+      settings.store = store_;
+      settings.seed = runner_.seed_of(cell.case_index);
+      settings.remember = false;
+      planned = plan_pipeline(pipeline, catalogue_, settings);
+    }
+    const auto& [cases, starts] = samples_;
+    const std::vector<bool> needed = pipeline.needed();
+    for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+      if (!needed[i] || makes_functions(pipeline.nodes[i])) continue;
+      const double all = cases.weight() * starts.weight();
+      const double alike = (dependences[i].on_case ? cases.weight() : 1) * (dependences[i].on_start ? starts.weight() : 1);
+      counts_.all += all;
+      counts_.shared += all;
+      if (!seen_.insert(keys[i]).second) continue;
+      counts_.shared -= alike;
+      if (!planned.empty() && planned[i].what == PlannedNode::What::cached) counts_.cached += alike;
+      else counts_.to_make[pipeline.nodes[i].info.name] += alike;
+    }
   }
-}
+
+  const Experiment& experiment_;
+  const Catalogue& catalogue_;
+  const Store* store_;
+  const CellRunner runner_;
+  std::pair<Sample, Sample> samples_;
+  std::set<Digest> seen_;
+  Counts counts_;
+  double cases_to_make_ = 0;
+};
 
 /// Mean time of a call of each node in earlier runs.
 std::map<std::string, double> seconds_before(const Store& store) {
@@ -58,33 +113,30 @@ std::map<std::string, double> seconds_before(const Store& store) {
   return means;
 }
 
-}  // namespace
-
-void print_plan(const Experiment& experiment, const Catalogue& catalogue, const Store* store, const fs::path& folder) {
-  const CellRunner runner(experiment, catalogue, store, folder, 1);
-  Counts counts;
-  std::set<Digest> seen;
-  long cases_to_make = 0;
-  for (std::size_t c = 0; c < experiment.cases.size(); ++c) {
-    cases_to_make += experiment.cases[c].is_simulated && !fs::exists(runner.case_place(c));
-    for (std::size_t s = 0; s < experiment.starts.size(); ++s)
-      for (std::size_t v = 0; v < experiment.variants.size(); ++v) count_cell(experiment, runner, {v, c, s}, catalogue, store, seen, counts);
-  }
-  long to_make = 0, unknown = 0;
-  double seconds = 0;
-  const std::map<std::string, double> before = store ? seconds_before(*store) : std::map<std::string, double>();
-  for (const auto& [node, count] : counts.to_make) {
+void Plan::print() const {
+  double to_make = 0, unknown = 0, seconds = 0;
+  const std::map<std::string, double> before = store_ ? seconds_before(*store_) : std::map<std::string, double>();
+  for (const auto& [node, count] : counts_.to_make) {
     to_make += count;
     const auto known = before.find(node);
     if (known == before.end()) unknown += count;
-    else seconds += known->second * double(count);
+    else seconds += known->second * count;
   }
-  std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment.cell_count(), experiment.variants.size(), experiment.cases.size(), experiment.starts.size());
-  if (cases_to_make) std::printf("%ld cases to simulate\n", cases_to_make);
-  std::printf("%ld evaluations of nodes: %ld shared, %ld cached, %ld to make\n", counts.all, counts.shared, counts.cached, to_make);
-  if (to_make) std::printf("estimate from earlier runs: %.1f s of work", seconds);
-  if (unknown) std::printf(", without %ld evaluations of nodes that never ran", unknown);
-  if (to_make) std::printf("\n");
+  const auto& [cases, starts] = samples_;
+  const bool is_sample = cases.taken < cases.all || starts.taken < starts.all;
+  std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(), cases.all, starts.all);
+  if (is_sample) std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken, starts.taken);
+  if (cases_to_make_ > 0) std::printf("%.0f cases to simulate\n", cases_to_make_);
+  std::printf("%.0f evaluations of nodes: %.0f shared, %.0f cached, %.0f to make\n", counts_.all, counts_.shared, counts_.cached, to_make);
+  if (to_make > 0) std::printf("estimate from earlier runs: %.1f s of work", seconds);
+  if (unknown > 0) std::printf(", without %.0f evaluations of nodes that never ran", unknown);
+  if (to_make > 0) std::printf("\n");
+}
+
+}  // namespace
+
+void print_plan(const Experiment& experiment, const Catalogue& catalogue, const Store* store, const fs::path& folder) {
+  Plan(experiment, catalogue, store, folder).print();
 }
 
 }  // namespace marrow::cli

@@ -58,6 +58,8 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   };
   pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
+  for (const auto& [name, value] : {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
+    if (value > 0) pool.command.insert(pool.command.end(), {name, std::to_string(value)});
   return pool;
 }
 
@@ -117,7 +119,7 @@ class Comparison {
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       const CellIndex& cell = cells_[i];
       const auto fault = case_faults_.find(cell.case_index);
-      if (fault != case_faults_.end()) rows_[i] = failed_row(cell, fault->second, 1);
+      if (fault != case_faults_.end()) rows_[i] = compare::failed_row(experiment_, cell, fault->second, 1);
       else rows_[i] = runner_.finished(cell);
       found_ += rows_[i] && fault == case_faults_.end();
       if (!rows_[i])
@@ -128,22 +130,10 @@ class Comparison {
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const CellIndex& cell = cells_[job.number];
       CellRow row = row_of(cell, end);
-      row.tries = end.tries;
-      runner_.write(row);
+      runner_.write(cell, row);
       progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
       rows_[job.number] = std::move(row);
     });
-  }
-
-  /// What a worker says of a cell counts only as figures of the cell that it was asked for.
-  CellRow row_of(const CellIndex& cell, const JobEnd& end) const {
-    if (!end.failed.empty()) return failed_row(cell, end.failed, end.tries);
-    try {
-      CellRow row = compare::row_from_json(end.answer.dump());
-      return row;
-    } catch (const Error& error) {
-      return failed_row(cell, std::string("its process gave no row: ") + error.what(), end.tries);
-    }
   }
 
   /// The same cases and starts for all variants, spread over all that there are, one run at a time on all threads.
@@ -182,17 +172,17 @@ class Comparison {
     return (cell.case_index * experiment_.starts.size() + cell.start) * experiment_.variants.size() + cell.variant;
   }
 
-  CellRow failed_row(const CellIndex& cell, const std::string& reason, int tries) const {
-    CellRow row;
-    row.id = compare::cell_id(experiment_, cell);
-    row.variant = experiment_.variants[cell.variant].name;
-    row.case_name = experiment_.cases[cell.case_index].name;
-    row.start = experiment_.starts[cell.start].name;
-    row.failed = reason;
-    row.tries = tries;
-    row.values.resize(experiment_.metrics.size());
-    row.units.resize(experiment_.metrics.size());
-    return row;
+  /// What a worker says counts only as figures of the cell that it was asked for.
+  CellRow row_of(const CellIndex& cell, const JobEnd& end) const {
+    if (!end.failed.empty()) return compare::failed_row(experiment_, cell, end.failed, end.tries);
+    try {
+      CellRow row = compare::row_from_json(end.answer.dump(), experiment_);
+      compare::name_row(row, experiment_, cell);
+      row.tries = end.tries;
+      return row;
+    } catch (const Error& error) {
+      return compare::failed_row(experiment_, cell, error.what(), end.tries);
+    }
   }
 
   void print_counts(const std::vector<CellRow>& rows) const {

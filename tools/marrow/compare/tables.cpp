@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // cells.csv and cells.jsonl (a row a cell), comparison.json (all of the answer).
-#include <cmath>
-#include <fstream>
+#include <charconv>
 #include <nlohmann/json.hpp>
 #include <set>
 
 #include "compare/comparison.hpp"
-#include "marrow/domain/error.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -15,17 +14,17 @@ using compare::CellRow;
 using compare::Experiment;
 using nlohmann::json;
 
-void write_file(const std::filesystem::path& file, const std::string& text) {
-  const std::filesystem::path temporary = file.string() + ".tmp";
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error("cannot write " + file.string() + "; is the disk full?");
-  std::filesystem::rename(temporary, file);
+bool is_number(const std::string& text) {
+  double value = 0;
+  const char* const begin = text.data() + (text[0] == '+');
+  const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
 }
 
-/// RFC 4180: quoted where it has to be.
-std::string field(const std::string& text) {
+/// RFC 4180: quoted where it has to be. A text that a spreadsheet would compute, as a reason that begins with "=", is marked
+/// as a text.
+std::string field(std::string text) {
+  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !is_number(text)) text = "'" + text;
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
   for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
@@ -121,9 +120,9 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
 }
 
 void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const std::filesystem::path& folder) {
-  write_file(folder / "cells.csv", csv(experiment, rows));
-  write_file(folder / "cells.jsonl", jsonl(experiment, rows));
-  write_file(folder / "comparison.json", answer_json(experiment, answer).dump(1) + "\n");
+  write_text_file(folder / "cells.csv", csv(experiment, rows));
+  write_text_file(folder / "cells.jsonl", jsonl(experiment, rows));
+  write_text_file(folder / "comparison.json", answer_json(experiment, answer).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace marrow::cli

@@ -44,7 +44,7 @@ int worker(const CompareRequest& request) {
   const Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics);
   if (!diagnostics.empty()) throw Error("the experiment has faults:\n" + diagnostics.text());
   const Store store;
-  CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads);
+  CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads, request.file_limits);
   return serve_worker({
       {"case",
        [&](const json& asked, WorkerReports&) {

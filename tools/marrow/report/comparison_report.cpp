@@ -86,8 +86,8 @@ json pipeline_graph(const Experiment& experiment, const compare::CellRunner& run
 }
 
 std::string command_of(const Experiment& experiment, const CompareRequest& request) {
-  std::string command = "marrow compare " + experiment.file.string();
-  if (!request.folder.empty()) command += " --out " + request.folder.string();
+  std::string command = "marrow compare " + shell_path(experiment.file);
+  if (!request.folder.empty()) command += " --out " + shell_path(request.folder);
   return command;
 }
 

@@ -43,6 +43,11 @@ nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<st
 /// What runs say of the machine and the plugins that they used.
 nlohmann::json machine_of(const nlohmann::json& run_record);
 
+/// A text as one word of a POSIX shell's command line, whatever is in it.
+std::string shell_word(const std::string& text);
+/// The same for a path, which is never taken for an option.
+std::string shell_path(const std::filesystem::path& path);
+
 /// FOLDER/report.html of a comparison; `shown` are the cells whose pictures were made.
 void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
                   const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown, const CompareRequest& request,

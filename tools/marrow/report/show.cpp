@@ -96,7 +96,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   json plugins = json::array();
   for (const json& plugin : record.value("plugins", json::array())) plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
   data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", pipeline_text_of(folder)}, {"seed", record.contains("seed") ? record["seed"] : json(1)},
-                        {"finished", record.value("finished", "")}, {"command", "marrow rerun " + folder.string()}, {"folder", cell["folder"]},
+                        {"finished", record.value("finished", "")}, {"command", "marrow rerun " + shell_path(folder)}, {"folder", cell["folder"]},
                         {"machine", machine_of(record)}, {"plugins", plugins}};
   return data;
 }

@@ -34,18 +34,30 @@ struct CellRow {
 };
 
 std::string to_json(const CellRow& row);
-/// Throws Error for a text that is no row.
-CellRow row_from_json(const std::string& text);
+/// A row of the experiment from its text. Throws Error for a text that is none. Which cell it is of is not believed: call
+/// name_row() with the cell that was asked for.
+CellRow row_from_json(const std::string& text, const Experiment& experiment);
+/// Says in the row which cell it is of.
+void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell);
+/// The row of a cell that has none, because of `reason`.
+CellRow failed_row(const Experiment& experiment, const CellIndex& cell, const std::string& reason, int tries);
 
 /// What each node will come to, as far as that can be said before anything ran: equal for equal nodes of equal histories.
 /// `case_name` stands for all data that paths name and for the seed of what is random.
 std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name);
 
+/// Whether a node comes out otherwise for another case, or another start, of the same variant.
+struct Dependence {
+  bool on_case = false, on_start = false;
+};
+std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& experiment);
+
 /// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record) and FOLDER/cells/ID/cell.json,
 /// which is written last and in one go; what there is to look at goes to FOLDER/pictures/ID/.
 class CellRunner {
  public:
-  CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder, int threads);
+  CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder, int threads,
+             const FileLimits& file_limits = {});
 
   /// The seed of a case's runs.
   std::uint64_t seed_of(std::size_t case_index) const;
@@ -64,17 +76,23 @@ class CellRunner {
   /// anew. Measured once: later runs with as many threads find it in the store. Throws Error where the run fails.
   double time(const CellIndex& cell);
   std::filesystem::path pictures_of(const CellIndex& cell) const;
-  /// Writes the row where finished() finds it.
-  void write(const CellRow& row) const;
+  /// Writes the row where finished() finds it. Where it cannot be written, the row fails by that: it costs the cell alone.
+  void write(const CellIndex& cell, CellRow& row) const;
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
-  std::string key_of(const CellIndex& cell);
   enum class Depth { figures, pictures };
   /// The pipeline of a cell, with its poses and the outputs that the experiment's metrics need, and those that are looked at.
   Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
 
  private:
-  RunResult run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell, const std::function<void(const RunEvent&)>& observer);
+  /// Of all that a run of the pipeline and the cell's row depend on; the case is looked at anew.
+  std::string key_of(const CellIndex& cell, const Pipeline& pipeline);
+  struct Done {
+    RunResult result;
+    std::string fault;  ///< of the first node that failed, or of an output that could not be written
+  };
+  Done run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell, const std::function<void(const RunEvent&)>& observer);
+  void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
   Pipeline simulation_of(std::size_t case_index) const;
   /// The nodes of the cell that not all variants have in common.
   std::set<std::string> own_nodes(const CellIndex& cell, const Pipeline& pipeline);
@@ -85,8 +103,8 @@ class CellRunner {
   const Store* store_;
   std::filesystem::path folder_;
   int threads_;
+  FileLimits file_limits_;
   std::map<std::size_t, std::filesystem::path> case_folders_;
-  std::map<std::size_t, std::string> case_keys_;
 };
 
 }  // namespace marrow::compare

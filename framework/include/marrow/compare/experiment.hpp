@@ -25,7 +25,23 @@ struct ExperimentCase {
   std::filesystem::path folder;  ///< empty where there is none yet
   bool is_simulated = false;
   std::uint64_t seed = 1;        ///< of the simulation; where there is none, of the runs
-  std::vector<InputValue> inputs;  ///< of the simulation's pipeline
+};
+
+/// An input of the simulation that is drawn uniformly.
+struct DrawnInput {
+  std::string name;
+  std::array<double, 2> range{};
+  Place place;
+};
+
+/// The pipeline that makes cases, and where the values of its inputs come from.
+struct CaseSimulation {
+  std::filesystem::path pipeline;  ///< empty where there is none
+  std::string output;
+  std::vector<Override> changes;   ///< of the pipeline, for all cases
+  std::vector<InputValue> inputs;  ///< the same for all cases
+  std::vector<DrawnInput> drawn;
+  std::vector<std::pair<std::string, Place>> seed_inputs;  ///< inputs that take the case's seed
 };
 
 /// A displacement of the start, about and along the fragment's frontal, lateral and long axes through its centroid.
@@ -57,6 +73,10 @@ struct MetricChoice {
   bool higher_is_better() const { return better == Better::higher; }
 };
 
+/// An experiment of more is a fault of its file. Each variant's pipeline is read whenever the experiment is.
+inline constexpr std::size_t kMostVariants = 1000;
+inline constexpr std::size_t kMostCells = 1000000;
+
 struct Experiment {
   std::string name, help;
   std::filesystem::path file;
@@ -66,9 +86,7 @@ struct Experiment {
   std::vector<Override> common;           ///< changes of the pipeline for all variants, before their own
   std::string case_input;                 ///< the pipeline's input that a case's folder is given to, where it has one
   Place cases_place;
-  std::filesystem::path simulation;       ///< the pipeline that makes cases; empty where there is none
-  std::string simulation_output;
-  std::vector<Override> simulation_changes;  ///< of the simulation's pipeline, for all cases
+  CaseSimulation simulation;
   std::vector<ExperimentCase> cases;
   std::vector<Variant> variants;
   std::size_t baseline = 0;

@@ -1,0 +1,115 @@
+// SPDX-License-Identifier: Apache-2.0
+// The row of a cell as text: what was not written by marrow, or was damaged since, is no row.
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+
+#include "marrow/compare/cell.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace {
+
+using marrow::compare::CellRow;
+using nlohmann::json;
+
+marrow::compare::Experiment experiment() {
+  marrow::compare::Experiment e;
+  for (const char* name : {"one", "two"}) e.variants.push_back({name, {}, {}});
+  e.cases.push_back({"a", {}, false, 1});
+  e.starts.push_back({"0", {}, {}});
+  for (const char* path : {"errors.mtre_mm", "errors.axial_deg"}) {
+    e.metrics.emplace_back();
+    e.metrics.back().path = path;
+  }
+  e.initial_error = "errors.start_mm";
+  return e;
+}
+
+CellRow good_row() {
+  CellRow row;
+  marrow::compare::name_row(row, experiment(), {1, 0, 0});
+  row.values = {1.5, -0.25};
+  row.units = {"mm", "deg"};
+  row.initial_error = 3.5;
+  row.seconds = 0.125;
+  row.evaluations = 70;
+  row.nodes["edges"] = {1, 2, 0.5};
+  row.key = "0123456789abcdef0123456789abcdef";
+  return row;
+}
+
+std::string fault_of(const json& row) {
+  try {
+    marrow::compare::row_from_json(row.dump(), experiment());
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "none";
+}
+
+TEST(CellRowText, ComesBackAsItWas) {
+  CellRow row = marrow::compare::row_from_json(to_json(good_row()), experiment());
+  marrow::compare::name_row(row, experiment(), {1, 0, 0});
+  EXPECT_EQ(to_json(row), to_json(good_row()));
+  CellRow failed = marrow::compare::failed_row(experiment(), {0, 0, 0}, "it broke", 2);
+  EXPECT_EQ(marrow::compare::row_from_json(to_json(failed), experiment()).failed, "it broke");
+}
+
+TEST(CellRowText, SaysNotWhichCellItIsOf) {
+  json forged = json::parse(to_json(good_row()));
+  for (const char* part : {"id", "variant", "case", "start"}) forged[part] = "../../elsewhere";
+  CellRow row = marrow::compare::row_from_json(forged.dump(), experiment());
+  EXPECT_EQ(row.id + row.variant + row.case_name + row.start, "");
+  marrow::compare::name_row(row, experiment(), {1, 0, 0});
+  EXPECT_EQ(row.id, "two/a/0");
+  EXPECT_EQ(row.variant + " " + row.case_name + " " + row.start, "two a 0");
+}
+
+TEST(CellRowText, ForgedOrDamaged) {
+  const json good = json::parse(to_json(good_row()));
+  const std::vector<std::pair<json, std::string>> changes = {
+      {json{{"values", json::array()}}, "'values' must be a list of 2"},
+      {json{{"values", {1}}}, "'values' must be a list of 2"},
+      {json{{"values", {1, 2, 3}}}, "'values' must be a list of 2"},
+      {json{{"values", {1, "2"}}}, "an item of 'values' is no number"},
+      {json{{"values", {1, json()}}}, "a cell that is done has all values, one that failed has none"},
+      {json{{"values", 7}}, "'values' must be a list of 2"},
+      {json{{"units", {"mm"}}}, "'units' must be a list of 2"},
+      {json{{"units", {"mm", 3}}}, "type must be string"},
+      {json{{"evaluations", -1}}, "'evaluations' is -1; expected a whole number from 0 to 2147483647"},
+      {json{{"evaluations", 1e10}}, "'evaluations': expected a whole number"},
+      {json{{"evaluations", 4294967297}}, "'evaluations' is 4294967297; expected"},
+      {json{{"tries", "many"}}, "'tries': expected a whole number"},
+      {json{{"initial_error", "far"}}, "'initial_error' is no number"},
+      {json{{"initial_error", json()}}, "'initial_error' is there where the experiment has none, or is not there"},
+      {json{{"status", "failed"}}, "'status' and 'reason' do not agree"},
+      {json{{"reason", "it broke"}}, "'status' and 'reason' do not agree"},
+      {json{{"reason", 1}}, "type must be string"},
+      {json{{"nodes", {{"edges", {{"made", -3}, {"cached", 0}, {"seconds", 0}}}}}}, "'made' is -3; expected"},
+      {json{{"nodes", {{"edges", {{"made", 1}}}}}}, "key 'cached' not found"},
+      {json{{"nodes", {{"edges", 1}}}}, "cannot use at() with number"},
+      {json{{"key", 5}}, "type must be string"},
+  };
+  EXPECT_EQ(fault_of(good), "none");
+  for (const auto& [change, fault] : changes) {
+    json row = good;
+    row.update(change);
+    EXPECT_NE(fault_of(row).find("not a cell's row: "), std::string::npos) << change;
+    EXPECT_NE(fault_of(row).find(fault), std::string::npos) << change << fault_of(row);
+  }
+  for (const char* key : {"values", "units", "tries", "nodes", "key", "status"}) {
+    json row = good;
+    row.erase(key);
+    EXPECT_NE(fault_of(row).find("key '" + std::string(key) + "' not found"), std::string::npos) << fault_of(row);
+  }
+}
+
+TEST(CellRowText, NoJson) {
+  for (const std::string& text : {std::string(), std::string("good"), std::string("[]"), std::string("7"), std::string(100000, '['), to_json(good_row()).substr(0, 60)})
+    EXPECT_THROW(marrow::compare::row_from_json(text, experiment()), marrow::Error) << text.substr(0, 80);
+  std::string endless = to_json(good_row());
+  endless.replace(endless.find("1.5"), 3, "1e999");
+  EXPECT_THROW(marrow::compare::row_from_json(endless, experiment()), marrow::Error);
+}
+
+}  // namespace
