@@ -54,8 +54,10 @@ json json_of_option(const OptionValue& value) {
 
 json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_inputs, const Context::Hooks& hooks,
                 const CallLimits& limits) {
+  const LibraryInfo& library = *catalogue.library_of(node.info.name);
   json request = {{"do", "call"},
-                  {"library", json_of_bytes(catalogue.library_of(node.info.name)->file.string())},
+                  {"library", json_of_bytes(library.file.string())},
+                  {"manifest", manifest_text(library)},
                   {"node", node.info.name},
                   {"options", json::array()},
                   {"has_inputs", has_inputs},

@@ -25,19 +25,23 @@ std::vector<fs::path> Catalogue::default_folders() {
 
 Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders)) {
   const Digest framework = file_digest(framework_file());
+  const auto refuse = [&](const fs::path& file, const std::string& reason) {
+    libraries_.push_back({});
+    libraries_.back().file = file;
+    libraries_.back().refused = reason;
+  };
   for (const fs::path& folder : folders_) {
     std::vector<fs::path> files;
     std::error_code error;
     for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
       if (at->path().extension() == ".so") files.push_back(at->path());
+    if (error && error != std::errc::no_such_file_or_directory) refuse(folder, "cannot be searched for libraries: " + error.message());
     std::sort(files.begin(), files.end());
     for (const fs::path& file : files) {
       try {
         libraries_.push_back(library_info(file, framework));
       } catch (const Error& error) {
-        libraries_.push_back({});
-        libraries_.back().file = file;
-        libraries_.back().refused = error.what();
+        refuse(file, error.what());
       }
     }
   }
@@ -96,16 +100,13 @@ const WriterInfo* Catalogue::find_writer(const TypeInfo& type) const {
 const Plugin& Catalogue::load_plugin(std::size_t library) const {
   const std::scoped_lock lock(mutex_);
   std::unique_ptr<Plugin>& plugin = loaded_[library];
-  if (!plugin) plugin = load_library(libraries_[library].file);
+  if (!plugin) plugin = load_library(libraries_[library]);
   return *plugin;
 }
 
 const NodeDefinition& Catalogue::load(const std::string& name) const {
   const Entry& entry = nodes_.at(name);
-  const Plugin& plugin = load_plugin(entry.library);
-  if (entry.index >= plugin.nodes.size() || plugin.nodes[entry.index].info.name != name)
-    throw Error(libraries_[entry.library].file.string() + " does not hold the node '" + name + "' that its manifest promises; describe it anew");
-  return plugin.nodes[entry.index];
+  return load_plugin(entry.library).nodes.at(entry.index);
 }
 
 const WriterDefinition& Catalogue::load_writer(const TypeInfo& type) const {

@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
+#include <cmath>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <set>
 
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/kinds.hpp"
@@ -15,29 +19,63 @@ bool is_name(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; });
 }
 
-void check_number(const OptionInfo& option, double value, std::vector<std::string>& faults) {
-  if ((option.minimum && value < *option.minimum) || (option.maximum && value > *option.maximum))
-    faults.push_back("option '" + option.name + "': its default is outside its own range");
+/// Whether a text can be shown on a terminal and written as JSON: UTF-8 without control characters.
+bool is_plain(const std::string& text) try {
+  if (std::any_of(text.begin(), text.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; })) return false;
+  nlohmann::json(text).dump();
+  return true;
+} catch (const nlohmann::json::exception&) {
+  return false;
+}
+
+void check_texts(const std::string& what, const std::vector<std::string>& texts, std::vector<std::string>& faults) {
+  if (!std::all_of(texts.begin(), texts.end(), is_plain)) faults.push_back(what + ": its texts must be UTF-8 without control characters");
+}
+
+std::vector<double> numbers_of(const OptionValue& value) {
+  if (const auto* integer = std::get_if<std::int64_t>(&value)) return {double(*integer)};
+  if (const auto* number = std::get_if<double>(&value)) return {*number};
+  const auto* numbers = std::get_if<std::vector<double>>(&value);
+  return numbers ? *numbers : std::vector<double>{};
+}
+
+std::vector<std::string> texts_of(const OptionValue& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return {*text};
+  const auto* texts = std::get_if<std::vector<std::string>>(&value);
+  return texts ? *texts : std::vector<std::string>{};
+}
+
+/// That range and default can be written down, and the default lies in the range.
+void check_numbers(const OptionInfo& option, const std::string& name, std::vector<std::string>& faults) {
+  constexpr double kLargest = std::numeric_limits<double>::max();
+  const double least = option.minimum.value_or(-kLargest), most = option.maximum.value_or(kLargest);
+  if (!std::isfinite(least) || !std::isfinite(most) || least > most) faults.push_back(name + ": its range is empty or not finite");
+  for (const double number : numbers_of(option.default_value)) {
+    if (!std::isfinite(number)) faults.push_back(name + ": its default is not a finite number");
+    else if (!option.required && (number < least || number > most)) faults.push_back(name + ": its default is outside its own range");
+  }
 }
 
 void check_option(const OptionInfo& option, std::vector<std::string>& faults) {
-  if (!is_name(option.name)) faults.push_back("option '" + option.name + "': names are lower_case");
-  if (option.help.empty()) faults.push_back("option '" + option.name + "': has no line of help");
-  if (option.required) return;
-  if (const auto* integer = std::get_if<std::int64_t>(&option.default_value)) check_number(option, double(*integer), faults);
-  if (const auto* number = std::get_if<double>(&option.default_value)) check_number(option, *number, faults);
-  if (const auto* numbers = std::get_if<std::vector<double>>(&option.default_value))
-    for (double number : *numbers) check_number(option, number, faults);
+  const std::string name = "option '" + option.name + "'";
+  if (!is_name(option.name)) faults.push_back(name + ": names are lower_case");
+  if (option.help.empty()) faults.push_back(name + ": has no line of help");
+  check_texts(name, {option.help, option.unit}, faults);
+  check_texts(name, option.choices, faults);
+  check_texts(name, texts_of(option.default_value), faults);
+  check_numbers(option, name, faults);
   const auto* text = std::get_if<std::string>(&option.default_value);
-  if (text && !option.choices.empty() && std::find(option.choices.begin(), option.choices.end(), *text) == option.choices.end())
-    faults.push_back("option '" + option.name + "': its default '" + *text + "' is not one of its choices");
+  if (text && !option.required && !option.choices.empty() && std::find(option.choices.begin(), option.choices.end(), *text) == option.choices.end())
+    faults.push_back(name + ": its default '" + *text + "' is not one of its choices");
 }
 
 void check_ports(const std::vector<PortInfo>& ports, const char* what, std::vector<std::string>& faults) {
   for (std::size_t i = 0; i < ports.size(); ++i) {
-    if (!is_name(ports[i].name)) faults.push_back(std::string(what) + " '" + ports[i].name + "': names are lower_case");
+    const std::string port = std::string(what) + " '" + ports[i].name + "'";
+    if (!is_name(ports[i].name)) faults.push_back(port + ": names are lower_case");
+    check_texts(port, {ports[i].help, ports[i].axis, ports[i].type.id}, faults);
     for (std::size_t j = 0; j < i; ++j)
-      if (ports[j].name == ports[i].name) faults.push_back(std::string(what) + " '" + ports[i].name + "' is named twice");
+      if (ports[j].name == ports[i].name) faults.push_back(port + " is named twice");
   }
 }
 
@@ -78,7 +116,12 @@ void check_declaration(NodeDefinition& node) {
   if (info.outputs.empty()) faults.push_back("has no output: name what the function returns with .out()");
   check_ports(info.inputs, "input", faults);
   check_ports(info.outputs, "output", faults);
-  for (const OptionInfo& option : info.options) check_option(option, faults);
+  check_texts("summary", {info.summary}, faults);
+  std::set<std::string> names;
+  for (const OptionInfo& option : info.options) {
+    check_option(option, faults);
+    if (!names.insert(option.name).second) faults.push_back("option '" + option.name + "' is named twice");
+  }
 
   const Kind* kind = find_kind(info.kind());
   if (!kind || !kind->sees_truth)

@@ -3,46 +3,29 @@
 #include "marrow/runtime/library.hpp"
 
 #include <dlfcn.h>
-#include <elf.h>
 #include <fcntl.h>
 #include <link.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
-#include <cstdlib>
 #include <cstring>
-#include <fstream>
 #include <set>
-#include <sstream>
 
 #include "apart.hpp"
+#include "descriptions.hpp"
+#include "elf_file.hpp"
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "regular_file.hpp"
+#include "trust.hpp"
 
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
 constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
-
-/// A file that is no whole ELF library would make the dynamic loader fail obscurely or crash.
-void check_elf(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw Error("cannot be read: " + std::string(std::strerror(errno)));
-  Elf64_Ehdr header{};
-  stream.read(reinterpret_cast<char*>(&header), sizeof header);
-  if (stream.gcount() < std::streamsize(SELFMAG) || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0)
-    throw Error("is not a shared library (it does not begin with an ELF header)");
-  const std::uint64_t size = fs::file_size(file);
-  const std::uint64_t expected = header.e_shoff + std::uint64_t(header.e_shentsize) * header.e_shnum;
-  if (stream.gcount() < std::streamsize(sizeof header) || size < expected)
-    throw Error("is truncated: its ELF header speaks of " + std::to_string(expected) + " bytes, the file has " +
-                std::to_string(size) + "; build or copy it again");
-}
 
 /// What differs between the plugin's stamp and ours, in words with both values and the cure; empty when they agree.
 std::string stamp_mismatch(const AbiStamp& theirs) {
@@ -154,40 +137,61 @@ LibraryInfo describe_here(const fs::path& file) {
   return info;
 }
 
-fs::path cache_folder() {
-  if (const char* cache = std::getenv("XDG_CACHE_HOME")) return fs::path(cache) / "marrow" / "libraries";
-  if (const char* home = std::getenv("HOME")) return fs::path(home) / ".cache" / "marrow" / "libraries";
-  return {};
-}
-
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
-void write_text(const fs::path& file, const std::string& text) {
-  const fs::path temporary = file.string() + "." + std::to_string(getpid()) + ".tmp";
-  std::ofstream stream(temporary, std::ios::binary);
-  stream << text;
-  stream.close();
-  std::error_code error;
-  if (stream) fs::rename(temporary, file, error);
-  if (!stream || error) {
-    fs::remove(temporary, error);
-    throw Error("cannot write " + file.string());
+/// What a library said of itself is checked as strictly as any manifest.
+LibraryInfo described(const std::string& text) {
+  LibraryInfo info;
+  try {
+    info = manifest_from_text(text);
+  } catch (const Error& error) {
+    info.refused = std::string("describes itself in a way that cannot be used: ") + error.what();
   }
+  return info;
 }
 
-/// That the manifest belongs to this very file and to the libraries that are here now; else why not.
-std::string stale(const LibraryInfo& info, const Digest& digest) {
-  if (info.digest != digest) return "it belongs to another build of the library";
-  for (const LinkedLibrary& library : info.linked) {
-    std::error_code error;
-    if (fs::file_size(library.path, error) != library.size || error) return fs::path(library.path).filename().string() + " has changed";
-  }
-  return "";
+/// Loads a library in a worker; the answer may be a refusal. Throws Error where there is none.
+LibraryInfo describe_apart(const fs::path& file) {
+  Worker worker({{worker_program().string()}});
+  worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
+  const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
+  LibraryInfo info;
+  if (end.is_late) info.refused = "did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded";
+  else if (end.is_out_of_memory) info.refused = "takes more than " + std::to_string(kDescribeLimit_mb) + " MB of memory to be loaded";
+  else if (end.signal) info.refused = std::string("crashed while being loaded (") + strsignal(end.signal) + ")";
+  else if (end.died) info.refused = "ended the process that loaded it";
+  else if (!end.failed.empty()) info.refused = "cannot be described: " + end.failed;
+  else if (!end.answer.is_string()) info.refused = "describes itself in a way that cannot be used";
+  else return described(end.answer.get<std::string>());
+  return info;
+}
+
+/// What a loaded library registers, and the libraries that it found.
+LibraryInfo registered(const Plugin& plugin, void* handle) {
+  LibraryInfo info;
+  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
+  for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
+  info.linked = linked_libraries(handle);
+  return info;
+}
+
+/// The build id counts the linked libraries by name and size.
+std::set<std::pair<std::string, std::uint64_t>> versions_of(const std::vector<LinkedLibrary>& libraries) {
+  std::set<std::pair<std::string, std::uint64_t>> result;
+  for (const LinkedLibrary& library : libraries) result.insert({fs::path(library.path).filename().string(), library.size});
+  return result;
+}
+
+/// Everything before the load went by the description: options were checked and set, and keys were made. Where it is not what the
+/// library registers, nothing of the library may be called.
+void expect_described(const LibraryInfo& described, const LibraryInfo& registered) {
+  std::string found = difference(described, registered);
+  const auto before = versions_of(described.linked), now = versions_of(registered.linked);
+  for (const auto& library : now)
+    if (found.empty() && !before.count(library)) found = "it loads another " + library.first + " (" + std::to_string(library.second) + " bytes)";
+  for (const auto& library : before)
+    if (found.empty() && !now.count(library)) found = "it does not load " + library.first + " of " + std::to_string(library.second) + " bytes";
+  if (found.empty()) return;
+  forget_description(described);
+  throw Error("is not what its description says: " + found + "; " + cure_of_description(described.file));
 }
 
 }  // namespace
@@ -198,31 +202,16 @@ fs::path framework_file() {
   return fs::canonical(info.dli_fname);
 }
 
-Digest file_digest(const fs::path& file) {
-  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  struct stat status{};
-  if (descriptor < 0 || fstat(descriptor, &status) != 0) {
-    if (descriptor >= 0) close(descriptor);
-    throw Error("cannot read " + file.string() + ": " + std::strerror(errno));
-  }
-  Hasher hasher;
-  if (status.st_size > 0) {
-    void* data = mmap(nullptr, std::size_t(status.st_size), PROT_READ, MAP_PRIVATE, descriptor, 0);
-    if (data != MAP_FAILED) {
-      hasher.bytes(data, std::size_t(status.st_size));
-      munmap(data, std::size_t(status.st_size));
-    }
-  }
-  close(descriptor);
-  return hasher.digest();
-}
-
-std::unique_ptr<Plugin> load_library(const fs::path& file) {
+std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
+  const fs::path& file = described.file;
   try {
-    check_elf(file);
+    expect_trusted(file);
+    check_elf(RegularFile(file));
     void* handle = open_library(file, RTLD_NOW);
     auto plugin = std::make_unique<Plugin>();
     run_registration(*plugin, checked_entry(handle));
+    if (digest_of(RegularFile(file)) != described.digest) throw Error("was changed since this program began; start it again");
+    expect_described(described, registered(*plugin, handle));
     return plugin;
   } catch (const Error& error) {
     throw Error(file.string() + " " + error.what());
@@ -235,76 +224,22 @@ nlohmann::json answer_describe(const nlohmann::json& request, WorkerReports&) {
 
 LibraryInfo describe_library(const fs::path& file) {
   LibraryInfo info;
-  const auto refuse = [&](const std::string& reason) {
-    info = LibraryInfo{};
-    info.refused = reason;
-  };
+  Digest digest;
   try {
-    check_elf(file);
-    Worker worker({{worker_program().string()}});
-    worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
-    const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
-    if (end.signal) refuse(std::string("crashed while being loaded (") + strsignal(end.signal) + ")");
-    else if (!end.failed.empty() && end.is_late) refuse("did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded");
-    else if (end.died) refuse("ended the process that loaded it");
-    else if (!end.failed.empty()) refuse("cannot be described: " + end.failed);
-    else info = manifest_from_text(end.answer.get<std::string>());
-  } catch (const std::exception& error) {
-    refuse(error.what());
+    expect_trusted(file);
+    const RegularFile library(file);
+    check_elf(library);
+    const Digest before = digest_of(library);
+    info = describe_apart(file);
+    if (digest_of(RegularFile(file)) != before) throw Error("cannot be described: it was changed meanwhile; try again");
+    digest = before;
+  } catch (const Error& error) {
+    info = LibraryInfo{};
+    info.refused = error.what();
   }
   info.file = file;
-  info.digest = file_digest(file);
+  info.digest = digest;
   return info;
-}
-
-LibraryInfo library_info(const fs::path& file, const Digest& framework) {
-  const Digest digest = file_digest(file);
-  const fs::path beside = fs::path(file).replace_extension(".json");
-  // A verdict depends on the framework too: what an older one refused, a newer one may accept.
-  Hasher cached_name;
-  cached_name.add(digest);
-  cached_name.add(framework);
-  const fs::path folder = cache_folder();
-  const fs::path cached = folder / (cached_name.digest().hex() + ".json");
-  std::string note;
-  LibraryInfo info;
-  bool known = false;
-  for (const fs::path& manifest : {beside, cached}) {
-    if (known || !fs::exists(manifest)) continue;
-    try {
-      info = manifest_from_text(read_text(manifest));
-      const std::string reason = stale(info, digest);
-      known = reason.empty();
-      if (!known && manifest == beside) note = "its manifest is stale (" + reason + "), so it was described anew";
-    } catch (const Error& error) {
-      if (manifest == beside) note = std::string("its manifest is not used (") + error.what() + "), so it was described anew";
-    }
-  }
-  if (!known) {
-    info = describe_library(file);
-    std::error_code error;
-    fs::create_directories(folder, error);
-    try {
-      if (!folder.empty()) write_text(cached, manifest_text(info));
-    } catch (const Error&) {
-      // Only a cache: without it the library is described again next time.
-    }
-  }
-  info.file = file;
-  info.note = note;
-  Hasher build_id;
-  build_id.add(digest);
-  build_id.add(framework);
-  for (const LinkedLibrary& library : info.linked) {
-    build_id.add(fs::path(library.path).filename().string());
-    build_id.add(library.size);
-  }
-  info.build_id = build_id.digest();
-  return info;
-}
-
-void write_manifest(const LibraryInfo& info) {
-  write_text(fs::path(info.file).replace_extension(".json"), manifest_text(info));
 }
 
 }  // namespace marrow

@@ -2,9 +2,15 @@
 #include "manifest.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <iterator>
+#include <limits>
+#include <set>
 
+#include "json_text.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/plugin.hpp"
+#include "marrow/runtime/store.hpp"
 
 namespace marrow {
 namespace {
@@ -12,17 +18,19 @@ namespace {
 using nlohmann::json;
 constexpr int kManifestVersion = 1;
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
+constexpr std::int64_t kMostBytes_of_value = 1 << 30;
+constexpr std::size_t kMostLinked = 1000;
 
 json json_of(const TypeInfo& type) {
   return {{"id", type.id}, {"version", type.version}, {"size", type.size}, {"function", type.is_function}};
 }
-TypeInfo type_from(const json& j) { return {j.at("id"), j.at("version"), j.at("size"), j.at("function")}; }
 
 json json_of(const PortInfo& port) {
-  return {{"name", port.name}, {"help", port.help}, {"type", json_of(port.type)}, {"optional", port.optional}, {"axis", port.axis}};
-}
-PortInfo port_from(const json& j) {
-  return {j.at("name"), j.at("help"), type_from(j.at("type")), j.at("optional"), j.at("axis")};
+  return {{"name", port.name},
+          {"help", port.help},
+          {"type", json_of(port.type)},
+          {"optional", port.optional},
+          {"axis", port.axis}};
 }
 
 json json_of(const OptionInfo& option) {
@@ -35,53 +43,203 @@ json json_of(const OptionInfo& option) {
   return j;
 }
 
-OptionValue value_from(const json& j, OptionType type) {
+json json_of(const WriterInfo& writer) {
+  return {{"type", json_of(writer.type)}, {"extension", writer.extension}, {"help", writer.help}};
+}
+
+[[noreturn]] void damaged(const std::string& what) {
+  throw Error("it is damaged: " + what);
+}
+
+/// An object of the manifest: each of its fields is there, has its type, and is read.
+class Fields {
+ public:
+  Fields(const json& object, std::string name, std::size_t count) : object_(object), name_(std::move(name)) {
+    if (!object.is_object()) damaged(name_ + " is not an object");
+    if (object.size() != count)
+      damaged(name_ + " has " + std::to_string(object.size()) + " fields, expected " + std::to_string(count));
+  }
+  const json& at(const char* key) const {
+    const auto found = object_.find(key);
+    if (found == object_.end()) damaged(name_ + " has no '" + key + "'");
+    return *found;
+  }
+  std::string text(const char* key) const { return text_of(at(key), key); }
+  bool boolean(const char* key) const {
+    if (!at(key).is_boolean()) damaged(said(key) + "is neither true nor false");
+    return at(key).get<bool>();
+  }
+  double number(const char* key) const { return number_of(at(key), key); }
+  std::int64_t integer(const char* key, std::int64_t least, std::int64_t most) const {
+    try {
+      return integer_of(at(key), least, most, name_ + ": '" + key + "'");
+    } catch (const Error& error) {
+      damaged(error.what());
+    }
+  }
+  const json& list(const char* key) const {
+    if (!at(key).is_array()) damaged(said(key) + "is not a list");
+    return at(key);
+  }
+  std::vector<std::string> texts(const char* key) const {
+    std::vector<std::string> result;
+    for (const json& item : list(key)) result.push_back(text_of(item, key));
+    return result;
+  }
+  std::vector<double> numbers(const char* key) const {
+    std::vector<double> result;
+    for (const json& item : list(key)) result.push_back(number_of(item, key));
+    return result;
+  }
+
+ private:
+  std::string said(const char* key) const { return name_ + ": '" + key + "' "; }
+  std::string text_of(const json& j, const char* key) const {
+    if (!j.is_string()) damaged(said(key) + "is not a text");
+    return j.get<std::string>();
+  }
+  double number_of(const json& j, const char* key) const {
+    if (!j.is_number()) damaged(said(key) + "is not a number");
+    return j.get<double>();
+  }
+
+  const json& object_;
+  std::string name_;
+};
+
+TypeInfo type_from(const json& j) {
+  const Fields fields(j, "a type", 4);
+  const auto version = int(fields.integer("version", 0, std::numeric_limits<int>::max()));
+  return {fields.text("id"), version, std::size_t(fields.integer("size", 1, kMostBytes_of_value)),
+          fields.boolean("function")};
+}
+
+PortInfo port_from(const json& j) {
+  const Fields fields(j, "a port", 5);
+  return {fields.text("name"), fields.text("help"), type_from(fields.at("type")), fields.boolean("optional"),
+          fields.text("axis")};
+}
+
+OptionValue default_from(const Fields& fields, OptionType type) {
   switch (type) {
-    case OptionType::boolean: return j.get<bool>();
-    case OptionType::integer: return j.get<std::int64_t>();
-    case OptionType::number: return j.get<double>();
+    case OptionType::boolean:
+      return fields.boolean("default");
+    case OptionType::integer:
+      return fields.integer("default", INT64_MIN, INT64_MAX);
+    case OptionType::number:
+      return fields.number("default");
     case OptionType::text:
-    case OptionType::path: return j.get<std::string>();
-    case OptionType::numbers: return j.get<std::vector<double>>();
-    default: return j.get<std::vector<std::string>>();
+    case OptionType::path:
+      return fields.text("default");
+    case OptionType::numbers:
+      return fields.numbers("default");
+    default:
+      return fields.texts("default");
   }
 }
 
 OptionInfo option_from(const json& j) {
+  const Fields fields(j, "an option", 8 + j.contains("minimum") + j.contains("maximum"));
   OptionInfo option;
-  option.name = j.at("name");
-  option.help = j.at("help");
-  option.unit = j.at("unit");
-  const std::string type = j.at("type");
-  option.type = OptionType(std::find(std::begin(kOptionTypes), std::end(kOptionTypes), type) - std::begin(kOptionTypes));
-  option.required = j.at("required");
-  option.default_value = value_from(j.at("default"), option.type);
-  option.choices = j.at("choices").get<std::vector<std::string>>();
-  option.length = j.at("length");
-  if (j.contains("minimum")) option.minimum = j.at("minimum").get<double>();
-  if (j.contains("maximum")) option.maximum = j.at("maximum").get<double>();
+  option.name = fields.text("name");
+  option.help = fields.text("help");
+  option.unit = fields.text("unit");
+  const auto type = std::find(std::begin(kOptionTypes), std::end(kOptionTypes), fields.text("type"));
+  if (type == std::end(kOptionTypes)) damaged("there is no type of options '" + fields.text("type") + "'");
+  option.type = OptionType(type - std::begin(kOptionTypes));
+  option.required = fields.boolean("required");
+  option.default_value = default_from(fields, option.type);
+  option.choices = fields.texts("choices");
+  option.length = std::size_t(fields.integer("length", 0, kMostBytes_of_value));
+  const auto* numbers = std::get_if<std::vector<double>>(&option.default_value);
+  if (option.length && (!numbers || numbers->size() != option.length))
+    damaged("the default of '" + option.name + "' does not have " + std::to_string(option.length) + " numbers");
+  if (j.contains("minimum")) option.minimum = fields.number("minimum");
+  if (j.contains("maximum")) option.maximum = fields.number("maximum");
   return option;
 }
 
+/// Held to the same rules as when a library registers it.
 NodeInfo node_from(const json& j) {
-  NodeInfo node;
-  node.name = j.at("name");
-  node.summary = j.at("summary");
-  node.random = j.at("random");
-  for (const json& port : j.at("inputs")) node.inputs.push_back(port_from(port));
-  for (const json& port : j.at("outputs")) node.outputs.push_back(port_from(port));
-  for (const json& option : j.at("options")) node.options.push_back(option_from(option));
-  return node;
+  const Fields fields(j, "a node", 6);
+  NodeDefinition node;
+  node.info.name = fields.text("name");
+  node.info.summary = fields.text("summary");
+  node.info.random = fields.boolean("random");
+  for (const json& port : fields.list("inputs")) node.info.inputs.push_back(port_from(port));
+  for (const json& port : fields.list("outputs")) node.info.outputs.push_back(port_from(port));
+  for (const json& option : fields.list("options")) node.info.options.push_back(option_from(option));
+  detail::check_declaration(node);
+  if (!node.faults.empty()) damaged(node.info.name + ": " + node.faults.front());
+  return node.info;
 }
 
-Digest digest_from(const std::string& hex) {
-  if (hex.size() != 32) throw Error("a digest has 32 digits");
-  return {std::stoull(hex.substr(16), nullptr, 16), std::stoull(hex.substr(0, 16), nullptr, 16)};
+WriterInfo writer_from(const json& j) {
+  const Fields fields(j, "a writer", 3);
+  WriterInfo writer{type_from(fields.at("type")), fields.text("extension"), fields.text("help")};
+  // The extension becomes the end of a file's path.
+  const bool plain = std::all_of(writer.extension.begin(), writer.extension.end(),
+                                 [](unsigned char c) { return std::isalnum(c) || c == '.' || c == '_' || c == '-'; });
+  if (!plain || (!writer.extension.empty() && writer.extension[0] != '.'))
+    damaged("'" + writer.extension + "' is not an extension of files");
+  return writer;
+}
+
+LinkedLibrary linked_from(const json& j) {
+  const Fields fields(j, "a linked library", 2);
+  const std::string path = fields.text("path");
+  if (path.empty() || path[0] != '/' || path.find('\0') != std::string::npos)
+    damaged("'" + path + "' is not the full path of a library");
+  return {path, std::uint64_t(fields.integer("size", 0, INT64_MAX))};
+}
+
+/// The document without its checksum.
+json checked_document(const std::string& text) {
+  if (text.size() > kMostManifest_bytes) damaged("it has " + std::to_string(text.size()) + " bytes");
+  json j;
+  try {
+    j = parse_json(text, "its text");
+  } catch (const Error& error) {
+    damaged(error.what());
+  }
+  if (!j.is_object()) damaged("it is not an object");
+  if (!j.contains("marrow_manifest") || j["marrow_manifest"] != kManifestVersion)
+    throw Error("it was written by another version of marrow");
+  if (!j.contains("checksum") || !j["checksum"].is_string()) damaged("it has no checksum");
+  const std::string checksum = j["checksum"].get<std::string>();
+  j.erase("checksum");
+  if (hash_of(j.dump()).hex() != checksum) throw Error("it was edited by hand");
+  return j;
+}
+
+/// Where two documents part; `path` names the place.
+std::string difference(const json& described, const json& registered, const std::string& path) {
+  if (described == registered) return "";
+  const bool lists = described.is_array() && registered.is_array() && described.size() == registered.size();
+  for (std::size_t i = 0; lists && i < described.size(); ++i) {
+    const bool named = described[i].is_object() && described[i].contains("name");
+    const std::string name = named ? described[i]["name"].get<std::string>() : std::to_string(i + 1);
+    if (const std::string found = difference(described[i], registered[i], path + "/" + name); !found.empty())
+      return found;
+  }
+  if (described.is_object() && registered.is_object())
+    for (const json* side : {&described, &registered})
+      for (const auto& [key, value] : side->items()) {
+        const json before = described.value(key, json()), now = registered.value(key, json());
+        if (const std::string found = difference(before, now, path + "/" + key); !found.empty()) return found;
+      }
+  const auto shown = [](const json& j) -> std::string {
+    if (j.is_array()) return std::to_string(j.size()) + " of them";
+    return j.is_null() ? "none" : j.is_object() ? "it" : j.dump();
+  };
+  return path.substr(1) + ": the library has " + shown(registered) + ", its description has " + shown(described);
 }
 
 }  // namespace
 
-const char* option_type_name(OptionType type) { return kOptionTypes[int(type)]; }
+const char* option_type_name(OptionType type) {
+  return kOptionTypes[int(type)];
+}
 
 json json_of(const OptionValue& value) {
   return std::visit([](const auto& v) { return json(v); }, value);
@@ -99,30 +257,53 @@ json json_of(const NodeInfo& node) {
 std::string manifest_text(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
   j["linked"] = j["nodes"] = j["writers"] = json::array();
-  for (const LinkedLibrary& library : info.linked) j["linked"].push_back({{"path", library.path}, {"size", library.size}});
+  for (const LinkedLibrary& library : info.linked)
+    j["linked"].push_back({{"path", library.path}, {"size", library.size}});
   for (const NodeInfo& node : info.nodes) j["nodes"].push_back(json_of(node));
-  for (const WriterInfo& writer : info.writers)
-    j["writers"].push_back({{"type", json_of(writer.type)}, {"extension", writer.extension}, {"help", writer.help}});
+  for (const WriterInfo& writer : info.writers) j["writers"].push_back(json_of(writer));
   j["checksum"] = hash_of(j.dump()).hex();
   return j.dump(1) + "\n";
 }
 
-LibraryInfo manifest_from_text(const std::string& text) try {
-  json j = json::parse(text);
-  if (j.at("marrow_manifest") != kManifestVersion) throw Error("it was written by another version of marrow");
-  const std::string checksum = j.at("checksum");
-  j.erase("checksum");
-  if (hash_of(j.dump()).hex() != checksum) throw Error("it was edited by hand");
+LibraryInfo manifest_from_text(const std::string& text) {
+  const json document = checked_document(text);
+  const Fields fields(document, "it", 6);
   LibraryInfo info;
-  info.digest = digest_from(j.at("library"));
-  info.refused = j.at("refused");
-  for (const json& library : j.at("linked")) info.linked.push_back({library.at("path"), library.at("size")});
-  for (const json& node : j.at("nodes")) info.nodes.push_back(node_from(node));
-  for (const json& writer : j.at("writers"))
-    info.writers.push_back({type_from(writer.at("type")), writer.at("extension"), writer.at("help")});
+  const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
+  if (!digest) damaged("the library's digest is not 32 hexadecimal digits");
+  info.digest = *digest;
+  info.refused = fields.text("refused");
+  if (fields.list("linked").size() > kMostLinked)
+    damaged("it names more than " + std::to_string(kMostLinked) + " linked libraries");
+  for (const json& library : fields.list("linked")) info.linked.push_back(linked_from(library));
+  std::set<std::string> names;
+  for (const json& node : fields.list("nodes")) {
+    info.nodes.push_back(node_from(node));
+    if (!names.insert(info.nodes.back().name).second) damaged("it has the node '" + info.nodes.back().name + "' twice");
+  }
+  for (const json& writer : fields.list("writers")) info.writers.push_back(writer_from(writer));
+  if (!info.refused.empty() && !(info.nodes.empty() && info.writers.empty()))
+    damaged("it has nodes of a library that it refuses");
   return info;
-} catch (const nlohmann::json::exception&) {
-  throw Error("it is damaged");
+}
+
+std::string difference(const LibraryInfo& described, const LibraryInfo& registered) {
+  const auto document = [](const LibraryInfo& info) {
+    json j = {{"nodes", json::object()}, {"writers", json::object()}};
+    for (const NodeInfo& node : info.nodes) j["nodes"][node.name] = json_of(node);
+    for (const WriterInfo& writer : info.writers) j["writers"][writer.type.id] = json_of(writer);
+    return j;
+  };
+  std::string found = difference(document(described), document(registered), "");
+  const auto names = [](const LibraryInfo& info) {
+    std::vector<std::string> result;
+    for (const NodeInfo& node : info.nodes) result.push_back(node.name);
+    for (const WriterInfo& writer : info.writers) result.push_back(writer.type.id);
+    return result;
+  };
+  if (found.empty() && names(described) != names(registered))
+    found = "the order or number of its nodes is another in its description";
+  return found;
 }
 
 }  // namespace marrow

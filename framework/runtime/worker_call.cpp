@@ -10,6 +10,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "apart.hpp"
+#include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/reading.hpp"
@@ -99,7 +100,9 @@ void now_reading(const std::filesystem::path& file) {
 }
 
 json answer_call(const json& request, WorkerReports& reports) {
-  const std::unique_ptr<Plugin> plugin = load_library(bytes_of_json(request.at("library")));
+  LibraryInfo library = manifest_from_text(request.at("manifest"));
+  library.file = bytes_of_json(request.at("library"));
+  const std::unique_ptr<Plugin> plugin = load_library(library);
   const NodeDefinition& node = find_node(*plugin, request.at("node"));
   const std::shared_ptr<void> options = options_of(node, request.at("options"));
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, request.at("threads").get<std::size_t>());

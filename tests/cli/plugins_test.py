@@ -1,9 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plugin outside the tree, and libraries that are refused."""
+import json
+import os
+import resource
 import shutil
+import socket
 import subprocess
 
-from marrow_cli import BUILD, SOURCE, TEST_PLUGINS, Case, main, marrow
+from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow
 
 BAD = BUILD / "tests" / "bad_plugins"
 
@@ -54,6 +58,77 @@ class Plugins(Case):
 
     def test_crash_while_loading(self):
         self.assertIn("crashed while being loaded", self.refused("a.so", lambda path: shutil.copy(BAD / "crashes.so", path)))
+
+    def own(self, **more):
+        return {"XDG_CACHE_HOME": str(self.scratch / "cache"), **more}
+
+    def unknown_library(self):
+        """A folder with a library that nothing is known of."""
+        folder = self.scratch / "plugins"
+        folder.mkdir()
+        shutil.copy(TEST_PLUGINS / "marrow_test_numbers.so", folder)
+        return folder
+
+    def test_what_is_no_file_does_not_hang(self):
+        folder = self.unknown_library()
+        os.mkfifo(folder / "pipe.so")
+        os.mkfifo(folder / "marrow_test_numbers.json")
+        os.symlink("/dev/tty", folder / "terminal.so")
+        with socket.socket(socket.AF_UNIX) as end:
+            end.bind(str(folder / "socket.so"))
+            for command in (["list"], ["inspect", "test.add"], ["schema"], ["check", SOURCE / "pipelines" / "femur.yaml"]):
+                result = marrow(*command, plugins=[folder], extra_environment=self.own(), timeout=60)
+                self.assertEqual(result.returncode, 0, result.stderr)
+            text = marrow("doctor", plugins=[folder], extra_environment=self.own(), timeout=60).stdout
+        self.assertIn("REFUSED  %s/pipe.so: it is a named pipe, not a regular file" % folder, text)
+        self.assertIn("REFUSED  %s/socket.so: it is a socket, not a regular file" % folder, text)
+        self.assertIn("note: its manifest is not used (it is a named pipe, not a regular file), so it was described anew", text)
+        self.assertIn("test.add", text, "the others still work")
+        result = marrow("describe", folder / "pipe.so", timeout=60)
+        self.assertEqual((result.returncode, result.stderr), (1, "marrow: error: %s/pipe.so is a named pipe, not a regular file\n" % folder))
+
+    def test_an_unknown_library_is_only_loaded_in_a_process_of_its_own(self):
+        folder = self.unknown_library()
+        pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {number: c}\n")
+        for command in (["list"], ["check", pipeline], ["inspect", "test.add"], ["graph", pipeline], ["plan", pipeline], ["schema"], ["doctor"], ["conformance", "test.add"]):
+            shutil.rmtree(self.scratch / "cache", ignore_errors=True)
+            environment = dict(os.environ, MARROW_PLUGIN_PATH=str(folder), LD_DEBUG="files", **self.own())
+            with subprocess.Popen([MARROW, *command], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+                _, messages = program.communicate(timeout=120)
+            self.assertEqual(program.returncode, 0, messages[-300:])
+            loads = [int(line.split(":")[0]) for line in messages.splitlines() if "calling init: %s/marrow_test" % folder in line]
+            self.assertEqual(len(loads), 1, command)
+            self.assertNotIn(program.pid, loads, command)
+            told = " ".join(marrow(command[0], "--help").stdout.split())
+            self.assertIn("A plugin library that is not known yet is loaded once, in a process of its own, to be described", told)
+
+    def test_a_folder_that_others_may_write_is_refused(self):
+        folder = self.unknown_library()
+        folder.chmod(0o777)
+        text = marrow("doctor", plugins=[folder], extra_environment=self.own()).stdout
+        self.assertIn("it is not trusted, because others may write to '%s' (owner " % folder, text)
+        self.assertIn("mode 0777); chmod go-w '%s', or set MARROW_TRUST_ALL_PLUGINS=1" % folder, text)
+        self.assertNotIn("test.add", text)
+        self.assertIn("test.add", marrow("doctor", plugins=[folder], extra_environment=self.own(MARROW_TRUST_ALL_PLUGINS="1")).stdout)
+        folder.chmod(0o755)
+        self.assertIn("test.add", marrow("doctor", plugins=[folder], extra_environment=self.own()).stdout, "the verdict is not kept")
+
+    def test_manifests_are_written_whole(self):
+        folder = self.unknown_library()
+        library, manifest = folder / "marrow_test_numbers.so", folder / "marrow_test_numbers.json"
+        programs = [subprocess.Popen([MARROW, "describe", library, "--write"]) for _ in range(6)]
+        self.assertEqual([program.wait(timeout=120) for program in programs], [0] * 6)
+        self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 15)
+        self.assertEqual(sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left")
+        self.assertEqual(manifest.stat().st_mode & 0o777, 0o644)
+
+    def test_a_manifest_on_a_full_disk(self):
+        folder = self.unknown_library()
+        limited = subprocess.run([MARROW, "describe", folder / "marrow_test_numbers.so", "--write"], capture_output=True, text=True,
+                                 restore_signals=False, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)))
+        self.assertEqual(limited.returncode, 2)
+        self.assertEqual(limited.stderr, "marrow: error: cannot write %s/marrow_test_numbers.json: File too large\n" % folder)
+        self.assertEqual([path.name for path in folder.iterdir()], ["marrow_test_numbers.so"])
 
 
 if __name__ == "__main__":

@@ -1,36 +1,53 @@
 // SPDX-License-Identifier: Apache-2.0
 // Libraries that must be refused, each with one sentence that says why, and manifests that do not belong.
-#include "marrow/runtime/library.hpp"
-#include "runtime/fixture.hpp"
+#include <elf.h>
+
+#include "runtime/library_fixture.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-const fs::path kBad = fs::path(MARROW_BINARY_DIR) / "tests" / "bad_plugins";
-const fs::path kGood = fs::path(MARROW_BINARY_DIR) / "tests" / "plugins" / "marrow_test_numbers.so";
+using nlohmann::json;
+using library_test::kBad;
+using library_test::kGood;
 
-class LibraryTest : public testing::Test {
+class LibraryTest : public library_test::LibraryTest {
  protected:
-  LibraryTest() { setenv("XDG_CACHE_HOME", (scratch.path / "cache").c_str(), 1); }
-  void expect_refused(const fs::path& file, const std::string& reason) {
-    const marrow::LibraryInfo info = marrow::describe_library(file);
-    EXPECT_NE(info.refused.find(reason), std::string::npos) << info.refused;
-    EXPECT_TRUE(info.nodes.empty());
-  }
-  fs::path copy_good(bool with_manifest) {
-    fs::create_directories(scratch.path / "plugins");
-    const fs::path file = scratch.path / "plugins" / "marrow_test_numbers.so";
-    fs::copy_file(kGood, file, fs::copy_options::overwrite_existing);
-    if (with_manifest)
-      fs::copy_file(fs::path(kGood).replace_extension(".json"), fs::path(file).replace_extension(".json"), fs::copy_options::overwrite_existing);
+  /// The good library with other bytes at the beginning.
+  fs::path copy_with_header(const std::function<void(Elf64_Ehdr&)>& change) {
+    const fs::path file = copy_good(false);
+    std::fstream stream(file, std::ios::in | std::ios::out | std::ios::binary);
+    Elf64_Ehdr header{};
+    stream.read(reinterpret_cast<char*>(&header), sizeof header);
+    change(header);
+    stream.seekp(0);
+    stream.write(reinterpret_cast<const char*>(&header), sizeof header);
     return file;
   }
-  static std::string text_of(const fs::path& file) {
-    std::ifstream stream(file);
-    return {std::istreambuf_iterator<char>(stream), {}};
+  /// The manifest of the good library with something invented in it, and with the checksum that makes it look untouched.
+  fs::path copy_with_invented(const std::function<void(nlohmann::json&)>& invent) {
+    const fs::path file = copy_good(true), manifest = fs::path(file).replace_extension(".json");
+    nlohmann::json document = nlohmann::json::parse(text_of(manifest));
+    invent(document);
+    document.erase("checksum");
+    document["checksum"] = marrow::hash_of(document.dump()).hex();
+    std::ofstream(manifest) << document.dump(1);
+    return file;
   }
-  Scratch scratch;
-  const marrow::Digest framework = marrow::file_digest(marrow::framework_file());
+  /// That an invented manifest is found out before anything of the library is called.
+  void expect_load_refused(const std::function<void(nlohmann::json&)>& invent, const std::string& reason) {
+    const fs::path file = copy_with_invented(invent);
+    const marrow::Catalogue catalogue({scratch.path / "plugins"});
+    ASSERT_EQ(catalogue.libraries().at(0).note, "");
+    try {
+      catalogue.load("test.constant");
+      ADD_FAILURE() << "loaded, not refused: " << reason;
+    } catch (const marrow::Error& error) {
+      EXPECT_EQ(std::string(error.what()),
+                file.string() + " is not what its description says: " + reason + "; run 'marrow describe " + file.string() +
+                    " --write', or remove " + fs::path(file).replace_extension(".json").string());
+    }
+  }
 };
 
 TEST_F(LibraryTest, GoodLibraryIsDescribed) {
@@ -93,7 +110,7 @@ TEST_F(LibraryTest, EditedManifestIsNoticed) {
 TEST_F(LibraryTest, DamagedManifestIsNoticed) {
   const fs::path file = copy_good(true);
   std::ofstream(fs::path(file).replace_extension(".json")) << "{";
-  EXPECT_EQ(marrow::library_info(file, framework).note, "its manifest is not used (it is damaged), so it was described anew");
+  EXPECT_EQ(marrow::library_info(file, framework).note, "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described anew");
 }
 TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   const fs::path file = copy_good(true);
@@ -102,6 +119,118 @@ TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   EXPECT_NE(before, marrow::library_info(file, marrow::Digest{1, 2}).build_id);
   std::ofstream(file, std::ios::app | std::ios::binary) << "x";
   EXPECT_NE(before, marrow::library_info(file, framework).build_id);
+}
+
+
+TEST_F(LibraryTest, ElfHeadersThatLieAreRefused) {
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = UINT64_MAX - 100; }), "is truncated: its ELF header speaks of");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phoff = UINT64_MAX - 100; }), "is truncated: its ELF header speaks of");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phnum = 0; }), "its ELF header describes no program segments");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_CLASS] = ELFCLASS32; }), "is not a 64 bit library; build it for this machine");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_DATA] = ELFDATA2MSB; }), "has its bytes in another order than this machine");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_machine = EM_RISCV; }), "was built for RISC-V, this machine is");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_type = ET_REL; }), "is not a shared library (its ELF type is 1)");
+  for (const std::uintmax_t size : {0, 3, 4, 5, 63, 64, 65, 500, 5000}) {
+    const fs::path file = copy_good(false);
+    fs::resize_file(file, size);
+    expect_refused(file, size < 4 ? "is not a shared library" : "is truncated: its ELF header speaks of");
+  }
+}
+TEST_F(LibraryTest, LibraryWithoutSectionsThatIsTruncated) {
+  // Sections may be stripped; then only the segments tell how long the file must be.
+  const fs::path file = copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = h.e_shnum = 0; });
+  fs::resize_file(file, 5000);
+  expect_refused(file, "is truncated: its ELF header speaks of");
+}
+
+constexpr const char* kConstant = "nodes/test.constant";
+json& constant(json& j) { return j["nodes"][0]; }
+
+TEST_F(LibraryTest, InventedOptionIsFoundOut) {
+  expect_load_refused([](json& j) { constant(j)["options"][1]["type"] = "text", constant(j)["options"][1]["default"] = "x"; constant(j)["options"][1].erase("minimum"); },
+                      std::string(kConstant) + "/options/count/default: the library has 0, its description has \"x\"");
+}
+TEST_F(LibraryTest, InventedDefaultIsFoundOut) {
+  expect_load_refused([](json& j) { constant(j)["options"][0]["default"] = 2.0; },
+                      std::string(kConstant) + "/options/value/default: the library has 1.0, its description has 2.0");
+}
+TEST_F(LibraryTest, OptionsThatTheLibraryDoesNotHave) {
+  expect_load_refused([](json& j) { constant(j)["options"].push_back(constant(j)["options"][0]), constant(j)["options"].back()["name"] = "more"; },
+                      std::string(kConstant) + "/options: the library has 7 of them, its description has 8 of them");
+}
+TEST_F(LibraryTest, PortsThatTheLibraryDoesNotHave) {
+  expect_load_refused([](json& j) { constant(j)["inputs"].push_back(j["nodes"][3]["inputs"][0]); },
+                      std::string(kConstant) + "/inputs: the library has 0 of them, its description has 1 of them");
+}
+TEST_F(LibraryTest, InventedTypeOfAnotherNodeIsFoundOut) {
+  expect_load_refused([](json& j) { j["nodes"][3]["inputs"][0]["type"]["size"] = 8; },
+                      "nodes/test.add/inputs/a/type/size: the library has 24, its description has 8");
+}
+TEST_F(LibraryTest, InventedRandomnessIsFoundOut) {
+  expect_load_refused([](json& j) { constant(j)["random"] = true; }, std::string(kConstant) + "/random: the library has false, its description has true");
+}
+TEST_F(LibraryTest, InventedWriterIsFoundOut) {
+  expect_load_refused([](json& j) { j["writers"].push_back({{"type", {{"id", "metrics"}, {"version", 1}, {"size", 24}, {"function", false}}}, {"extension", ".x"}, {"help", "x"}}); },
+                      "writers/metrics: the library has none, its description has it");
+}
+TEST_F(LibraryTest, LinkedLibraryThatIsKeptBackIsFoundOut) {
+  const std::vector<marrow::LinkedLibrary> linked = marrow::describe_library(kGood).linked;
+  const std::string name = fs::path(linked.back().path).filename();
+  expect_load_refused([](json& j) { j["linked"].erase(j["linked"].size() - 1); },
+                      "it loads another " + name + " (" + std::to_string(linked.back().size) + " bytes)");
+}
+TEST_F(LibraryTest, LinkedLibraryThatIsNoFileMakesTheManifestStale) {
+  for (const std::string path : {"/dev/zero", "/", "/nonexistent/lib.so"}) {
+    const fs::path file = copy_with_invented([&](json& j) { j["linked"].push_back({{"path", path}, {"size", 0}}); });
+    EXPECT_NE(marrow::library_info(file, framework).note.find("its manifest is stale ("), std::string::npos) << path;
+  }
+}
+TEST_F(LibraryTest, LibraryThatChangesAfterItWasDescribedIsNotUsed) {
+  const fs::path file = copy_good(true);
+  const marrow::Catalogue catalogue({scratch.path / "plugins"});
+  std::ofstream(file, std::ios::app | std::ios::binary) << "another build";
+  try {
+    catalogue.load("test.add");
+    ADD_FAILURE();
+  } catch (const marrow::Error& error) {
+    EXPECT_EQ(std::string(error.what()), file.string() + " was changed since this program began; start it again");
+  }
+}
+TEST_F(LibraryTest, WrongDescriptionInTheCacheIsForgotten) {
+  const fs::path file = copy_with_invented([](json& j) { constant(j)["random"] = true; }), folder = scratch.path / "cache" / "marrow" / "libraries";
+  fs::remove_all(scratch.path / "cache");
+  const std::string invented = text_of(fs::path(file).replace_extension(".json"));
+  fs::remove(fs::path(file).replace_extension(".json"));
+  marrow::library_info(file, framework);
+  std::ofstream(fs::directory_iterator(folder)->path()) << invented;
+  EXPECT_THROW(marrow::Catalogue({scratch.path / "plugins"}).load("test.add"), marrow::Error);
+  EXPECT_NO_THROW(marrow::Catalogue({scratch.path / "plugins"}).load("test.add"));
+}
+TEST_F(LibraryTest, DamagedCacheIsMadeAnewWithoutAWord) {
+  const fs::path file = copy_good(false);
+  marrow::library_info(file, framework);
+  const fs::path cached = *fs::directory_iterator(scratch.path / "cache" / "marrow" / "libraries");
+  const std::string whole = text_of(cached);
+  for (const std::string& damaged : {std::string(), std::string("{"), std::string(1000000, '['), whole.substr(0, whole.size() / 2)}) {
+    std::ofstream(cached) << damaged;
+    const marrow::LibraryInfo info = marrow::library_info(file, framework);
+    EXPECT_EQ(info.note, "");
+    EXPECT_GT(info.nodes.size(), 5u);
+    EXPECT_EQ(text_of(cached), whole);
+  }
+}
+TEST_F(LibraryTest, LibraryThatLacksAnotherIsAskedAgain) {
+  // The verdict on a library is kept, but not one that another library may change.
+  const fs::path file = copy_good(false);
+  std::string bytes = text_of(file);
+  const std::size_t at = bytes.find("libtbb.so.12");
+  const std::size_t name = at != std::string::npos ? at : bytes.find("libmarrow.so.0");
+  ASSERT_NE(name, std::string::npos);
+  bytes.replace(name, 6, "libxxx");
+  std::ofstream(file, std::ios::binary) << bytes;
+  const marrow::LibraryInfo info = marrow::library_info(file, framework);
+  EXPECT_TRUE(info.refused.starts_with("cannot be loaded: ")) << info.refused;
+  EXPECT_TRUE(!fs::exists(scratch.path / "cache") || fs::is_empty(scratch.path / "cache" / "marrow" / "libraries"));
 }
 
 }  // namespace

@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
 
   PipelineRequest check_request;
   bool check_json = false;
-  auto* check_command = app.add_subcommand("check", "check a pipeline and show every fault; loads no plugin");
+  auto* check_command = app.add_subcommand("check", "check a pipeline and show every fault; runs nothing");
   add_pipeline_arguments(check_command, check_request);
   check_command->add_flag("--json", check_json, "print the faults as JSON");
   check_command->callback([&] { code = check(check_request, check_json); });
@@ -167,10 +167,14 @@ int main(int argc, char** argv) {
 
   std::filesystem::path library;
   bool write = false;
-  auto* describe_command = app.add_subcommand("describe", "load one plugin library in a child process and print its manifest");
+  auto* describe_command = app.add_subcommand("describe", "load one plugin library in a process of its own and print its manifest");
   describe_command->add_option("library", library, "the .so file")->required();
   describe_command->add_flag("--write", write, "write the manifest beside the library instead");
   describe_command->callback([&] { code = describe(library, write); });
+
+  for (CLI::App* command : {check_command, plan_command, list_command, inspect_command, graph_command, schema_command, doctor_command, conformance_command})
+    command->footer("A plugin library that is not known yet is loaded once, in a process of its own, to be described; where nobody else may put one: see "
+                    "'marrow doctor' and MARROW_PLUGIN_PATH.");
 
   try {
     app.parse(argc, argv);

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is known of libraries without loading them: manifests beside them, and a cache of descriptions in the user's own
+// folder.
+#include "descriptions.hpp"
+
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cstdlib>
+
+#include "manifest.hpp"
+#include "marrow/domain/error.hpp"
+#include "regular_file.hpp"
+#include "trust.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path manifest_beside(const fs::path& library) {
+  return fs::path(library).replace_extension(".json");
+}
+
+/// Empty for a variable that is not set, is empty or is relative to wherever the program happens to run.
+fs::path folder_of(const char* variable) {
+  const char* text = std::getenv(variable);
+  return text && text[0] == '/' ? fs::path(text) : fs::path();
+}
+
+/// Empty where there is none: without a home nothing is kept.
+fs::path cache_folder() {
+  if (const fs::path cache = folder_of("XDG_CACHE_HOME"); !cache.empty()) return cache / "marrow" / "libraries";
+  if (const fs::path home = folder_of("HOME"); !home.empty()) return home / ".cache" / "marrow" / "libraries";
+  return {};
+}
+
+/// That a folder is the user's alone. One that an older version made readable for all is closed.
+bool is_own(const fs::path& folder) {
+  struct stat status {};
+  if (stat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) return false;
+  if ((status.st_mode & 077) && chmod(folder.c_str(), 0700) != 0) return false;
+  return changeable_by_others(folder).empty();
+}
+
+/// Makes the folder for the user alone. What is above it must already be nobody else's.
+bool make_own(const fs::path& folder) {
+  std::error_code error;
+  if (fs::exists(folder, error)) return is_own(folder);
+  const fs::path parent = folder.parent_path();
+  if (!fs::exists(parent, error) && !make_own(parent)) return false;
+  if (!changeable_by_others(parent).empty()) return false;
+  return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
+}
+
+/// Of the description of a library in the cache; a verdict depends on the framework too: what an older one refused, a
+/// newer one may accept. Empty where nothing can be kept.
+fs::path cached_file(const Digest& library, const Digest& framework, bool make) {
+  const fs::path folder = cache_folder();
+  if (folder.empty() || !(make ? make_own(folder) : is_own(folder))) return {};
+  Hasher name;
+  name.add(library);
+  name.add(framework);
+  return folder / (name.digest().hex() + ".json");
+}
+
+/// That the description belongs to this very library and to the libraries that are here now; else why not.
+std::string stale(const LibraryInfo& info, const Digest& digest) {
+  if (info.digest != digest) return "it belongs to another build of the library";
+  for (const LinkedLibrary& library : info.linked) {
+    struct stat status {};
+    if (stat(library.path.c_str(), &status) != 0 || !S_ISREG(status.st_mode) ||
+        std::uint64_t(status.st_size) != library.size)
+      return fs::path(library.path).filename().string() + " has changed";
+  }
+  return "";
+}
+
+/// Throws Error, which begins with "it".
+std::string manifest_text_of(const fs::path& file) try {
+  expect_trusted(file);
+  return read_text(RegularFile(file), kMostManifest_bytes);
+} catch (const Error& error) {
+  throw Error(std::string("it ") + error.what());
+}
+
+/// The description of a library from the manifest beside it; else nothing, and `note` says why.
+std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& digest, std::string& note) {
+  const fs::path manifest = manifest_beside(library);
+  std::error_code error;
+  if (!fs::exists(fs::symlink_status(manifest, error))) return std::nullopt;
+  try {
+    LibraryInfo info = manifest_from_text(manifest_text_of(manifest));
+    if (!info.refused.empty()) throw Error("it is of a library that was refused");
+    const std::string reason = stale(info, digest);
+    if (reason.empty()) return info;
+    note = "its manifest is stale (" + reason + "), so it was described anew";
+  } catch (const Error& fault) {
+    note = std::string("its manifest is not used (") + fault.what() + "), so it was described anew";
+  }
+  return std::nullopt;
+}
+
+/// The description of a library from the cache; nothing where that has none that can be used.
+std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framework) {
+  const fs::path file = cached_file(digest, framework, false);
+  if (file.empty()) return std::nullopt;
+  try {
+    const RegularFile source(file);
+    if (source.status().st_uid != geteuid()) return std::nullopt;
+    LibraryInfo info = manifest_from_text(read_text(source, kMostManifest_bytes));
+    if (stale(info, digest).empty()) return info;
+  } catch (const Error&) {
+    // Only a cache: the library is described anew, and that is kept instead.
+  }
+  return std::nullopt;
+}
+
+void keep(const LibraryInfo& info, const Digest& framework) {
+  // A reason that lies outside of the library, such as another one that it needs, may be gone next time.
+  if (info.refused.starts_with("cannot be")) return;
+  try {
+    if (const fs::path file = cached_file(info.digest, framework, true); !file.empty())
+      write_text(file, manifest_text(info), 0600);
+  } catch (const Error&) {
+    // Only a cache: without it the library is described again next time.
+  }
+}
+
+LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Digest& framework) {
+  LibraryInfo info = describe_library(file);
+  if (info.refused.empty() && info.digest != digest) throw Error("was changed while it was described; start again");
+  if (info.digest == digest) keep(info, framework);
+  return info;
+}
+
+}  // namespace
+
+LibraryInfo library_info(const fs::path& file, const Digest& framework) {
+  expect_trusted(file);
+  const Digest digest = digest_of(RegularFile(file));
+  std::string note;
+  std::optional<LibraryInfo> known = from_manifest(file, digest, note);
+  if (!known) known = from_cache(digest, framework);
+  LibraryInfo info = known ? *known : describe_anew(file, digest, framework);
+  info.file = file;
+  info.note = note;
+  Hasher build_id;
+  build_id.add(digest);
+  build_id.add(framework);
+  for (const LinkedLibrary& library : info.linked) {
+    build_id.add(fs::path(library.path).filename().string());
+    build_id.add(library.size);
+  }
+  info.build_id = build_id.digest();
+  return info;
+}
+
+void forget_description(const LibraryInfo& library) {
+  const fs::path file = cached_file(library.digest, file_digest(framework_file()), false);
+  std::error_code error;
+  if (!file.empty()) fs::remove(file, error);
+}
+
+std::string cure_of_description(const fs::path& library) {
+  std::error_code error;
+  const fs::path manifest = manifest_beside(library);
+  if (!fs::exists(fs::symlink_status(manifest, error))) return "start again: it is then described anew";
+  return "run 'marrow describe " + library.string() + " --write', or remove " + manifest.string();
+}
+
+void write_manifest(const LibraryInfo& info) {
+  write_text(manifest_beside(info.file), manifest_text(info), 0644);
+}
+
+}  // namespace marrow

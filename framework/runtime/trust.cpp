@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loading a library runs its code as the user, so one that another user could have put there is not loaded.
+#include "trust.hpp"
+
+#include <grp.h>
+#include <pwd.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <optional>
+#include <vector>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/runtime/library.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr const char* kTrustAll = "MARROW_TRUST_ALL_PLUGINS";
+constexpr std::size_t kMostNames_bytes = 1 << 20;  // of a group's members
+
+struct User {
+  std::string name;
+  gid_t group = 0;
+};
+
+std::optional<User> user_of(uid_t id) {
+  std::vector<char> buffer(1 << 14);
+  passwd entry{}, *found = nullptr;
+  if (getpwuid_r(id, &entry, buffer.data(), buffer.size(), &found) != 0 || !found) return std::nullopt;
+  return User{found->pw_name, found->pw_gid};
+}
+
+std::string name_of(uid_t id) {
+  const std::optional<User> user = user_of(id);
+  return user ? user->name : "user " + std::to_string(id);
+}
+
+/// A group of the owner's own, as most systems make one for each user: programs of developers let it write (umask 002).
+bool is_private(gid_t id, uid_t owner) {
+  const std::optional<User> user = user_of(owner);
+  if (!user) return id == owner || (owner == geteuid() && id == getegid());
+  if (id != user->group) return false;
+  std::vector<char> buffer(1 << 12);
+  group entry{}, *found = nullptr;
+  while (getgrgid_r(id, &entry, buffer.data(), buffer.size(), &found) == ERANGE && buffer.size() < kMostNames_bytes)
+    buffer.resize(4 * buffer.size());
+  if (!found || found->gr_name != user->name) return false;
+  for (char** member = found->gr_mem; *member; ++member)
+    if (*member != user->name) return false;
+  return true;
+}
+
+uid_t owner_of_framework() {
+  static const uid_t owner = [] {
+    struct stat status {};
+    return stat(framework_file().c_str(), &status) == 0 ? status.st_uid : 0;
+  }();
+  return owner;
+}
+
+std::string mode_text(mode_t mode) {
+  char text[8];
+  std::snprintf(text, sizeof text, "%04o", unsigned(mode & 07777));
+  return text;
+}
+
+/// What lets others change a file or the entries of a folder. Of a folder further above, a sticky bit keeps them from
+/// replacing what is not theirs.
+std::string fault_of(const fs::path& path, bool is_above) {
+  struct stat status {};
+  if (stat(path.c_str(), &status) != 0) return "cannot be read: " + std::string(std::strerror(errno));
+  const std::string quoted = "'" + path.string() + "'";
+  if (status.st_uid != geteuid() && status.st_uid != 0 && status.st_uid != owner_of_framework())
+    return "is not trusted, because " + quoted + " belongs to " + name_of(status.st_uid) + " (mode " +
+           mode_text(status.st_mode) + "), who is neither you nor root; copy it into a folder of your own";
+  if (is_above && (status.st_mode & S_ISVTX)) return "";
+  const bool group = (status.st_mode & S_IWGRP) && !is_private(status.st_gid, status.st_uid);
+  if (!group && !(status.st_mode & S_IWOTH)) return "";
+  return "is not trusted, because others may write to " + quoted + " (owner " + name_of(status.st_uid) + ", mode " +
+         mode_text(status.st_mode) + "); chmod go-w " + quoted;
+}
+
+/// Whoever can write here can replace marrow itself, so that trusting no plugin below would gain nothing.
+bool holds_framework(const fs::path& folder) {
+  static const fs::path framework = framework_file();
+  return std::mismatch(folder.begin(), folder.end(), framework.begin(), framework.end()).first == folder.end();
+}
+
+/// Of a path without links: the file, its folder and those above, or a folder and those above.
+std::string fault_of_chain(const fs::path& real) {
+  std::string fault = fault_of(real, false);
+  bool is_above = fs::is_directory(real);
+  for (fs::path folder = real; fault.empty() && folder != folder.parent_path(); is_above = true) {
+    folder = folder.parent_path();
+    if (!holds_framework(folder)) fault = fault_of(folder, is_above);
+  }
+  return fault;
+}
+
+}  // namespace
+
+std::string changeable_by_others(const fs::path& file) {
+  std::error_code error;
+  const fs::path real = fs::canonical(file, error);
+  if (error) return "cannot be read: " + error.message();
+  const fs::path folder = fs::canonical(fs::absolute(file).parent_path(), error);
+  if (error) return "cannot be read: " + error.message();
+  std::string fault = fault_of_chain(real);
+  if (fault.empty() && real.parent_path() != folder) fault = fault_of_chain(folder);
+  return fault;
+}
+
+void expect_trusted(const fs::path& library) {
+  const char* all = std::getenv(kTrustAll);
+  if (all && std::strcmp(all, "1") == 0) return;
+  const std::string fault = changeable_by_others(library);
+  if (!fault.empty())
+    throw Error(fault + (fault.starts_with("is not") ? std::string(", or set ") + kTrustAll + "=1" : ""));
+}
+
+}  // namespace marrow
