@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <cstring>
 #include <fstream>
+#include <new>
 
 #include "marrow/domain/error.hpp"
 
@@ -29,6 +30,9 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   } catch (const fs::filesystem_error& error) {
     fs::remove_all(temporary, failure);
     throw Error(path.string() + ": cannot be written (" + error.code().message() + ")");
+  } catch (const std::bad_alloc&) {
+    fs::remove_all(temporary, failure);
+    throw Error(path.string() + ": cannot be written (out of memory)");
   } catch (const std::exception& error) {
     fs::remove_all(temporary, failure);
     // The temporary name would only puzzle.
@@ -39,10 +43,10 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   }
 }
 
-void write_text_plainly(const fs::path& path, const std::string& text) {
+void write_plainly(const fs::path& path, std::initializer_list<std::string_view> parts) {
   errno = 0;
   std::ofstream stream(path, std::ios::binary);
-  stream << text;
+  for (const std::string_view part : parts) stream.write(part.data(), std::streamsize(part.size()));
   stream.close();
   if (!stream)
     throw Error(path.string() + ": cannot be written" + (errno ? std::string(" (") + std::strerror(errno) + ")" : "") +
@@ -50,7 +54,7 @@ void write_text_plainly(const fs::path& path, const std::string& text) {
 }
 
 void write_text(const fs::path& path, const std::string& text) {
-  write_atomically(path, [&](const fs::path& temporary) { write_text_plainly(temporary, text); });
+  write_atomically(path, [&](const fs::path& temporary) { write_plainly(temporary, {text}); });
 }
 
 }  // namespace marrow::write

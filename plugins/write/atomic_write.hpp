@@ -2,7 +2,9 @@
 #pragma once
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <string>
+#include <string_view>
 
 namespace marrow::write {
 
@@ -13,7 +15,7 @@ void write_atomically(const std::filesystem::path& path, const std::function<voi
 /// Writes text in this way.
 void write_text(const std::filesystem::path& path, const std::string& text);
 
-/// Writes text under this very name; throws Error when not all of it could be written.
-void write_text_plainly(const std::filesystem::path& path, const std::string& text);
+/// Writes parts one after the other under this very name; throws Error when not all of it could be written.
+void write_plainly(const std::filesystem::path& path, std::initializer_list<std::string_view> parts);
 
 }  // namespace marrow::write

@@ -27,7 +27,7 @@ ViewFiles write_view_files(const marrow::View& view, const fs::path& folder, con
   const std::string dot = stem.empty() ? "" : stem + ".";
   ViewFiles files{(stem.empty() ? "image" : stem) + image_name(view.image), dot + "camera.yaml", ""};
   marrow::write::write_pixels(folder / files.image, view.image.pixels);
-  marrow::write::write_text_plainly(folder / files.camera, marrow::write::camera(view.camera));
+  marrow::write::write_plainly(folder / files.camera, {marrow::write::camera(view.camera)});
   if (!view.mask.empty()) {
     files.mask = dot + "mask.png";
     marrow::write::write_pixels(folder / files.mask, view.mask);
@@ -111,8 +111,8 @@ void write_case(const marrow::Case& value, const std::string& path) {
   marrow::write::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
     marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
-    marrow::write::write_text_plainly(
-        folder / "case.yaml", "marrow-case: 1\nct: ct.mha\n" + views_text(value, folder) + fragments_text(value));
+    marrow::write::write_plainly(folder / "case.yaml",
+                                 {"marrow-case: 1\nct: ct.mha\n", views_text(value, folder), fragments_text(value)});
   });
 }
 

@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <csetjmp>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -14,23 +15,42 @@
 namespace marrow::write {
 namespace {
 
+/// What libpng is handed: it is C, so no exception may pass through it.
+struct Target {
+  std::string bytes, fault;
+};
+
 void put(png_structp png, png_bytep bytes, std::size_t count) {
-  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(bytes), count);
+  bool is_kept = true;
+  try {
+    static_cast<Target*>(png_get_io_ptr(png))->bytes.append(reinterpret_cast<const char*>(bytes), count);
+  } catch (const std::exception&) {
+    is_kept = false;
+  }
+  if (!is_kept) png_error(png, "out of memory");
 }
 
 void flush(png_structp) {}
 
+void on_error(png_structp png, png_const_charp reason) {
+  try {
+    static_cast<Target*>(png_get_error_ptr(png))->fault = reason;
+  } catch (const std::exception&) {  // then without a reason
+  }
+  png_longjmp(png, 1);
+}
+
 void on_warning(png_structp, png_const_charp) {}
 
 struct Writer {
-  explicit Writer(std::string& bytes) {
-    png = png_create_write_struct(PNG_LIBPNG_VER_STRING, nullptr, nullptr, on_warning);
-    info = png_create_info_struct(png);
-    png_set_write_fn(png, &bytes, put, flush);
+  explicit Writer(Target& target)
+      : png(png_create_write_struct(PNG_LIBPNG_VER_STRING, &target, on_error, on_warning)),
+        info(png ? png_create_info_struct(png) : nullptr) {
+    if (info) png_set_write_fn(png, &target, put, flush);
   }
   ~Writer() { png_destroy_write_struct(&png, &info); }
-  png_structp png = nullptr;
-  png_infop info = nullptr;
+  png_structp png;
+  png_infop info;
 };
 
 /// Nothing with a destructor lives between setjmp and the calls that may jump back to it.
@@ -56,16 +76,18 @@ std::string png_of(int width, int height, int channels, Sample sample, const voi
   // libpng takes rows that it may write to, but does not.
   auto* first = static_cast<png_bytep>(const_cast<void*>(pixels));
   for (int v = 0; v < height; ++v) rows.push_back(first + std::size_t(v) * row_bytes);
-  std::string bytes;
-  Writer writer(bytes);
+  Target target;
+  Writer writer(target);
+  if (!writer.info) throw std::bad_alloc();
   if (!write_rows(writer, width, height, channels, bits, rows.data()))
-    throw Error("libpng takes no image of " + std::to_string(width) + " x " + std::to_string(height) + " pixels");
-  return bytes;
+    throw Error("libpng cannot write an image of " + std::to_string(width) + " x " + std::to_string(height) +
+                " pixels: " + target.fault);
+  return std::move(target.bytes);
 }
 
 void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
                const void* pixels) {
-  write_text_plainly(path, png_of(width, height, channels, sample, pixels));
+  write_plainly(path, {png_of(width, height, channels, sample, pixels)});
 }
 
 }  // namespace marrow::write

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The narrow door to ITK for writing: its headers bring an Eigen of their own.
+// Samples as files, without the domain's types.
 #include <array>
 #include <filesystem>
 #include <string>
@@ -9,7 +9,7 @@ namespace marrow::write {
 
 enum class Sample { u8, u16 };
 
-/// A grid of float samples, x fastest, as compressed MHA. Throws Error when the file did not become whole.
+/// A grid of float samples, x fastest, as compressed MHA. Throws Error.
 struct GridOut {
   std::array<int, 3> size;
   std::array<double, 3> spacing_mm, origin_mm;
@@ -24,7 +24,7 @@ std::string png_of(int width, int height, int channels, Sample sample, const voi
 void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
                const void* pixels);
 
-/// The same as TIFF of float. Throws Error when the file did not become whole.
+/// The same as TIFF of float. Throws Error.
 void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels);
 
 }  // namespace marrow::write

@@ -57,6 +57,18 @@ TEST(WritePicture, ColoursAndFaults) {
   EXPECT_FALSE(std::filesystem::exists(folder / "q.png"));
 }
 
+TEST(WritePicture, FloatTiffIsWholeOrAnError) {
+  const TemporaryFolder folder;
+  const cv::Mat pixels = noise(CV_32F, 1);
+  marrow::write::write_pixels(folder / "whole.tif", pixels);
+  EXPECT_EQ(cv::countNonZero(marrow::read::read_image_file(folder / "whole.tif").pixels != pixels), 0);
+  const auto size = std::filesystem::file_size(folder / "whole.tif");
+  for (const std::uintmax_t bytes : {std::uintmax_t(0), size / 2, size - 100, size - 1}) {
+    const marrow::test::FullDisk full(bytes);
+    EXPECT_SAYS((marrow::write::write_pixels(folder / "half.tif", pixels), 0), "half.tif: cannot be written");
+  }
+}
+
 TEST(WritePicture, FullDisk) {
   const TemporaryFolder folder;
   for (const rlim_t bytes : {0, 60, 4000})

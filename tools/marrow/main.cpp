@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <new>
 
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
+#include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/printable.hpp"
 
@@ -31,9 +33,7 @@ void add_compare_arguments(CLI::App* command, marrow::cli::CompareRequest& reque
   add_file_limits(command, request.file_limits);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run_program(int argc, char** argv) {
   using namespace marrow::cli;
   CLI::App app{"marrow finds the 3D pose of bone fragments in X-ray images, by pipelines of plugins described in YAML."};
   app.require_subcommand(1);
@@ -181,11 +181,21 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     const int status = app.exit(error);
     return status == 0 ? 0 : 2;
+  }
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  marrow::cli::prepare_process();
+  try {
+    return marrow::cli::with_output_written(run_program(argc, argv));
+  } catch (const std::bad_alloc&) {
+    std::fprintf(stderr, "marrow: error: out of memory\n");
+    return 1;
   } catch (const std::exception& error) {
     std::fprintf(stderr, "marrow: error: %s\n", marrow::printable_lines(error.what()).c_str());
     return 2;
   }
-  if (std::fflush(stdout) == 0 && !std::ferror(stdout)) return code;
-  std::fprintf(stderr, "marrow: error: what was to be printed could not be written; is the disk full?\n");
-  return code ? code : 2;
 }

@@ -1,9 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -11,6 +9,7 @@
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "process.hpp"
 #include "runtime/printable.hpp"
 
 namespace marrow::cli {
@@ -18,12 +17,6 @@ namespace {
 
 using nlohmann::json;
 using Kind = RunEvent::Kind;
-
-std::atomic<bool> interrupted{false};
-
-extern "C" void on_interrupt(int) {
-  if (interrupted.exchange(true)) _exit(130);  // asked twice: do not wait for the nodes
-}
 
 /// Shows a run's events: lines that stay for what has ended, one that is rewritten for what goes on.
 class Progress {
@@ -137,14 +130,12 @@ void print_json_summary(const RunResult& result, const std::vector<RunFolder::Wr
 
 RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
                    RunFolder& folder) {
-  std::signal(SIGINT, on_interrupt);
-  std::signal(SIGTERM, on_interrupt);
   Progress progress(request, folder);
   RunSettings settings;
   settings.seed = request.seed;
   settings.threads = request.threads;
   settings.file_limits = request.file_limits;
-  settings.cancelled = &interrupted;
+  settings.cancelled = &stop_on_signals();
   settings.observer = [&](const RunEvent& event) { progress(event); };
   const auto note = [&](const std::string& text) {
     folder.append_log("note: " + text);
@@ -167,15 +158,20 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
     if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
     outcome.is_faulty = true;
   }
-  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: stopped by Ctrl-C; what was done is in %s\n", printable(folder.path().string()).c_str());
+  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: %s; what was done is in %s\n", stopped_text().c_str(), printable(folder.path().string()).c_str());
   if (!folder.log_fault().empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(folder.log_fault()).c_str());
   return outcome;
 }
 
 int run(const RunRequest& request) {
+  const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
+  if (is_stopped) {
+    std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
+    return 130;
+  }
   RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline) : RunFolder(request.folder, pipeline);
   const Store store;
   const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline), request.no_cache ? nullptr : &store, folder);

@@ -7,6 +7,7 @@
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
+#include "process.hpp"
 #include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
@@ -69,6 +70,7 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
 
 int compare_variants(const CompareRequest& asked) {
   CompareRequest request = asked;
+  stop_on_signals();
   const Catalogue catalogue;
   Experiment experiment;
   if (!load(request, catalogue, experiment)) return 2;

@@ -2,9 +2,7 @@
 // A comparison from its start, or from where it was left, to its report.
 #include <unistd.h>
 
-#include <atomic>
 #include <chrono>
-#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -13,6 +11,7 @@
 #include "compare/comparison.hpp"
 #include "compare/pool.hpp"
 #include "marrow/domain/error.hpp"
+#include "process.hpp"
 #include "report/report.hpp"
 
 namespace marrow::cli {
@@ -23,11 +22,6 @@ using compare::CellIndex;
 using compare::CellRow;
 using compare::CellRunner;
 using compare::Experiment;
-
-std::atomic<bool> interrupted{false};
-extern "C" void on_compare_interrupt(int) {
-  if (interrupted.exchange(true)) _exit(130);
-}
 
 class Progress {
  public:
@@ -52,7 +46,7 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   pool.workers = request.jobs > 0 ? request.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
   pool.time_limit_s = request.time_limit_s;
   pool.memory_limit_mb = request.memory_limit_mb;
-  pool.cancelled = &interrupted;
+  pool.cancelled = &stop_on_signals();
   pool.waits = [](const Job&, const std::string& where) {
     std::fprintf(stderr, "  %s waits for another run that is making the same result\n", where.empty() ? "a cell" : where.c_str());
   };
@@ -70,8 +64,6 @@ class Comparison {
         runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {}
 
   int run() {
-    std::signal(SIGINT, on_compare_interrupt);
-    std::signal(SIGTERM, on_compare_interrupt);
     if (!make_cases() || !make_cells()) return stopped();
     std::vector<CellRow> rows;
     for (auto& row : rows_) rows.push_back(std::move(*row));
@@ -92,7 +84,7 @@ class Comparison {
 
  private:
   static int stopped() {
-    std::fprintf(stderr, "marrow: stopped; the same command goes on from here\n");
+    std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
     return 130;
   }
 

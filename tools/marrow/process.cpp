@@ -1,0 +1,84 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "process.hpp"
+
+#include <fcntl.h>
+#include <poll.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <exception>
+#include <new>
+
+namespace marrow::cli {
+namespace {
+
+std::atomic<bool> stopped{false};
+std::atomic<int> stopped_by{0};
+
+/// To the standard error without asking for memory, of which there may be none.
+void say(const char* text) {
+  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody is left to be told
+}
+
+/// For an exception that nobody caught, as in a thread or before main(): a sentence, where the system would abort.
+[[noreturn]] void on_terminate() {
+  say("marrow: error: ");
+  try {
+    if (const std::exception_ptr error = std::current_exception()) std::rethrow_exception(error);
+    say("ended without a reason that it knows");
+  } catch (const std::bad_alloc&) {
+    say("out of memory");
+  } catch (const std::exception& error) {
+    say(error.what());
+  } catch (...) {
+    say("an exception of an unknown type");
+  }
+  say("\n");
+  _exit(1);
+}
+
+extern "C" void on_stop(int signal) {
+  if (stopped.exchange(true)) {  // asked twice: do not wait for the nodes
+    say("\nmarrow: stopped at once; what was being done is lost\n");
+    _exit(130);
+  }
+  stopped_by = signal;
+}
+
+bool nobody_reads(int stream) {
+  pollfd event{stream, POLLOUT, 0};
+  return poll(&event, 1, 0) > 0 && (event.revents & POLLERR);
+}
+
+}  // namespace
+
+void prepare_process() {
+  std::set_terminate(on_terminate);
+  for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
+    if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) break;  // it takes the lowest number that is free
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+int with_output_written(int code) {
+  if ((std::fflush(stdout) == 0 && !std::ferror(stdout)) || nobody_reads(STDOUT_FILENO)) return code;
+  std::fprintf(stderr, "marrow: error: what was to be printed could not be written; is the disk full?\n");
+  return code ? code : 1;
+}
+
+const std::atomic<bool>& stop_on_signals() {
+  std::signal(SIGINT, on_stop);
+  std::signal(SIGTERM, on_stop);
+  if (std::signal(SIGHUP, on_stop) == SIG_IGN) std::signal(SIGHUP, SIG_IGN);  // started by nohup
+  return stopped;
+}
+
+std::string stopped_text() {
+  if (stopped_by == SIGHUP) return "stopped, because its terminal was closed";
+  if (stopped_by == SIGTERM) return "stopped, because it was asked to end (SIGTERM)";
+  return "stopped by Ctrl-C";
+}
+
+}  // namespace marrow::cli
