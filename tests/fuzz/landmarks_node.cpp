@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "landmarks_node.hpp"
+
+#include "tests/without_registration.hpp"
+#include "plugins/read/landmarks.cpp"
+
+void marrow::fuzz::read_landmarks(const std::filesystem::path& path) { landmarks({path}); }

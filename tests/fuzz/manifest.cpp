@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+// Manifests: as they are, and with the checksum that belongs to them, behind which all else is.
+#include "framework/runtime/manifest.hpp"
+
+#include "marrow/runtime/hash.hpp"
+#include "target.hpp"
+
+namespace {
+
+using namespace marrow;
+
+/// nlohmann's writer calls itself for each level.
+bool is_deep(std::string_view text) {
+  int depth = 0, deepest = 0;
+  for (const char c : text) {
+    depth += c == '[' || c == '{' ? 1 : c == ']' || c == '}' ? -1 : 0;
+    deepest = std::max(deepest, depth);
+  }
+  return deepest > 500;
+}
+
+std::string with_checksum(std::string_view text) {
+  if (is_deep(text)) return std::string(text);
+  nlohmann::json j = nlohmann::json::parse(text, nullptr, false);
+  if (!j.is_object()) return std::string(text);
+  j.erase("checksum");
+  std::string content;
+  try {
+    content = j.dump();
+  } catch (const nlohmann::json::exception&) {  // not UTF-8
+    return std::string(text);
+  }
+  j["checksum"] = hash_of(content).hex();
+  return j.dump();
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::Input input(data, size);
+  const bool mended = input.choice("cr") == 'c';
+  const std::string text = mended ? with_checksum(input.rest) : std::string(input.rest);
+  fuzz::expect_value_or_error([&] {
+    const LibraryInfo info = manifest_from_text(text);
+    const std::string again = manifest_text(info);
+    if (manifest_text(manifest_from_text(again)) != again) fuzz::finding("a manifest is read as another one than was written:\n" + again);
+  });
+  return 0;
+}

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "mutate.hpp"
+
+#include <algorithm>
+#include <cctype>
+#include <fstream>
+#include <stdexcept>
+
+namespace marrow::fuzz {
+namespace {
+
+constexpr std::uint64_t kNumbers[] = {0,          1,          2,          3,          7,          8,           16,          127,         128,
+                                      255,        256,        4095,       32767,      32768,      65535,       65536,       0x7fffffff,  0x80000000,
+                                      0xfffffffe, 0xffffffff, 0x10000000, 1000000000, 0x7fffffffffffffff,      0x8000000000000000,       0xffffffffffffffff};
+constexpr const char* kDigits[] = {"0",    "-1",   "1",    "2",     "65536", "2147483647", "-2147483648", "4294967296", "9223372036854775807", "99999999999999999999",
+                                   "1e30", "-1e9", "1e-9", "0.001", "nan",   "inf",        "-inf",        "1e999",      "0x10",                "010"};
+
+std::string unescaped(const std::string& text) {
+  std::string word;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '\\' || i + 1 >= text.size()) {
+      word += text[i];
+    } else if (text[i + 1] == 'x' && i + 3 < text.size()) {
+      word += char(std::stoi(text.substr(i + 2, 2), nullptr, 16));
+      i += 3;
+    } else {
+      word += text[++i];
+    }
+  }
+  return word;
+}
+
+}  // namespace
+
+std::vector<std::string> read_dictionary(const std::filesystem::path& path) {
+  std::ifstream stream(path);
+  if (!stream) throw std::runtime_error("cannot read the dictionary " + path.string());
+  std::vector<std::string> words;
+  for (std::string line; std::getline(stream, line);) {
+    const std::size_t first = line.find('"'), last = line.rfind('"');
+    if (!line.starts_with('#') && first < last) words.push_back(unescaped(line.substr(first + 1, last - first - 1)));
+  }
+  return words;
+}
+
+std::string Mutator::mutated(std::string bytes, const std::string& other, std::size_t longest) {
+  for (std::size_t changes = 1 + below(below(2) ? 2 : 8); changes > 0; --changes) change(bytes, other);
+  if (bytes.size() > longest) bytes.resize(longest);
+  return bytes;
+}
+
+void Mutator::change(std::string& bytes, const std::string& other) {
+  const std::size_t at = below(bytes.size());
+  const std::size_t length = std::min(bytes.size() - at, 1 + below(below(4) ? 8 : 512));
+  switch (below(11)) {
+    case 0:
+      if (!bytes.empty()) bytes[at] = char(bytes[at] ^ (1 << below(8)));
+      break;
+    case 1:
+      if (!bytes.empty()) bytes[at] = char(random_());
+      break;
+    case 2: put_number(bytes); break;
+    case 3: put_digits(bytes); break;
+    case 4: bytes.erase(at, length); break;
+    case 5: bytes.insert(at, bytes.substr(at, length)); break;
+    case 6: bytes.insert(at, std::string(1 + below(below(8) ? 16 : 3000), char(random_()))); break;
+    case 7: bytes.resize(at); break;
+    case 8:  // a part of another input
+      if (!other.empty()) {
+        const std::size_t from = below(other.size());
+        bytes.replace(at, below(2) ? length : 0, other.substr(from, 1 + below(below(2) ? 64 : other.size())));
+      }
+      break;
+    default:
+      if (!words_.empty()) {
+        const std::string& word = words_[below(words_.size())];
+        bytes.replace(at, below(2) ? std::min(word.size(), bytes.size() - at) : 0, word);
+      }
+  }
+}
+
+/// A number that tends to be at a border, of 1 to 8 bytes in either order.
+void Mutator::put_number(std::string& bytes) {
+  const std::size_t width = std::size_t(1) << below(4);
+  if (bytes.size() < width) return;
+  const std::size_t at = below(bytes.size() - width + 1);
+  const std::uint64_t number = kNumbers[below(std::size(kNumbers))];
+  const bool big_endian = below(2);
+  for (std::size_t i = 0; i < width; ++i) bytes[at + i] = char(number >> 8 * (big_endian ? width - 1 - i : i));
+}
+
+/// Another number for one that is written out.
+void Mutator::put_digits(std::string& bytes) {
+  std::vector<std::size_t> begins;
+  const auto is_digit = [&](std::size_t i) { return i < bytes.size() && std::isdigit(static_cast<unsigned char>(bytes[i])); };
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    if (is_digit(i) && (i == 0 || !is_digit(i - 1))) begins.push_back(i);
+  if (begins.empty()) return;
+  const std::size_t begin = begins[below(begins.size())];
+  std::size_t end = begin;
+  while (is_digit(end)) ++end;
+  bytes.replace(begin, end - begin, kDigits[below(std::size(kDigits))]);
+}
+
+}  // namespace marrow::fuzz

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run has left: run.json, the pipeline.yaml beside it, and the row of a cell.
+#include "difference/run_record.hpp"
+
+#include "marrow/compare/cell.hpp"
+#include "target.hpp"
+
+namespace {
+
+using namespace marrow;
+
+constexpr std::string_view kPipeline =
+    "marrow: 1\nnodes:\n  one: {uses: test.constant, with: {value: 2}}\n  two: {uses: test.add, in: {a: one, b: [one, one]}}\noutputs: {sum: two}\n";
+constexpr std::string_view kRecord =
+    R"({"pipeline":"p","status":"done","seed":1,"nodes":[{"id":"one","status":"done","keys":{"number":"0f"},"items":{"number":[["","0f"]]}}]})";
+
+void read(char format, std::string_view text) {
+  if (format == 'c') {
+    compare::to_json(compare::row_from_json(std::string(text)));
+    return;
+  }
+  fuzz::put("run/run.json", format == 'r' ? text : kRecord);
+  cli::read_run(fuzz::put("run/pipeline.yaml", format == 'p' ? text : kPipeline).parent_path());
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  fuzz::Input input(data, size);
+  const char format = input.choice("rcp");
+  fuzz::expect_value_or_error([&] { read(format, input.rest); });
+  return 0;
+}

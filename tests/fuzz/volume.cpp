@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// Volumes: MetaImage, NRRD, NIfTI and TIFF; headers alone, with their samples in a file beside them.
+#include <zlib.h>
+
+#include "plugins/read/volume_file.hpp"
+#include "target.hpp"
+
+namespace {
+
+using marrow::fuzz::put;
+
+/// As a .nii.gz holds it: the bytes that are tried are those of the header, not of the packing.
+std::string packed(std::string_view bytes) {
+  z_stream stream{};
+  deflateInit2(&stream, 1, Z_DEFLATED, 15 + 16, 8, Z_DEFAULT_STRATEGY);
+  std::string result(deflateBound(&stream, uLong(bytes.size())), '\0');
+  stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+  stream.avail_in = uInt(bytes.size());
+  stream.next_out = reinterpret_cast<Bytef*>(result.data());
+  stream.avail_out = uInt(result.size());
+  deflate(&stream, Z_FINISH);
+  result.resize(stream.total_out);
+  deflateEnd(&stream);
+  return result;
+}
+
+/// A folder with a header and the file that it is to name.
+std::filesystem::path detached(const std::string& name, std::string_view header) {
+  const std::filesystem::path file = put(name + "/a." + name, header);
+  static const std::string kSamples(64, 'x');
+  put(name + "/a.raw", kSamples);
+  return file.parent_path();
+}
+
+std::filesystem::path file_of(marrow::fuzz::Input& input) {
+  switch (input.choice("mdrhnzgt")) {
+    case 'm': return put("a.mha", input.rest);
+    case 'd': return detached("mhd", input.rest);
+    case 'r': return put("a.nrrd", input.rest);
+    case 'h': return detached("nhdr", input.rest);
+    case 'n': return put("a.nii", input.rest);
+    case 'z': return put("a.nii.gz", packed(input.rest));
+    case 'g': return put("a.nii.gz", input.rest);
+    default: return put("a.tif", input.rest);
+  }
+}
+
+}  // namespace
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  marrow::fuzz::Input input(data, size);
+  const std::filesystem::path path = file_of(input);
+  marrow::read::VolumeReading reading;
+  if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
+  marrow::fuzz::expect_value_or_error([&] { marrow::read::read_volume_file(path, reading); });
+  return 0;
+}
