@@ -17,7 +17,7 @@ namespace {
 class XmalabText {
  public:
   explicit XmalabText(const std::filesystem::path& path) : path_(path) {
-    const InputFile file(path);
+    const InputFile file(path, true);
     if (file.size() > 65536)
       throw Error(path.string() +
                   ": expected a camera file: marrow's YAML (.yaml) or XMALab's text (image size, camera "

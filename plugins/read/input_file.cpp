@@ -20,7 +20,7 @@ constexpr std::size_t kWindow = 16384;
 
 }  // namespace
 
-InputFile::InputFile(std::filesystem::path path) : path_(std::move(path)) {
+InputFile::InputFile(std::filesystem::path path, bool may_be_empty) : path_(std::move(path)) {
   const std::string what = path_.string();
   descriptor_ = ::open(path_.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (descriptor_ < 0) {
@@ -31,7 +31,7 @@ InputFile::InputFile(std::filesystem::path path) : path_(std::move(path)) {
   }
   struct stat status {};
   const bool is_known = ::fstat(descriptor_, &status) == 0;
-  if (is_known && S_ISREG(status.st_mode) && status.st_size > 0) {
+  if (is_known && S_ISREG(status.st_mode) && (status.st_size > 0 || may_be_empty)) {
     size_ = std::uint64_t(status.st_size);
     now_reading(path_);
     return;
@@ -63,8 +63,8 @@ std::string InputFile::text(std::uint64_t at, std::size_t count) const {
   return bytes;
 }
 
-std::string read_bytes(const std::filesystem::path& path, std::uint64_t most) {
-  const InputFile file(path);
+std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty) {
+  const InputFile file(path, may_be_empty);
   if (file.size() > most)
     throw Error(path.string() + ": has " + std::to_string(file.size()) + " bytes; at most " + std::to_string(most) +
                 " are read");

@@ -12,8 +12,9 @@ namespace marrow::read {
 /// meanwhile, is an Error, not a signal.
 class InputFile {
  public:
-  /// Throws Error unless `path` is a regular file with something in it. A pipe is not waited for, a device not read.
-  explicit InputFile(std::filesystem::path path);
+  /// Throws Error unless `path` is a regular file, and one with something in it unless it `may_be_empty`. A pipe is not waited for, a
+  /// device not read.
+  explicit InputFile(std::filesystem::path path, bool may_be_empty = false);
   ~InputFile();
   InputFile(const InputFile&) = delete;
   InputFile& operator=(const InputFile&) = delete;
@@ -32,7 +33,7 @@ class InputFile {
 };
 
 /// All bytes of a file. Throws Error, also where there are more than `most`.
-std::string read_bytes(const std::filesystem::path& path, std::uint64_t most);
+std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty = false);
 
 /// Numbers and texts out of a file place by place, whose neighbours are read at once.
 class FileWindow {

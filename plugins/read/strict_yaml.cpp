@@ -107,7 +107,7 @@ std::string nearest(const std::string& word, const std::vector<std::string>& kno
 }
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = read_bytes(path_, kLargestFile);
+  const std::string text = read_bytes(path_, kLargestFile, true);
   lines_ = split_lines(text);
   if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {

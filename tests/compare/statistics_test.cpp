@@ -128,6 +128,13 @@ TEST(Summarise, OfOneValueIsThatValue) {
     EXPECT_EQ(value, -2);
 }
 
+TEST(Summarise, OfAScoreTheLowestAreTheWorst) {
+  const Summary summary = summarise({4, 1, 3, 10}, true);
+  EXPECT_DOUBLE_EQ(summary.percentile_95, 1.3);  // position 0.15 in 1 3 4 10
+  EXPECT_DOUBLE_EQ(summary.worst, 1);
+  EXPECT_DOUBLE_EQ(summary.upper_quartile, 5.5);
+}
+
 TEST(Summarise, RefusesWhatIsNotFinite) {
   EXPECT_NE(message_of([] { summarise({1, nan, 3}); }).find("value 2 of 3 is nan"), std::string::npos);
   EXPECT_NE(message_of([] { summarise({infinite}); }).find("value 1 of 1 is inf"), std::string::npos);

@@ -68,6 +68,7 @@ TEST(Camera, PixelSizeShrinksTowardsTheSource) {
   camera.intrinsics(1, 1) = 2000;
   EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {0, 0, 0}), 0.3);
   EXPECT_DOUBLE_EQ(pixel_size_at_mm(camera, {50, 400, -20}), 0.5);
+  EXPECT_DOUBLE_EQ(pixel_size_at_mm(frontal(), {0, 0, 0}), 600 / 3000.0) << "by the mean of both focal lengths";
 }
 
 TEST(Camera, CheckNamesTheFault) {
@@ -76,6 +77,15 @@ TEST(Camera, CheckNamesTheFault) {
   camera.height_px = 0;
   EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
             "view 'a': image size 400 x 0 pixels is not positive");
+  camera = frontal();
+  camera.width_px = -1;
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("image size -1 x 800"), std::string::npos);
+  camera = frontal();
+  camera.width_px = camera.height_px = 1;
+  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }), "no error");
+  camera = frontal();
+  camera.intrinsics(0, 0) = 0;
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("needs positive focal lengths"), std::string::npos);
   camera = frontal();
   camera.intrinsics(1, 1) = -1;
   EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
@@ -94,6 +104,13 @@ TEST(View, CheckNamesTheFault) {
   view.mask = cv::Mat(800, 401, CV_8U, cv::Scalar(0));
   EXPECT_EQ(message_of([&] { check_view(view); }),
             "view 'lateral': the mask has 401 x 800 pixels, the image 400 x 800");
+  view.mask = cv::Mat(799, 400, CV_8U, cv::Scalar(0));
+  EXPECT_EQ(message_of([&] { check_view(view); }),
+            "view 'lateral': the mask has 400 x 799 pixels, the image 400 x 800");
+  for (const auto& [width, height] : {std::pair(400, 801), {399, 800}}) {
+    view.image.pixels = cv::Mat(height, width, CV_8U, cv::Scalar(0));
+    EXPECT_NE(message_of([&] { check_view(view); }).find("but its camera is for 400 x 800"), std::string::npos);
+  }
   view.image.pixels = cv::Mat(512, 512, CV_8U, cv::Scalar(0));
   EXPECT_EQ(message_of([&] { check_view(view); }),
             "view 'lateral': the image has 512 x 512 pixels, but its camera is for 400 x 800; give the camera that "

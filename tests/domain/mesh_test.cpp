@@ -76,6 +76,25 @@ TEST(Mesh, SamplesLieEvenlyOnTheSurface) {
   EXPECT_EQ(sample_surface(mesh, 1).size(), 1u);
 }
 
+TEST(Mesh, SamplesAreUniformInATriangle) {
+  Mesh mesh;
+  mesh.vertices_mm = {{0, 0, 0}, {6, 0, 0}, {0, 6, 0}, {6, 6, 0}};
+  mesh.triangles = {{0, 1, 2}, {3, 2, 1}};
+  const auto points = sample_surface(mesh, 3600);
+  ASSERT_EQ(points.size(), 3600u);
+  // The square in 36 parts, of which the diagonal halves six.
+  std::array<int, 36> inside{};
+  for (const Vector3d& point : points) ++inside[std::size_t(int(point.y()) * 6 + int(point.x()))];
+  for (std::size_t i = 0; i < 36; ++i) EXPECT_NEAR(inside[i], 100, 12) << i;
+  // The first half of the points lies in the first triangle; each stands for as much area, beginning and ending with half of it.
+  EXPECT_LT(points[1799].x() + points[1799].y(), 6);
+  EXPECT_GT(points[1800].x() + points[1800].y(), 6);
+  const auto share = [&](const Vector3d& p) { return std::pow((p.x() + p.y()) / 6, 2); };  // of the first triangle's area, between the point and its first corner
+  EXPECT_NEAR(share(points[0]), 0.5 / 1800, 1e-9);
+  EXPECT_NEAR(share(points[700]), 700.5 / 1800, 1e-9);
+  EXPECT_NEAR(points[1].y() / (points[1].x() + points[1].y()), 0.6180339887, 1e-9) << "of the side, the golden section";
+}
+
 TEST(FragmentFrame, LongAxisAndCentroidOfACylinderOffTheOrigin) {
   const Vector3d centre(40, -30, 250), along = Vector3d(0, 0.6, 0.8);
   const marrow::FragmentFrame frame = fragment_frame(cylinder(centre, along, 10, 100, 32));
@@ -96,6 +115,15 @@ TEST(FragmentFrame, LongAxisAgreesWithPlusZ) {
   const marrow::FragmentFrame frame = fragment_frame(cylinder({1, 2, 3}, Vector3d(0.6, 0, -0.8), 10, 100, 32));
   EXPECT_LT((frame.axes.col(2) - Vector3d(-0.6, 0, 0.8)).norm(), 1e-6);
   EXPECT_LT((frame.axes.col(0) - Vector3d(0.8, 0, 0.6)).norm(), 1e-6) << "+x made orthogonal to the long axis";
+}
+
+TEST(FragmentFrame, TheReferenceChangesAtNineTenthsAlongX) {
+  for (const double x : {0.89, 0.91, -0.91}) {
+    const Vector3d along(x, 0, std::sqrt(1 - x * x));
+    const marrow::FragmentFrame frame = fragment_frame(cylinder({1, 2, 3}, along, 10, 100, 32));
+    const Vector3d expected = x == 0.89 ? Vector3d(Vector3d(along.z(), 0, -along.x())) : Vector3d(Vector3d::UnitY());
+    EXPECT_LT((frame.axes.col(0) - expected).norm(), 1e-6) << x;
+  }
 }
 
 TEST(FragmentFrame, UsesAnotherReferenceWhenTheBoneLiesAlongX) {

@@ -57,6 +57,14 @@ TEST(RigidTransform, CheckNamesTheFault) {
             "with determinant +1");
   transform.rotation = 1.1 * Matrix3d::Identity();
   EXPECT_NE(message_of([&] { check_rigid(transform, "start"); }).find("off orthonormal by 0.21"), std::string::npos);
+  transform.rotation = (1 + 0.4e-6) * Matrix3d::Identity();  // off by 0.8e-6
+  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }), "no error");
+  transform.rotation = (1 + 0.6e-6) * Matrix3d::Identity();
+  EXPECT_NE(message_of([&] { check_rigid(transform, "start"); }).find("not a rotation"), std::string::npos);
+  transform.rotation.setIdentity();
+  transform.rotation(1, 2) = std::nan("");
+  EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }),
+            "start: the transform has a number that is not finite");
   transform.rotation.setIdentity();
   transform.translation_mm.x() = std::numeric_limits<double>::infinity();
   EXPECT_EQ(message_of([&] { check_rigid(transform, "start"); }),

@@ -81,6 +81,56 @@ TEST(EvaluateShaftLines, OneThatIsTurnedSaysByHowMuch) {
   EXPECT_NEAR(figure(lines, "worst_mm"), 150 * std::sin(marrow::radians(1)) * 0.6 * 300 / 512, 0.05);
 }
 
+TEST(EvaluateShaftLines, LengthsAndWidths) {
+  ShaftLines lines = borders(frontal());
+  lines.log_likelihood = -3.5;
+  const double pixel_mm = 0.6 * 300 / 512;
+  EXPECT_NEAR(figure(lines, "length_mm"), pixel_mm * (lines.left.to_px - lines.left.from_px).norm(), 1e-9);
+  EXPECT_NEAR(figure(lines, "true_width_mm"), pixel_mm * (lines.left.from_px - lines.right.from_px).norm(), 0.02);
+  EXPECT_EQ(figure(lines, "log_likelihood"), -3.5);
+}
+
+TEST(EvaluateShaftLines, TheWorseOfTheTwoBordersCounts) {
+  // The right one 0.9 mm outwards and turned by half a degree to the other side.
+  for (const bool left : {true, false}) {
+    ShaftLines lines = borders(frontal());
+    marrow::LineSegment& moved = left ? lines.left : lines.right;
+    const double shift_px = 0.9 / (0.6 * 300 / 512);
+    const Eigen::Vector2d outwards = (left ? 1 : -1) * (lines.left.from_px - lines.right.from_px).normalized();
+    const Eigen::Vector2d middle = 0.5 * (moved.from_px + moved.to_px) + shift_px * outwards;
+    const Eigen::Vector2d half = Eigen::Rotation2Dd(marrow::radians(-0.5)) * (0.5 * (moved.to_px - moved.from_px));
+    moved = {middle - half, middle + half};
+    EXPECT_NEAR(figure(lines, "border_offset_mm"), 0.9, 0.02);
+    EXPECT_NEAR(figure(lines, "border_angle_deg"), 0.5, 0.02);
+    EXPECT_NEAR(figure(lines, "axis_offset_mm"), 0.45, 0.02);
+    EXPECT_NEAR(figure(lines, "axis_angle_deg"), 0.25, 0.02);
+    EXPECT_NEAR(figure(lines, "width_error_mm"), 0.9, 0.04);
+    EXPECT_NEAR(figure(lines, "worst_mm"), 0.9 + 150 * std::sin(marrow::radians(0.5)) * 0.6 * 300 / 512, 0.05);
+  }
+}
+
+TEST(EvaluateShaftLines, AgainstTheFragmentWhoseOutlineIsNearest) {
+  Listener listener;
+  Bone truth = bone();
+  for (const char* name : {"far", "near", "unknown"}) {
+    truth.models.add(name, tube::cylinder(kRadius_mm, 200));
+    Truth shifted;
+    shifted.world_from_model = {"world", "model"};
+    shifted.world_from_model.translation_mm.x() = name == std::string("near") ? 0.3 : 4;
+    if (name != std::string("unknown")) truth.truths.add(name, shifted);
+  }
+  Truth off;
+  off.world_from_model = {"world", "model"};
+  off.world_from_model.translation_mm.x() = -2;
+  List<Truth> truths;
+  truths.add("distal", off);
+  truths.add("far", truth.truths[1]);
+  truths.add("near", truth.truths[2]);
+  const auto metrics = shaft_lines(borders(frontal()), frontal(), truth.models, truths, {}, listener.context);
+  ASSERT_TRUE(metrics);
+  EXPECT_NEAR(metrics->items[1].value, 0.3, 0.02) << metrics->items[1].name;
+}
+
 TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
   Listener listener;
   EXPECT_FALSE(shaft_lines(borders(frontal()), frontal(), {}, {}, {}, listener.context));

@@ -36,6 +36,10 @@ TEST(PoseDifference, OfATurnAndAShift) {
   EXPECT_NEAR(figure(metrics, "translation_mm"), 5, 1e-9);
   EXPECT_GT(figure(metrics, "distance_mm"), 5);
   EXPECT_LT(figure(metrics, "distance_mm"), std::hypot(5.0, marrow::radians(10) * 15));
+  // At all points spread over the surface, as at one of it that is told by hand: how far it turns depends on its distance from the axis.
+  double sum = 0;
+  for (const Eigen::Vector3d& point : marrow::sample_surface(kLower, 500)) sum += std::hypot(5.0, 2 * std::sin(marrow::radians(5)) * point.head<2>().norm()) / 500;
+  EXPECT_NEAR(figure(metrics, "distance_mm"), sum, 1e-9);
 }
 
 TEST(PoseDifference, RefusesPosesOfOtherFrames) {
@@ -65,6 +69,30 @@ TEST(ReductionGap, AnErrorOfAPoseStaysOpen) {
   EXPECT_NEAR(figure(metrics, "gap_mm"), 0.5, 1e-9);
   EXPECT_NEAR(figure(metrics, "largest_gap_mm"), 0.5, 1e-9);
   EXPECT_NEAR(figure(metrics, "translation_mm"), 0.5, 1e-9);
+}
+
+// Found turned by 2 degrees about x through the fracture: at the fracture's points, which lie up to 10 mm to the side and, on the walls, up to
+// border_mm below the cut, it stays open by that much of a turn.
+TEST(ReductionGap, OfATurnIsWhatTheFractureShows) {
+  const auto truth = placed({0, 0, 0}, {0, 0, 0}), found = placed({marrow::radians(2), 0, 0}, {0, 0, 0});
+  for (const double border_mm : {3.0, 8.0}) {
+    const auto metrics = shipped::call("evaluate.reduction_gap", {{"poses", both(pose(found), pose(truth))}, {"truths", both(marrow::Truth{truth}, marrow::Truth{truth})},
+                                                                  {"models", both(kLower, kUpper)}}, {{"border_mm", border_mm}}).at("metrics");
+    const double turn = 2 * std::sin(marrow::radians(1));
+    EXPECT_NEAR(figure(metrics, "rotation_deg"), 2, 1e-9);
+    EXPECT_NEAR(figure(metrics, "before_mm"), 0, 1e-9);
+    EXPECT_NEAR(figure(metrics, "largest_gap_mm"), turn * std::hypot(10, border_mm), 0.02 * turn * 10);
+    // The cut itself (20 x 20, mean |y| of 5), and walls: two at |y| = 10, two at any y, from 0 down to nearly border_mm.
+    const auto mean_at = [&](auto y_of) {
+      double sum = 0;
+      for (int i = 0; i < 200; ++i)
+        for (int k = 0; k < 200; ++k) sum += std::hypot(y_of((i + 0.5) / 200), border_mm * (k + 0.5) / 200) / 40000;
+      return sum;
+    };
+    const double walls = 40 * border_mm, mean = (400 * 5 + walls * mean_at([](double) { return 10.0; }) + walls * mean_at([](double share) { return 10 * share; })) / (400 + 2 * walls);
+    EXPECT_NEAR(figure(metrics, "gap_mm"), turn * mean, 0.02 * turn * mean);
+    EXPECT_NEAR(figure(metrics, "translation_mm"), 25 * turn, 1e-6) << "the centroid lies 25 mm below";
+  }
 }
 
 TEST(ReductionGap, SaysWhatIsWrong) {

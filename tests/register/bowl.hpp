@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A cost whose Hessian, derivatives and noise are known exactly, and an optimizer that only notes what it is asked.
+#include <marrow/domain/functions.hpp>
+#include <vector>
+
+#include "well.hpp"
+
+namespace well {
+
+/// way . hessian way / 2, of the way from the bottom in degrees and mm about the frame.
+class Bowl : public marrow::Cost {
+ public:
+  Bowl(marrow::RigidTransform bottom, marrow::FragmentFrame frame, const marrow::Matrix6d& hessian, double likelihood_factor = 1)
+      : bottom_(std::move(bottom)), frame_(std::move(frame)), hessian_(hessian), likelihood_factor_(likelihood_factor) {}
+
+  double value(const marrow::RigidTransform& pose) const override {
+    const marrow::Vector6d motion = way(bottom_, pose, frame_);
+    return 0.5 * motion.dot(hessian_ * motion);
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+    levels.push_back(level);
+    return std::make_shared<Bowl>(*this);
+  }
+  std::optional<double> likelihood_factor(const marrow::RigidTransform&) const override { return likelihood_factor_; }
+
+  mutable std::vector<marrow::CostLevel> levels;
+
+ private:
+  marrow::RigidTransform bottom_;
+  marrow::FragmentFrame frame_;
+  marrow::Matrix6d hessian_;
+  double likelihood_factor_;
+};
+
+/// Notes every problem, and answers with its start, or with one step of it along its first coordinate.
+class Listener : public marrow::Optimizer {
+ public:
+  explicit Listener(bool goes = false) : goes_(goes) {}
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    problems.push_back(problem);
+    marrow::MinimisationResult result;
+    result.x = problem.start;
+    if (goes_) result.x[0] += problem.initial_step[0];
+    result.value = problem.function(result.x);
+    result.evaluations = 7;
+    if (problem.observer) problem.observer(1, result.x, result.value);
+    return result;
+  }
+  mutable std::vector<marrow::MinimisationProblem> problems;  ///< their functions hold no longer than the search
+
+ private:
+  bool goes_;
+};
+
+}  // namespace well

@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each thing that may change a result changes its key, on its own; nothing else does.
+#include "framework/runtime/keys.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <set>
+
+#include "framework/runtime/mapping.hpp"
+
+namespace {
+
+namespace fs = std::filesystem;
+using marrow::Digest;
+using marrow::OptionType;
+using marrow::Provenance;
+using marrow::Value;
+
+class Keys : public testing::Test {
+ protected:
+  Keys() {
+    std::string folder = (fs::temp_directory_path() / "marrow-keys-XXXXXX").string();
+    folder_ = mkdtemp(folder.data());
+    node_.info.name = "kind.one";
+    add("flag", OptionType::boolean, false);
+    add("count", OptionType::integer, std::int64_t(3));
+    add("size", OptionType::number, 1.5);
+    add("word", OptionType::text, std::string("a"));
+    add("sizes", OptionType::numbers, std::vector<double>{1, 2});
+    add("words", OptionType::texts, std::vector<std::string>{"a", "b"});
+    add("file", OptionType::path, write("file", "content"));
+    add("files", OptionType::paths, std::vector<std::string>{write("first", "1"), write("second", "2")});
+    write("below/a", "1");
+    write("below/deep/b", "2");
+    add("folder", OptionType::path, (folder_ / "below").string());
+    for (const char* name : {"image", "views"}) {
+      node_.info.inputs.push_back({});
+      node_.info.inputs.back().name = name;
+    }
+    Value image, views;
+    image.key = {1, 2};
+    views.axis = "view";
+    views.names = {"frontal", "lateral"};
+    views.items.resize(2);
+    views.items[0].key = {3, 4};
+    views.items[1].key = {5, 6};
+    inputs_ = {image, views};
+  }
+  ~Keys() override { fs::remove_all(folder_); }
+
+  void add(const std::string& name, OptionType type, const marrow::OptionValue& value) {
+    marrow::OptionInfo info;
+    info.name = name;
+    info.type = type;
+    node_.info.options.push_back(info);
+    node_.options.push_back(value);
+  }
+  marrow::OptionValue& option(const std::string& name) {
+    std::size_t i = 0;
+    while (node_.info.options.at(i).name != name) ++i;
+    return node_.options[i];
+  }
+  std::string write(const std::string& name, const std::string& text) {
+    fs::create_directories((folder_ / name).parent_path());
+    std::ofstream(folder_ / name) << text;
+    return (folder_ / name).string();
+  }
+  Digest recipe() const { return recipe_of(node_, inputs_); }
+
+  fs::path folder_;
+  marrow::PipelineNode node_;
+  std::vector<Value> inputs_;
+};
+
+}  // namespace
+
+TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
+  const marrow::PipelineNode node = node_;
+  const std::vector<Value> inputs = inputs_;
+  std::set<Digest> seen{recipe()};
+  EXPECT_EQ(recipe(), *seen.begin()) << "the same each time";
+  const auto is_new = [&](const char* what) {
+    EXPECT_TRUE(seen.insert(recipe()).second) << what;
+    node_ = node;
+    inputs_ = inputs;
+  };
+  node_.info.name = "kind.other";
+  is_new("the node");
+  const std::vector<std::pair<std::string, marrow::OptionValue>> others{{"flag", true},
+                                                                        {"count", std::int64_t(4)},
+                                                                        {"size", std::nextafter(1.5, 2)},
+                                                                        {"word", std::string("b")},
+                                                                        {"sizes", std::vector<double>{2, 1}},
+                                                                        {"words", std::vector<std::string>{"ab", ""}},
+                                                                        {"file", write("other", "other content")},
+                                                                        {"files", std::vector<std::string>{write("first", "1"), write("third", "3")}},
+                                                                        {"folder", std::string()}};
+  for (const auto& [name, value] : others) {
+    option(name) = value;
+    is_new(name.c_str());
+    for (marrow::OptionInfo& info : node_.info.options)
+      if (info.name == name) info.name += "_renamed";
+    is_new((name + ", renamed").c_str());
+  }
+  inputs_[0].key.low = 9;
+  is_new("an input");
+  inputs_[0].key.high = 9;
+  is_new("the other half of its key");
+  inputs_[1].items[1].key.low = 9;
+  is_new("the second item of a list");
+  inputs_[1].items.pop_back();
+  inputs_[1].names.pop_back();
+  is_new("the length of a list");
+  inputs_[1].names[0] = "oblique";
+  is_new("the name of an item");
+  inputs_[1].axis = "frame";
+  is_new("the axis of a list");
+  std::swap(inputs_[1].items[0], inputs_[1].items[1]);
+  is_new("the order of a list");
+  node_.info.inputs[0].name = "mask";
+  is_new("the port");
+}
+
+TEST_F(Keys, FilesCountByTheirContentAndNames) {
+  const Digest before = recipe();
+  std::set<Digest> seen{before};
+  // As long as before and perhaps within the same tick of the clock: it is read again.
+  write("file", "CONTENT");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "the content of a file";
+  write("file", "content");
+  EXPECT_EQ(recipe(), before);
+  option("file") = write("elsewhere/file", "content");
+  EXPECT_EQ(recipe(), before) << "where it lies is no part of it";
+  write("second", "3");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "the content of a second file";
+  write("second", "2");
+  write("below/deep/b", "3");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "a file deep in a folder";
+  write("below/deep/b", "2");
+  write("below/deep/c", "");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "one more file";
+  fs::remove(folder_ / "below/deep/c");
+  fs::rename(folder_ / "below/deep/b", folder_ / "below/deep/d");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "the name of a file";
+  fs::rename(folder_ / "below/deep/d", folder_ / "below/deep/b");
+  EXPECT_EQ(recipe(), before);
+  fs::remove(folder_ / "second");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "a file that is gone";
+}
+
+TEST_F(Keys, FilesKnownFromBeforeAreReadAgainWhenTheirSizeOrTimeIsAnother) {
+  const fs::path file = write("old", "one");
+  const auto day = std::chrono::hours(24);
+  fs::last_write_time(file, fs::file_time_type::clock::now() - 2 * day);
+  const Digest one = marrow::path_digest(file);
+  write("old", "two");
+  fs::last_write_time(file, fs::file_time_type::clock::now() - day);
+  const Digest two = marrow::path_digest(file);
+  EXPECT_NE(two, one) << "another time";
+  const auto time = fs::last_write_time(file);
+  write("old", "twenty");
+  fs::last_write_time(file, time);
+  EXPECT_NE(marrow::path_digest(file), two) << "another size";
+  write("old", "two");
+  EXPECT_EQ(marrow::path_digest(file), two);
+}
+
+TEST_F(Keys, OfResults) {
+  const Digest recipe{1, 2}, build{3, 4};
+  const Digest key = marrow::result_key(recipe, build, false, 1);
+  EXPECT_EQ(marrow::result_key(recipe, build, false, 2), key) << "the seed is none of what is not random";
+  EXPECT_NE(marrow::result_key({1, 3}, build, false, 1), key);
+  EXPECT_NE(marrow::result_key(recipe, {3, 5}, false, 1), key) << "the build id";
+  EXPECT_NE(marrow::result_key(recipe, {4, 4}, false, 1), key) << "the other half of the build id";
+  EXPECT_NE(marrow::result_key(recipe, build, true, 1), marrow::result_key(recipe, build, true, 2));
+  EXPECT_NE(marrow::function_key(key, 0), marrow::function_key(key, 1));
+  EXPECT_NE(marrow::function_key(key, 0), marrow::function_key(recipe, 0));
+  EXPECT_NE(marrow::seed_of(recipe, 1), marrow::seed_of(recipe, 2));
+  EXPECT_NE(marrow::seed_of(recipe, 1), marrow::seed_of(build, 1));
+}
+
+TEST_F(Keys, OptionsInWords) {
+  EXPECT_EQ(marrow::text_of(true, OptionType::boolean), "true");
+  EXPECT_EQ(marrow::text_of(false, OptionType::boolean), "false");
+  EXPECT_EQ(marrow::text_of(std::int64_t(-7), OptionType::integer), "-7");
+  EXPECT_EQ(marrow::text_of(0.1, OptionType::number), "0.10000000000000001") << "all that counts for the key";
+  EXPECT_EQ(marrow::text_of(std::string("word"), OptionType::text), "word");
+  EXPECT_EQ(marrow::text_of(std::vector<double>{1, 2.5}, OptionType::numbers), "[1, 2.5]");
+  EXPECT_EQ(marrow::text_of(std::vector<std::string>{"a", "b"}, OptionType::texts), "[a, b]");
+  EXPECT_EQ(marrow::text_of(std::vector<std::string>{}, OptionType::texts), "[]");
+  const std::string file = write("file", "content"), content = " (content " + marrow::path_digest(file).hex().substr(0, 8) + ")";
+  EXPECT_EQ(marrow::text_of(file, OptionType::path), file + content);
+  EXPECT_EQ(marrow::text_of(std::vector<std::string>{file, file}, OptionType::paths), "[" + file + content + ", " + file + content + "]");
+}
+
+TEST_F(Keys, WhatMadeADifference) {
+  Provenance before;
+  before.node = "edges.canny";
+  before.build_id = {1, 1};
+  before.options = {{"high", "75"}, {"low", "50"}};
+  before.inputs = {{"image", {1, 1}}, {"mask", {2, 2}}};
+  before.seed = 1;
+  Provenance now = before;
+  now.seed = 2;
+  now.seconds = 9;
+  EXPECT_EQ(marrow::difference(before, now), "") << "it is not random";
+  now.random = true;
+  EXPECT_EQ(marrow::difference(before, now), "the seed is 2, was 1");
+  now.seed = 1;
+  EXPECT_EQ(marrow::difference(before, now), "");
+  now.build_id = {1, 2};
+  EXPECT_EQ(marrow::difference(before, now), "the plugin of edges.canny was rebuilt");
+  now.options["high"] = "80";
+  now.options["blur"] = "1";
+  now.inputs["image"] = {3, 3};
+  now.inputs["region"] = {};
+  EXPECT_EQ(marrow::difference(before, now),
+            "the plugin of edges.canny was rebuilt; option 'blur' is 1, was not there; option 'high' is 80, was 75; input 'image' changed; input 'region' changed");
+  now.node = "edges.sobel";
+  EXPECT_EQ(marrow::difference(before, now), "it uses edges.sobel, used edges.canny; input 'image' changed; input 'region' changed");
+}

@@ -1,0 +1,244 @@
+// SPDX-License-Identifier: Apache-2.0
+// The derivatives and the noise model of the contour's cost, against differences, numbers worked out by hand, and noise itself.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "marrow/domain/case.hpp"
+#include "marrow/domain/features.hpp"
+#include "marrow/domain/functions.hpp"
+#include "project/shapes.hpp"
+#include "shipped.hpp"
+
+namespace {
+
+using marrow::Cost;
+using marrow::FragmentFrame;
+using marrow::List;
+using marrow::Matrix6d;
+using marrow::RigidTransform;
+using marrow::Vector6d;
+
+constexpr double kDepth_mm = 600, kFocal_px = 1000 / 0.586, kMiddle_px = 255.5;
+
+/// Three sides of a rectangle, each in a plane through the source, so that it stays a straight line of the image at any depth:
+/// left and right at -+40 mm, and the upper one at 50 mm. Of the view from the side another one.
+class Sides : public marrow::Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose, double spacing_px) const override {
+    std::vector<marrow::OutlinePoint> points;
+    const bool frontal = camera.camera_from_world.rotation(0, 0) > 0.5;
+    const auto add = [&](double across_mm, double up_mm, double depth_mm, double normal_u, double normal_v) {
+      const double scale = (kDepth_mm + depth_mm) / kDepth_mm;
+      const Eigen::Vector3d seen(scale * across_mm, -scale * up_mm, kDepth_mm + depth_mm);
+      const Eigen::Vector3d model = inverse(camera.camera_from_world) * seen;
+      const Eigen::Vector2d pixel = marrow::project(camera, pose * model);
+      points.push_back({float(pixel.x()), float(pixel.y()), float(normal_u), float(normal_v), model.cast<float>()});
+    };
+    for (double at = -35; at < 35; at += spacing_px * 0.35) {
+      add(frontal ? -40 : -30, at, 20 * std::sin(0.1 * at), -1, 0);
+      add(frontal ? 40 : 50, at, 15 * std::cos(0.07 * at), 1, 0);
+      add(at, 50, -0.3 * at, 0, -1);
+    }
+    return points;
+  }
+};
+
+/// Edges so far outside of the sides.
+marrow::EdgeMap edges_outside(double offset_px, bool frontal) {
+  marrow::EdgeMap map{512, 512, {}};
+  const auto px = [](double mm) { return kFocal_px * mm / kDepth_mm; };
+  const float left = float(kMiddle_px + px(frontal ? -40 : -30) - offset_px), right = float(kMiddle_px + px(frontal ? 40 : 50) + offset_px),
+              top = float(kMiddle_px - px(50) - offset_px);
+  for (int u = 130; u < 380; ++u) map.pixels.push_back({float(u), top, 0, -1, 1});
+  for (int v = 130; v < 400; ++v) {
+    map.pixels.push_back({left, float(v), -1, 0, 1});
+    map.pixels.push_back({right, float(v), 1, 0, 1});
+  }
+  return map;
+}
+
+/// A cost, and what it refers to.
+struct Held {
+  Held(const marrow::Projector* projector, const List<marrow::View>& views, const List<marrow::EdgeMap>& edges, const shipped::Options& options)
+      : inputs{{"projector", marrow::Value::of<marrow::Projector>(std::shared_ptr<const marrow::Projector>(projector))},
+               {"views", shipped::list(views, "view")},
+               {"edges", shipped::list(edges, "view")}},
+        made(shipped::call("similarity.contour_distance", inputs, options).at("cost")) {}
+  const Cost& operator*() const { return made.as<Cost>(); }
+  const Cost* operator->() const { return &made.as<Cost>(); }
+  shipped::Inputs inputs;
+  marrow::Value made;
+};
+
+Held cost_of(double offset_px, const shipped::Options& options) {
+  List<marrow::View> views;
+  List<marrow::EdgeMap> edges;
+  for (const double angle : {0.0, 90.0}) {
+    views.add(angle == 0 ? "frontal" : "lateral", marrow::View{"", {}, shapes::c_arm(angle), {}});
+    edges.add(views.name(views.size() - 1), edges_outside(offset_px, angle == 0));
+  }
+  shipped::Options all{{"contour_spacing_px", 1.0}, {"reach_px", 20.0}, {"weights", std::vector<double>{3, 1}}};
+  for (const auto& [name, value] : options) all[name] = value;
+  return {new Sides, views, edges, all};
+}
+
+FragmentFrame frame() { return {Eigen::Vector3d(10, -5, 20), marrow::rotation_from_vector({0.2, -0.3, 0.4})}; }
+
+/// Away from the bottom by about a pixel or two in all six.
+RigidTransform away() {
+  Vector6d motion;
+  motion << 0.012, -0.015, 0.01, 0.7, -0.5, 0.6;
+  return marrow::moved(RigidTransform{"world", "ct"}, frame(), motion);
+}
+
+/// A step that moves the outline by a small part of a pixel.
+double step(int axis) { return axis < 3 ? 4e-4 : 0.02; }
+
+Vector6d slope_by_differences(const Cost& cost, const RigidTransform& pose) {
+  Vector6d slope;
+  for (int axis = 0; axis < 6; ++axis) {
+    const Vector6d motion = step(axis) * Vector6d::Unit(axis);
+    slope[axis] = (cost.value(marrow::moved(pose, frame(), motion)) - cost.value(marrow::moved(pose, frame(), -motion))) / (2 * step(axis));
+  }
+  return slope;
+}
+
+Matrix6d curvature_by_differences(const Cost& cost, const RigidTransform& pose) {
+  Matrix6d curvature;
+  const auto value = [&](int i, double a, int j, double b) {
+    return cost.value(marrow::moved(pose, frame(), a * step(i) * Vector6d::Unit(i) + b * step(j) * Vector6d::Unit(j)));
+  };
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j)
+      curvature(i, j) = (value(i, 1, j, 1) - value(i, 1, j, -1) - value(i, -1, j, 1) + value(i, -1, j, -1)) / (4 * step(i) * step(j));
+  return curvature;
+}
+
+/// Lengths of both in like units: a step of each axis.
+Vector6d in_steps(Vector6d slope) {
+  for (int axis = 0; axis < 6; ++axis) slope[axis] *= step(axis);
+  return slope;
+}
+
+void expect_slope(const Cost& cost, double tolerance) {
+  const auto about = cost.expansion(away(), frame());
+  ASSERT_TRUE(about.has_value());
+  EXPECT_NEAR(about->value, cost.value(away()), 1e-12);
+  const Vector6d told = in_steps(about->gradient), found = in_steps(slope_by_differences(cost, away()));
+  EXPECT_LT((told - found).norm(), tolerance * found.norm()) << told.transpose() << "\n" << found.transpose();
+}
+
+void expect_curvature_at_the_bottom(const Cost& cost) {
+  const RigidTransform bottom{"world", "ct"};
+  const auto about = cost.expansion(bottom, frame());
+  ASSERT_TRUE(about.has_value());
+  EXPECT_NEAR(about->value, 0, 1e-6);
+  const Matrix6d found = curvature_by_differences(cost, bottom);
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < 6; ++j) EXPECT_NEAR(about->curvature(i, j), found(i, j), 0.01 * std::sqrt(found(i, i) * found(j, j))) << i << ", " << j;
+}
+
+}  // namespace
+
+TEST(ContourDerivatives, TheSlopeIsThatOfTheValueWithAnEdgeOffset) {
+  for (const double offset_px : {0.0, 1.5, -1.0}) expect_slope(*cost_of(0, {{"estimate_offset", false}, {"edge_offset_px", offset_px}}), 0.005);
+}
+
+TEST(ContourDerivatives, TheSlopeIsThatOfTheValueWhereTheOffsetIsFound) { expect_slope(*cost_of(1.5, {}), 0.01); }
+
+TEST(ContourDerivatives, TheSlopeIsThatOfTheValueBothWays) {
+  expect_slope(*cost_of(0, {{"symmetric", true}, {"estimate_offset", false}, {"edge_offset_px", 1.0}}), 0.05);
+}
+
+TEST(ContourDerivatives, TheCurvatureIsThatOfTheValueAtTheBottom) {
+  expect_curvature_at_the_bottom(*cost_of(1.5, {{"estimate_offset", false}, {"edge_offset_px", 1.5}}));
+  expect_curvature_at_the_bottom(*cost_of(1.5, {}));
+}
+
+namespace {
+
+/// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
+class Line : public marrow::Projector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose, double) const override {
+    std::vector<marrow::OutlinePoint> points;
+    for (int v = 50; v < camera.height_px - 50; ++v) points.push_back({float(100 + pose.translation_mm.x()), float(v), -1, 0});
+    return points;
+  }
+};
+
+marrow::EdgeMap line_at(double u_px, int height_px = 200) {
+  marrow::EdgeMap map{200, height_px, {}};
+  for (int v = 0; v < height_px; ++v) map.pixels.push_back({float(u_px), float(v), -1, 0, 1});
+  return map;
+}
+
+RigidTransform shifted(double x_mm) {
+  RigidTransform pose{"world", "ct"};
+  pose.translation_mm.x() = x_mm;
+  return pose;
+}
+
+/// Views of the same line.
+Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options options) {
+  List<marrow::View> views;
+  List<marrow::EdgeMap> edges;
+  for (const marrow::EdgeMap& map : maps) {
+    marrow::Camera camera = shapes::c_arm(0, 200);
+    camera.height_px = map.height_px;
+    views.add("view " + std::to_string(views.size()), marrow::View{"", {}, camera, {}});
+    edges.add(views.name(views.size() - 1), map);
+  }
+  options["contour_spacing_px"] = 1.0;
+  options["estimate_offset"] = false;
+  return {new Line, views, edges, options};
+}
+
+double factor(const std::vector<marrow::EdgeMap>& maps, const shipped::Options& options) {
+  return cost_of_line(maps, options)->likelihood_factor(shifted(0)).value_or(-1);
+}
+
+}  // namespace
+
+TEST(ContourLikelihood, IsWhatOneComputesByHand) {
+  // All 100 edges lie 0.5 px off, in blocks of 14, 32, 32 and 22 points.
+  const double d = 0.5, root = std::sqrt(1 + d * d), blocks = 14 * 14 + 32 * 32 + 32 * 32 + 22 * 22;
+  const double curvature = 1 / (root * root * root);
+  const auto expected = [&](double model_error_px) { return curvature * 100 * 100 / (blocks * (d * d + model_error_px * model_error_px) / (root * root)); };
+  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}}), expected(0), 1e-3 * expected(0));
+  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.7}}), expected(0.7), 1e-3 * expected(0.7));
+  // The offset is no error: with it, the edges lie where they should, and are known to 0.05 px each.
+  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}, {"edge_offset_px", -0.5}}), 100 / (0.05 * 0.05), 1);
+  // Two views tell twice as much, and less where one of them counts more.
+  EXPECT_NEAR(factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}}), 2 * expected(0), 2e-3 * expected(0));
+  EXPECT_NEAR(factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}, {"weights", std::vector<double>{3, 1}}}), 1.6 * expected(0), 2e-3 * expected(0));
+}
+
+TEST(ContourLikelihood, PredictsTheScatterThatNoiseMakes) {
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 0.4);
+  constexpr int kRuns = 120;
+  double squares = 0, predicted = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    // Of each edge and of what its block has in common.
+    marrow::EdgeMap map = line_at(100, 740);  // 20 blocks
+    double common = 0;
+    for (std::size_t v = 0; v < map.pixels.size(); ++v) {
+      if (v % 32 == 0) common = 0.5 * noise(random);
+      map.pixels[v].u_px += float(common + noise(random));
+    }
+    const auto cost = cost_of_line({map}, {{"model_error_px", 0.0}});
+    const auto value = [&](double x) { return cost->value(shifted(x)); };
+    const double h = 0.2;
+    double x = 0;
+    for (int round = 0; round < 4; ++round) x -= 0.5 * h * (value(x + h) - value(x - h)) / (value(x + h) - 2 * value(x) + value(x - h));
+    const double curvature = (value(x + h) - 2 * value(x) + value(x - h)) / (h * h);
+    squares += x * x / kRuns;
+    predicted += 1 / (*cost->likelihood_factor(shifted(x)) * curvature) / kRuns;
+  }
+  std::printf("standard deviation %.4f px, predicted %.4f px\n", std::sqrt(squares), std::sqrt(predicted));
+  EXPECT_LT(predicted, 1.4 * squares);
+  EXPECT_GT(predicted, squares / 1.4);
+}

@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Builds what a changed file changes, runs the tests near it, and puts everything back: sources, objects, programs, with their times."""
+import filecmp
+import json
+import os
+import pathlib
+import re
+import resource
+import shutil
+import signal
+import subprocess
+import time
+
+from graph import Graph
+
+# The tests near a folder, by the beginnings of their programs' or of their own names.
+NEAR = {
+    "framework/domain": ["domain_", "fracture_", "evaluate_targets", "evaluate_pose_error", "evaluate_shapes", "register_", "camera_", "mesh_", "read_camera", "read_pose",
+                         "initial_axis", "runtime_"],
+    "framework/runtime": ["runtime_", "domain_hash", "compare_experiment", "cli_"],
+    "framework/compare": ["compare_", "cli_compare", "cli_commands"],
+    "plugins/camera": ["camera_", "conformance_camera", "cli_schema"],
+    "plugins/evaluate": ["evaluate_", "cli_schema"],
+    "plugins/fracture": ["fracture_", "evaluate_targets", "cli_schema"],
+    "plugins/register": ["register_", "initial_global_search", "cli_schema"],
+    "plugins/similarity": ["similarity_", "conformance_similarity", "register_multiresolution", "cli_schema"],
+}
+FOLDERS = sorted(NEAR)
+LEAST_LIMIT_S = 30
+
+
+class Test:
+    """One program of the test run: all GoogleTest cases of a program count as one."""
+
+    def __init__(self, name, command, properties):
+        self.name, self.command = name, command
+        self.folder = properties.get("WORKING_DIRECTORY", ".")
+        self.skipped = properties.get("SKIP_RETURN_CODE", 0)
+        self.seconds = None
+
+    def limit_s(self):
+        return max(LEAST_LIMIT_S, 8 * self.seconds)
+
+
+class DoesNotCompile(Exception):
+    pass
+
+
+class ChangesNothing(Exception):
+    pass
+
+
+class Bench:
+    def __init__(self, root, build, jobs):
+        self.root, self.build, self.jobs = pathlib.Path(root), pathlib.Path(build).resolve(), jobs
+        self.own = self.build / "mutate"
+        self.undo = self.own / "undo"
+        self.own.mkdir(exist_ok=True)
+        self.put_back()
+        self.graph = Graph(self.build)
+        self.tests = self.read_tests()
+
+    def read_tests(self):
+        text = subprocess.run(["ctest", "--test-dir", str(self.build), "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout
+        tests = {}
+        for test in json.loads(text)["tests"]:
+            command = test.get("command")
+            if not command:
+                continue
+            name = test["name"]
+            if any(part.startswith("--gtest_filter") for part in command):
+                name = os.path.basename(command[0]).removeprefix("test_")
+                command = [command[0], "--gtest_fail_fast", "--gtest_brief=1"]
+            tests.setdefault(name, Test(name, command, {p["name"]: p["value"] for p in test.get("properties", [])}))
+        return tests
+
+    def near(self, path):
+        names = next(names for folder, names in NEAR.items() if path.startswith(folder + "/"))
+        return [test for test in self.tests.values() if test.name.startswith(tuple(names))]
+
+    def run(self, test, limit_s):
+        """None where the test passes, else what failed."""
+        scratch = self.own / "scratch"
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir()
+        environment = dict(os.environ, TMPDIR=str(scratch), MARROW_CACHE=str(scratch / "cache"))
+        with open(self.own / "output.txt", "w+", errors="replace") as output:
+            process = subprocess.Popen(test.command, cwd=self.build / test.folder, stdout=output, stderr=subprocess.STDOUT, env=environment, start_new_session=True,
+                                       preexec_fn=limit_resources)
+            try:
+                code = process.wait(limit_s)
+            except subprocess.TimeoutExpired:
+                code = None
+            finally:
+                kill_group(process)
+            output.seek(0)
+            text = output.read()
+        shutil.rmtree(scratch, ignore_errors=True)
+        if code is not None and code in (0, test.skipped):
+            return None
+        failed = re.search(r"^\[  FAILED  \] ([\w./]+)|^(?:FAIL|ERROR): (\w+)", text, re.M)
+        name = "%s (%s)" % (test.name, failed.group(1) or failed.group(2)) if failed else test.name
+        return name if failed else "%s, %s" % (name, "time limit" if code is None else "signal %d" % -code if code < 0 else "exit code %d" % code)
+
+    def ninja(self, targets):
+        names = [os.path.relpath(target, self.build) for target in targets]
+        return subprocess.run(["ninja", "-C", str(self.build), "-j", str(self.jobs), *names], capture_output=True, text=True)
+
+    def measure(self, tests):
+        """Times the tests as the sources are; a test that fails so tells nothing. Times are kept until a program is another."""
+        programs = {test.command[0] for test in tests if test.command[0].startswith(str(self.build))}
+        built = self.ninja(programs | {str(self.build / "bin/marrow")})
+        if built.returncode:
+            raise SystemExit("the sources do not build as they are:\n" + built.stdout[-2000:])
+        kept = self.own / "times.json"
+        times = json.loads(kept.read_text()) if kept.exists() else {}
+        for test in tests:
+            made = os.path.getmtime(test.command[0])
+            if times.get(test.name, [0])[0] != made:
+                begin = time.monotonic()
+                failed = self.run(test, 1200)
+                if failed:
+                    raise SystemExit("fails before anything is changed: " + failed)
+                times[test.name] = [made, time.monotonic() - begin]
+                kept.write_text(json.dumps(times))
+            test.seconds = times[test.name][1]
+
+    def try_change(self, path, text, tests):
+        """What catches the file with another text; None where nothing does. Everything is put back."""
+        source = self.root / path
+        made = self.graph.made_from(source)
+        self.save([str(source), *made])
+        try:
+            source.write_text(text)
+            return self.first_failure(sorted(tests, key=lambda test: (test.command[0] not in made, test.seconds)), made)
+        finally:
+            self.put_back()
+
+    def first_failure(self, tests, made):
+        """Builds for each test what it needs, the tests that hold the changed code themselves first."""
+        libraries = {name for name in made if ".so" in name}
+        changed, waiting = False, []
+        for test in tests:
+            wanted = {test.command[0]} if test.command[0] in made else libraries
+            changed |= self.compile(made, wanted)
+            if self.ninja(wanted).returncode:
+                return "build of " + test.name  # a node cannot be described, or a test not listed
+            if not changed:
+                waiting.append(test)
+                continue
+            failed = self.run(test, test.limit_s())
+            if failed:
+                return failed
+        if not changed:
+            raise ChangesNothing()
+        return next(filter(None, (self.run(test, test.limit_s()) for test in waiting)), None)
+
+    def compile(self, made, wanted):
+        """Whether the machine code differs from before."""
+        objects = [name for name in made if name.endswith(".o") and self.graph.made_from(name) & wanted]
+        if objects and self.ninja(objects).returncode:
+            raise DoesNotCompile()
+        return not all(filecmp.cmp(name, self.saved[name], shallow=False) for name in objects)
+
+    def save(self, names):
+        shutil.rmtree(self.undo, ignore_errors=True)
+        self.undo.mkdir()
+        self.saved = {}
+        described = [name[:-3] + ".json" for name in names if name.endswith(".so")]
+        for number, name in enumerate([*names, *described]):
+            if os.path.isfile(name):
+                self.saved[name] = str(self.undo / str(number))
+                shutil.copy2(name, self.saved[name])
+        (self.undo / "list.json").write_text(json.dumps(self.saved))  # last: from now on there is something to put back
+
+    def put_back(self):
+        """Also what a run that was killed has left."""
+        listed = self.undo / "list.json"
+        if listed.exists():
+            for name, copy in json.loads(listed.read_text()).items():
+                shutil.copy2(copy, name + ".put-back")
+                os.replace(name + ".put-back", name)
+        shutil.rmtree(self.undo, ignore_errors=True)
+
+
+def limit_resources():
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    resource.setrlimit(resource.RLIMIT_DATA, (8 << 30, 8 << 30))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (4 << 30, 4 << 30))
+
+
+def kill_group(process):
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except ProcessLookupError:
+        pass
+    process.wait()
