@@ -17,25 +17,27 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kQuiet = std::chrono::seconds(5);  // waiting that is not worth a word
+constexpr auto kAtOnce = std::chrono::milliseconds(100);  // not worth a word to anyone
+constexpr auto kLong = std::chrono::seconds(5);           // worth a word to people
 
-/// Says that a wait is long, and that it has ended.
+/// Says that a wait begins, that it is long, and that it has ended.
 class Waiting {
  public:
   explicit Waiting(const std::function<void(bool)>& on_wait) : on_wait_(on_wait) {}
   ~Waiting() {
-    if (is_said_) on_wait_(false);
+    if (said_) on_wait_(false);
   }
   void goes_on() {
-    if (is_said_ || !on_wait_ || Clock::now() - start_ < kQuiet) return;
-    is_said_ = true;
+    const auto waited = Clock::now() - start_;
+    if (!on_wait_ || waited < (said_ == 0 ? Clock::duration(kAtOnce) : Clock::duration(kLong)) || said_ == 2) return;
+    ++said_;
     on_wait_(true);
   }
 
  private:
   const std::function<void(bool)>& on_wait_;
   Clock::time_point start_ = Clock::now();
-  bool is_said_ = false;
+  int said_ = 0;
 };
 
 struct flock one_byte(short type, off_t place) {

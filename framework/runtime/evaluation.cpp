@@ -184,9 +184,11 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
   if (makes_functions(node)) {
     defer(node, call, key);
   } else if (!read_back(node, call, key)) {
+    int said = 0;
     const auto on_wait = [&](bool waits) {
-      report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item,
-             waits ? "waits for another run that is making the same result" : "goes on after waiting for another run");
+      const bool is_long = waits ? said++ > 0 : said > 1;
+      const std::string text = waits ? "waits for another run that is making the same result" : "goes on after waiting for another run";
+      report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item, is_long ? text : "");
     };
     const Store::Claim claim = settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
     // Another process may have made it in the meantime.

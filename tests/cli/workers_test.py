@@ -9,7 +9,7 @@ import time
 
 from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
 
-FORGED = json.dumps({"id": "../../../forged", "variant": "one", "case": "s1", "start": "0", "status": "done", "tries": 1, "values": [0.001],
+FORGED = json.dumps({"id": "../../../forged", "variant": "one", "case": "seed-1", "start": "0", "status": "done", "tries": 1, "values": [0.001],
                      "units": [""], "initial_error": None, "seconds": None, "evaluations": 0, "nodes": {}, "key": "k"})
 NAMES = """marrow: 1
 nodes:
@@ -42,7 +42,7 @@ class Workers(Case):
         result = self.compare()
         self.assertEqual(result.returncode, 0, result.stderr)
         # 10 + 10 and 20 + 20
-        self.assertEqual(sorted(self.rows()), [(cell, "done", "60.0") for cell in ("one/1/0", "one/2/0", "two/1/0", "two/2/0")])
+        self.assertEqual(sorted(self.rows()), [(cell, "done", "60.0") for cell in ("one/seed-1/0", "one/seed-2/0", "two/seed-1/0", "two/seed-2/0")])
         self.assertEqual([str(path) for path in self.scratch.rglob("*forged*")], [])
 
     def test_waiting_for_another_run_is_no_failure(self):

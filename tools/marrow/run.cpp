@@ -32,7 +32,9 @@ class Progress {
       case Kind::failed: error_line("error: " + event.text); break;
       case Kind::warning: line(where, "warning: " + event.text); break;
       case Kind::waiting:
-      case Kind::waited: line(where, event.text); break;
+      case Kind::waited:
+        if (!event.text.empty()) line(where, event.text);
+        break;
       case Kind::message: folder_.append_log(where + ": " + event.text); break;
       case Kind::progress: moving_line(where, event); break;
       case Kind::started:

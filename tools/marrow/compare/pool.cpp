@@ -97,7 +97,7 @@ class Pool {
 
   void look_after(Member& member) {
     auto end = member.worker.take([&](const nlohmann::json& report) {
-      if (report["say"] == "waiting" && settings_.waits && member.job) settings_.waits(*member.job, member.worker.at());
+      if (report["say"] == "waits long" && settings_.waits && member.job) settings_.waits(*member.job, member.worker.at());
     });
     if (!end) end = member.worker.check({settings_.time_limit_s, settings_.memory_limit_mb});
     if (!end || !member.job) return;

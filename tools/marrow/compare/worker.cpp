@@ -33,6 +33,7 @@ std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
       reports.at("node '" + event.node + "'" + item);
     if (event.kind == RunEvent::Kind::waiting || event.kind == RunEvent::Kind::waited)
       reports.waiting(event.kind == RunEvent::Kind::waiting);
+    if (event.kind == RunEvent::Kind::waiting && !event.text.empty()) reports.say({{"say", "waits long"}});
   };
 }
 

@@ -16,7 +16,7 @@
 namespace marrow {
 
 /// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names the place along the mapped axes ("lateral", "distal/final").
-/// `waiting`, after a few seconds of it: another run is making the same result; `waited`: that is over, and the call goes on.
+/// `waiting`: another run is making the same result, with a text once that takes seconds; `waited`: that is over, and the call goes on.
 struct RunEvent {
   enum class Kind { started, progress, finished, failed, skipped, message, warning, cached, waiting, waited };
   Kind kind = Kind::message;

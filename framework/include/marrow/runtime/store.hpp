@@ -82,8 +82,8 @@ class Store {
     int descriptor_;
   };
   /// Waits for it; look the result up again then. Comes back empty-handed where the folder cannot be written or when
-  /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back. After five seconds of
-  /// waiting `on_wait(true)` is called, and `on_wait(false)` when that waiting has ended, however it did.
+  /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back. `on_wait(true)`
+  /// is called when waiting begins and again after five seconds of it, `on_wait(false)` when it has ended, however it did.
   Claim claim(const Digest& key, const std::atomic<bool>* cancelled,
               const std::function<void(bool waits)>& on_wait = {}) const;
   /// Removes an entry that turned out to be damaged.
