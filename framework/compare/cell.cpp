@@ -178,7 +178,10 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
     if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
   const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
-  std::ofstream(temporary.path / "content.txt") << content_of_case(temporary.path / outputs) << '\n';
+  std::ofstream content(temporary.path / "content.txt");
+  content << content_of_case(temporary.path / outputs) << '\n';
+  content.close();
+  if (!content) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + "; is the disk full?");
   std::error_code error;
   fs::rename(temporary.path, folder, error);
   if (!error || is_whole_case(folder, folder / outputs)) return;  // another process may have been quicker

@@ -88,6 +88,8 @@ class CaseReader {
       } else if (fs::is_symlink(folder, error)) {  // not what else lies among the cases: it may have been one
         if (fs::exists(folder, error)) continue;
         return yaml_.fault(place, "the link " + folder.string() + " leads nowhere", "remove it, or put its target back");
+      } else if (fs::status(folder, error).type() == fs::file_type::none) {
+        return yaml_.fault(place, folder.string() + " cannot be looked at: " + error.message());
       }
     }
     if (!any) yaml_.fault(place, "there is no folder at '" + pattern + "'", "the path starts at the experiment's file");

@@ -244,6 +244,8 @@ class Reader {
     const std::string hint = "write it as  metrics: [errors.distal.final.mtre_mm]";
     if (!entry.value.IsSequence()) return yaml_.fault(entry.place, "'metrics' must be a list", hint);
     if (entry.value.size() == 0) return yaml_.fault(entry.place, "'metrics' names no figure", hint);
+    if (entry.value.size() > kMostMetrics)
+      return yaml_.fault(entry.place, "'metrics' names " + std::to_string(entry.value.size()) + " figures, at most " + std::to_string(kMostMetrics) + " can be compared");
     for (const YAML::Node& item : entry.value) {
       const Place place = yaml_.place(item);
       const MetricChoice metric = read_metric(item, place);

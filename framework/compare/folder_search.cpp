@@ -13,17 +13,21 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_pattern(const std::string& name) { return name.find_first_of("*?[\\") != std::string::npos; }
+bool is_pattern(const std::string& name) {
+  return name.find_first_of("*?[\\") != std::string::npos;
+}
 
 }  // namespace
 
 void FolderSearch::look() {
   if (++looked_at_ > kMostLookedAt)
-    throw Error("the search goes through more than " + std::to_string(kMostLookedAt) + " files and folders; do links lead in a circle?");
+    throw Error("the search goes through more than " + std::to_string(kMostLookedAt) +
+                " files and folders; do links lead in a circle?");
 }
 
 std::vector<fs::path> FolderSearch::matches(const fs::path& pattern) {
-  if (pattern.native().size() >= PATH_MAX) throw Error("the path has " + std::to_string(pattern.native().size()) + " bytes, more than any path may have");
+  if (pattern.native().size() >= PATH_MAX)
+    throw Error("the path has " + std::to_string(pattern.native().size()) + " bytes, more than any path may have");
   std::vector<fs::path> found{pattern.root_path()};
   for (const fs::path& part : pattern.relative_path()) {
     if (part.empty()) continue;  // after a slash at the end

@@ -73,7 +73,9 @@ const PluginEntry& checked_entry(void* handle) {
 }
 
 void* open_library(const fs::path& file, int mode) {
-  void* handle = dlopen(fs::absolute(file).c_str(), mode | RTLD_LOCAL);
+  // What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait for ever.
+  const auto load = [mode](const char* path) noexcept { return dlopen(path, mode | RTLD_LOCAL); };
+  void* handle = load(fs::absolute(file).c_str());
   if (handle) return handle;
   const char* text = dlerror();
   std::string reason = text ? text : "unknown reason";

@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <new>
 
 #include "store_entry.hpp"
 #include "store_folder.hpp"
@@ -68,6 +69,8 @@ std::optional<StoredResult> Store::find(const Digest& key) const {
     result.provenance = std::move(entry.description.provenance);
     file.mark_as_used();
     return result;
+  } catch (const std::bad_alloc&) {
+    return std::nullopt;
   } catch (const Error&) {  // damaged, of another layout, or of another key
   }
   drop(key);
@@ -83,6 +86,8 @@ std::string Store::save(const Digest& key, const std::vector<Value>& outputs, co
   try {
     const EntryDescription description = describe_entry(key, outputs, provenance);
     return write_whole(file_of(key), [&](Archive& out) { write_entry(out, description, outputs); });
+  } catch (const std::bad_alloc&) {
+    return "out of memory";
   } catch (const std::exception& error) {
     return error.what();
   }

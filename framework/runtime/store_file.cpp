@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <new>
 
 #include "store_folder.hpp"
 
@@ -144,6 +145,8 @@ std::string write_whole(const fs::path& file, const std::function<void(Archive&)
     FileWriter writer(descriptor);
     fill(writer);
     if (const int number = writer.flush()) fault = fault_of(number);
+  } catch (const std::bad_alloc&) {
+    fault = fault_of(ENOMEM);
   } catch (const std::exception& error) {
     fault = error.what();
   }

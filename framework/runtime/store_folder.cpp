@@ -112,7 +112,9 @@ FolderState examine_own(const fs::path& folder, mode_t mode) {
 }  // namespace
 
 FolderState examine_store(const fs::path& folder) {
-  if (folder.empty()) return {false, "this user has no home folder; set MARROW_CACHE to a folder for them"};
+  if (folder.empty())
+    return {false,
+            "neither HOME nor the system names a home folder of this user; set MARROW_CACHE to a folder for them"};
   struct stat status {};
   if (stat(folder.c_str(), &status) != 0) {
     const int number = errno;
@@ -169,8 +171,11 @@ fs::path new_folder_beside(const fs::path& final) {
   fs::path temporary;
   do temporary = temporary_beside(final);
   while (mkdir(temporary.c_str(), 0700) != 0 && errno == EEXIST);
-  if (chmod(temporary.c_str(), 0700) != 0)
-    throw Error("cannot make the folder " + temporary.string() + ": " + std::strerror(errno));
+  if (chmod(temporary.c_str(), 0700) != 0) {
+    const int number = errno;
+    rmdir(temporary.c_str());
+    throw Error("cannot make the folder " + temporary.string() + ": " + std::strerror(number));
+  }
   return temporary;
 }
 

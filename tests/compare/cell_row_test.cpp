@@ -105,7 +105,8 @@ TEST(CellRowText, ForgedOrDamaged) {
 }
 
 TEST(CellRowText, NoJson) {
-  for (const std::string& text : {std::string(), std::string("good"), std::string("[]"), std::string("7"), std::string(100000, '['), to_json(good_row()).substr(0, 60)})
+  for (const std::string& text : {std::string(), std::string("good"), std::string("[]"), std::string("7"),
+                                  std::string(100000, '['), to_json(good_row()).substr(0, 60)})
     EXPECT_THROW(marrow::compare::row_from_json(text, experiment()), marrow::Error) << text.substr(0, 80);
   std::string endless = to_json(good_row());
   endless.replace(endless.find("1.5"), 3, "1e999");

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Experiments that are too large are a fault before anything of them is made; names that become folders fit every file system.
+// Experiments that are too large are a fault before anything of them is made; names that become folders fit every file
+// system.
 #include <ctime>
 #include <filesystem>
 
@@ -19,13 +20,15 @@ class ExperimentLimits : public ExperimentFiles {
   void expect_fault(const std::string& text, const std::string& fault) {
     const std::clock_t start = std::clock();
     read(text);
-    const double seconds = double(std::clock() - start) / CLOCKS_PER_SEC;  // of this process, whatever else the machine does
+    const double seconds =
+        double(std::clock() - start) / CLOCKS_PER_SEC;  // of this process, whatever else the machine does
     ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text().substr(0, 2000);
     EXPECT_NE(diagnostics.text().find(fault), std::string::npos) << diagnostics.text().substr(0, 2000);
     EXPECT_LT(seconds, 2);
   }
   std::string matrix(int keys, int values) {
-    static const char* const kOptions[] = {"c.value", "f.value", "n.scale", "c.count", "c.word", "c.numbers", "t.x", "t.y"};
+    static const char* const kOptions[] = {"c.value", "f.value",   "n.scale", "c.count",
+                                           "c.word",  "c.numbers", "t.x",     "t.y"};
     std::string text = kStart + kMetrics + "matrix:\n", list;
     for (int i = 0; i < values; ++i) list += (i ? ", " : "") + std::to_string(i);
     for (int i = 0; i < keys; ++i) text += std::string("  ") + kOptions[i] + ": [" + list + "]\n";
@@ -35,7 +38,8 @@ class ExperimentLimits : public ExperimentFiles {
 
 TEST_F(ExperimentLimits, Matrix) {
   expect_fault(matrix(8, 10), "e.yaml:5:1: error: the matrix makes 100000000 variants, at most 1000 can be compared");
-  EXPECT_NE(diagnostics.text().find("hint: leave values out, or name the combinations that matter under  variants:"), std::string::npos);
+  EXPECT_NE(diagnostics.text().find("hint: leave values out, or name the combinations that matter under  variants:"),
+            std::string::npos);
   expect_fault(matrix(8, 1000), "the matrix makes 1e+24 variants");
   expect_fault(matrix(1, 1001), "the matrix makes 1001 variants");
   EXPECT_EQ(read(matrix(1, 1000)).variants.size(), 1000u) << diagnostics.text().substr(0, 2000);
@@ -52,28 +56,46 @@ TEST_F(ExperimentLimits, Cells) {
   pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
   scratch.write("p.yaml", pipeline);
   const std::string cases = std::string(kHead) + "cases: {seeds: 1..100000}\ninputs: {case: cases/a}\n" + kMetrics;
-  expect_fault(cases + kVariants + "starts: {node: s, count: 6, rotation_deg: 1}\n",
-               "e.yaml:1:1: error: 2 variants, 100000 cases and 6 starts are 1200000 cells, at most 1000000 can be compared\n");
+  expect_fault(
+      cases + kVariants + "starts: {node: s, count: 6, rotation_deg: 1}\n",
+      "e.yaml:1:1: error: 2 variants, 100000 cases and 6 starts are 1200000 cells, at most 1000000 can be compared\n");
   EXPECT_NE(diagnostics.text().find("hint: take fewer of them, or make several experiments"), std::string::npos);
   expect_fault(cases + kVariants + "starts: {node: s, count: 100000, rotation_deg: 1}\n", "are 20000000000 cells");
-  EXPECT_EQ(read(cases + kVariants + "starts: {node: s, count: 5, rotation_deg: 1}\n").cell_count(), 1000000u) << diagnostics.text();
+  EXPECT_EQ(read(cases + kVariants + "starts: {node: s, count: 5, rotation_deg: 1}\n").cell_count(), 1000000u)
+      << diagnostics.text();
+}
+
+TEST_F(ExperimentLimits, Metrics) {
+  std::string metrics = "metrics:\n";
+  for (int i = 0; i < 200000; ++i) metrics += "- a.f" + std::to_string(i) + "\n";
+  expect_fault(kStart + kVariants + metrics,
+               "e.yaml:7:1: error: 'metrics' names 200000 figures, at most 1000 can be compared");
 }
 
 TEST_F(ExperimentLimits, SeedsAtTheEndOfTheIntegers) {
   const std::string ranges = "'seeds' must be a range such as 1..20, of at most 100000, or a list of integers";
-  for (const char* wrong : {"9223372036854775800..9223372036854775807999", "99999999999999999999..99999999999999999999", "18446744073709551610..18446744073709551615",
-                            "1..2x", "1...3", "1 ..3", "+1..3", "0x1..3", "1..3..5", "1..100001"})
-    expect_fault(std::string(kHead) + "cases: {seeds: " + wrong + "}\ninputs: {case: cases/a}\n" + kVariants + kMetrics, ranges);
-  const auto e = read(std::string(kHead) + "cases: {seeds: 9223372036854775800..9223372036854775807}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
+  for (const char* wrong : {"9223372036854775800..9223372036854775807999", "99999999999999999999..99999999999999999999",
+                            "18446744073709551610..18446744073709551615", "1..2x", "1...3", "1 ..3", "+1..3", "0x1..3",
+                            "1..3..5", "1..100001"})
+    expect_fault(std::string(kHead) + "cases: {seeds: " + wrong + "}\ninputs: {case: cases/a}\n" + kVariants + kMetrics,
+                 ranges);
+  const auto e =
+      read(std::string(kHead) + "cases: {seeds: 9223372036854775800..9223372036854775807}\ninputs: {case: cases/a}\n" +
+           kVariants + kMetrics);
   ASSERT_EQ(e.cases.size(), 8u) << diagnostics.text();
   EXPECT_EQ(e.cases.back().seed, 9223372036854775807u);
-  expect_fault(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: 1..3, draw: {x: [-1.7e308, 1.7e308]}}}\n" + kVariants + kMetrics,
+  expect_fault(std::string(kHead) +
+                   "cases: {simulate: {pipeline: s.yaml, seeds: 1..3, draw: {x: [-1.7e308, 1.7e308]}}}\n" + kVariants +
+                   kMetrics,
                "the range of 'x' is too wide for a number to be drawn from it");
 }
 
 TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
   const std::clock_t start = std::clock();
-  const auto e = read(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: 1..100000, draw: {x: [0, 1]}, seed_input: [shape]}}\n" + kVariants + kMetrics);
+  const auto e =
+      read(std::string(kHead) +
+           "cases: {simulate: {pipeline: s.yaml, seeds: 1..100000, draw: {x: [0, 1]}, seed_input: [shape]}}\n" +
+           kVariants + kMetrics);
   EXPECT_EQ(e.cases.size(), 100000u) << diagnostics.text();
   EXPECT_EQ(marrow::compare::cell_of(e, "two/seed-99999/0")->case_index, 99998u);
   EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 2) << "quadratic, it was minutes";
@@ -82,7 +104,8 @@ TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
 TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {
   const std::string longest(100, 'n'), longer(101, 'n');
   EXPECT_EQ(read(kStart + kMetrics + "variants:\n  " + longest + ": {}\n").variants.size(), 1u) << diagnostics.text();
-  expect_fault(kStart + kMetrics + "variants:\n  " + longer + ": {}\n", "e.yaml:6:3: error: a variant's name becomes a file name: '");
+  expect_fault(kStart + kMetrics + "variants:\n  " + longer + ": {}\n",
+               "e.yaml:6:3: error: a variant's name becomes a file name: '");
   EXPECT_NE(diagnostics.text().find("it has 101 bytes"), std::string::npos) << diagnostics.text();
   expect_fault(kGood + "name: " + std::string(260, 'n') + "\n", "an experiment's name becomes a file name");
   fs::create_directories(scratch.path / "cases" / longer);
@@ -90,8 +113,10 @@ TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {
 }
 
 TEST_F(ExperimentLimits, NamesThatTheMatrixComposes) {
-  expect_fault(kStart + kMetrics + "matrix:\n  c.path: [" + std::string(60, 'a') + ", b]\n  c.value: [1, " + std::string(40, '0') + "2]\n",
-               "e.yaml:5:1: error: the matrix makes a variant's name of 102 bytes of its values; as a folder's name it may have 100\n");
+  expect_fault(kStart + kMetrics + "matrix:\n  c.path: [" + std::string(60, 'a') + ", b]\n  c.value: [1, " +
+                   std::string(40, '0') + "2]\n",
+               "e.yaml:5:1: error: the matrix makes a variant's name of 102 bytes of its values; as a folder's name it "
+               "may have 100\n");
   EXPECT_NE(diagnostics.text().find("hint: name the combinations under  variants:"), std::string::npos);
   // Whatever the values are, each variant has a folder of its own.
   const auto e = read(kStart + kMetrics + "matrix:\n  c.path: [two, TWO, 'two', two-2, 'a b', a_b]\n");
@@ -101,13 +126,15 @@ TEST_F(ExperimentLimits, NamesThatTheMatrixComposes) {
 }
 
 TEST_F(ExperimentLimits, NamesThatAreOneFolderToSomeFileSystems) {
-  expect_fault(kStart + kMetrics + "variants:\n  canny: {}\n  Canny: {}\n", "e.yaml:7:3: error: the variants 'canny' and 'Canny' are one folder to some file systems\n");
+  expect_fault(kStart + kMetrics + "variants:\n  canny: {}\n  Canny: {}\n",
+               "e.yaml:7:3: error: the variants 'canny' and 'Canny' are one folder to some file systems\n");
   fs::create_directories(scratch.path / "cases" / "A");
   expect_fault(kGood, "e.yaml:3:19: error: two cases are named 'a' and 'A', which is one folder to some file systems");
 }
 
 TEST_F(ExperimentLimits, FoldersWithOddNames) {
-  for (const char* name : {"with space", "line\nbreak", "esc\x1b[31m", "not\xffutf8", ".hidden"}) fs::create_directories(scratch.path / "odd" / name);
+  for (const char* name : {"with space", "line\nbreak", "esc\x1b[31m", "not\xffutf8", ".hidden"})
+    fs::create_directories(scratch.path / "odd" / name);
   const auto e = read(std::string(kHead) + "cases: {folders: [odd/*, odd/.hidden]}\n" + kVariants + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   std::vector<std::string> names;
@@ -117,7 +144,9 @@ TEST_F(ExperimentLimits, FoldersWithOddNames) {
 }
 
 TEST_F(ExperimentLimits, FoldersThatCannotBeFound) {
-  const auto folders = [](const std::string& pattern) { return std::string(kHead) + "cases:\n  folders:\n  - " + pattern + "\n" + kVariants + kMetrics; };
+  const auto folders = [](const std::string& pattern) {
+    return std::string(kHead) + "cases:\n  folders:\n  - " + pattern + "\n" + kVariants + kMetrics;
+  };
   expect_fault(folders(std::string(65536, 'a')), "e.yaml:5:5: error: the cases at '");
   EXPECT_NE(diagnostics.text().find("more than any path may have"), std::string::npos);
   std::string deep;
@@ -147,15 +176,23 @@ TEST_F(ExperimentLimits, TheFileItself) {
     marrow::compare::read_experiment(file, test_catalogue(), diagnostics);
     return diagnostics.text();
   };
-  EXPECT_NE(fault(scratch.path).find("error: the experiment file cannot be read: it is a folder"), std::string::npos) << diagnostics.text();
-  EXPECT_NE(fault("/dev/zero").find("error: the experiment file cannot be read: it is no regular file"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(fault(scratch.path).find("error: the experiment file cannot be read: it is a folder"), std::string::npos)
+      << diagnostics.text();
+  EXPECT_NE(fault("/dev/zero").find("error: the experiment file cannot be read: it is no regular file"),
+            std::string::npos)
+      << diagnostics.text();
   const std::string named = scratch.write("...yaml", kGood).string();
-  EXPECT_NE(fault(named).find("the experiment is named after its file, which becomes a folder's name: '..' cannot be one, it begins with a dot"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(fault(named).find("the experiment is named after its file, which becomes a folder's name: '..' cannot be "
+                              "one, it begins with a dot"),
+            std::string::npos)
+      << diagnostics.text();
   EXPECT_EQ(fault(scratch.write("...yaml", kGood + "name: good\n")), "");
 }
 
 TEST_F(ExperimentLimits, AVariantWhoseOutputIsNoFigure) {
-  scratch.write("p.yaml", "marrow: 1\ninputs: {case: {type: path, default: x}}\nnodes:\n  m: {uses: test.constant}\noutputs: {number: m}\n");
+  scratch.write("p.yaml",
+                "marrow: 1\ninputs: {case: {type: path, default: x}}\nnodes:\n  m: {uses: test.constant}\noutputs: "
+                "{number: m}\n");
   expect_fault(kStart + kMetrics + "variants:\n  one: {}\n  two: {m.uses: test.truth}\n",
                "e.yaml:7:3: error: in variant 'two' output 'number' is truth, not figures of merit");
 }

@@ -2,6 +2,8 @@
 // What is wrong with a declaration is found when the plugin registers.
 #include <gtest/gtest.h>
 
+#include <limits>
+
 #include "marrow/plugin.hpp"
 
 namespace {
@@ -55,6 +57,30 @@ TEST(Declaration, DefaultNotAmongChoices) {
   Plugin plugin;
   plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
   EXPECT_NE(faults(plugin).find("option 'word': its default 'a' is not one of its choices"), std::string::npos);
+}
+TEST(Declaration, OptionNamedTwice) {
+  Plugin plugin;
+  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("word", &Options::word, "h").option("word", &Options::word, "h");
+  EXPECT_NE(faults(plugin).find("option 'word' is named twice"), std::string::npos);
+}
+TEST(Declaration, NumbersThatCannotBeWrittenDown) {
+  struct Odd { double x = std::numeric_limits<double>::quiet_NaN(); double y = 1; };
+  Metrics (*odd)(const Metrics&, const Odd&) = [](const Metrics& metrics, const Odd&) { return metrics; };
+  Plugin plugin;
+  plugin.node("test.odd", odd).summary("s").in("a", "h").out("b", "h").option("x", &Odd::x, "h")
+      .option("y", &Odd::y, "h", marrow::at_least(2), marrow::at_most(0)).option("z", &Odd::y, "h", marrow::at_most(std::numeric_limits<double>::infinity()));
+  EXPECT_NE(faults(plugin).find("option 'x': its default is not a finite number"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("option 'y': its range is empty or not finite"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("option 'z': its range is empty or not finite"), std::string::npos);
+}
+TEST(Declaration, TextsThatCannotBeShown) {
+  for (const char* text : {"\x1b[2J", "two\nlines", "\xff"}) {
+    Plugin plugin;
+    plugin.node("test.plain", plain).summary(text).in("a", text).out("b", "h").option("word", &Options::word, text);
+    EXPECT_NE(faults(plugin).find("summary: its texts must be UTF-8 without control characters"), std::string::npos);
+    EXPECT_NE(faults(plugin).find("input 'a': its texts must be UTF-8 without control characters"), std::string::npos);
+    EXPECT_NE(faults(plugin).find("option 'word': its texts must be UTF-8 without control characters"), std::string::npos);
+  }
 }
 TEST(Declaration, PortNamedTwice) {
   Plugin plugin;

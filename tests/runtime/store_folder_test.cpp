@@ -266,7 +266,7 @@ TEST_F(StoreFolderTest, AUserWithoutAHomeKeepsNothing) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can be another user";
   for (const char* name : {"MARROW_CACHE", "XDG_CACHE_HOME", "HOME"}) environment.set(name, std::nullopt);
   EXPECT_EQ(as_someone(54321, [&] { return save(Store()); }),
-            "this user has no home folder; set MARROW_CACHE to a folder for them");
+            "neither HOME nor the system names a home folder of this user; set MARROW_CACHE to a folder for them");
 }
 
 TEST_F(StoreFolderTest, NumbersOfGigabytesAreStrict) {

@@ -19,17 +19,20 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr const char* kMarker = "marrow-comparison";
-const std::string kHead = "This folder is a comparison of marrow, which changes and removes what is in it.\nexperiment: ";
+const std::string kHead =
+    "This folder is a comparison of marrow, which changes and removes what is in it.\nexperiment: ";
 
 // Bytes of the marker that are locked; cells follow. They need not be there.
 constexpr long kUse = 0, kText = 1, kCells = 2;
 
 [[noreturn]] void refuse_foreign(const fs::path& folder) {
-  throw Error("the folder " + folder.string() + " holds something else than a comparison; choose another with --out, or remove it");
+  throw Error("the folder " + folder.string() +
+              " holds something else than a comparison; choose another with --out, or remove it");
 }
 
 [[noreturn]] void refuse_unwritable(const fs::path& folder, int reason) {
-  throw Error("cannot write to the folder " + folder.string() + ": " + std::strerror(reason) + "; choose another with --out");
+  throw Error("cannot write to the folder " + folder.string() + ": " + std::strerror(reason) +
+              "; choose another with --out");
 }
 
 bool holds_only_the_marker(const fs::path& folder) {
@@ -43,21 +46,26 @@ bool holds_only_the_marker(const fs::path& folder) {
 void remove_parts(const fs::path& folder) {
   std::error_code error, ignored;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
-    if (at->path().filename().native().starts_with(".part") && at->is_regular_file(ignored)) fs::remove(at->path(), ignored);
+    if (at->path().filename().native().starts_with(".part") && at->is_regular_file(ignored))
+      fs::remove(at->path(), ignored);
 }
 
 }  // namespace
 
-ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experiment& experiment, Use use) : folder_(folder) {
+ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experiment& experiment, Use use)
+    : folder_(folder) {
   try {
     open_marker();
     check_marker(experiment.name);
     if (!lock(kUse, use == Use::alone ? F_WRLCK : F_RDLCK, false))
-      throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") + " is running in " + folder.string() + "; wait for it, or choose another folder with --out");
+      throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") +
+                  " is running in " + folder.string() + "; wait for it, or choose another folder with --out");
     if (use == Use::alone) remove_parts(folder);
     std::error_code error;
     fs::create_directories(folder / "cells", error);
-    if (error) throw Error("cannot make the folder " + (folder / "cells").string() + ": " + error.message() + "; choose another with --out");
+    if (error)
+      throw Error("cannot make the folder " + (folder / "cells").string() + ": " + error.message() +
+                  "; choose another with --out");
     write_text_file(folder / "experiment.yaml", experiment.text);
   } catch (...) {
     if (marker_ >= 0) close(marker_);
@@ -65,10 +73,13 @@ ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experi
   }
 }
 
-ComparisonFolder::~ComparisonFolder() { close(marker_); }
+ComparisonFolder::~ComparisonFolder() {
+  close(marker_);
+}
 
 void ComparisonFolder::take_cell(const std::string& id) {
-  if (!lock(kCells + long(hash_of(id).low >> 2), F_WRLCK, false)) throw Error("the cell " + id + " is being run by another process");
+  if (!lock(kCells + long(hash_of(id).low >> 2), F_WRLCK, false))
+    throw Error("the cell " + id + " is being run by another process");
 }
 
 /// A new marker is made in an empty folder alone. Several processes may come at once.
@@ -76,7 +87,8 @@ void ComparisonFolder::open_marker() {
   const fs::path marker = folder_ / kMarker;
   std::error_code error;
   fs::create_directories(folder_, error);
-  if (error) throw Error("cannot make the folder " + folder_.string() + ": " + error.message() + "; choose another with --out");
+  if (error)
+    throw Error("cannot make the folder " + folder_.string() + ": " + error.message() + "; choose another with --out");
   for (bool is_second_look = false;; is_second_look = true) {
     marker_ = open(marker.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK);
     if (marker_ >= 0) break;
@@ -103,21 +115,24 @@ void ComparisonFolder::check_marker(const std::string& name) {
   const ssize_t count = pread(marker_, buffer, sizeof buffer, 0);
   if (count < 0) throw Error("cannot read " + (folder_ / kMarker).string() + ": " + std::strerror(errno));
   const std::string text(buffer, std::size_t(count)), expected = kHead + name + "\n";
-  const bool is_begun = kHead.starts_with(text) || (text.starts_with(kHead) && text.find('\n', kHead.size()) == std::string::npos);
+  const bool is_begun =
+      kHead.starts_with(text) || (text.starts_with(kHead) && text.find('\n', kHead.size()) == std::string::npos);
   if (is_begun && holds_only_the_marker(folder_)) {
-    if (pwrite(marker_, expected.data(), expected.size(), 0) != ssize_t(expected.size()) || ftruncate(marker_, off_t(expected.size())) != 0)
+    if (pwrite(marker_, expected.data(), expected.size(), 0) != ssize_t(expected.size()) ||
+        ftruncate(marker_, off_t(expected.size())) != 0)
       throw Error("cannot write " + (folder_ / kMarker).string() + ": " + std::strerror(errno) + "; is the disk full?");
   } else if (is_begun || !text.starts_with(kHead)) {
     refuse_foreign(folder_);
   } else if (text != expected) {
-    throw Error("the folder " + folder_.string() + " holds the comparison of another experiment, '" + text.substr(kHead.size(), text.find('\n', kHead.size()) - kHead.size()) +
-                "'; this one is '" + name + "': choose another folder with --out, or remove it");
+    throw Error("the folder " + folder_.string() + " holds the comparison of another experiment, '" +
+                text.substr(kHead.size(), text.find('\n', kHead.size()) - kHead.size()) + "'; this one is '" + name +
+                "': choose another folder with --out, or remove it");
   }
   lock(kText, F_UNLCK, true);
 }
 
-/// False where another process has it. The lock is of the open file, not of the process: other parts of this process that
-/// open the marker do not end it.
+/// False where another process has it. The lock is of the open file, not of the process: other parts of this process
+/// that open the marker do not end it.
 bool ComparisonFolder::lock(long byte, short type, bool wait) {
   struct flock what {};
   what.l_type = type;
@@ -127,7 +142,8 @@ bool ComparisonFolder::lock(long byte, short type, bool wait) {
   while (fcntl(marker_, wait ? F_OFD_SETLKW : F_OFD_SETLK, &what) != 0) {
     if (errno == EAGAIN || errno == EACCES) return false;
     if (errno == EINTR) continue;
-    std::fprintf(stderr, "marrow: %s cannot be locked (%s); start nothing else in this folder\n", (folder_ / kMarker).c_str(), std::strerror(errno));
+    std::fprintf(stderr, "marrow: %s cannot be locked (%s); start nothing else in this folder\n",
+                 (folder_ / kMarker).c_str(), std::strerror(errno));
     return true;
   }
   return true;

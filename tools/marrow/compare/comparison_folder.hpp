@@ -7,9 +7,9 @@
 
 namespace marrow::cli {
 
-/// The folder that a comparison is kept in, new or to be continued. A file in it, the marker, says that it is marrow's and of
-/// which experiment: nothing is written into a folder that holds anything else. Locks on the marker, which end with the
-/// process however that ends, keep others out.
+/// The folder that a comparison is kept in, new or to be continued. A file in it, the marker, says that it is marrow's
+/// and of which experiment: nothing is written into a folder that holds anything else. Locks on the marker, which end
+/// with the process however that ends, keep others out.
 class ComparisonFolder {
  public:
   enum class Use { alone, with_others };  ///< others that run single cells

@@ -76,6 +76,7 @@ struct MetricChoice {
 /// An experiment of more is a fault of its file. Each variant's pipeline is read whenever the experiment is.
 inline constexpr std::size_t kMostVariants = 1000;
 inline constexpr std::size_t kMostCells = 1000000;
+inline constexpr std::size_t kMostMetrics = 1000;
 
 struct Experiment {
   std::string name, help;
