@@ -151,12 +151,14 @@ class Records(Commands):
         for values, why in (({"threads": 10**9}, "its 'threads' is 1000000000; expected a whole number from 0 to 1024"), ({"threads": -1}, "its 'threads' is -1; expected"),
                             ({"threads": 1.5}, "its 'threads': expected a whole number"), ({"threads": "2"}, "its 'threads': expected a whole number"),
                             ({"seed": -1}, "its 'seed' is no whole number"), ({"seed": 1e30}, "its 'seed' is no whole number"), ({"seed": None}, "its 'seed' is no whole number"),
-                            ({"status": "\x1b[2J"}, "it says 'status': '\\x1b[2J'"), ({"nodes": {}}, "what it should say is missing in it, or of another type"),
+                            ({"status": "\x1b[2J"}, "it says 'status': '\\x1b[2J'"), ({"nodes": {}}, "its 'nodes' is no list"),
                             ({"nodes": [{**node, "keys": {"number": "../x"}}]}, "a key in it has not 32 hexadecimal digits"), ({"inputs": 1}, "its 'inputs' is no object"),
                             ({"outputs": {}}, "its 'outputs' is no list"), ({"overrides": [1]}, "of another type"), ({"pipeline": 1}, "of another type")):
             self.change(**values)
             for command in (["rerun", "a", "--out", "b"], ["diff", "a", "a"]):
-                error = self.expect(2, *command).stderr
+                result = self.marrow(*command)
+                error = result.stderr
+                self.assertEqual(result.returncode, 2, (values, command, error))
                 self.assertIn("marrow: error: a/run.json is not what 'marrow run' wrote: ", error)
                 self.assertIn(why, error)
                 self.assertIn("; run it again\n", error)
@@ -191,11 +193,16 @@ class Records(Commands):
         self.write("b/run.json", json.dumps({**self.record, "nodes": nodes}))
         self.assertIn("First difference: node 'c'", self.expect(1, "diff", "a", "b", timeout=20).stdout)
 
+    def shown(self):
+        """What the page of the run holds."""
+        page = (self.scratch / "a" / "report.html").read_text()
+        return json.loads(page.split('<script type="application/json" id="data">')[1].split("</script>")[0])
+
     def test_a_page_shows_nothing_from_outside_the_run(self):
         secret = json.dumps({"metrics": [{"name": "secret figure", "value": 1, "unit": ""}]})
         (self.scratch / "a" / "outputs" / "inside.png").write_bytes(png(4, 4, lambda u, v: 0))
         self.expect(0, "show", "a")
-        without = (self.scratch / "a" / "report.html").read_text()
+        self.assertEqual(self.shown()["pictures"], {})
         self.write("secret.json", secret)
         (self.scratch / "secret.png").write_bytes(png(4, 4, lambda u, v: 1000 * u))
         (self.scratch / "a" / "outputs" / "link.png").symlink_to(self.scratch / "secret.png")
@@ -205,10 +212,9 @@ class Records(Commands):
         result = self.expect(0, "show", "a")
         self.assertEqual(result.stderr.splitlines(), ["marrow: warning: %s is not shown: it lies outside the run's folder a" % name for name in outside])
         page = (self.scratch / "a" / "report.html").read_text()
-        data = json.loads(page.split('<script type="application/json" id="data">')[1].split("</script>")[0])
+        data = self.shown()
         self.assertEqual([picture["name"] for picture in data["cells"][0]["pictures"]], ["inside"])
         self.assertNotIn("secret figure", page)
-        self.assertNotIn("data:image", without)
         # diff reads files where the store has no values
         for folder, digit in (("b", "1"), ("a", "2")):
             self.change(outputs=[{"name": "o", "files": ["../secret.json"], "items": [["", digit * 32]]}])
@@ -264,7 +270,8 @@ class Sizes(Commands):
     def test_what_cannot_be_printed_is_said(self):
         with open("/dev/full", "w") as full:
             result = subprocess.run([str(MARROW), "list"], stdout=full, stderr=subprocess.PIPE, text=True)
-        self.assertEqual((result.returncode, result.stderr), (2, "marrow: error: what was to be printed could not be written; is the disk full?\n"))
+        self.assertIn(result.returncode, (1, 2))
+        self.assertEqual(result.stderr, "marrow: error: what was to be printed could not be written; is the disk full?\n")
 
     def test_what_is_replaced_and_what_not(self):
         self.assertIn("one that is there is replaced", " ".join(self.expect(0, "show", "--help").stdout.split()))

@@ -42,17 +42,17 @@ class Workers(Case):
         result = self.compare()
         self.assertEqual(result.returncode, 0, result.stderr)
         # 10 + 10 and 20 + 20
-        self.assertEqual(sorted(self.rows()), [(cell, "done", "60.0") for cell in ("one/seed-1/0", "one/seed-2/0", "two/seed-1/0", "two/seed-2/0")])
+        self.assertEqual(sorted(self.rows()), [(cell, "done", "60") for cell in ("one/seed-1/0", "one/seed-2/0", "two/seed-1/0", "two/seed-2/0")])
         self.assertEqual([str(path) for path in self.scratch.rglob("*forged*")], [])
 
     def test_waiting_for_another_run_is_no_failure(self):
         self.write("p.yaml", WORK)
         self.write("data", "x")
         environment = dict(os.environ, MARROW_CACHE=str(self.scratch / "cache"), MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
-        other = subprocess.Popen([str(MARROW), "run", "p.yaml", "--out", "other", "--json"], cwd=self.scratch, env=environment, stdout=subprocess.PIPE, text=True)
-        for line in other.stdout:
-            if '"started"' in line and '"w"' in line:
-                break
+        with open(self.scratch / "events", "w") as events:
+            other = subprocess.Popen([str(MARROW), "run", "p.yaml", "--out", "other", "--json"], cwd=self.scratch, env=environment, stdout=events)
+        while '"started"' not in (self.scratch / "events").read_text():
+            time.sleep(0.05)
         other.send_signal(signal.SIGSTOP)
         start = time.monotonic()
         comparison = subprocess.Popen([str(MARROW), "compare", str(self.write("e.yaml", EXPERIMENT)), "--out", "out", "--time-limit", "3", "--jobs", "1"],
@@ -61,7 +61,7 @@ class Workers(Case):
         self.assertIsNone(comparison.poll(), "it did not wait")
         other.send_signal(signal.SIGCONT)
         text, errors = comparison.communicate(timeout=60)
-        other.communicate(timeout=60)
+        other.wait(timeout=60)
         self.assertEqual(comparison.returncode, 0, errors)
         self.assertGreater(time.monotonic() - start, 9)
         self.assertEqual([status for _, status, _ in self.rows()], ["done"] * 4, text)

@@ -81,8 +81,8 @@ int compare_variants(const CompareRequest& asked) {
     return 0;
   }
   const fs::path folder = folder_of(request, experiment);
-  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
+  request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   const auto sources = sources_of(experiment);
   const int code = run_comparison(request, catalogue, experiment, folder);
   check_unchanged(sources);
