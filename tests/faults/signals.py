@@ -85,10 +85,10 @@ class Signals:
             came = process.poll() is None and self.disturb(process, trial, mark, (process.stdout, process.stderr))
             texts = [readers.submit(stream.read) if not stream.closed else None for stream in (process.stdout, process.stderr)]
             try:
-                process.wait(60)
+                process.wait(180)
                 complaints = []
             except subprocess.TimeoutExpired:
-                complaints = ["it did not end within 60 s"]
+                complaints = ["it did not end within 180 s"]
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()
             errors = texts[1].result().decode(errors="replace") if texts[1] else None

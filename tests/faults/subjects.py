@@ -96,6 +96,7 @@ class Program:
         (libraries / "marrow").mkdir(parents=True)
         for file in (build / "lib").glob("libmarrow*"):
             shutil.copy2(file, libraries / file.name, follow_symlinks=False)
+        shutil.copy2(build / "lib" / "marrow" / "marrow-worker", libraries / "marrow")
         for name in PLUGINS:
             for file in (build / "lib" / "marrow").glob("marrow_%s.*" % name):
                 (libraries / "marrow" / file.name).symlink_to(file)
@@ -110,7 +111,7 @@ class Program:
         return {**self.environment, "MARROW_CACHE": str(folder / "store"), **more}
 
     def run(self, arguments, folder, **more):
-        return subprocess.run([str(self.marrow), *map(str, arguments)], capture_output=True, text=True, errors="replace", cwd=folder, timeout=60,
+        return subprocess.run([str(self.marrow), *map(str, arguments)], capture_output=True, text=True, errors="replace", cwd=folder, timeout=180,
                               stdin=subprocess.DEVNULL, env=self.environment_of(folder, **more))
 
     def damaged_entries(self, folder):

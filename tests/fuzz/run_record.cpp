@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run has left: run.json, the pipeline.yaml beside it, and the row of a cell.
+// What a run has left: run.json, the pipeline.yaml beside it, the row of a cell, and a picture.
 #include "difference/run_record.hpp"
 
 #include "marrow/compare/cell.hpp"
+#include "run_files.hpp"
 #include "target.hpp"
 
 namespace {
@@ -14,9 +15,27 @@ constexpr std::string_view kPipeline =
 constexpr std::string_view kRecord =
     R"({"pipeline":"p","status":"done","seed":1,"nodes":[{"id":"one","status":"done","keys":{"number":"0f"},"items":{"number":[["","0f"]]}}]})";
 
+/// Of one variant, case and start, and two figures.
+const compare::Experiment& experiment() {
+  static const compare::Experiment one = [] {
+    compare::Experiment made;
+    made.variants.push_back({"a", {}, {}});
+    made.cases.push_back({"b", {}, false, 1});
+    made.starts.push_back({"0", {}, {}});
+    made.metrics.resize(2);
+    return made;
+  }();
+  return one;
+}
+
 void read(char format, std::string_view text) {
   if (format == 'c') {
-    compare::to_json(compare::row_from_json(std::string(text)));
+    const compare::CellRow row = compare::row_from_json(std::string(text), experiment());
+    compare::row_from_json(compare::to_json(row), experiment());
+    return;
+  }
+  if (format == 'i') {
+    cli::read_png(fuzz::put("run/outputs/a.png", text));
     return;
   }
   fuzz::put("run/run.json", format == 'r' ? text : kRecord);
@@ -27,7 +46,7 @@ void read(char format, std::string_view text) {
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   fuzz::Input input(data, size);
-  const char format = input.choice("rcp");
+  const char format = input.choice("rcpi");
   fuzz::expect_value_or_error([&] { read(format, input.rest); });
   return 0;
 }

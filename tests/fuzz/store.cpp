@@ -13,10 +13,10 @@ using namespace marrow;
 
 constexpr Digest kKey{0x0123456789abcdefull, 0xfedcba9876543210ull};
 
-/// In front of the description, as store.cpp writes it: what the file is, how long the description is, and its hash.
+/// In front of the description, as store_entry.cpp writes it: what the file is, how long the description is, and its hash.
 std::string with_preamble(std::string_view description, std::string_view payload) {
   Packer packer;
-  packer.bytes("marrowr1", 8);
+  packer.bytes("marrowr2", 8);
   packer.add(std::uint64_t(description.size()));
   packer.add(hash_of_bytes(description.data(), description.size()));
   return packer.packed.append(description).append(payload);
@@ -25,12 +25,18 @@ std::string with_preamble(std::string_view description, std::string_view payload
 void read_all(const Value& value) {
   for (const Value& item : value.items) read_all(item);
   if (!value.source) return;
-  for (const TypeInfo& type : {TypeInfo::of<Pose>(), TypeInfo::of<Image>(), TypeInfo::of<Metrics>()})
-    if (type.id == value.type.id) fuzz::expect_value_or_error([&] { value.source->data(type); });
+  for (TypeInfo type : {TypeInfo::of<Pose>(), TypeInfo::of<Image>(), TypeInfo::of<Metrics>()}) {
+    if (type.id != value.type.id) continue;
+    type.version = value.type.version;
+    type.size = value.type.size;
+    fuzz::expect_value_or_error([&] { value.source->data(type); });
+  }
 }
 
 void find(std::string_view file) {
-  const Store store(fuzz::folder() / "store");
+  static const Store store(fuzz::folder() / "store");
+  static const std::string fault = store.prepare();
+  if (!fault.empty()) throw std::runtime_error(fault);
   const std::string name = kKey.hex();
   fuzz::put("store/" + name.substr(0, 2) + "/" + name, file);
   store.entries();

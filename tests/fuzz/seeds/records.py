@@ -3,6 +3,8 @@
 import json
 import struct
 
+from images import png
+
 
 def u64(value):
     return struct.pack("<Q", value)
@@ -48,13 +50,13 @@ def provenance(node="read.pose"):
             texts(["mind the gap"]))
 
 
-def leaf(kind, version, size, offset, length, items=(), axis="", names=(), present=True):
-    return (text(kind) + struct.pack("<i", version) + u64(size) + (b"\1" if present else b"\0") + digest(9) + u64(offset) + u64(length) + text(axis) + texts(names) +
-            u64(len(items)) + b"".join(items))
+def leaf(kind, version, size, offset, length, axis="", names=(), present=True):
+    return text(kind) + struct.pack("<i", version) + u64(size) + (b"\1" if present else b"\0") + digest(9) + u64(offset) + u64(length) + text(axis) + texts(names)
 
 
-def entry(outputs, payload):
-    return provenance() + u64(len(outputs)) + b"".join(outputs) + u64(payload)
+def entry(leaves, payload):
+    """The description of an entry; a list's items follow it."""
+    return struct.pack("<QQ", 0x0123456789abcdef, 0xfedcba9876543210) + provenance() + u64(len(leaves)) + b"".join(leaves) + u64(payload)
 
 
 def store_seeds():
@@ -67,11 +69,11 @@ def store_seeds():
               "Q": GRID + u64(8) + bytes(32) + texts(["d"]) + SEEDS + texts(["f"]) + VIEW + texts(["d"]) + POSE + texts(["d"]) + TRANSFORM}
     result = {"v_" + letter: b"v" + letter.encode() + packed for letter, packed in values.items()}
     one = leaf("image", 1, 96, 0, 16)
-    listed = leaf("pose", 2, 500, 0, 0, items=[leaf("pose", 2, 500, 0, 8), leaf("pose", 2, 500, 8, 8, present=False)], axis="fragment", names=["a", "b"], present=False)
-    for name, outputs in {"one": [one], "list": [listed], "both": [one, listed], "wrapping": [leaf("image", 1, 96, 2**64 - 8, 16)],
+    listed = [leaf("pose", 2, 500, 0, 0, axis="fragment", names=["a", "b"], present=False), leaf("pose", 2, 500, 0, 8), leaf("pose", 2, 500, 8, 8, present=False)]
+    for name, outputs in {"one": [one], "list": listed, "both": [one, *listed], "short_list": listed[:2], "wrapping": [leaf("image", 1, 96, 2**64 - 8, 16)],
                           "huge": [leaf("metrics", 1, 24, 8, 2**63)]}.items():
         result["d_" + name] = b"d\x10" + entry(outputs, 16) + bytes(16)
-    result["f_file"] = b"f" + b"marrowr1" + u64(100) + digest(1) + entry([one], 16) + bytes(16)
+    result["f_file"] = b"f" + b"marrowr2" + u64(100) + digest(1) + entry([one], 16) + bytes(16)
     return result
 
 
@@ -141,4 +143,5 @@ def run_seeds():
                 "outputs: {sum: two}\n")
     return {"r_run": b"r" + json.dumps(run).encode(), "r_threads": b"r" + json.dumps(dict(run, threads=1e9)).encode(), "r_deep": b"r" + b'{"a":' * 10000,
             "c_cell": b"c" + json.dumps(cell).encode(), "c_failed": b"c" + json.dumps(dict(cell, status="failed", reason="crashed")).encode(),
-            "c_long": b"c" + json.dumps(dict(cell, tries=10**30, evaluations=-1)).encode(), "p_pipeline": b"p" + pipeline.encode()}
+            "c_long": b"c" + json.dumps(dict(cell, tries=10**30, evaluations=-1)).encode(), "p_pipeline": b"p" + pipeline.encode(),
+            "i_picture": b"i" + png(8, 2), "i_wide": b"i" + png(16, 6), "i_interlaced": b"i" + png(8, interlaced=1)}
