@@ -2,6 +2,7 @@
 // Names that become names of files: what is accepted stays in its folder, and different names give different files.
 #include "framework/runtime/file_names.hpp"
 
+#include <algorithm>
 #include <set>
 
 #include "target.hpp"

@@ -39,7 +39,7 @@ void read_memory(std::string_view bytes) {
   static const SharedMemory memory;
   if (ftruncate(memory.descriptor(), off_t(bytes.size())) != 0 || pwrite(memory.descriptor(), bytes.data(), bytes.size(), 0) != ssize_t(bytes.size()))
     throw std::runtime_error("cannot write to shared memory");
-  read_values(memory.descriptor(), content_by_name);
+  read_values(memory.descriptor(), getpid(), content_by_name);
 }
 
 void expect_same_text(std::string_view bytes) {
