@@ -75,7 +75,7 @@ class CaseReader {
     try {
       found = search_.matches((folder_ / pattern).lexically_normal());
     } catch (const Error& error) {
-      return yaml_.fault(place, "the cases at '" + pattern + "' cannot be found: " + error.what());
+      return yaml_.fault(place, "the cases at '" + (pattern.size() > 100 ? pattern.substr(0, 80) + "..." : pattern) + "' cannot be found: " + error.what());
     }
     bool any = false;
     for (fs::path& folder : found) {

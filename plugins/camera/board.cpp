@@ -133,12 +133,14 @@ Board read_board_file(const std::filesystem::path& path) {
   const auto sides = map.required("sides");
   if (sides && (!sides->IsMap() || sides->size() != 2))
     map.fault("sides", "sides: expected the board's two sides by name, each with landmarks and beads");
-  else if (sides)
-    for (const auto& item : *sides) {
-      board.sides.push_back(item.first.Scalar());
-      const YamlMap side(file, item.second, "side '" + item.first.Scalar() + "'", {"landmarks", "beads"});
+  else if (sides) {
+    const YamlMap by_name(file, *sides, "sides", read::FreeKeys::labels);
+    for (const std::string& name : by_name.keys()) {
+      board.sides.push_back(name);
+      const YamlMap side(file, by_name.node(name), "side '" + name + "'", {"landmarks", "beads"});
       for (const char* key : {"landmarks", "beads"}) add_beads(side, key, int(board.sides.size()) - 1, board);
     }
+  }
   file.finish();
   if (board.beads.size() > kMostBeads)
     throw Error(path.string() + ": has " + std::to_string(board.beads.size()) + " beads; at most 1000 can be told apart");

@@ -186,6 +186,7 @@ marrow::Case read_case(const Options& options) {
     throw marrow::Error(
         options.path.string() + ": expected the folder of a case, which holds case.yaml" +
         (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
+  marrow::read::check_stays_inside(options.path, options.path / "case.yaml");
   YamlFile file(options.path / "case.yaml");
   const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "views", "fragments"});
   marrow::read::check_version(map, "marrow-case");

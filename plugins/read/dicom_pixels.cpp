@@ -116,7 +116,7 @@ CodedImage coded_frame(const DicomPixels& pixels, const InputFile& file, int fra
   for (std::size_t i = pixels.first_part_of_frame[std::size_t(frame - 1)];
        i < pixels.first_part_of_frame[std::size_t(frame)]; ++i)
     image.bytes += file.text(pixels.frame_parts[i].begin, std::size_t(pixels.frame_parts[i].bytes));
-  check_size(pixels.path.string(), {pixels.columns, pixels.rows, 1}, image.bytes.size());
+  check_size(pixels.path.string(), {pixels.columns, pixels.rows, 1}, image.bytes.size(), 100);
   return image;
 }
 

@@ -28,6 +28,12 @@ void check_frame(int frame, long long frames, const fs::path& path, const std::s
                 std::to_string(frame));
 }
 
+void check_finite(const Image& image, const fs::path& path) {
+  if (image.pixels.type() != CV_32F) return;
+  for (const float value : cv::Mat_<float>(image.pixels))
+    if (!std::isfinite(value)) throw Error(path.string() + ": has pixels that are not finite numbers");
+}
+
 /// One page or frame of samples as an image.
 Image image_of(const Samples& samples, int frame, const fs::path& path) {
   const int type = samples.type == Samples::Type::u8    ? CV_8U
@@ -38,9 +44,7 @@ Image image_of(const Samples& samples, int frame, const fs::path& path) {
   const std::size_t page_bytes = std::size_t(samples.size[0]) * std::size_t(samples.size[1]) * bytes_each(samples.type);
   Image image{cv::Mat(samples.size[1], samples.size[0], type)};
   std::memcpy(image.pixels.data, samples.bytes.data() + std::size_t(frame - 1) * page_bytes, page_bytes);
-  if (type == CV_32F)
-    for (const float value : cv::Mat_<float>(image.pixels))
-      if (!std::isfinite(value)) throw Error(path.string() + ": has pixels that are not finite numbers");
+  check_finite(image, path);
   return image;
 }
 
@@ -48,16 +52,13 @@ Image read_dicom_image(const fs::path& path, int frame) {
   const DicomPixels pixels = read_dicom_pixels(path);
   check_frame(frame, pixels.frames, path, " frames; name one with frame (from 1)");
   check_one_channel(pixels.channels, path);
-  Samples samples = read_dicom_frame(pixels, std::max(1, frame));
+  const Samples samples = read_dicom_frame(pixels, std::max(1, frame));
   const bool is_signed = samples.type != Samples::Type::u8 && samples.type != Samples::Type::u16;
-  if (is_signed || pixels.slope != 1 || pixels.intercept != 0) {
-    std::vector<float> values(samples.count());
-    scaled_values(pixels, samples, values.data());
-    samples.type = Samples::Type::f32;
-    samples.bytes.resize(values.size() * sizeof(float));
-    std::memcpy(samples.bytes.data(), values.data(), samples.bytes.size());
-  }
-  return image_of(samples, 1, path);
+  if (!is_signed && pixels.slope == 1 && pixels.intercept == 0) return image_of(samples, 1, path);
+  Image image{cv::Mat(pixels.rows, pixels.columns, CV_32F)};
+  scaled_values(pixels, samples, image.pixels.ptr<float>());
+  check_finite(image, path);
+  return image;
 }
 
 Image as_its_camera_sees(Image image, const fs::path& path) {

@@ -15,9 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "samples are taken as they are where they are little-endian");
 
-/// No CT or image is packed more tightly than 500 samples a byte (zlib ends at 1032 bytes a byte), so a header that
-/// claims more is damaged; what fits into 64 MB as float does no harm.
-constexpr double kMostSamplesPerByte = 500;
+/// What fits into 64 MB as float does no harm, however tightly it is packed.
 constexpr double kFewSamples = 1 << 24;
 
 template <class T>
@@ -113,12 +111,13 @@ std::size_t bytes_each(Samples::Type type) {
   return kBytes[int(type)];
 }
 
-void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes) {
+void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes,
+                double most_samples_per_byte) {
   for (const long long length : size)
     if (length < 1 || length > 100000)
       throw Error(what + ": its header gives a size of " + std::to_string(length) + "; it is damaged");
   const double samples = double(size[0]) * double(size[1]) * double(size[2]);
-  if (samples > std::max(kFewSamples, kMostSamplesPerByte * double(stored_bytes)))
+  if (samples > std::max(kFewSamples, most_samples_per_byte * double(stored_bytes)))
     throw Error(what + ": its header claims " + std::to_string(size[0]) + " x " + std::to_string(size[1]) + " x " +
                 std::to_string(size[2]) + " samples, but the file has only " + std::to_string(stored_bytes) +
                 " bytes; it is damaged or cut off (or save it without compression)");

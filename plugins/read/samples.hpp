@@ -44,9 +44,10 @@ VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::
 Samples read_tiff(const std::filesystem::path& path);
 Samples read_png(const std::filesystem::path& path);
 
-/// Throws Error where a size of the header is none of a volume or image, or where a file of `stored_bytes` cannot hold
-/// so many samples: this comes before any memory is taken for them.
-void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes);
+/// Throws Error where a size of the header is none of a volume or image, or where a file of `stored_bytes` cannot hold so many samples:
+/// this comes before any memory is taken for them. No CT or image is packed more tightly than 500 samples a byte; zlib ends at 1032.
+void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes,
+                double most_samples_per_byte = 500);
 
 /// Where a file holds the samples of a volume, and how.
 struct StoredSamples {

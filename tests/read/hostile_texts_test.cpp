@@ -187,6 +187,9 @@ TEST_F(HostileTexts, CasesThatHarm) {
   std::string views = "marrow-case: 1\nct: real/ct.mha\nviews:\n";
   for (int i = 0; i < 1500; ++i) views += "  - {name: v" + std::to_string(i) + ", image: a.png, camera: a.yaml}\n";
   expect(views + fragments, "views: there are 1500; at most 1000 are read");
+  std::filesystem::rename(here / "case.yaml", folder / "case.yaml");
+  std::filesystem::create_symlink("../case.yaml", here / "case.yaml");
+  EXPECT_SAYS(read_case({here}), "case.yaml: is a link to a place outside the folder");
 }
 
 }  // namespace

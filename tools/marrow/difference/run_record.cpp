@@ -107,7 +107,6 @@ YAML::Node pipeline_of(const fs::path& file) {
 /// The nodes of the resolved pipeline that the run's record speaks of.
 void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
   std::map<std::string, const json*> recorded;
-  if (!record.at("nodes").is_array()) throw Error("its 'nodes' is no list");
   for (const json& one : record.at("nodes")) recorded.emplace(one.at("id"), &one);
   for (const auto& entry : pipeline["nodes"]) {
     RecordedNode node;
