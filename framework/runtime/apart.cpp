@@ -156,7 +156,7 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   const SharedMemory given, made;
   write_values(given.descriptor(), inputs, false);
   const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
-  Worker worker({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true});
+  Worker worker({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true, true});
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
                                     [&](const json& report) { pass_on(report, hooks); });

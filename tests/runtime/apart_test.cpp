@@ -112,7 +112,8 @@ TEST_F(ApartTest, FileThatChangesWhileItIsReadGivesNoResult) {
   const marrow::Store store(scratch.path / "store");
   settings.store = &store;
   EXPECT_EQ(failure("change"), " changed while it was read; run it again");
-  EXPECT_TRUE(std::none_of(store.entries().begin(), store.entries().end(), [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
+  const auto entries = store.entries();
+  EXPECT_TRUE(std::none_of(entries.begin(), entries.end(), [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
 }
 
 TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {

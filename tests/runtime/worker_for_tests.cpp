@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // A worker that does what it is asked, also what no worker should.
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -14,8 +15,10 @@ using nlohmann::json;
 
 /// Writes a line to where answers go, as a library that knows the protocol could.
 void forge(const std::string& line) {
-  for (int descriptor = 3; descriptor < 20; ++descriptor)
-    if (write(descriptor, line.data(), line.size()) > 0) return;
+  for (int descriptor = 3; descriptor < 100; ++descriptor) {
+    struct stat status {};
+    if (fstat(descriptor, &status) == 0 && S_ISFIFO(status.st_mode) && write(descriptor, line.data(), line.size()) < 0) continue;
+  }
 }
 }  // namespace
 

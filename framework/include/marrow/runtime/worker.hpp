@@ -27,6 +27,7 @@ struct WorkerSettings {
   std::vector<std::string> command;  ///< program and its arguments
   std::vector<int> shared = {};      ///< open files that the worker gets as descriptors 3, 4, ...
   bool quiet = false;                ///< what it prints on its standard error goes nowhere
+  bool has_large_pages = false;      ///< its memory comes in large pages, which is quicker where it takes hundreds of megabytes
 };
 
 /// What one job may use.
