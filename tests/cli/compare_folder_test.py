@@ -44,7 +44,10 @@ class Comparison(Case):
         self.assertEqual(len(result.stderr.splitlines()), 1, result.stderr)
 
     def start(self, *arguments):
-        return subprocess.Popen([str(MARROW), *map(str, arguments)], env=self.environment, cwd=self.scratch, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen([str(MARROW), *map(str, arguments)], env=self.environment, cwd=self.scratch, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)  # where the test ends before
+        return process
 
     def wait_for(self, path):
         end = time.monotonic() + 60

@@ -13,6 +13,7 @@
 #include "marrow/domain/error.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -123,7 +124,7 @@ class Comparison {
       const CellIndex& cell = cells_[job.number];
       CellRow row = row_of(cell, end);
       runner_.write(cell, row);
-      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
+      progress.done(++done, printable(row.id + (row.failed.empty() ? "" : " failed: " + row.failed)));
       rows_[job.number] = std::move(row);
     });
   }
@@ -155,7 +156,7 @@ class Comparison {
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string id = compare::cell_id(experiment_, cells_[job.number]);
-      if (!end.failed.empty()) std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), end.failed.c_str());
+      if (!end.failed.empty()) std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable(end.failed).c_str());
       progress.done(++done, "pictures of " + id);
     });
   }
@@ -192,7 +193,7 @@ class Comparison {
   static void print_failures(const std::vector<CellRow>& rows) {
     std::size_t count = 0;
     for (const CellRow& row : rows)
-      if (!row.failed.empty() && ++count <= 20) std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", row.id.c_str(), row.failed.c_str());
+      if (!row.failed.empty() && ++count <= 20) std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", printable(row.id).c_str(), printable(row.failed).c_str());
     if (count > 20) std::printf("  and %zu more, in cells.csv\n", count - 20);
   }
 
