@@ -143,7 +143,7 @@ class Reader {
     bool has_uses = false;
     for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys)) {
       if (part.key == "uses") {
-        has_uses = true;
+        has_uses = !part.value.IsScalar() || !part.value.Scalar().empty();
         node.uses_place = yaml_.place(part.value);
         node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
       } else {
@@ -173,6 +173,10 @@ class Reader {
     }
     const std::string what = key.substr(dot + 1);
     const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
+    if (what == "uses" && text.empty()) {
+      diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses", "write it as  " + key + "=kind.name");
+      return;
+    }
     if (what == "uses") {
       // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for this run, in any order.
       const auto of_file = [](const auto& option) { return !option.second.is_override; };

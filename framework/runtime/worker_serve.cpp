@@ -115,9 +115,10 @@ json json_of_bytes(const std::string& text) {
 
 std::string bytes_of_json(const json& value) {
   if (value.is_string()) return value.get<std::string>();
-  if (!value.is_object() || !value.contains("bytes")) throw Error("expected a text");
-  const auto bytes = value["bytes"].get<std::vector<std::uint8_t>>();
-  return std::string(bytes.begin(), bytes.end());
+  if (!value.is_object() || !value.contains("bytes") || !value["bytes"].is_array()) throw Error("expected a text");
+  std::string text;
+  for (const json& byte : value["bytes"]) text += char(integer_of(byte, 0, 255, "a byte of a text"));
+  return text;
 }
 
 }  // namespace marrow

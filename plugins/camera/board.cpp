@@ -134,7 +134,7 @@ Board read_board_file(const std::filesystem::path& path) {
   if (sides && (!sides->IsMap() || sides->size() != 2))
     map.fault("sides", "sides: expected the board's two sides by name, each with landmarks and beads");
   else if (sides) {
-    const YamlMap by_name(file, *sides, "sides", read::FreeKeys::labels);
+    const YamlMap by_name(file, *sides, "sides", read::FreeKeys{});
     for (const std::string& name : by_name.keys()) {
       board.sides.push_back(name);
       const YamlMap side(file, by_name.node(name), "side '" + name + "'", {"landmarks", "beads"});

@@ -19,7 +19,7 @@ std::optional<KnownPoint> point_from(read::YamlFile& file, const YAML::Node& nod
     map.fault("seen_px", "seen_px: expected the point's place per view, as {frontal: [u, v]}");
     return std::nullopt;
   }
-  const read::YamlMap places(file, *seen, map.what() + ": seen_px", read::FreeKeys::names);
+  const read::YamlMap places(file, *seen, map.what() + ": seen_px", read::FreeKeys{});
   for (const std::string& view : places.keys())
     if (const auto at = places.numbers(view, 2)) point.seen_px[view] = {(*at)[0], (*at)[1]};
   if (!point.world_mm && point.seen_px.size() < 2)

@@ -150,7 +150,7 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
   if (!fragments->IsMap() || fragments->size() == 0)
     return map.fault("fragments", "fragments: expected at least one fragment by name, with its seeds");
   std::vector<std::string> registered, with_start, with_truth;
-  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::read::FreeKeys::names);
+  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::read::FreeKeys{});
   for (const std::string& name : by_name.keys()) {
     const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'", {"seeds", "register", "start", "truth"});
     if (!fragment.valid()) continue;

@@ -23,16 +23,16 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
   Landmarks landmarks;
   const auto points = fragment.required("points");
   if (!points) return landmarks;
-  const YamlMap places(file, *points, fragment.what() + ", points", FreeKeys::labels);
+  const YamlMap places(file, *points, fragment.what() + ", points", FreeKeys{});
   for (const std::string& name : places.keys()) {
     const auto place = places.vector3(name);
     landmarks.points.push_back({name, place.value_or(Eigen::Vector3d::Zero())});
   }
   if (places.valid() && landmarks.points.empty()) fragment.fault("points", "points: expected places [x, y, z] in mm by name, got none");
   if (const YAML::Node seen = fragment.node("seen"); seen.IsDefined()) {
-    const YamlMap views(file, seen, fragment.what() + ", seen", FreeKeys::names);
+    const YamlMap views(file, seen, fragment.what() + ", seen", FreeKeys{});
     for (const std::string& view : views.keys()) {
-      const YamlMap pixels(file, views.node(view), fragment.what() + ", seen, view '" + view + "'", FreeKeys::labels);
+      const YamlMap pixels(file, views.node(view), fragment.what() + ", seen, view '" + view + "'", FreeKeys{});
       for (const std::string& name : pixels.keys()) {
         check_known(places, pixels, name);
         if (const auto pixel = pixels.numbers(name, 2)) landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
@@ -40,7 +40,7 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
     }
   }
   if (const YAML::Node tracked = fragment.node("tracked"); tracked.IsDefined()) {
-    const YamlMap found(file, tracked, fragment.what() + ", tracked", FreeKeys::labels);
+    const YamlMap found(file, tracked, fragment.what() + ", tracked", FreeKeys{});
     for (const std::string& name : found.keys()) {
       check_known(places, found, name);
       if (const auto place = found.vector3(name)) landmarks.tracked.push_back({name, *place});
@@ -55,7 +55,7 @@ List<Landmarks> landmarks(const Options& options) {
   read::check_version(map, "marrow-landmarks");
   List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
-    const YamlMap by_name(file, *fragments, "fragments", FreeKeys::names);
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name, got none");
     for (const std::string& name : by_name.keys())
       landmarks.add(name, landmarks_of(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"points", "seen", "tracked"}), file));

@@ -36,18 +36,11 @@ bool is_printable(long c) {
 
 }  // namespace
 
-std::string fault_of_label(const std::string& name) {
+std::string fault_of_name(const std::string& name) {
   if (name.empty()) return "is empty";
   if (name.size() > kLongest) return "has " + std::to_string(name.size()) + " bytes; at most 100 are taken";
   for (std::size_t at = 0; at < name.size();)
     if (!is_printable(next_character(name, at))) return "holds a character that cannot be printed";
-  return "";
-}
-
-std::string fault_of_name(const std::string& name) {
-  if (const std::string fault = fault_of_label(name); !fault.empty()) return fault;
-  if (name.find_first_of("/\\") != std::string::npos) return "holds '/' or '\\', but it becomes part of file names";
-  if (name[0] == '.') return "begins with '.', but it becomes part of file names";
   return "";
 }
 

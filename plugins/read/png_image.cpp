@@ -38,6 +38,8 @@ struct Reader {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
     info = png_create_info_struct(png);
     png_set_read_fn(png, &source, take);
+    // What is no pixels is passed over: libpng takes the memory that a comment claims, and only warns where that is much.
+    png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     // Notes and colour profiles, which are unpacked too, are of no use here: not many, and none that is large.
     png_set_chunk_malloc_max(png, 4 << 20);
     png_set_chunk_cache_max(png, 16);

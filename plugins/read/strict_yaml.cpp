@@ -164,10 +164,10 @@ YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const
   });
 }
 
-YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys keys)
+YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys)
     : file_(file), node_(node), what_(std::move(what)) {
   take_keys([&](const std::string& key, const YAML::Mark& mark) {
-    const std::string fault = keys == FreeKeys::names ? fault_of_name(key) : fault_of_label(key);
+    const std::string fault = fault_of_name(key);
     if (!fault.empty()) file_.fault(mark, what_ + ": a name " + fault + "; choose another");
     if (keys_.size() == kMostFreeKeys + 1) file_.fault(mark, what_ + ": there are more than 1000 of them");
   });

@@ -42,11 +42,8 @@ class YamlFile {
   std::size_t more_faults_ = 0;
 };
 
-/// What the keys of a map are that its author chose.
-enum class FreeKeys {
-  names,  ///< of views or fragments, which become part of file names
-  labels  ///< of points
-};
+/// Says of a map that its keys are names that its author chose.
+struct FreeKeys {};
 
 /// One map of a file, whose keys are all known: unknown and repeated keys are faults. A getter whose key is missing or
 /// whose value is of the wrong form notes a fault and returns nothing (a `_or` getter takes a missing key as the
@@ -56,7 +53,7 @@ class YamlMap {
   /// `what` names the map in messages, as in "a view".
   YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const std::vector<std::string>& known_keys);
   /// A map of which each key is good that can be a name.
-  YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys keys);
+  YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys);
 
   YamlFile& file() const { return file_; }
   const std::string& what() const { return what_; }

@@ -134,7 +134,7 @@ List<Seeds> read_seeds_file(const std::filesystem::path& path) {
   check_version(map, "marrow-seeds");
   List<Seeds> seeds;
   if (const auto fragments = map.required("fragments")) {
-    const YamlMap by_name(file, *fragments, "fragments", FreeKeys::names);
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name");
     for (const std::string& name : by_name.keys())
       seeds.add(name, seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));

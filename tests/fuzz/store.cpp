@@ -63,7 +63,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect_value_or_error([&] {
     if (way == 'f') find(input.rest);
     if (way == 'd') {
-      const std::size_t payload = std::min<std::size_t>(std::uint8_t(input.choice("\x10\x20\x40\x80")), input.rest.size());
+      const std::size_t wanted = std::uint8_t(input.choice("\x10\x20\x40\x80"));
+      const std::size_t payload = std::min(wanted, input.rest.size());
       find(with_preamble(input.rest.substr(0, input.rest.size() - payload), input.rest.substr(input.rest.size() - payload)));
     }
     if (way == 'v') {

@@ -85,7 +85,7 @@ TEST(WriteCase, EachViewHasFilesOfItsOwn) {
   const TemporaryFolder folder;
   marrow::Case written = example_case();
   written.views = {};
-  for (const char* name : {"view-2", "a/b", "a b", "a\nb: c"})
+  for (const char* name : {"view-2", "a/b", "a b", "a: b # c"})
     written.views.add(name, example_view(name, CV_16U, double(written.views.size())));
   write_case(written, (folder / "case").string());
   EXPECT_EQ(marrow::hash_of(read_back(folder / "case").views), marrow::hash_of(written.views));
