@@ -56,7 +56,7 @@ class Checks {
     const bool was_fresh = !worker_;
     WorkerEnd end = ask(number);
     // What an earlier check did to the process is not this check's failure.
-    if (end.died && !was_fresh) end = ask(number);
+    if (end.died && !end.is_late && !was_fresh) end = ask(number);
     if (end.is_late) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
     if (end.signal) return {'-', std::string("it crashed: ") + strsignal(end.signal)};
     if (!end.failed.empty()) return {'-', end.failed};
