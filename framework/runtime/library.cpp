@@ -72,10 +72,15 @@ const PluginEntry& checked_entry(void* handle) {
   return *entry;
 }
 
+/// What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait for ever.
+void* load_without_throwing(const char* path, int mode) noexcept {
+  // dlopen is declared as a function that throws nothing. A compiler that knows this leaves out the end of the process here.
+  void* (*volatile load)(const char*, int) = dlopen;
+  return load(path, mode);
+}
+
 void* open_library(const fs::path& file, int mode) {
-  // What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait for ever.
-  const auto load = [mode](const char* path) noexcept { return dlopen(path, mode | RTLD_LOCAL); };
-  void* handle = load(fs::absolute(file).c_str());
+  void* handle = load_without_throwing(fs::absolute(file).c_str(), mode | RTLD_LOCAL);
   if (handle) return handle;
   const char* text = dlerror();
   std::string reason = text ? text : "unknown reason";
