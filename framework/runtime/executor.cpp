@@ -11,7 +11,6 @@
 #include <exception>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
-#include <system_error>
 #include <thread>
 
 #include "evaluation.hpp"
@@ -29,7 +28,7 @@ int threads_to_be_had(int wanted) {
   std::atomic<bool> may_end{false};
   try {
     while (int(threads.size()) < wanted) threads.emplace_back([&] { may_end.wait(false); });
-  } catch (const std::system_error&) {
+  } catch (const std::exception&) {  // a limit of threads, or of memory
   }
   may_end = true;
   may_end.notify_all();
@@ -72,7 +71,11 @@ class Executor {
     std::vector<std::size_t> ready;
     for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i)
       if (needed_[i] && states_[i].waiting_for == 0) ready.push_back(i);
-    for (std::size_t i : ready) enqueue([this, i] { start_node(i); });
+    try {
+      for (std::size_t i : ready) enqueue([this, i] { start_node(i); });
+    } catch (...) {
+      set_fault();
+    }
     watch();
     if (fault_) std::rethrow_exception(fault_);
     arena.execute([&] { make_outputs(); });
@@ -157,17 +160,26 @@ class Executor {
   template <class Work>
   void enqueue(Work work) {
     ++at_work_;
-    arena_->enqueue([this, work] {
-      try {
-        if (!is_broken_) work();
-      } catch (...) {
+    try {
+      arena_->enqueue([this, work] {
+        try {
+          if (!is_broken_) work();
+        } catch (...) {
+          set_fault();
+        }
         const std::scoped_lock lock(mutex_);
-        if (!fault_) fault_ = std::current_exception();
-        is_broken_ = true;
-      }
-      const std::scoped_lock lock(mutex_);
-      if (--at_work_ == 0) all_done_.notify_all();
-    });
+        if (--at_work_ == 0) all_done_.notify_all();
+      });
+    } catch (...) {  // no memory for it: nobody will be at it
+      --at_work_;
+      throw;
+    }
+  }
+
+  void set_fault() {
+    const std::scoped_lock lock(mutex_);
+    if (!fault_) fault_ = std::current_exception();
+    is_broken_ = true;
   }
 
   /// The main thread samples memory until all nodes have ended, and nothing of the run is at work any more.
