@@ -11,8 +11,8 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostInName = 100;       // bytes
-constexpr std::size_t kMostInFileName = 200;   // leaves room for an extension and a temporary's prefix below the usual 255
+constexpr std::size_t kMostInName = 100;  // bytes
+constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix below the usual 255
 
 /// As in addresses; `text` may be several bytes.
 std::string percent_encoded(std::string_view text) {
@@ -52,8 +52,9 @@ std::string file_name_of(const std::string& text) {
     next = i + 1;
     while (next < text.size() && (static_cast<unsigned char>(text[next]) & 0xC0) == 0x80) ++next;  // one character
     const std::string character = text.substr(i, next - i);
-    const bool is_special = std::string("/\\%~").find(character) != std::string::npos || printable(character) != character ||
-                            (i == 0 && (character == "." || character == " ")) || (next == text.size() && character == " ");
+    const bool is_special = std::string("/\\%~").find(character) != std::string::npos ||
+                            printable(character) != character || (i == 0 && (character == "." || character == " ")) ||
+                            (next == text.size() && character == " ");
     result += is_special ? percent_encoded(character) : character;
   }
   if (result.size() <= kMostInFileName) return result;

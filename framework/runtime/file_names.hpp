@@ -8,10 +8,12 @@
 
 namespace marrow {
 
-inline constexpr const char* kNameHint = "use at most 100 letters, digits, '-', '_', '.' and spaces, and begin with neither a dot nor a space";
+inline constexpr const char* kNameHint =
+    "use at most 100 letters, digits, '-', '_', '.' and spaces, and begin with neither a dot nor a space";
 
-/// Why a text cannot be the name of a file or folder on any machine, as "it holds '/'"; empty where it can: 1 to 100 bytes
-/// of UTF-8 without '/', '\' and control characters, that begins neither with a dot nor with a space and ends with no space.
+/// Why a text cannot be the name of a file or folder on any machine, as "it holds '/'"; empty where it can: 1 to 100
+/// bytes of UTF-8 without '/', '\' and control characters, that begins neither with a dot nor with a space and ends
+/// with no space.
 std::string fault_of_name(const std::string& name);
 
 /// A fault at `place` for a text that cannot be the name of a file; `what` says whose it is ("a pipeline's name").

@@ -27,8 +27,9 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
     const std::string* value = value_of(text.substr(i + 1, end - i - 1), place);
     if (value && (bytes_ += value->size()) > kMostBytes) {
-      diagnostics_.add(place, "the values of inputs make the pipeline longer than " + std::to_string(kMostBytes / 1'000'000) + " MB",
-                       "give shorter values, or name them less often");
+      diagnostics_.add(
+          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostBytes / 1'000'000) + " MB",
+          "give shorter values, or name them less often");
       return std::nullopt;
     }
     known = known && value;

@@ -11,7 +11,8 @@ namespace marrow {
 /// Puts the values of a pipeline's inputs where texts name them, as $name; $$ is a dollar.
 class InputTexts {
  public:
-  InputTexts(const WrittenPipeline& pipeline, Diagnostics& diagnostics) : pipeline_(pipeline), diagnostics_(diagnostics) {}
+  InputTexts(const WrittenPipeline& pipeline, Diagnostics& diagnostics)
+      : pipeline_(pipeline), diagnostics_(diagnostics) {}
 
   /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none.
   std::optional<std::string> put_into(const std::string& text, const Place& place);

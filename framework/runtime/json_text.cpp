@@ -16,10 +16,14 @@ int levels_of(const std::string& text) {
   bool in_text = false;
   for (std::size_t i = 0; i < text.size(); ++i) {
     const char c = text[i];
-    if (in_text && c == '\\') ++i;
-    else if (c == '"') in_text = !in_text;
-    else if (!in_text && (c == '[' || c == '{')) most = std::max(most, ++level);
-    else if (!in_text && (c == ']' || c == '}')) --level;
+    if (in_text && c == '\\')
+      ++i;
+    else if (c == '"')
+      in_text = !in_text;
+    else if (!in_text && (c == '[' || c == '{'))
+      most = std::max(most, ++level);
+    else if (!in_text && (c == ']' || c == '}'))
+      --level;
   }
   return most;
 }

@@ -25,7 +25,8 @@ std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, 
     }
   for (std::size_t i = 0; i < nodes.size(); ++i)
     if (waiting_for[i] > 0) stuck.push_back(i);
-  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return std::pair(round[a], a) < std::pair(round[b], b); });
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return std::pair(round[a], a) < std::pair(round[b], b); });
   return order;
 }
 

@@ -6,7 +6,8 @@
 
 namespace marrow {
 
-/// The nodes with sources before users, in their own order otherwise. `stuck` gets those that wait for each other, or for such.
+/// The nodes with sources before users, in their own order otherwise. `stuck` gets those that wait for each other, or
+/// for such.
 std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, std::vector<std::size_t>& stuck);
 
 }  // namespace marrow

@@ -7,9 +7,9 @@ namespace marrow {
 namespace {
 
 struct Character {
-  std::size_t size = 1;    ///< bytes
+  std::size_t size = 1;  ///< bytes
   char32_t code = 0;
-  bool is_valid = false;   ///< well-formed UTF-8: no overlong form, no surrogate, nothing above U+10FFFF
+  bool is_valid = false;  ///< well-formed UTF-8: no overlong form, no surrogate, nothing above U+10FFFF
 };
 
 Character first_of(std::string_view text) {
@@ -57,9 +57,13 @@ std::string printable(std::string_view text, const char* after_line_break) {
 
 }  // namespace
 
-std::string printable(std::string_view text) { return printable(text, nullptr); }
+std::string printable(std::string_view text) {
+  return printable(text, nullptr);
+}
 
-std::string printable_lines(std::string_view text) { return printable(text, "  "); }
+std::string printable_lines(std::string_view text) {
+  return printable(text, "  ");
+}
 
 std::string cut(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
@@ -68,6 +72,8 @@ std::string cut(std::string_view text, std::size_t most) {
   return std::string(text.substr(0, end)) + "\u2026";
 }
 
-std::string in_quotes(std::string_view text) { return "'" + cut(text) + "'"; }
+std::string in_quotes(std::string_view text) {
+  return "'" + cut(text) + "'";
+}
 
 }  // namespace marrow

@@ -34,7 +34,9 @@ class Descriptor {
   int number_;
 };
 
-std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
+std::string reason() {
+  return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno);
+}
 
 bool write_all(int descriptor, const std::string& text) {
   for (std::size_t done = 0; done < text.size();) {
@@ -46,7 +48,8 @@ bool write_all(int descriptor, const std::string& text) {
   return true;
 }
 
-/// A name beside the file that no other thread or process writes to, as long as none on another machine has this number.
+/// A name beside the file that no other thread or process writes to, as long as none on another machine has this
+/// number.
 fs::path free_temporary(const fs::path& file) {
   static std::atomic<int> count{0};
   for (struct stat info{};;) {
@@ -59,9 +62,11 @@ fs::path free_temporary(const fs::path& file) {
 
 std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes, Kinds kinds) {
   const auto unreadable = [&](const std::string& why) { return Error(file.string() + " cannot be read: " + why); };
-  const auto too_long = [&] { return Error(file.string() + " is longer than " + std::to_string(most_bytes / 1'000'000) + " MB"); };
+  const auto too_long = [&] {
+    return Error(file.string() + " is longer than " + std::to_string(most_bytes / 1'000'000) + " MB");
+  };
   Descriptor descriptor(file, kinds == Kinds::files ? O_RDONLY | O_NONBLOCK : O_RDONLY);
-  struct stat info{};
+  struct stat info {};
   if (descriptor < 0 || ::fstat(descriptor, &info) != 0) throw unreadable(reason());
   if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
   if (kinds == Kinds::files && !S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
@@ -79,7 +84,7 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes, Kind
 
 void write_text_file(const fs::path& file, const std::string& text) {
   const auto unwritten = [&](const std::string& why) { return Error("cannot write " + file.string() + ": " + why); };
-  struct stat info{};
+  struct stat info {};
   if (::lstat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISLNK(info.st_mode) && !S_ISDIR(info.st_mode)) {
     Descriptor device(file, O_WRONLY);
     if (device < 0 || !write_all(device, text) || !device.close()) throw unwritten(reason());

@@ -15,8 +15,8 @@ enum class Kinds { files, files_and_pipes };  ///< a pipe may keep its reader wa
 /// Throws Error for a file that cannot be read, is longer than `most_bytes`, or is none of `kinds`.
 std::string read_text_file(const std::filesystem::path& file, std::uintmax_t most_bytes, Kinds kinds = Kinds::files);
 
-/// Writes a temporary file beside it and renames that, so that a full disk or an end by force leaves the file that was there
-/// before, or none. A link is replaced, a device or pipe is written to. Throws Error.
+/// Writes a temporary file beside it and renames that, so that a full disk or an end by force leaves the file that was
+/// there before, or none. A link is replaced, a device or pipe is written to. Throws Error.
 void write_text_file(const std::filesystem::path& file, const std::string& text);
 
 }  // namespace marrow

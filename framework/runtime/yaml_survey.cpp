@@ -15,7 +15,9 @@ namespace {
 constexpr std::size_t kMostLevels = 100;
 constexpr std::size_t kMostRepeated = 100'000;  // values, by aliases
 
-[[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
+[[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) {
+  throw YAML::Exception(mark, why);
+}
 
 /// Counts values and levels as they would be with every alias written out.
 class Survey : public YAML::EventHandler {
@@ -25,17 +27,27 @@ class Survey : public YAML::EventHandler {
   }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { add(mark, anchor); }
-  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string&) override { add(mark, anchor); }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { open(mark, anchor); }
+  void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string&) override {
+    add(mark, anchor);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    open(mark, anchor);
+  }
   void OnSequenceEnd() override { close(); }
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { open(mark, anchor); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    open(mark, anchor);
+  }
   void OnMapEnd() override { close(); }
 
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchored_.find(anchor);
     if (found == anchored_.end()) refuse(mark, "an alias names a list or map that it is in itself");
     repeated_ += found->second.values;
-    if (repeated_ > kMostRepeated) refuse(mark, "aliases repeat more than " + std::to_string(kMostRepeated) + " values; write out what is meant, or less of it");
+    if (repeated_ > kMostRepeated)
+      refuse(mark, "aliases repeat more than " + std::to_string(kMostRepeated) +
+                       " values; write out what is meant, or less of it");
     count(mark, found->second);
   }
 
@@ -72,7 +84,8 @@ class Survey : public YAML::EventHandler {
     outer.levels = std::max(outer.levels, inner.levels + 1);
   }
   void check_levels(const YAML::Mark& mark, std::size_t below) const {
-    if (open_.size() + below > kMostLevels) refuse(mark, "lists and maps are nested more than " + std::to_string(kMostLevels) + " deep");
+    if (open_.size() + below > kMostLevels)
+      refuse(mark, "lists and maps are nested more than " + std::to_string(kMostLevels) + " deep");
   }
 
   std::vector<Open> open_;
@@ -87,7 +100,8 @@ void survey_yaml(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
   Survey survey;
-  while (parser.HandleNextDocument(survey)) {}  // what follows the first document would be left out without a word
+  while (parser.HandleNextDocument(survey)) {
+  }  // what follows the first document would be left out without a word
 }
 
 }  // namespace marrow

@@ -22,7 +22,9 @@ TEST(Diagnostics, ControlCharactersAreWrittenOut) {
   Diagnostics diagnostics;
   diagnostics.remember("\x1b[2Jf", "a: \x1b]0;owned\x07");
   diagnostics.add({"\x1b[2Jf", 1, 1}, "unknown key '\x1b[31m'\nf:1:1: error: forged", "did you mean '\u202e'?");
-  EXPECT_EQ(diagnostics.text(), "\\x1b[2Jf:1:1: error: unknown key '\\x1b[31m'\n  f:1:1: error: forged\n  a: \\x1b]0;owned\\x07\n  ^\n  hint: did you mean '\\u202e'?\n");
+  EXPECT_EQ(diagnostics.text(),
+            "\\x1b[2Jf:1:1: error: unknown key '\\x1b[31m'\n  f:1:1: error: forged\n  a: \\x1b]0;owned\\x07\n  ^\n  "
+            "hint: did you mean '\\u202e'?\n");
 }
 
 TEST(Diagnostics, CaretStandsBelowTheColumn) {
@@ -75,7 +77,8 @@ TEST(Diagnostics, LongMessagesAreCut) {
 }
 
 TEST(Suggestion, NearNamesAlone) {
-  EXPECT_EQ(marrow::suggestion("vlaue", {"count", "value", "flag"}), "did you mean 'value'?") << "two neighbours swapped";
+  EXPECT_EQ(marrow::suggestion("vlaue", {"count", "value", "flag"}), "did you mean 'value'?")
+      << "two neighbours swapped";
   EXPECT_EQ(marrow::nearest_name("kitten", {"sitting", "kitchen"}), "kitchen");
   EXPECT_EQ(marrow::nearest_name("abcdef", {"uvwxyz"}), "");
   EXPECT_EQ(marrow::suggestion("abcdef", {}), "there are none");

@@ -14,7 +14,9 @@ using marrow::file_name_of;
 using Texts = std::vector<std::string>;
 
 TEST(FileNames, GoodOnes) {
-  for (const char* name : {"femur", "a b", "a.b", "1", "-5", "canny+bobyqa", "größer", "\u6f22", "a..b", "x.", "[1,_2]"}) EXPECT_EQ(fault_of_name(name), "") << name;
+  for (const char* name :
+       {"femur", "a b", "a.b", "1", "-5", "canny+bobyqa", "größer", "\u6f22", "a..b", "x.", "[1,_2]"})
+    EXPECT_EQ(fault_of_name(name), "") << name;
   EXPECT_EQ(fault_of_name(std::string(100, 'x')), "");
 }
 
@@ -29,7 +31,9 @@ TEST(FileNames, BadOnesAndWhy) {
   EXPECT_EQ(fault_of_name(" a"), "it begins with a space");
   EXPECT_EQ(fault_of_name("a "), "it ends with a space");
   EXPECT_EQ(fault_of_name(std::string(101, 'x')), "it has 101 bytes");
-  for (const std::string& name : {std::string("a\nb"), std::string("a\tb"), std::string("\x1b[2J"), std::string("a\0b", 3), std::string("a\x7f"), std::string("\xff"), std::string("\u202e"), std::string("\u009b")})
+  for (const std::string& name :
+       {std::string("a\nb"), std::string("a\tb"), std::string("\x1b[2J"), std::string("a\0b", 3), std::string("a\x7f"),
+        std::string("\xff"), std::string("\u202e"), std::string("\u009b")})
     EXPECT_EQ(fault_of_name(name), "it holds a control character or bytes that are no UTF-8") << name;
 }
 
@@ -58,13 +62,16 @@ TEST(FileNames, LongTextsEndWithAHash) {
   EXPECT_LE(file_name_of(std::string(1000, '/')).size(), 200u);
   std::string characters;
   for (int i = 0; i < 100; ++i) characters += "\u6f22";
-  EXPECT_EQ(file_name_of(characters), file_name_of(file_name_of(characters)).replace(file_name_of(file_name_of(characters)).find("%7E"), 3, "~")) << "no character is cut in two";
+  EXPECT_EQ(file_name_of(characters),
+            file_name_of(file_name_of(characters)).replace(file_name_of(file_name_of(characters)).find("%7E"), 3, "~"))
+      << "no character is cut in two";
 }
 
 TEST(FileNames, NoTwoTextsShareOne) {
   std::mt19937 random(1);
   std::set<std::string> texts, names;
-  const std::vector<std::string> parts{"/", "\\", "%", "_", ".", " ", "~", "2F", "2", "F", "a", "\x1b", "\xff", "\xc3", "\xa4", "\u00e4", "\n", "\u202e"};
+  const std::vector<std::string> parts{"/", "\\", "%",    "_",    ".",    " ",    "~",      "2F", "2",
+                                       "F", "a",  "\x1b", "\xff", "\xc3", "\xa4", "\u00e4", "\n", "\u202e"};
   for (int i = 0; i < 200000; ++i) {
     std::string text;
     for (unsigned length = random() % 6; length-- > 0;) text += parts[random() % parts.size()];

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // JSON that nobody vouches for.
+#include "framework/runtime/json_text.hpp"
+
 #include <gtest/gtest.h>
 
 #include <functional>
 
-#include "framework/runtime/json_text.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace {
@@ -22,7 +23,9 @@ std::string fault_in(const std::string& text) {
   return fault_of([&] { marrow::parse_json(text, "a.json"); });
 }
 
-std::string nested(int levels) { return std::string(std::size_t(levels), '[') + std::string(std::size_t(levels), ']'); }
+std::string nested(int levels) {
+  return std::string(std::size_t(levels), '[') + std::string(std::size_t(levels), ']');
+}
 
 TEST(JsonText, DeepNestingIsRefused) {
   EXPECT_EQ(fault_in(nested(64)), "none");

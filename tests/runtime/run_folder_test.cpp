@@ -29,7 +29,8 @@ const marrow::Catalogue& writing_catalogue() {
   static const Scratch plugins;
   static const marrow::Catalogue catalogue([] {
     const fs::path build = MARROW_BINARY_DIR;
-    for (const fs::path& library : {build / "tests" / "plugins" / "marrow_test_numbers", build / "lib" / "marrow" / "marrow_write_text"})
+    for (const fs::path& library :
+         {build / "tests" / "plugins" / "marrow_test_numbers", build / "lib" / "marrow" / "marrow_write_text"})
       for (const char* extension : {".so", ".json"}) fs::copy(library.string() + extension, plugins.path);
     return std::vector<fs::path>{plugins.path};
   }());
@@ -40,7 +41,9 @@ class RunFolderTest : public testing::Test {
  protected:
   marrow::Pipeline pipeline_of(const std::string& nodes, const std::string& outputs) {
     marrow::Diagnostics diagnostics;
-    const marrow::Pipeline pipeline = marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"), {}, test_catalogue(), diagnostics);
+    const marrow::Pipeline pipeline =
+        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
+                              {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     return pipeline;
   }
@@ -66,7 +69,8 @@ TEST_F(RunFolderTest, OfManyThatWantOneAtOnceOneGetsIt) {
       threads.emplace_back([&] {
         const std::string fault = fault_of([&] { RunFolder{folder, pipeline}; });
         good += fault == "none";
-        refused += fault.find("was taken by another run just now; choose another with --out") != std::string::npos || fault.find("is already there and not empty") != std::string::npos;
+        refused += fault.find("was taken by another run just now; choose another with --out") != std::string::npos ||
+                   fault.find("is already there and not empty") != std::string::npos;
       });
     for (std::thread& thread : threads) thread.join();
     EXPECT_EQ(good, 1);
@@ -82,7 +86,10 @@ TEST_F(RunFolderTest, FreeNamesAreTakenByOneEach) {
     const pid_t process = ::fork();
     if (process == 0) {
       try {
-        for (int k = 0; k < 25; ++k) std::ofstream(RunFolder::with_free_name(scratch.path / "runs" / "p", pipeline).path() / "owner", std::ios::app) << ::getpid() << '\n';
+        for (int k = 0; k < 25; ++k)
+          std::ofstream(RunFolder::with_free_name(scratch.path / "runs" / "p", pipeline).path() / "owner",
+                        std::ios::app)
+              << ::getpid() << '\n';
       } catch (...) {
         ::_exit(1);
       }
@@ -111,7 +118,10 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
     const fs::path folder = scratch.path / (std::string("with ") + name);
     fs::create_directory(folder);
     std::ofstream(folder / name) << "mine";
-    EXPECT_NE(fault_of([&] { RunFolder{folder, pipeline}; }).find("is already there and not empty; choose another with --out"), std::string::npos);
+    EXPECT_NE(fault_of([&] {
+                RunFolder{folder, pipeline};
+              }).find("is already there and not empty; choose another with --out"),
+              std::string::npos);
     EXPECT_EQ(text_of(folder / name), "mine");
     EXPECT_EQ(std::distance(fs::directory_iterator(folder), fs::directory_iterator()), 1);
   }
@@ -137,9 +147,12 @@ TEST_F(RunFolderTest, FullDiskLeavesNoHalfRecordAndTheLogSaysSo) {
   {
     const marrow::test::FullDisk full(20);
     folder.append_log(std::string(100, 'x'));
-    EXPECT_NE(fault_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"), std::string::npos);
+    EXPECT_NE(
+        fault_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"),
+        std::string::npos);
   }
-  EXPECT_NE(folder.log_fault().find("lines are missing in " + (folder.path() / "log.txt").string()), std::string::npos) << folder.log_fault();
+  EXPECT_NE(folder.log_fault().find("lines are missing in " + (folder.path() / "log.txt").string()), std::string::npos)
+      << folder.log_fault();
   EXPECT_FALSE(fs::exists(folder.path() / "run.json"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 3);
 }
@@ -152,8 +165,10 @@ TEST_F(RunFolderTest, LogTakesNoEscapeSequencesAndNoForgedLines) {
 }
 
 TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
-  const marrow::Pipeline pipeline =
-      pipeline_of("  s: {uses: test.sides, with: {names: [a/b, a_b, 'a\\b', .., '', \"a\\nb\", same, same, 'a%2Fb', \"" + std::string(300, 'x') + "\"]}}\n", "o: s.both");
+  const marrow::Pipeline pipeline = pipeline_of(
+      "  s: {uses: test.sides, with: {names: [a/b, a_b, 'a\\b', .., '', \"a\\nb\", same, same, 'a%2Fb', \"" +
+          std::string(300, 'x') + "\"]}}\n",
+      "o: s.both");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
   const std::vector<RunFolder::Written> written = folder.write_outputs(pipeline, result, writing_catalogue());
@@ -161,7 +176,9 @@ TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
   EXPECT_EQ(written[0].fault, "");
   ASSERT_EQ(written[0].files.size(), 10u);
   for (std::size_t i = 0; i < 10; ++i)
-    EXPECT_NE(text_of(folder.path() / written[0].files[i]).find("\"value\": " + std::to_string(10 * (i + 1)) + ".0"), std::string::npos) << written[0].files[i];
+    EXPECT_NE(text_of(folder.path() / written[0].files[i]).find("\"value\": " + std::to_string(10 * (i + 1)) + ".0"),
+              std::string::npos)
+        << written[0].files[i];
   EXPECT_EQ(written[0].files[0], "outputs/o/a%2Fb.json");
   EXPECT_EQ(written[0].files[1], "outputs/o/a_b.json");
   EXPECT_EQ(written[0].files[7], "outputs/o/same (2).json");
@@ -173,7 +190,8 @@ TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
 }
 
 TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {
-  const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n  s: {uses: test.sides}\n", "x: c, x.json: s.both");
+  const marrow::Pipeline pipeline =
+      pipeline_of("  c: {uses: test.constant}\n  s: {uses: test.sides}\n", "x: c, x.json: s.both");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
   const auto written = folder.write_outputs(pipeline, result, writing_catalogue());

@@ -31,7 +31,9 @@ class TextFileTest : public testing::Test {
     const std::string fault = fault_of([&] { read_text_file(file, most); });
     return fault.starts_with(file.string()) ? fault.substr(file.string().size()) : fault;
   }
-  std::size_t files() const { return std::size_t(std::distance(fs::directory_iterator(scratch.path), fs::directory_iterator())); }
+  std::size_t files() const {
+    return std::size_t(std::distance(fs::directory_iterator(scratch.path), fs::directory_iterator()));
+  }
   Scratch scratch;
 };
 
@@ -49,7 +51,9 @@ TEST_F(TextFileTest, SaysWhyItDoesNotRead) {
   scratch.write("long", std::string(3000001, 'x'));
   EXPECT_EQ(fault_in_reading(scratch.path / "long", 3000000), " is longer than 3 MB");
   EXPECT_EQ(fault_in_reading("/dev/zero", 1000000), " cannot be read: it is no regular file");
-  EXPECT_NE(fault_of([] { read_text_file("/dev/zero", 1000000, marrow::Kinds::files_and_pipes); }).find("longer than 1 MB"), std::string::npos);
+  EXPECT_NE(
+      fault_of([] { read_text_file("/dev/zero", 1000000, marrow::Kinds::files_and_pipes); }).find("longer than 1 MB"),
+      std::string::npos);
 }
 
 TEST_F(TextFileTest, WaitsForNoPipeUnlessAsked) {
@@ -65,7 +69,9 @@ TEST_F(TextFileTest, FullDiskLeavesTheOldFile) {
   const fs::path file = scratch.write("file", "old");
   {
     const marrow::test::FullDisk full(1000);
-    EXPECT_NE(fault_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "), std::string::npos);
+    EXPECT_NE(
+        fault_of([&] { write_text_file(file, std::string(5000, 'x')); }).find("cannot write " + file.string() + ": "),
+        std::string::npos);
     EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "new", std::string(5000, 'x')); }), "none");
   }
   EXPECT_EQ(read_text_file(file, 100), "old");
@@ -73,7 +79,8 @@ TEST_F(TextFileTest, FullDiskLeavesTheOldFile) {
 }
 
 TEST_F(TextFileTest, WhereItCannotWrite) {
-  EXPECT_EQ(fault_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }), "cannot write " + (scratch.path / "no" / "file").string() + ": No such file or directory");
+  EXPECT_EQ(fault_of([&] { write_text_file(scratch.path / "no" / "file", "x"); }),
+            "cannot write " + (scratch.path / "no" / "file").string() + ": No such file or directory");
   fs::create_directory(scratch.path / "folder");
   EXPECT_NE(fault_of([&] { write_text_file(scratch.path / "folder", "x"); }).find("directory"), std::string::npos);
   EXPECT_EQ(fault_of([] { write_text_file("/dev/full", "x"); }), "cannot write /dev/full: the disk is full");

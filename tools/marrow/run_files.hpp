@@ -15,8 +15,8 @@ nlohmann::json read_record(const std::filesystem::path& folder);
 /// [throws Error] that run.json is damaged, and how.
 [[noreturn]] void refuse_record(const std::filesystem::path& folder, const std::string& why);
 
-/// A regular file that a record names below the run's folder. Nothing where there is none, or where the name or a link leads
-/// out of the folder: a page or a comparison of runs shows nothing else of this machine.
+/// A regular file that a record names below the run's folder. Nothing where there is none, or where the name or a link
+/// leads out of the folder: a page or a comparison of runs shows nothing else of this machine.
 std::optional<std::filesystem::path> file_of_run(const std::filesystem::path& folder, const std::string& name);
 
 /// Whether the name leads to something outside the folder.

@@ -107,6 +107,7 @@ YAML::Node pipeline_of(const fs::path& file) {
 /// The nodes of the resolved pipeline that the run's record speaks of.
 void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
   std::map<std::string, const json*> recorded;
+  if (!record.at("nodes").is_array()) throw Error("its 'nodes' is no list");
   for (const json& one : record.at("nodes")) recorded.emplace(one.at("id"), &one);
   for (const auto& entry : pipeline["nodes"]) {
     RecordedNode node;
@@ -124,7 +125,7 @@ void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) 
 
 void check_age(const fs::path& folder, const json& record) {
   const json nodes = record.contains("nodes") ? record["nodes"] : json();
-  if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), [](const json& node) { return node.contains("items"); })) return;
+  if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), [](const json& node) { return !node.is_object() || node.contains("items"); })) return;
   throw Error((folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
               (record.contains("seed") && record["seed"].is_number() ? record["seed"].dump() : "1"));
 }
