@@ -10,6 +10,7 @@
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
+#include "runtime/folder_use.hpp"
 #include "runtime/keys.hpp"
 #include "runtime/store_folder.hpp"
 #include "runtime/text_file.hpp"
@@ -154,12 +155,18 @@ fs::path CellRunner::case_place(std::size_t index) const {
 fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
   if (!one.is_simulated) return one.folder;
-  fs::path& place = case_folders_[index];
-  const fs::path outputs = place.empty() ? case_place(index) : place, folder = outputs.parent_path().parent_path();
-  if (place.empty() && !is_whole_case(folder, outputs)) simulate(index, folder);
+  FoundCase& found = simulated_[index];
+  const fs::path outputs = found.use ? found.outputs : case_place(index), folder = outputs.parent_path().parent_path();
+  // Another process may tidy the store up until this one uses the folder.
+  for (int tries = 0; !found.use; ++tries) {
+    std::shared_ptr<const void> use = use_folder(folder);
+    if (use && is_whole_case(folder, outputs)) found = {outputs, use};
+    else if (tries == 10) throw Error("case '" + one.name + "' is removed again and again; is the store " + folder.parent_path().string() + " being tidied?");
+    else simulate(index, folder);
+  }
   std::error_code ignored;
   fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now: what a cell needs is removed last
-  return place = outputs;
+  return outputs;
 }
 
 void CellRunner::simulate(std::size_t index, const fs::path& folder) const {

@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cstdlib>
 
+#include "folder_use.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
 
@@ -43,13 +44,13 @@ bool is_abandoned(const StoreItem& item) {
 }
 
 /// Returns false with the reason where something of it is left. A folder gets another name first, so that no one takes
-/// half of it for the whole.
+/// half of it for the whole; one in use is left.
 bool remove_item(const StoreItem& item, std::error_code& error) {
   error.clear();
   fs::path path = item.path;
   if (item.kind == Kind::simulated_case) {
     path = temporary_beside(item.path);
-    fs::rename(item.path, path, error);
+    rename_unused(item.path, path, error);
   }
   if (!error) fs::remove_all(path, error);
   return !error;
@@ -99,7 +100,8 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   std::error_code error;
   const auto remove = [&](const StoreItem& item) {
     if (remove_item(item, error)) return true;
-    if (error != std::errc::no_such_file_or_directory && freed.fault.empty())
+    const bool is_fault = error != std::errc::no_such_file_or_directory && error != std::errc::device_or_resource_busy;
+    if (is_fault && freed.fault.empty())
       freed.fault = "cannot remove " + item.path.string() + ": " + error.message();
     return false;
   };

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <sstream>
 
 #include "marrow/domain/error.hpp"
 #include "printable.hpp"
@@ -26,10 +25,12 @@ std::string describe(const YAML::Node& node) {
 /// A quoted scalar is a text even when it looks like a number.
 bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
 
+/// Whole numbers with all their digits.
 std::string show(double value) {
-  std::ostringstream out;
-  out << value;
-  return out.str();
+  char text[32];
+  const bool is_whole = value == std::trunc(value) && std::abs(value) < 1e15;
+  return {text, is_whole ? std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr
+                         : std::to_chars(text, text + sizeof text, value).ptr};
 }
 
 }  // namespace

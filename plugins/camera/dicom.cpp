@@ -2,7 +2,7 @@
 // Cameras from the headers of X-ray images: what a C-arm writes of its angles and distances.
 #include <marrow/plugin.hpp>
 
-#include "plugins/read/names.hpp"
+#include "marrow/domain/names.hpp"
 #include "plugins/read/xray_header.hpp"
 
 namespace {
@@ -24,7 +24,7 @@ marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& cont
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
-    marrow::read::check_name("view", name);
+    marrow::check_item_name("view", name);
     if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
     const auto geometry = marrow::read::read_xray_geometry(
         options.paths[i], options.frame, {options.source_to_detector_mm, options.source_to_isocentre_mm, options.pixel_mm});

@@ -4,7 +4,7 @@
 
 #include "camera_file.hpp"
 #include "input_file.hpp"
-#include "names.hpp"
+#include "marrow/domain/names.hpp"
 #include "volume_file.hpp"
 #include "yaml_values.hpp"
 
@@ -100,7 +100,7 @@ std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& m
 void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
   const auto name = map.text("name");
   if (name)
-    if (const std::string fault = marrow::read::fault_of_name(*name); !fault.empty())
+    if (const std::string fault = marrow::fault_of_item_name(*name); !fault.empty())
       return map.fault("name", "name: the name of a view " + fault + "; choose another");
   const auto image = read_image(folder, map, "image");
   const auto camera = read_camera(folder, map);

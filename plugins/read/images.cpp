@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "names.hpp"
+#include "marrow/domain/names.hpp"
 #include "volume_file.hpp"
 
 namespace {
@@ -20,7 +20,7 @@ marrow::List<marrow::Image> images(const Options& options) {
   marrow::List<marrow::Image> images;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
-    marrow::read::check_name("view", name);
+    marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
     images.add(name, marrow::read::read_image_file(options.paths[i], options.frame));
   }

@@ -11,7 +11,7 @@
 
 #include "input_file.hpp"
 #include "marrow/domain/error.hpp"
-#include "names.hpp"
+#include "marrow/domain/names.hpp"
 
 namespace marrow::read {
 namespace {
@@ -167,7 +167,7 @@ YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, const
 YamlMap::YamlMap(YamlFile& file, const YAML::Node& node, std::string what, FreeKeys)
     : file_(file), node_(node), what_(std::move(what)) {
   take_keys([&](const std::string& key, const YAML::Mark& mark) {
-    const std::string fault = fault_of_name(key);
+    const std::string fault = fault_of_item_name(key);
     if (!fault.empty()) file_.fault(mark, what_ + ": a name " + fault + "; choose another");
     if (keys_.size() == kMostFreeKeys + 1) file_.fault(mark, what_ + ": there are more than 1000 of them");
   });

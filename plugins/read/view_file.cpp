@@ -4,13 +4,13 @@
 #include "calibration.hpp"
 #include "camera_file.hpp"
 #include "marrow/domain/error.hpp"
-#include "names.hpp"
+#include "marrow/domain/names.hpp"
 #include "volume_file.hpp"
 
 namespace marrow::read {
 
 View read_view_files(const ViewSource& source) {
-  check_name("view", source.name);
+  check_item_name("view", source.name);
   View view;
   view.name = source.name;
   view.image = read_image_file(source.image, source.frame);

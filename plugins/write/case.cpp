@@ -2,6 +2,7 @@
 // Folders: a view, and a whole case as read.case takes it (docs/case.md).
 #include <algorithm>
 #include <cctype>
+#include <marrow/domain/names.hpp>
 #include <marrow/plugin.hpp>
 
 #include "atomic_write.hpp"
@@ -90,13 +91,16 @@ std::string fragments_text(const marrow::Case& value) {
 void check_case(const marrow::Case& value, const std::string& path) {
   if (value.views.empty()) throw marrow::Error(path + ": the case has no view");
   if (value.seeds.empty()) throw marrow::Error(path + ": the case has no fragment with seeds");
-  const auto check_distinct = [&](const std::vector<std::string>& names, const std::string& what) {
+  const auto check_names = [&](const std::vector<std::string>& names, const std::string& what) {
+    for (const std::string& name : names)
+      if (const std::string fault = marrow::fault_of_item_name(name); !fault.empty())
+        throw marrow::Error(path + ": the name " + quoted(name) + " of a " + what + " " + fault + "; choose another");
     for (std::size_t i = 0; i < names.size(); ++i)
       if (std::find(names.begin(), names.begin() + std::ptrdiff_t(i), names[i]) != names.begin() + std::ptrdiff_t(i))
-        throw marrow::Error(path + ": two " + what + " are named '" + names[i] + "'");
+        throw marrow::Error(path + ": two " + what + "s are named '" + names[i] + "'");
   };
-  check_distinct(value.views.names(), "views");
-  check_distinct(value.seeds.names(), "fragments");
+  check_names(value.views.names(), "view");
+  check_names(value.seeds.names(), "fragment");
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
       if (!value.seeds.find(name))

@@ -33,10 +33,12 @@ TEST(Misalignment, RefusesOtherFragments) {
   auto poses = displaced(marrow::Vector6d::Zero());
   EXPECT_EQ(message(poses, {"distal", "shaft"}), "there is no pose of a fragment 'shaft', only of proximal, distal; name both fragments with moved and reference, and register both");
   EXPECT_EQ(message(poses, {"distal", "distal"}), "moved and reference both name 'distal'; they must be two fragments");
-  marrow::List<marrow::Pose> mixed;
-  marrow::Pose other = poses[1];
-  other.world_from_model.source = "ct2";
-  mixed.add("proximal", poses[0]);
-  mixed.add("distal", other);
-  EXPECT_EQ(message(mixed, {}), "the poses of 'proximal' and 'distal' are between other frames; both fragments must come from one CT");
+  for (const auto frame : {&marrow::RigidTransform::source, &marrow::RigidTransform::target}) {
+    marrow::List<marrow::Pose> mixed;
+    marrow::Pose other = poses[1];
+    other.world_from_model.*frame = "elsewhere";
+    mixed.add("proximal", poses[0]);
+    mixed.add("distal", other);
+    EXPECT_EQ(message(mixed, {}), "the poses of 'proximal' and 'distal' are between other frames; both fragments must come from one CT");
+  }
 }

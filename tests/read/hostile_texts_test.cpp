@@ -163,7 +163,7 @@ TEST_F(HostileTexts, NamesThatHarm) {
   marrow::read::ViewSource source;
   source.name = "a\n/b";
   EXPECT_SAYS(marrow::read::read_view_files(source),
-              "the name 'a?/b' of a view holds a character that cannot be printed; choose another");
+              "the name 'a\\x0a/b' of a view holds a character that cannot be printed; choose another");
 }
 
 TEST_F(HostileTexts, CasesThatHarm) {

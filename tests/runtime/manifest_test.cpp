@@ -235,7 +235,7 @@ TEST(Manifest, MutantsAreRefusedOrConsistent) {
   std::mt19937 random(1);
   const std::string text = marrow::manifest_text(library());
   int believed = 0;
-  for (int i = 0; i < 20000; ++i) {
+  for (int i = 0; i < 5000; ++i) {
     std::string mutant = text;
     for (std::size_t flips = random() % 3; i % 2 && flips > 0; --flips)
       mutant[random() % mutant.size()] = char(random());
@@ -252,7 +252,7 @@ TEST(Manifest, MutantsAreRefusedOrConsistent) {
     }
     if (HasFatalFailure()) FAIL() << mutant;
   }
-  EXPECT_GT(believed, 100);
+  EXPECT_GT(believed, 50);
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ TEST_F(PipelineTest, ResolvedYamlKeepsEveryTextAndNumber) {
   for (const std::string& text : texts) {
     Pipeline p = plain;
     p.nodes[0].options[0] = 1.0 / 3;
-    p.nodes[0].options[1] = std::int64_t(1) << 53;
+    p.nodes[0].options[1] = std::int64_t(2147483647);
     p.nodes[0].options[4] = std::vector<double>{0.1, -0.0, 1e-300, 1.7976931348623157e308, 5e-324};
     p.nodes[0].options[6] = text.empty() ? text : "/folder " + text;
     p.nodes[1].options[0] = std::vector<std::string>{text, "b", text};
@@ -144,6 +144,9 @@ TEST_F(PipelineTest, QuotedNumberIsText) { expect_node_fault("{uses: test.consta
 TEST_F(PipelineTest, NotANumber) { expect_node_fault("{uses: test.constant, with: {value: nan}}", 35, "expected a number, got 'nan'"); }
 TEST_F(PipelineTest, BelowRange) { expect_node_fault("{uses: test.constant, with: {value: -2000}}", 35, "-2000 is below the least allowed, -1000"); }
 TEST_F(PipelineTest, AboveRange) { expect_node_fault("{uses: test.constant, with: {value: 2000}}", 35, "2000 is above the most allowed, 1000"); }
+TEST_F(PipelineTest, WholeNumberThatTheOptionCannotHold) {
+  expect_node_fault("{uses: test.constant, with: {count: 5000000000}}", 35, "5000000000 is above the most allowed, 2147483647");
+}
 TEST_F(PipelineTest, OctalLookingInteger) {
   expect_node_fault("{uses: test.constant, with: {count: 010}}", 35, "expected an integer, got '010'", "write it without leading zeros");
 }

@@ -9,6 +9,7 @@
 #include <cstdlib>
 #include <set>
 
+#include "framework/runtime/folder_use.hpp"
 #include "marrow/runtime/store.hpp"
 #include "runtime/fixture.hpp"
 
@@ -113,6 +114,25 @@ TEST_F(StoreFolderTest, AFolderOfOtherThingsIsNeverTouched) {
   EXPECT_EQ(store.tidy(), "");
   EXPECT_TRUE(store.entries().empty());
   EXPECT_EQ(tree(folder), before);
+}
+
+TEST_F(StoreFolderTest, ACaseInUseIsLeft) {
+  ASSERT_EQ(save(store), "");
+  const fs::path one = folder / "cases" / kHex;
+  put(one / "outputs" / "ct.mha");
+  std::shared_ptr<const void> first = marrow::use_folder(one), second = marrow::use_folder(one);
+  ASSERT_TRUE(first && second);
+  Store::Freed freed = store.collect(0);
+  EXPECT_EQ(freed.fault, "") << "what is in use is no fault";
+  EXPECT_EQ(freed.entries, 1u) << "the entry alone";
+  EXPECT_TRUE(fs::exists(one / "outputs" / "ct.mha"));
+  first.reset();
+  EXPECT_EQ(store.collect(0).entries, 0u);
+  second.reset();
+  EXPECT_EQ(store.collect(0).entries, 1u);
+  EXPECT_FALSE(fs::exists(one));
+  EXPECT_FALSE(marrow::use_folder(one));
+  EXPECT_FALSE(marrow::use_folder(folder / "marrow-store")) << "no folder";
 }
 
 TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {

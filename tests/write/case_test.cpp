@@ -107,6 +107,12 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   value.seeds.add("distal", {"distal", {{1, 2, 3}}, false});
   EXPECT_SAYS((write_case(value, path), 0), "case: two fragments are named 'distal'");
   value = example_case();
+  value.views.add("a\nb", example_view("a\nb", CV_8U, 0));
+  EXPECT_SAYS((write_case(value, path), 0), "case: the name \"a\\x0Ab\" of a view holds a character that cannot be printed; choose another");
+  value = example_case();
+  value.seeds.add("", {"", {{1, 2, 3}}, false});
+  EXPECT_SAYS((write_case(value, path), 0), "case: the name \"\" of a fragment is empty; choose another");
+  value = example_case();
   value.ct.values.pop_back();
   EXPECT_SAYS((write_case(value, path), 0), "ct.mha: 24 samples expected from the grid's size, got 23");
   EXPECT_FALSE(std::filesystem::exists(path));

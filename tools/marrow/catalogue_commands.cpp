@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // list, inspect, doctor, describe: what can be used, from manifests alone.
 #include <cstdio>
+#include <limits>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "commands.hpp"
@@ -105,6 +107,13 @@ std::string yaml_text(const OptionValue& value) {
   }, value);
 }
 
+/// A bound of an option's range; none where it is only what an int can hold.
+std::optional<double> bound_told(const OptionInfo& option, std::optional<double> bound) {
+  using Limits = std::numeric_limits<int>;
+  const bool is_of_int = option.type == OptionType::integer && bound && (*bound == Limits::min() || *bound == Limits::max());
+  return is_of_int ? std::nullopt : bound;
+}
+
 std::string range_text(const OptionInfo& option) {
   if (!option.choices.empty()) {
     std::string text;
@@ -113,9 +122,10 @@ std::string range_text(const OptionInfo& option) {
   }
   std::string text = type_name(option.type);
   if (option.length) text = std::to_string(option.length) + " numbers";
-  if (option.minimum && option.maximum) text += ", " + number_text(*option.minimum) + " to " + number_text(*option.maximum);
-  else if (option.minimum) text += ", at least " + number_text(*option.minimum);
-  else if (option.maximum) text += ", at most " + number_text(*option.maximum);
+  const std::optional<double> least = bound_told(option, option.minimum), most = bound_told(option, option.maximum);
+  if (least && most) text += ", " + number_text(*least) + " to " + number_text(*most);
+  else if (least) text += ", at least " + number_text(*least);
+  else if (most) text += ", at most " + number_text(*most);
   return option.unit.empty() ? text : text + " [" + option.unit + "]";
 }
 

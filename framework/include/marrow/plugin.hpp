@@ -21,10 +21,12 @@
 // Returned: a value, std::optional of one, List<T>, std::shared_ptr<const Interface> for a function, a std::tuple, or a struct
 // whose members are named with .out("port", &Struct::member, "help").
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <deque>
 #include <filesystem>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -191,6 +193,17 @@ constexpr std::size_t option_length() {
   else return 0;
 }
 
+/// A whole number that the member cannot hold is out of the option's range.
+template <class M>
+void narrow_range(OptionInfo& info) {
+  using Limits = std::numeric_limits<M>;
+  constexpr bool kWhole = std::is_integral_v<M> && !std::is_same_v<M, bool>;
+  if constexpr (kWhole && (sizeof(M) < sizeof(std::int64_t) || std::is_unsigned_v<M>))
+    info.minimum = std::max(info.minimum.value_or(double(Limits::min())), double(Limits::min()));
+  if constexpr (kWhole && sizeof(M) < sizeof(std::int64_t))
+    info.maximum = std::min(info.maximum.value_or(double(Limits::max())), double(Limits::max()));
+}
+
 /// Unit by the suffix of a name: "sigma_mm" is in mm.
 std::string unit_of_name(const std::string& name);
 /// Checks the declaration itself (defaults within their range, names well formed, kind's contract) and fills `faults`.
@@ -277,6 +290,7 @@ class NodeBuilder {
     info.length = detail::option_length<M>();
     info.default_value = detail::to_option_value<M>(Options{}.*member);
     (apply(info, attributes), ...);
+    detail::narrow_range<M>(info);
     node_.info.options.push_back(std::move(info));
     node_.set_option.push_back([member](void* options, const OptionValue& value) {
       detail::from_option_value<M>(static_cast<Options*>(options)->*member, value);

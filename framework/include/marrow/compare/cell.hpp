@@ -2,6 +2,7 @@
 #pragma once
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -104,7 +105,11 @@ class CellRunner {
   std::filesystem::path folder_;
   int threads_;
   FileLimits file_limits_;
-  std::map<std::size_t, std::filesystem::path> case_folders_;
+  struct FoundCase {
+    std::filesystem::path outputs;
+    std::shared_ptr<const void> use;  ///< while it lives, no tidying of the store removes the folder
+  };
+  std::map<std::size_t, FoundCase> simulated_;
 };
 
 }  // namespace marrow::compare

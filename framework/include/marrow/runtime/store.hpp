@@ -115,8 +115,8 @@ class Store {
     std::uint64_t bytes = 0;
     std::string fault;  ///< of the first that could not be removed
   };
-  /// Removes the least recently used entries and simulated cases until the rest is at most `keep_bytes`, and what
-  /// killed processes left behind. Touches only what bears a name that the store itself gives, and follows no link.
+  /// Removes the least recently used entries, and simulated cases that no comparison is using, until the rest is at
+  /// most `keep_bytes`, and what killed processes left behind. Touches only what bears a name that the store itself gives, and follows no link.
   Freed collect(std::uint64_t keep_bytes) const;
   /// The same with MARROW_CACHE_GB (20 where it is not set), once a day at most: after a run, so that the store does
   /// not fill the disk. Returns what is wrong with MARROW_CACHE_GB, in which case nothing is removed, or what could not

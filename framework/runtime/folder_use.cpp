@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "folder_use.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// An open folder; what is locked through it is given back when it is closed.
+struct OpenFolder {
+  explicit OpenFolder(const fs::path& folder)
+      : descriptor(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)) {}
+  ~OpenFolder() {
+    if (descriptor >= 0) close(descriptor);
+  }
+  OpenFolder(const OpenFolder&) = delete;
+  OpenFolder& operator=(const OpenFolder&) = delete;
+
+  int descriptor;
+};
+
+bool is_still(const OpenFolder& open_folder, const fs::path& folder) {
+  struct stat held {}, named {};
+  return fstat(open_folder.descriptor, &held) == 0 && lstat(folder.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
+         held.st_ino == named.st_ino;
+}
+
+}  // namespace
+
+std::shared_ptr<const void> use_folder(const fs::path& folder) {
+  auto held = std::make_shared<OpenFolder>(folder);
+  if (held->descriptor < 0) return nullptr;
+  // Who removes a folder holds it alone while it is renamed, no longer.
+  while (flock(held->descriptor, LOCK_SH) != 0 && errno == EINTR) continue;
+  return is_still(*held, folder) ? held : nullptr;
+}
+
+void rename_unused(const fs::path& folder, const fs::path& to, std::error_code& error) {
+  const OpenFolder held(folder);
+  if (held.descriptor >= 0 && flock(held.descriptor, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK) {
+    error = std::make_error_code(std::errc::device_or_resource_busy);
+    return;
+  }
+  fs::rename(folder, to, error);
+}
+
+}  // namespace marrow

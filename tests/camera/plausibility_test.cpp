@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// Each limit of what is said about a camera, just within it and just beyond.
+#include "plugins/camera/plausibility.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "plugins/camera/carm_geometry.hpp"
+
+namespace {
+
+using namespace marrow;
+using camera::Device;
+using camera::SeenPoints;
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+Camera right_camera() {
+  const camera::CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
+  return camera::carm_camera(arm, camera::world_from_camera_rotation(radians(12), radians(35)));
+}
+
+/// Two points near the middle of the camera's image, about 600 mm from the source.
+std::vector<Vector3d> object_seen_by(const Camera& camera) {
+  const Vector3d source = source_position_mm(camera);
+  const Vector2d middle(0.5 * camera.width_px, 0.5 * camera.height_px);
+  return {source + 590 * ray_direction(camera, middle - Vector2d(20, 20)), source + 610 * ray_direction(camera, middle + Vector2d(20, 20))};
+}
+
+/// Whether a sentence with these words is said, and no other. Without an object of its own: of one that the camera sees.
+bool says(const std::string& words, const Camera& camera, const Device& device = {}, std::vector<Vector3d> object = {}) {
+  if (object.empty()) object = object_seen_by(camera);
+  const auto sentences = camera::implausible_numbers(camera, device, object);
+  for (const std::string& sentence : sentences) EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
+  EXPECT_LE(sentences.size(), 1u);
+  return !sentences.empty();
+}
+
+Camera with_focal(double u, double v) {
+  Camera camera = right_camera();
+  camera.intrinsics(0, 0) = u;
+  camera.intrinsics(1, 1) = v;
+  return camera;
+}
+
+Camera with_principal(double u, double v) {
+  Camera camera = right_camera();
+  camera.intrinsics.topRightCorner<2, 1>() = Vector2d(u, v);
+  return camera;
+}
+
+/// So far from the source, in the middle of the image, and of that extent.
+std::vector<Vector3d> object_at(double distance_mm, double extent_mm) {
+  const Camera camera = right_camera();
+  const Vector3d axis = camera.camera_from_world.rotation.row(2).transpose();
+  const Vector3d middle = source_position_mm(camera) + distance_mm * axis;
+  return {middle - 0.5 * extent_mm * axis, middle + 0.5 * extent_mm * axis};
+}
+
+double focal_of_angle(double angle_deg) { return 320 / std::tan(radians(0.5 * angle_deg)); }
+
+/// Points spread over the field, exactly where they should be seen.
+SeenPoints points_of(const Camera& camera, int count = 20) {
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> place(-45, 45);
+  SeenPoints points;
+  for (int i = 0; i < count; ++i) {
+    points.world_mm.emplace_back(place(random), place(random), place(random));
+    points.pixels.push_back(project(camera, points.world_mm.back()));
+  }
+  return points;
+}
+
+}  // namespace
+
+TEST(Plausibility, AnglesOfTheImage) {
+  for (const auto& [angle, said] : {std::pair(59.9, false), {60.1, true}, {2.02, false}, {1.98, true}})
+    EXPECT_EQ(says("opens an image of 640 px", with_focal(focal_of_angle(angle), focal_of_angle(angle))), said) << angle;
+}
+
+TEST(Plausibility, PixelsAreSquareToATenth) {
+  for (const auto& [ratio, said] : {std::pair(1.095, false), {1.105, true}, {0.905, false}, {0.895, true}})
+    EXPECT_EQ(says("so pixels would not be square", with_focal(2000 * ratio, 2000)), said) << ratio;
+}
+
+TEST(Plausibility, FocalLengthIsThatOfTheDeviceToATwentieth) {
+  for (const auto& [ratio, said] : {std::pair(1.049, false), {1.051, true}, {0.951, false}, {0.949, true}})
+    EXPECT_EQ(says("the pixels are scaled to the patient, or binned?", right_camera(), {1000, 0.5 * ratio, 0}), said) << ratio;
+  EXPECT_FALSE(says("", right_camera(), {2000, 0, 0})) << "without the pixels' size nothing is known";
+  EXPECT_FALSE(says("", right_camera(), {0, 5, 0}));
+}
+
+TEST(Plausibility, TheImageFitsOnTheDetectorToAFiftieth) {
+  // 640 x 512 pixels of 0.5 mm.
+  const auto of = [](double detector_mm, double pixel_mm, double source_to_detector_mm) {
+    return says("the size of a pixel is too large, or the image was enlarged", right_camera(), {source_to_detector_mm, pixel_mm, detector_mm});
+  };
+  EXPECT_FALSE(of(320 / 1.019, 0.5, 0));
+  EXPECT_TRUE(of(320 / 1.021, 0.5, 0));
+  EXPECT_FALSE(of(320 / 1.019, 0, 1000)) << "the pixels' size by the focal length";
+  EXPECT_TRUE(of(320 / 1.021, 0, 1000));
+  EXPECT_FALSE(of(1, 0, 0));
+  Camera upright = right_camera();
+  std::swap(upright.width_px, upright.height_px);
+  upright.intrinsics.topRightCorner<2, 1>() = Vector2d(255.5, 319.5);
+  EXPECT_TRUE(says("256 x 320 mm at 0.5 mm per pixel", upright, {0, 0.5, 310})) << "the longer side counts";
+}
+
+TEST(Plausibility, PrincipalPoints) {
+  for (const double factor : {0.25, 0.5, 2.0, 4.0}) {
+    const std::string size = std::to_string(int(640 * factor)) + " x " + std::to_string(int(512 * factor));
+    EXPECT_TRUE(says("lies in the middle of an image of " + size, with_principal(320 * factor + 0.029 * factor * 640, 256 * factor))) << factor;
+    EXPECT_TRUE(says("lies in the middle of an image of " + size, with_principal(320 * factor, 256 * factor - 0.029 * factor * 512))) << factor;
+    const auto beyond = camera::implausible_numbers(with_principal(320 * factor + 0.031 * factor * 640, 256 * factor), {}, object_seen_by(right_camera()));
+    for (const std::string& sentence : beyond) EXPECT_EQ(sentence.find("in the middle of an image of"), std::string::npos) << sentence;
+  }
+  EXPECT_FALSE(says("", with_principal(0.74 * 640, 0.26 * 512)));
+  EXPECT_TRUE(says("lies far from the middle", with_principal(0.76 * 640, 0.5 * 512)));
+  EXPECT_TRUE(says("lies far from the middle", with_principal(0.5 * 640, 0.24 * 512)));
+  EXPECT_TRUE(says("lies far from the middle", with_principal(0.99 * 640, 0.6 * 512)));
+  EXPECT_TRUE(says("lies outside the image", with_principal(1.01 * 640, 0.6 * 512)));
+  EXPECT_TRUE(says("lies outside the image", with_principal(0.6 * 640, -1)));
+}
+
+TEST(Plausibility, SizesAndDistancesOfTheObject) {
+  for (const auto& [extent, said] : {std::pair(3.1, false), {2.9, true}})
+    EXPECT_EQ(says("are its coordinates in metres or centimetres?", right_camera(), {}, object_at(600, extent)), said) << extent;
+  for (const auto& [extent, said] : {std::pair(2490.0, false), {2510.0, true}})
+    EXPECT_EQ(says("are its coordinates in a smaller unit than mm?", right_camera(), {}, object_at(1600, extent)), said) << extent;
+  for (const auto& [distance, said] : {std::pair(151.0, false), {149.0, true}, {4990.0, false}, {5010.0, true}})
+    EXPECT_EQ(says("mm from the X-ray source, where C-arms have 300 to 1500", right_camera(), {}, object_at(distance, 50)), said) << distance;
+  EXPECT_FALSE(says("", right_camera(), {}, {object_at(600, 0)[0]})) << "one point has no extent";
+}
+
+TEST(Plausibility, ObjectsBehindTheSourceOrBesideTheImage) {
+  const std::vector<Vector3d> behind = object_at(-600, 50);
+  std::vector<Vector3d> one = object_seen_by(right_camera());
+  one.push_back(source_position_mm(right_camera()) - 10 * Vector3d(right_camera().camera_from_world.rotation.row(2).transpose()));
+  EXPECT_TRUE(says("1 of 3 points of the object lie behind the X-ray source", right_camera(), {}, one));
+  EXPECT_TRUE(says("2 of 2 points of the object lie behind the X-ray source", right_camera(), {}, behind));
+  // Beside the image: where a pixel more would be in it.
+  const Camera camera = right_camera();
+  const auto at = [&](double u, double v) { return Vector3d(source_position_mm(camera) + 600 * ray_direction(camera, {u, v})); };
+  const auto is_said = [&](const std::vector<Vector3d>& object) { return says("the object is projected wholly outside the image", camera, {}, object); };
+  for (const auto& [u, v] : {std::pair(-1.5, 200.0), {640.5, 200.0}, {300.0, -1.5}, {300.0, 512.5}}) {
+    EXPECT_TRUE(is_said({at(u, v), at(u, v) + 5 * (at(u, v) - at(320, 256)).normalized()})) << u << ", " << v;
+    EXPECT_FALSE(is_said({at(u, v), at(320, 256)})) << "a part is seen";
+  }
+  for (const auto& [u, v] : {std::pair(-0.5, 200.0), {639.5, 200.0}, {300.0, -0.5}, {300.0, 511.5}})
+    EXPECT_FALSE(is_said({at(u, v), at(u, v) + 5 * (at(u, v) - at(320, 256)).normalized()})) << u << ", " << v;
+}
+
+TEST(Reprojection, IsTheRootMeanSquareOfDistances) {
+  const Camera camera = right_camera();
+  SeenPoints points = points_of(camera, 4);
+  EXPECT_NEAR(camera::reprojection_error_px(camera, points), 0, 1e-9);
+  points.pixels[1] += Vector2d(3, 4);
+  points.pixels[2] -= Vector2d(0, 10);
+  EXPECT_NEAR(camera::reprojection_error_px(camera, points), std::sqrt(125.0 / 4), 1e-9);
+  points.world_mm[3] = source_position_mm(camera) - 10 * Vector3d(camera.camera_from_world.rotation.row(2).transpose());
+  EXPECT_EQ(camera::reprojection_error_px(camera, points), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(camera::reprojection_error_px(camera, {}), 0);
+}
+
+TEST(Explanation, OfEveryUnit) {
+  const Camera right = right_camera();
+  for (const auto& [unit, factor] : std::vector<std::pair<std::string, double>>{{"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}}) {
+    SeenPoints points = points_of(right);
+    for (auto& point : points.world_mm) point /= factor;
+    auto sentence = camera::explanation(right, points);
+    ASSERT_TRUE(sentence) << unit;
+    EXPECT_TRUE(sentence->ends_with("if the points are in " + unit + ", not mm")) << *sentence;
+    Camera camera = right;
+    camera.camera_from_world.translation_mm /= factor;
+    sentence = camera::explanation(camera, points_of(right));
+    ASSERT_TRUE(sentence) << unit;
+    EXPECT_TRUE(sentence->ends_with("if the camera's translation is in " + unit + ", not mm")) << *sentence;
+  }
+  Camera twice = right;
+  twice.intrinsics.topRows<2>() *= 2;
+  EXPECT_TRUE(camera::explanation(twice, points_of(right))->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5"));
+}
+
+TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
+  const Camera right = right_camera();
+  // Mirrored, and on top of that off by so many pixels each: 6.4 px are a hundredth of the image, 12.8 px two.
+  const auto mirrored = [&](double noise_px, int count = 20) {
+    SeenPoints points = points_of(right, count);
+    for (std::size_t i = 0; i < points.pixels.size(); ++i) points.pixels[i] = Vector2d(639 - points.pixels[i].x(), points.pixels[i].y() + (i % 2 ? noise_px : -noise_px));
+    return points;
+  };
+  EXPECT_TRUE(camera::explanation(right, mirrored(0)));
+  EXPECT_TRUE(camera::explanation(right, mirrored(12.5))) << "what is left may be a fiftieth of the image";
+  EXPECT_FALSE(camera::explanation(right, mirrored(13.1)));
+  EXPECT_TRUE(camera::explanation(right, mirrored(0, 4)));
+  EXPECT_FALSE(camera::explanation(right, mirrored(0, 3)));
+  // Points near the line about which they are mirrored move little: by d px, and stay off by a part of that.
+  const auto near_line = [&](double off_px, double rest_px) {
+    SeenPoints points = points_of(right);
+    for (std::size_t i = 0; i < points.pixels.size(); ++i) {
+      const double side = i % 2 ? 1 : -1;
+      points.world_mm[i] = source_position_mm(right) + 600 * ray_direction(right, {319.5 - 0.5 * off_px * side, points.pixels[i].y()});
+      points.pixels[i] = Vector2d(319.5 + 0.5 * off_px * side, points.pixels[i].y() + (i % 4 < 2 ? rest_px : -rest_px));
+    }
+    return points;
+  };
+  EXPECT_TRUE(camera::explanation(right, near_line(6.5, 0)));
+  EXPECT_FALSE(camera::explanation(right, near_line(6.3, 0))) << "less than a hundredth of the image is no mistake";
+  EXPECT_TRUE(camera::explanation(right, near_line(10, 2))) << "five times better: sqrt(104) to 2";
+  EXPECT_FALSE(camera::explanation(right, near_line(10, 2.1)));
+}
+
+TEST(Refit, NeedsSixPoints) {
+  const Camera right = right_camera();
+  Camera moved = right;
+  moved.camera_from_world.translation_mm.x() += 4;
+  EXPECT_FALSE(camera::refit_pose(moved, points_of(right, 5)));
+  const auto refit = camera::refit_pose(moved, points_of(right, 6));
+  ASSERT_TRUE(refit);
+  EXPECT_LT(refit->error_px, 1e-3);
+  EXPECT_NEAR(refit->turn_deg, 0, 1e-3);
+  EXPECT_NEAR(refit->shift_mm, 4, 1e-3);
+}
