@@ -9,7 +9,7 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+from marrow_cli import IS_SANITIZED, MARROW, TEST_PLUGINS, Case, main, marrow
 
 PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
@@ -77,11 +77,12 @@ class Compare(Case):
     def test_what_goes_wrong_in_a_cell_stays_there(self):
         path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
                                 "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)
-        result = self.compare(path, "--out", self.scratch / "out", "--time-limit", 2, "--memory-limit", 1000)
+        limit = 20 if IS_SANITIZED else 2
+        result = self.compare(path, "--out", self.scratch / "out", "--time-limit", limit, "--memory-limit", 1000)
         self.assertEqual(result.returncode, 0, result.stderr)
         rows = self.rows("out")
         self.assertEqual(len(rows), 14)
-        reasons = {"crash": "crashed in node 'm': Segmentation fault", "hang": "its process in node 'm' took longer than 2 s",
+        reasons = {"crash": "crashed in node 'm': Segmentation fault", "hang": "its process in node 'm' took longer than %d s" % limit,
                    "memory": "its process in node 'm' used more than 1000 MB of memory", "nan": "'number.value' is nan, not a finite number",
                    "error": "node 'm' (test.misbehave) failed: it will not do", "exit": "ended in node 'm' with exit code 3"}
         for name, row in rows.items():

@@ -13,6 +13,8 @@ SOURCE = pathlib.Path(sys.argv[1])
 BUILD = pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
 TEST_PLUGINS = BUILD / "tests" / "plugins"
+# A sanitizer makes everything several times slower and larger.
+IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
 atexit.register(shutil.rmtree, CACHE, ignore_errors=True)
 os.environ["MARROW_CACHE"] = str(CACHE)
