@@ -161,8 +161,9 @@ fs::path CellRunner::case_folder(std::size_t index) {
   for (int tries = 0; !found.use; ++tries) {
     std::shared_ptr<const void> use = use_folder(folder);
     if (use && is_whole_case(folder, outputs)) found = {outputs, use};
-    else if (tries == 10) throw Error("case '" + one.name + "' is removed again and again; is the store " + folder.parent_path().string() + " being tidied?");
-    else simulate(index, folder);
+    else if (tries < 10) simulate(index, folder);
+    else throw Error("case '" + one.name + "' is removed again and again; let nothing tidy up " +
+                     folder.parent_path().string() + " meanwhile");
   }
   std::error_code ignored;
   fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now: what a cell needs is removed last

@@ -151,7 +151,8 @@ class Records(Commands):
         for values, why in (({"threads": 10**9}, "its 'threads' is 1000000000; expected a whole number from 0 to 1024"), ({"threads": -1}, "its 'threads' is -1; expected"),
                             ({"threads": 1.5}, "its 'threads': expected a whole number"), ({"threads": "2"}, "its 'threads': expected a whole number"),
                             ({"seed": -1}, "its 'seed' is no whole number"), ({"seed": 1e30}, "its 'seed' is no whole number"), ({"seed": None}, "its 'seed' is no whole number"),
-                            ({"status": "\x1b[2J"}, "it says 'status': '\\x1b[2J'"), ({"nodes": {}}, "its 'nodes' is no list"), ({"nodes": [1]}, "what it should say is missing in it, or of another type"),
+                            ({"status": "\x1b[2J"}, "it says 'status': '\\x1b[2J'"), ({"nodes": {}}, "its 'nodes' is no list"),
+                            ({"nodes": [1]}, "what it should say is missing in it, or of another type"),
                             ({"nodes": [{**node, "keys": {"number": "../x"}}]}, "a key in it has not 32 hexadecimal digits"), ({"inputs": 1}, "its 'inputs' is no object"),
                             ({"outputs": {}}, "its 'outputs' is no list"), ({"overrides": [1]}, "of another type"), ({"pipeline": 1}, "of another type")):
             self.change(**values)

@@ -110,7 +110,7 @@ std::string yaml_text(const OptionValue& value) {
 /// A bound of an option's range; none where it is only what an int can hold.
 std::optional<double> bound_told(const OptionInfo& option, std::optional<double> bound) {
   using Limits = std::numeric_limits<int>;
-  const bool is_of_int = option.type == OptionType::integer && bound && (*bound == Limits::min() || *bound == Limits::max());
+  const bool is_of_int = option.type == OptionType::integer && (bound == Limits::min() || bound == Limits::max());
   return is_of_int ? std::nullopt : bound;
 }
 

@@ -125,7 +125,8 @@ void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) 
 
 void check_age(const fs::path& folder, const json& record) {
   const json nodes = record.contains("nodes") ? record["nodes"] : json();
-  if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), [](const json& node) { return !node.is_object() || node.contains("items"); })) return;
+  const auto is_new = [](const json& node) { return !node.is_object() || node.contains("items"); };
+  if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), is_new)) return;
   throw Error((folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
               (record.contains("seed") && record["seed"].is_number() ? record["seed"].dump() : "1"));
 }
