@@ -285,9 +285,9 @@ TEST_F(StoreTest, AForkedChildDoesNotKeepAClaim) {
   { const Store::Claim claim = store.claim(key, nullptr); }
   is_over = true;
   limit.join();
-  EXPECT_EQ(kill(child, SIGKILL), 0);
   int status = 0;
   EXPECT_EQ(waitpid(child, &status, WNOHANG), 0) << "the claim came back only when the child was killed";
+  kill(child, SIGKILL);
   waitpid(child, &status, 0);
 }
 
