@@ -155,8 +155,9 @@ class Resolver {
       }
       // A port that only siblings use is checked like any other, and then left unwired.
       Wire wire = resolve_wire(value, own ? *port : *sibling, node);
-      wire.port = own ? int(port - node.info.inputs.begin()) : -1;
-      if (own) node.wires.push_back(std::move(wire));
+      if (!own) continue;
+      wire.port = int(port - node.info.inputs.begin());
+      node.wires.push_back(std::move(wire));
     }
     for (const PortInfo& port : node.info.inputs)
       if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(), [&](const auto& wire) { return wire.first == port.name; }))

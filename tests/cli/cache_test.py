@@ -6,9 +6,8 @@ import re
 import stat
 import struct
 import subprocess
-import time
 
-from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow
+from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
 
 NUMBER = "marrow: 1\nnodes:\n  c: {uses: test.constant, with: {value: 3}}\noutputs: {number: c}\n"
 WRONG_NUMBERS = ("abc", "inf", "nan", "-5", "0,5", "1e12", "")
@@ -90,19 +89,21 @@ class Cache(Case):
     def test_waiting_for_another_run_is_said_and_is_no_failure(self):
         self.assertEqual(self.run_pipeline().returncode, 0)
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
-        out = self.scratch / "waits"
+        out, said = self.scratch / "waits", "c: waits for another run that is making the same result"
         with open(self.cache / "claims", "r+b") as claims:
             fcntl.fcntl(claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0))  # F_OFD_SETLK: another run makes all there is
             environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.cache))
             process = subprocess.Popen([str(MARROW), "run", str(self.pipeline), "--out", str(out)], env=environment, text=True,
                                        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-            time.sleep(2)
+            self.addCleanup(process.kill)
+            log = out / "log.txt"
+            wait_until(lambda: process.poll() is not None or log.exists() and said in log.read_text(),
+                       "it does not say that it waits")
             self.assertIsNone(process.poll(), "it does not wait")
-            time.sleep(4.5)
-        self.assertEqual(process.wait(timeout=60), 0)
-        said = [" ".join(line.split()) for line in process.stderr.read().splitlines()]
-        self.assertEqual(said[:2], ["c waits for another run that is making the same result", "c goes on after waiting for another run"])
-        self.assertIn("c: waits for another run that is making the same result", (out / "log.txt").read_text())
+        self.assertEqual(process.wait(timeout=120), 0)
+        lines = [" ".join(line.split()) for line in process.stderr.read().splitlines()]
+        self.assertEqual(lines[:2], ["c waits for another run that is making the same result", "c goes on after waiting for another run"])
+        self.assertIn(said, (out / "log.txt").read_text())
 
 
 if __name__ == "__main__":

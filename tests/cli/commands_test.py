@@ -6,7 +6,7 @@ import signal
 import subprocess
 import time
 
-from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow
+from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main, marrow, wait_until
 
 WORK = """marrow: 1
 nodes:
@@ -114,7 +114,8 @@ class Commands(Case):
 
     def test_two_slow_nodes_overlap(self):
         path = self.write("p.yaml", WORK)
-        for attempt in range(3):  # a busy machine, or the one that it is a guest of, may put both threads on one core
+        # A busy machine, or the one that it is a guest of, may put both threads on one core, or let one of them wait.
+        for attempt in range(5):
             out = self.scratch / str(attempt)
             busy_before, before, start = busy_seconds(), resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
             self.assertEqual(marrow("run", path, "--out", out, "--threads", 2, "--no-cache", plugins=[TEST_PLUGINS]).returncode, 0)
@@ -123,21 +124,22 @@ class Commands(Case):
             others = max(0, busy_seconds() - busy_before - cpu)
             print("two slow nodes: CPU %.0f %%, other programs %.0f %%" % (100 * cpu / wall, 100 * others / wall))
             record = json.loads((out / "run.json").read_text())
-            self.assertLess(abs(record["nodes"][0]["start_s"] - record["nodes"][1]["start_s"]), 0.5)
-            self.assertLess(record["seconds"], 3)  # each lasts 2 seconds on the clock: 4 one after the other
-            if cpu / wall > 1.5 or os.cpu_count() - others / wall < 1.9:
+            # Each lasts 2 seconds on the clock: one after the other they begin 2 seconds apart.
+            is_apart = abs(record["nodes"][0]["start_s"] - record["nodes"][1]["start_s"]) >= 2
+            if not is_apart and (cpu / wall > 1.5 or os.cpu_count() - others / wall < 1.9):
                 return
-        self.fail("two nodes never used more than 150 % of a core, on a machine with nothing else to do")
+        self.fail("two nodes never overlapped, or never used more than 150 % of a core on a machine with nothing else to do")
 
     def test_control_c_ends_cleanly(self):
         path = self.write("p.yaml", WORK.replace("2.000001", "60").replace("outputs: {", "  c: {uses: test.constant}\noutputs: {c: c, "))
         environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
         process = subprocess.Popen([str(MARROW), "run", str(path), "--out", str(self.scratch / "out")], env=environment, stdout=subprocess.DEVNULL,
                                    stderr=subprocess.PIPE, text=True)
-        while not (self.scratch / "out" / "log.txt").exists() or "c" not in (self.scratch / "out" / "log.txt").read_text():
-            time.sleep(0.05)
+        self.addCleanup(process.kill)
+        log = self.scratch / "out" / "log.txt"
+        wait_until(lambda: log.exists() and "c: " in log.read_text(), "the first node did not end")
         process.send_signal(signal.SIGINT)
-        errors = process.communicate(timeout=30)[1]
+        errors = process.communicate(timeout=50)[1]  # a node would work for a minute
         self.assertEqual(process.returncode, 130)
         self.assertIn("stopped by Ctrl-C; what was done is in", errors)
         self.assertEqual(json.loads((self.scratch / "out" / "run.json").read_text())["status"], "cancelled")

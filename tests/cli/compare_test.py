@@ -77,7 +77,7 @@ class Compare(Case):
     def test_what_goes_wrong_in_a_cell_stays_there(self):
         path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
                                 "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)
-        limit = 20 if IS_SANITIZED else 2
+        limit = 40 if IS_SANITIZED else 15  # far more than a good cell takes on a busy machine
         result = self.compare(path, "--out", self.scratch / "out", "--time-limit", limit, "--memory-limit", 1000)
         self.assertEqual(result.returncode, 0, result.stderr)
         rows = self.rows("out")
@@ -118,10 +118,11 @@ class Compare(Case):
         killed = 0
         for _ in range(20):
             process = subprocess.Popen([str(MARROW), "compare", str(path), "--out", str(self.scratch / "out"), "--quiet"], env=environment,
-                                       stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
             time.sleep(chance.uniform(0.01, 0.3))
             process.send_signal(signal.SIGKILL)
-            killed += process.wait() == -signal.SIGKILL
+            process.communicate()  # to the end of what its workers could say: none of them writes any more
+            killed += process.returncode == -signal.SIGKILL
             if chance.random() < 0.3:  # begin anew, so that every moment is met
                 shutil.rmtree(self.scratch / "out", ignore_errors=True)
                 shutil.rmtree(self.scratch / "cache", ignore_errors=True)
@@ -140,15 +141,19 @@ class Compare(Case):
 
     def test_a_time_counts_what_the_variants_of_its_own_experiment_do_not_share(self):
         self.experiment({"a": "{}"}, cases=1)
-        self.write("p.yaml", PIPELINE.replace("0.05", "0.3"))
-        seconds = {}
-        for name, variants in (("one", "  a: {}\n  b: {m.value: 5}\n"), ("two", "  a: {}\n  b: {shared.value: 0.1}\n")):
-            path = self.write(name + ".yaml", HEAD + "variants:\n" + variants)
-            result = self.compare(path, "--out", self.scratch / name)
-            self.assertEqual(result.returncode, 0, result.stderr)
-            seconds[name] = float(self.rows(name)["a/0/0"]["seconds"])
-        self.assertLess(seconds["one"], 0.3, "both share it")
-        self.assertGreater(seconds["two"], 0.3, "the same cell, and the other variant makes another one")
+        self.write("p.yaml", PIPELINE.replace("0.05", "1"))
+        seconds = {"one": 1}
+        for attempt in range(5):  # what both share takes a second each time; the rest may, on a busy machine
+            if seconds["one"] < 1:
+                break
+            for name, variant in (("one", "{m.value: 5}"), ("two", "{shared.value: 0.1}")):
+                path = self.write(name + ".yaml", HEAD + "variants:\n  a: {}\n  b: %s\n" % variant)
+                out = "%s-%d" % (name, attempt)
+                result = self.compare(path, "--out", self.scratch / out, cache="cache-%d" % attempt)
+                self.assertEqual(result.returncode, 0, result.stderr)
+                seconds[name] = float(self.rows(out)["a/0/0"]["seconds"])
+        self.assertLess(seconds["one"], 1, "both share it")
+        self.assertGreater(seconds["two"], 1, "the same cell, and the other variant makes another one")
 
     def test_a_simulated_case_that_is_not_whole_is_made_again(self):
         self.write("p.yaml", PIPELINE.replace("0.05", "0"))

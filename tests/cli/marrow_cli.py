@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 SOURCE = pathlib.Path(sys.argv[1])
@@ -26,6 +27,14 @@ def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None
     environment.update(extra_environment or {})
     return subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=cwd, timeout=timeout,
                           env=environment, errors="replace")
+
+
+def wait_until(condition, what, seconds=120):
+    """Returns when the condition holds, which may take long on a machine that has other work."""
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, what
+        time.sleep(0.05)
 
 
 class Case(unittest.TestCase):

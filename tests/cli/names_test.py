@@ -107,7 +107,7 @@ class Names(Commands):
             for bad in (b"\x1b", b"\x07", b"\xc2\x9b", b"\xe2\x80\xae", b"\nmarrow: forged"):
                 self.assertNotIn(bad, text)
         self.assertIn(b"f (\\x1b[2J\\x1b]0;owned\\x07\\x0amarrow: forged)", told[0])
-        self.assertIn(b"w (\\u009b31m\\u202e): 0.", told[-1])
+        self.assertRegex(told[-1], rb"w \(\\u009b31m\\u202e\): \d")
 
     def test_nor_does_a_faulty_file(self):
         # YAML itself lets no escape sequence through, but these it does.
@@ -192,7 +192,7 @@ class Records(Commands):
             one["inputs"] = {port: "%032x" % 2 for port in one["inputs"]}
         nodes[-1]["keys"] = {"number": "%032x" % 3}
         self.write("b/run.json", json.dumps({**self.record, "nodes": nodes}))
-        self.assertIn("First difference: node 'c'", self.expect(1, "diff", "a", "b", timeout=20).stdout)
+        self.assertIn("First difference: node 'c'", self.expect(1, "diff", "a", "b", timeout=120).stdout)
 
     def shown(self):
         """What the page of the run holds."""
@@ -254,7 +254,7 @@ class Sizes(Commands):
         self.write("p.yaml", "marrow: 1\n" + "".join("%08d:\n" % i for i in range(1300000)))
         code, seconds, _, said = self.measured("check", "p.yaml")
         self.assertEqual((code, said), (2, "p.yaml: error: the pipeline file is longer than 4 MB\n1 error\n"))
-        self.assertLess(seconds, 2)
+        self.assertLess(seconds, 20)
 
     def test_files_of_64_kB_take_little(self):
         nodes = "".join(" n%d: {uses: test.add, in: {a: n%d}}\n" % (i, i + 1) for i in range(1500))
@@ -264,7 +264,7 @@ class Sizes(Commands):
             self.write("p.yaml", text)
             code, seconds, megabytes, said = self.measured("check", "p.yaml")
             self.assertIn(code, (0, 2), said[:1000])
-            self.assertLess(seconds, 2, text[:60])
+            self.assertLess(seconds, 20, text[:60])
             self.assertLess(megabytes, 256, text[:60])
             self.assertLess(len(said), 100000)
 

@@ -60,8 +60,9 @@ def run_limited(pipeline_text, folder, limit):
     def restrict():
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    return subprocess.run([str(marrow_cli.MARROW), "run", "p.yaml", "--out", "out", "--quiet"], cwd=folder, capture_output=True, text=True,
-                          errors="replace", timeout=60, preexec_fn=restrict, env=dict(os.environ, MARROW_PLUGIN_PATH=""))
+    # One thread: how many there are at the same moment, each with a stack, would be a matter of chance.
+    command = [str(marrow_cli.MARROW), "run", "p.yaml", "--out", "out", "--quiet", "--threads", "1"]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=240, preexec_fn=restrict, env=dict(os.environ, MARROW_PLUGIN_PATH=""))
 
 
 class Reading(Case):
@@ -333,7 +334,8 @@ class Damaged(Reading):
             result = run_limited(text % (node, bad, options), self.scratch, limit)
             what = "%s, copy %d: %s" % (good.name, number, result.stderr)
             self.assertIn(result.returncode, (0, 1) if number % 3 == 2 else (1,), what)
-            self.assertNotRegex(result.stderr, "bad_alloc|memory|std::|0x[0-9a-f]", what)
+            said = result.stderr.replace(str(self.scratch), "")  # the folder's name may hold any letters
+            self.assertNotRegex(said, "bad_alloc|memory|std::|0x[0-9a-f]", what)
             if result.returncode == 1:
                 self.assertIn(bad.name, result.stderr, what)
             read += result.returncode == 0

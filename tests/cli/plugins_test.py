@@ -79,14 +79,14 @@ class Plugins(Case):
         with socket.socket(socket.AF_UNIX) as end:
             end.bind(str(folder / "socket.so"))
             for command in (["list"], ["inspect", "test.add"], ["schema"], ["check", SOURCE / "pipelines" / "femur.yaml"]):
-                result = marrow(*command, plugins=[folder], extra_environment=self.own(), timeout=60)
+                result = marrow(*command, plugins=[folder], extra_environment=self.own(), timeout=240)
                 self.assertEqual(result.returncode, 0, result.stderr)
-            text = marrow("doctor", plugins=[folder], extra_environment=self.own(), timeout=60).stdout
+            text = marrow("doctor", plugins=[folder], extra_environment=self.own(), timeout=240).stdout
         self.assertIn("REFUSED  %s/pipe.so: it is a named pipe, not a regular file" % folder, text)
         self.assertIn("REFUSED  %s/socket.so: it is a socket, not a regular file" % folder, text)
         self.assertIn("note: its manifest is not used (it is a named pipe, not a regular file), so it was described anew", text)
         self.assertIn("test.add", text, "the others still work")
-        result = marrow("describe", folder / "pipe.so", timeout=60)
+        result = marrow("describe", folder / "pipe.so", timeout=240)
         self.assertEqual((result.returncode, result.stderr), (1, "marrow: error: %s/pipe.so is a named pipe, not a regular file\n" % folder))
 
     def test_an_unknown_library_is_only_loaded_in_a_process_of_its_own(self):
@@ -96,7 +96,7 @@ class Plugins(Case):
             shutil.rmtree(self.scratch / "cache", ignore_errors=True)
             environment = dict(os.environ, MARROW_PLUGIN_PATH=str(folder), LD_DEBUG="files", **self.own())
             with subprocess.Popen([MARROW, *command], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
-                _, messages = program.communicate(timeout=120)
+                _, messages = program.communicate(timeout=240)
             self.assertEqual(program.returncode, 0, messages[-300:])
             loads = [int(line.split(":")[0]) for line in messages.splitlines() if "calling init: %s/marrow_test" % folder in line]
             self.assertEqual(len(loads), 1, command)
@@ -119,7 +119,7 @@ class Plugins(Case):
         folder = self.unknown_library()
         library, manifest = folder / "marrow_test_numbers.so", folder / "marrow_test_numbers.json"
         programs = [subprocess.Popen([MARROW, "describe", library, "--write"]) for _ in range(6)]
-        self.assertEqual([program.wait(timeout=120) for program in programs], [0] * 6)
+        self.assertEqual([program.wait(timeout=240) for program in programs], [0] * 6)
         self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 15)
         self.assertEqual(sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left")
         self.assertEqual(manifest.stat().st_mode & 0o777, 0o644)

@@ -24,7 +24,7 @@ class ExperimentLimits : public ExperimentFiles {
         double(std::clock() - start) / CLOCKS_PER_SEC;  // of this process, whatever else the machine does
     ASSERT_EQ(diagnostics.size(), 1u) << diagnostics.text().substr(0, 2000);
     EXPECT_NE(diagnostics.text().find(fault), std::string::npos) << diagnostics.text().substr(0, 2000);
-    EXPECT_LT(seconds, marrow::abi_stamp().sanitizers ? 20 : 2);
+    EXPECT_LT(seconds, marrow::abi_stamp().sanitizers ? 60 : 20);
   }
   std::string matrix(int keys, int values) {
     static const char* const kOptions[] = {"c.value", "f.value",   "n.scale", "c.count",
@@ -98,7 +98,7 @@ TEST_F(ExperimentLimits, AHundredThousandCasesAreReadAtOnce) {
            kVariants + kMetrics);
   EXPECT_EQ(e.cases.size(), 100000u) << diagnostics.text();
   EXPECT_EQ(marrow::compare::cell_of(e, "two/seed-99999/0")->case_index, 99998u);
-  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 2) << "quadratic, it was minutes";
+  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, 20) << "quadratic, it was minutes";
 }
 
 TEST_F(ExperimentLimits, NamesThatAreTooLongForAFolder) {

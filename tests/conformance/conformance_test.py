@@ -90,21 +90,21 @@ class Conformance(unittest.TestCase):
                 self.assertTrue(failed & expected, "failed: %s, expected one of %s" % (failed, expected))
 
     def test_a_fault_in_one_place_fails_there_alone(self):
-        self.assertEqual({name for name, (passed, _) in conformance("edges.shifted")[1]["edges.shifted"].items() if not passed}, WRONG["edges.shifted"])
-        self.assertEqual({name for name, (passed, _) in conformance("mesh.hasty")[1]["mesh.hasty"].items() if not passed}, WRONG["mesh.hasty"])
-        self.assertEqual({name for name, (passed, _) in conformance("mesh.unturned")[1]["mesh.unturned"].items() if not passed}, WRONG["mesh.unturned"])
+        self.assertEqual({name for name, (passed, _) in conformance("edges.shifted", seconds=60)[1]["edges.shifted"].items() if not passed}, WRONG["edges.shifted"])
+        self.assertEqual({name for name, (passed, _) in conformance("mesh.hasty", seconds=60)[1]["mesh.hasty"].items() if not passed}, WRONG["mesh.hasty"])
+        self.assertEqual({name for name, (passed, _) in conformance("mesh.unturned", seconds=60)[1]["mesh.unturned"].items() if not passed}, WRONG["mesh.unturned"])
 
     def test_what_happened_is_said(self):
-        texts = {name: text for name, (_, text) in conformance("edges.crashing")[1]["edges.crashing"].items()}
+        texts = {name: text for name, (_, text) in conformance("edges.crashing", seconds=60)[1]["edges.crashing"].items()}
         self.assertEqual(texts["one_pixel"], "it crashed: Aborted")
         texts = {name: text for name, (_, text) in conformance("mesh.endless")[1]["mesh.endless"].items()}
         self.assertEqual(texts["nothing_inside"], "it took longer than 10 s")
-        texts = {name: text for name, (_, text) in conformance("mesh.fat")[1]["mesh.fat"].items()}
+        texts = {name: text for name, (_, text) in conformance("mesh.fat", seconds=60)[1]["mesh.fat"].items()}
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_right_ones_pass(self):
         for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "project.plain", "segment.plain", "shaft.plain", "similarity.plain"):
-            result, nodes = conformance(node, seconds=60)
+            result, nodes = conformance(node, seconds=300)
             self.assertEqual(result.returncode, 0, result.stdout)
 
     def test_unknown(self):

@@ -22,7 +22,7 @@ HELP = "SUBJECT/main|children/CALL/N/1|forever/PLACE: only this fault, as the li
 
 class Injector:
     def __init__(self, program, seed):
-        self.program, self.chance, self.number = program, random.Random(seed), 0
+        self.program, self.seed, self.chance, self.number = program, seed, random.Random(seed), 0
         self.subjects = {subject.name: subject for subject in (Run(program), Compare(program), Collect(program))}
         for subject in self.subjects.values():
             if subject.name != "gc":
@@ -96,7 +96,8 @@ def chosen_faults(injector, options):
     faults = []
     for group in injector.groups(names, options.calls):
         if not options.all:
-            faults.append(injector.chance.choice(group))
+            # A draw of its own: how often a call is made may differ, and must not change which of the others fails.
+            faults.append(random.Random("%d %s" % (injector.seed, group[0])).choice(group))
             continue
         rare = group[0].call == "loader_malloc" or (group[0].call == "malloc" and (group[0].times == "forever" or group[0].subject == "compare"))
         most = options.most if rare else len(group)

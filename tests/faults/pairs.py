@@ -110,14 +110,15 @@ class Pairs:
     def two_experiments(self, folder, gap_s):
         ended = self.both(folder, *(self.compare.arguments(None, experiment) for experiment in EXPERIMENTS), gap_s)
         yield from self.one_was_told(ended)
-        in_turn = all(one.code == 0 for one in ended)  # the first had ended: the second goes on with its name, as after an edit
-        for experiment, one in zip(EXPERIMENTS, ended):
-            if one.code != 0 or (in_turn and experiment == EXPERIMENTS[0]):
-                continue
-            out = folder / "runs" / "compare" / "small-experiment"
+        out = folder / "runs" / "compare" / "small-experiment"
+        # Where both went well, one of them had ended when the other came, which goes on with its name, as after an edit.
+        good = [experiment for experiment, one in zip(EXPERIMENTS, ended) if one.code == 0]
+        held = (out / "experiment.yaml").read_bytes() if good else b""
+        whose = [experiment for experiment in good if (self.program.data / experiment).read_bytes() == held]
+        if good and not whose:
+            yield "experiment.yaml is that of the other one"
+        for experiment in whose:
             yield from self.compare.complaints_of(out, True, True, experiment)
-            if (out / "experiment.yaml").read_bytes() != (self.program.data / experiment).read_bytes():
-                yield "experiment.yaml is that of the other one"
 
     def comparisons_one_store(self, folder, gap_s):
         ended = self.both(folder, *(self.compare.arguments(folder / str(i), experiment) for i, experiment in enumerate(EXPERIMENTS)), gap_s)

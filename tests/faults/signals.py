@@ -107,14 +107,18 @@ class Signals:
 
     @staticmethod
     def orphans(mark):
-        for _ in range(30):
+        for _ in range(300):
             left = processes_with(mark)
             if not left:
                 return []
             time.sleep(0.1)
-        names = [pathlib.Path("/proc/%d/cmdline" % one).read_bytes().replace(b"\0", b" ").decode() for one in left]
+        names = []
         for one in left:
-            os.kill(one, signal.SIGKILL)
+            try:
+                names.append(pathlib.Path("/proc/%d/cmdline" % one).read_bytes().replace(b"\0", b" ").decode())
+                os.kill(one, signal.SIGKILL)
+            except OSError:  # it has just ended
+                pass
         return ["left behind: " + "; ".join(names)]
 
     @staticmethod

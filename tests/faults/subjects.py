@@ -111,7 +111,7 @@ class Program:
         return {**self.environment, "MARROW_CACHE": str(folder / "store"), **more}
 
     def run(self, arguments, folder, **more):
-        return subprocess.run([str(self.marrow), *map(str, arguments)], capture_output=True, text=True, errors="replace", cwd=folder, timeout=180,
+        return subprocess.run([str(self.marrow), *map(str, arguments)], capture_output=True, text=True, errors="replace", cwd=folder, timeout=400,
                               stdin=subprocess.DEVNULL, env=self.environment_of(folder, **more))
 
     def damaged_entries(self, folder):
@@ -192,7 +192,7 @@ class Compare:
         self.program = program
 
     def arguments(self, out, experiment="small-experiment.yaml", more=()):
-        return ["compare", self.program.data / experiment, "--jobs", 2, "--time-limit", 20, *more, *(["--out", out] if out else [])]
+        return ["compare", self.program.data / experiment, "--jobs", 2, "--time-limit", 60, *more, *(["--out", out] if out else [])]
 
     def prepare(self, folder):
         pass

@@ -31,7 +31,7 @@ inline std::size_t address_space_bytes() {
   return pages * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
-/// What reading comes to in a process that may reserve only `limit` bytes more than it has, and gets 20 seconds. `said`: the error.
+/// What reading comes to in a process that may reserve only `limit` bytes more than it has, and gets 60 seconds. `said`: the error.
 inline Outcome outcome_of(const std::function<void()>& read, const std::string& file_name, std::size_t limit, std::string& said) {
   int channel[2];
   if (::pipe(channel) != 0) throw std::runtime_error("no pipe");
@@ -42,7 +42,7 @@ inline Outcome outcome_of(const std::function<void()>& read, const std::string& 
     const rlimit memory{most, most}, no_core{0, 0};
     ::setrlimit(RLIMIT_AS, &memory);
     ::setrlimit(RLIMIT_CORE, &no_core);
-    ::alarm(20);
+    ::alarm(60);
     Outcome outcome = Outcome::accepted;
     std::string text;
     try {

@@ -41,6 +41,12 @@ inline void put(const std::filesystem::path& path, const std::string& bytes) {
   std::ofstream(path, std::ios::binary) << bytes;
 }
 
+/// `text` without a folder's name, which may hold any letters.
+inline std::string without_folder(std::string text, const std::filesystem::path& folder) {
+  for (std::size_t at; (at = text.find(folder.string())) != std::string::npos;) text.erase(at, folder.string().size());
+  return text;
+}
+
 /// `text` with the first `from` replaced.
 inline std::string with(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
@@ -87,7 +93,7 @@ void expect_damage_is_diagnosed(const std::filesystem::path& good, const std::fi
     const std::string said = message_of([&] { read(damaged); });
     EXPECT_NE(said.find(damaged.filename().string()), std::string::npos)
         << how << ": " << (said.empty() ? "(nothing thrown)" : said);
-    EXPECT_EQ(said.find("0x"), std::string::npos) << how << ": " << said;
+    EXPECT_EQ(without_folder(said, damaged.parent_path()).find("0x"), std::string::npos) << how << ": " << said;
   };
   for (const double part : {0.01, 0.1, 0.5, 0.9, 0.99})
     expect_named(bytes.substr(0, std::size_t(double(bytes.size()) * part)), "cut off at " + std::to_string(part));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
+#include <algorithm>
 #include <ctime>
 
 #include "plugins/read/camera_file.hpp"
@@ -96,11 +97,15 @@ void write_strip(const TemporaryFolder& folder, int squares) {
   put(folder / "a.stl", stl);
 }
 
-/// Processor time, which does not count what other programs take.
+/// Processor time, which does not count what other programs take; the least of five, since they take from its caches.
 double seconds_to_read(const Path& path) {
-  const std::clock_t begin = std::clock();
-  EXPECT_EQ(marrow::read::read_mesh_file(path, 1).triangles.size(), 200000u);
-  return double(std::clock() - begin) / CLOCKS_PER_SEC;
+  double least = 1e9;
+  for (int i = 0; i < 5; ++i) {
+    const std::clock_t begin = std::clock();
+    EXPECT_EQ(marrow::read::read_mesh_file(path, 1).triangles.size(), 200000u);
+    least = std::min(least, double(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  return least;
 }
 
 TEST_F(HostileTexts, PlyIsReadAsFastAsStl) {

@@ -23,6 +23,7 @@ def missing():
 class Browser:
     def __init__(self):
         from selenium import webdriver
+        from selenium.common.exceptions import WebDriverException
         from selenium.webdriver.chrome.service import Service
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
@@ -30,7 +31,14 @@ class Browser:
         for flag in flags + (["--no-sandbox"] if os.geteuid() == 0 else []):
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-        self.driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+        for is_last in (False, False, True):  # on a busy machine it may come too late for its driver
+            try:
+                self.driver = webdriver.Chrome(service=Service(shutil.which("chromedriver")), options=options)
+                break
+            except WebDriverException:
+                if is_last:
+                    raise
+        self.driver.set_script_timeout(120)
 
     def open(self, path, width_px=1200, height_px=900, theme="light"):
         """Opens a page from disk; the seconds until it says that it is ready."""
@@ -46,10 +54,14 @@ class Browser:
     def js(self, text, *arguments):
         return self.driver.execute_script(text, *arguments)
 
-    def wait(self, condition, seconds=30):
+    def wait(self, condition, seconds=120):
+        from selenium.common.exceptions import JavascriptException
         end = time.monotonic() + seconds
         while True:
-            value = self.js(condition)
+            try:
+                value = self.js(condition)
+            except JavascriptException:  # the page is not there yet
+                value = None
             if value:
                 return value
             if time.monotonic() > end:

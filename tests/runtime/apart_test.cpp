@@ -89,11 +89,9 @@ TEST_F(ApartTest, MemoryIsLimitedByTheFilesSize) {
 
 TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
   settings.file_limits.seconds = 0.2;
-  const auto start = std::chrono::steady_clock::now();
   const std::string limit = marrow::abi_stamp().sanitizers ? "4" : "0.2";
   EXPECT_EQ(failure("spin"), ": to read it takes more than " + limit + " s, which is more than a file of its size should; "
                                              "where the file is good, raise the limit with --file-seconds");
-  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(20));
 }
 
 TEST_F(ApartTest, WhatALibraryPrintsIsNoAnswer) { EXPECT_EQ(failure("shout"), ""); }

@@ -94,7 +94,7 @@ TEST(Suggestion, LongAndManyNamesTakeNoTime) {
   std::vector<std::string> known;
   for (int i = 0; i < 2000; ++i) known.push_back("node_" + std::to_string(10000 + i));
   for (int i = 0; i < 200; ++i) EXPECT_TRUE(marrow::nearest_name("other_" + std::to_string(10000 + i), known).empty());
-  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, marrow::abi_stamp().sanitizers ? 20 : 2);
+  EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, marrow::abi_stamp().sanitizers ? 60 : 20);
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <mutex>
-#include <thread>
+#include <atomic>
+#include <functional>
 
 #include "marrow/runtime/run_folder.hpp"
 #include "runtime/fixture.hpp"
@@ -21,7 +21,10 @@ class ExecutorTest : public testing::Test {
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     settings.seed = seed;
     settings.threads = threads;
-    settings.observer = [this](const RunEvent& event) { events.push_back(event); };
+    settings.observer = [this](const RunEvent& event) {
+      events.push_back(event);
+      if (on_event) on_event(event);
+    };
     return marrow::run_pipeline(pipeline, test_catalogue(), settings);
   }
   marrow::Value output(const RunResult& result, std::size_t index = 0) { return marrow::value_of(result, pipeline.outputs[index].source); }
@@ -35,6 +38,7 @@ class ExecutorTest : public testing::Test {
   Pipeline pipeline;
   marrow::RunSettings settings;
   std::vector<RunEvent> events;
+  std::function<void(const RunEvent&)> on_event;
 };
 
 TEST_F(ExecutorTest, AddsAlongTheGraph) {
@@ -164,23 +168,27 @@ TEST_F(ExecutorTest, SeedDecidesRandomNodesAlone) {
 }
 
 TEST_F(ExecutorTest, IndependentNodesOverlap) {
-  const RunResult result = run("  a: {uses: test.work, with: {value: 0.5}}\n  b: {uses: test.work, with: {value: 0.5000001}}\n", "a: a, b: b");
-  EXPECT_LT(std::abs(result.nodes[0].start_s - result.nodes[1].start_s), 0.25);
+  // One after the other they would never begin less than half a second apart; a busy machine may let one of them wait.
+  RunResult result;
+  double apart_s = 1;
+  for (int i = 0; i < 20 && apart_s >= 0.5; ++i) {
+    result = run("  a: {uses: test.work, with: {value: 0.5}}\n  b: {uses: test.work, with: {value: 0.5000001}}\n", "a: a, b: b");
+    apart_s = std::abs(result.nodes[0].start_s - result.nodes[1].start_s);
+  }
+  EXPECT_LT(apart_s, 0.5);
   EXPECT_GT(result.nodes[0].peak_memory_mb, 0);
 }
 
 TEST_F(ExecutorTest, CancelStopsWithinANode) {
   std::atomic<bool> stop{false};
   settings.cancelled = &stop;
-  std::thread stopper([&] {
-    std::this_thread::sleep_for(std::chrono::milliseconds(200));
-    stop = true;
-  });
+  on_event = [&](const RunEvent& event) {
+    if (event.node == "a" && event.kind == RunEvent::Kind::progress) stop = true;
+  };
   const RunResult result = run("  c: {uses: test.constant}\n  a: {uses: test.work, in: {after: c}, with: {value: 60}}\n  b: {uses: test.add, in: {a: a}}\n", "b: b, c: c");
-  stopper.join();
   EXPECT_TRUE(result.cancelled());
   EXPECT_FALSE(result.failed());
-  EXPECT_LT(result.seconds, 30);
+  EXPECT_LT(result.seconds, 50) << "the node works for a minute";
   EXPECT_EQ(number(result, 1), 1);
 }
 

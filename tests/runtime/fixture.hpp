@@ -17,7 +17,10 @@ class Scratch {
     std::string name = (std::filesystem::temp_directory_path() / "marrow-test-XXXXXX").string();
     path = mkdtemp(name.data());
   }
-  ~Scratch() { std::filesystem::remove_all(path); }
+  ~Scratch() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path, ignored);
+  }
   std::filesystem::path write(const std::string& name, const std::string& text) const {
     std::ofstream(path / name) << text;
     return path / name;
