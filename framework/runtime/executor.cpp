@@ -218,8 +218,9 @@ class Executor {
       finish_node(index);
       return;
     }
-    state.unfinished = state.calls.size();
-    for (std::size_t c = 0; c < state.calls.size(); ++c) enqueue([this, index, c] { evaluate(index, c); });
+    const std::size_t count = state.calls.size();  // the last of them to end clears the calls
+    state.unfinished = count;
+    for (std::size_t c = 0; c < count; ++c) enqueue([this, index, c] { evaluate(index, c); });
   }
 
   /// Gathers the inputs and spreads them over the mapped axes.

@@ -199,8 +199,11 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
   for (int i = 1;; ++i) {
     RunFolder run;
     run.folder_ = i == 1 ? base : fs::path(base.string() + "-" + std::to_string(i));
-    if (::mkdir(run.folder_.c_str(), 0777) == 0 && run.take(pipeline)) return run;
-    if (errno != EEXIST) throw Error("cannot make the output folder " + run.folder_.string() + ": " + std::strerror(errno) + kAdvice);
+    if (::mkdir(run.folder_.c_str(), 0777) == 0) {
+      if (run.take(pipeline)) return run;
+    } else if (errno != EEXIST) {
+      throw Error("cannot make the output folder " + run.folder_.string() + ": " + std::strerror(errno) + kAdvice);
+    }
   }
 }
 
