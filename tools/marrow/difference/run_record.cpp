@@ -141,7 +141,7 @@ RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const js
   run.seed = seed_of(record.at("seed"));
   run.threads = int(integer_of(record.value("threads", json(0)), 0, 1024, "its 'threads'"));
   const json inputs = map_in(record, "inputs");
-  for (const auto& [name, value] : inputs.items()) run.arguments.inputs.emplace_back(name, value);
+  for (const auto& [name, value] : inputs.items()) run.arguments.inputs.push_back({name, value});
   for (const std::string text : list_in(record, "overrides")) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
   for (const json& plugin : list_in(record, "plugins")) run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
   for (const json& output : list_in(record, "outputs"))
