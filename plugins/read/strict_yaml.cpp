@@ -26,7 +26,10 @@ struct Refusal : YAML::Exception {
 /// What is looked at before a tree is made of a file: its nodes cost some hundred bytes each.
 class Census final : public YAML::EventHandler {
  public:
-  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentStart(const YAML::Mark& mark) override {
+    // Of some texts that are no YAML, such as a single comma, the parser makes documents without end.
+    if (documents_++) throw Refusal(mark, "expected one YAML document, got more");
+  }
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { count(mark, anchor); }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t) override { refuse(mark); }
@@ -47,6 +50,7 @@ class Census final : public YAML::EventHandler {
     if (++nodes_ > kMostNodes) throw Refusal(mark, "it has more than 1000000 values");
   }
   std::size_t nodes_ = 0;
+  int documents_ = 0;
 };
 
 std::vector<std::string> split_lines(const std::string& text) {
@@ -114,10 +118,9 @@ YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
     std::istringstream stream(text);
     Census census;
     YAML::Parser parser(stream);
-    int documents = 0;
-    while (parser.HandleNextDocument(census)) ++documents;
-    if (documents > 1) throw Error(path_.string() + ": expected one YAML document, got " + std::to_string(documents));
-    if (documents == 1) root_ = YAML::Load(text);
+    bool is_empty = true;
+    while (parser.HandleNextDocument(census)) is_empty = false;
+    if (!is_empty) root_ = YAML::Load(text);
   } catch (const Refusal& refusal) {
     throw Error(describe(refusal.mark, refusal.msg));
   } catch (const YAML::Exception& error) {

@@ -227,6 +227,7 @@ static int fails(int call, int at, const char* path) {
     return NEXT(name) arguments;                                                    \
   }
 
+#define NO_FOLDER (-2)  // below none that is asked for
 OPEN(open, (const char* path, int flags, ...), (path, flags, mode), AT_FDCWD)
 OPEN(open64, (const char* path, int flags, ...), (path, flags, mode), AT_FDCWD)
 OPEN(openat, (int at, const char* path, int flags, ...), (at, path, flags, mode), at)
@@ -237,8 +238,8 @@ FUNCTION(FILE*, fopen, (const char* path, const char* mode), (path, mode), kOpen
 FUNCTION(FILE*, fopen64, (const char* path, const char* mode), (path, mode), kOpen, AT_FDCWD, path, NULL)
 FUNCTION(DIR*, opendir, (const char* path), (path), kOpen, AT_FDCWD, path, NULL)
 FUNCTION(DIR*, fdopendir, (int at), (at), kOpen, at, NULL, NULL)
-FUNCTION(int, shm_open, (const char* path, int flags, mode_t mode), (path, flags, mode), kOpen, -1, path, -1)
-FUNCTION(int, memfd_create, (const char* path, unsigned flags), (path, flags), kOpen, -1, path, -1)
+FUNCTION(int, shm_open, (const char* path, int flags, mode_t mode), (path, flags, mode), kOpen, NO_FOLDER, path, -1)
+FUNCTION(int, memfd_create, (const char* path, unsigned flags), (path, flags), kOpen, NO_FOLDER, path, -1)
 
 FUNCTION(ssize_t, read, (int at, void* data, size_t size), (at, data, size), kRead, at, NULL, -1)
 FUNCTION(ssize_t, readv, (int at, const struct iovec* parts, int count), (at, parts, count), kRead, at, NULL, -1)

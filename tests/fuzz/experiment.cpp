@@ -17,11 +17,22 @@ void put_neighbours() {
   for (const char* name : {"cases/a", "cases/b"}) std::filesystem::create_directories(fuzz::folder() / name);
 }
 
+/// Numbers of many digits make many cases, up to the most that there may be, which takes a thousand times as long.
+bool has_long_number(std::string_view text) {
+  std::size_t digits = 0;
+  for (const char letter : text) {
+    digits = letter >= '0' && letter <= '9' ? digits + 1 : 0;
+    if (digits > 3) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   static const bool once = (put_neighbours(), true);
   (void)once;
+  if (size % 64 != 0 && has_long_number({reinterpret_cast<const char*>(data), size})) return -1;  // one in 64 may
   const std::filesystem::path file = fuzz::put("experiment.yaml", {reinterpret_cast<const char*>(data), size});
   fuzz::expect_value_or_error([&] {
     Diagnostics faults;

@@ -137,6 +137,10 @@ TEST_F(HostileTexts, YamlAliasesAreRefused) {
   expect_seeds(points, "a.yaml:3:6: anchors and aliases (&name, *name) are not read; write the value out");
 }
 
+TEST_F(HostileTexts, YamlWhoseDocumentsHaveNoEnd) {
+  for (const char* text : {",", ",\na: 1\n", "a: 1\n---\nb: 2\n"}) expect_seeds(text, "expected one YAML document, got more");
+}
+
 TEST_F(HostileTexts, ManyFaultsAreCountedNotListed) {
   std::string text = "marrow-seeds: 1\n";
   for (int i = 0; i < 6000; ++i) text += "key" + std::to_string(i) + ": " + std::string(2, 'x') + "\n";

@@ -64,7 +64,7 @@ TEST(ReadPose, DiagnosesFaults) {
   expect(kPose + "covariance: [[1]]\n", "covariance: expected 6 rows of 6 numbers");
   expect("- a\n", "expected a YAML map of keys and values, got a list of 1");
   expect("", "expected a YAML map of keys and values, got nothing");
-  expect(kPose + "---\n" + kPose, "expected one YAML document, got 2");
+  expect(kPose + "---\n" + kPose, "expected one YAML document, got more");
 }
 
 }  // namespace
