@@ -4,6 +4,7 @@
 
 #include <csetjmp>
 #include <cstring>
+#include <new>
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
@@ -37,6 +38,10 @@ struct Reader {
   explicit Reader(Source& source) {
     png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &source, on_error, on_warning);
     info = png_create_info_struct(png);
+    if (!info) {
+      png_destroy_read_struct(&png, nullptr, nullptr);
+      throw std::bad_alloc();
+    }
     png_set_read_fn(png, &source, take);
     // What is no pixels is passed over: libpng takes the memory that a comment claims, and only warns where that is much.
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
