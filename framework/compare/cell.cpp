@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <set>
 #include <sstream>
 
@@ -90,11 +89,18 @@ int evaluations_in(const Value& value) {
 std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
 
 bool is_whole_case(const fs::path& folder, const fs::path& outputs) {
-  std::string content;
-  std::getline(std::ifstream(folder / "content.txt") >> std::ws, content);
   try {
-    return !content.empty() && content == content_of_case(outputs);
+    return read_text_file(folder / "content.txt", kMostSourceBytes) == content_of_case(outputs) + "\n";
   } catch (const std::exception&) {  // it cannot even be read
+    return false;
+  }
+}
+
+/// False too for a file that is not there, or cannot be read.
+bool has_text(const fs::path& file, const std::string& text) {
+  try {
+    return read_text_file(file, kMostSourceBytes) == text;
+  } catch (const Error&) {
     return false;
   }
 }
@@ -186,10 +192,7 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
     if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
   const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
-  std::ofstream content(temporary.path / "content.txt");
-  content << content_of_case(temporary.path / outputs) << '\n';
-  content.close();
-  if (!content) throw Error("case '" + one.name + "' cannot be written to " + folder.string() + "; is the disk full?");
+  write_text_file(temporary.path / "content.txt", content_of_case(temporary.path / outputs) + "\n");
   std::error_code error;
   fs::rename(temporary.path, folder, error);
   if (!error || is_whole_case(folder, folder / outputs)) return;  // another process may have been quicker
@@ -300,9 +303,7 @@ bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunE
   const fs::path folder = pictures_of(cell);
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::pictures);
   const std::string key = key_of(cell, pipeline);
-  std::string found;
-  std::getline(std::ifstream(folder / "key.txt"), found);
-  if (found == key) return false;
+  if (has_text(folder / "key.txt", key + "\n")) return false;
   const Done done = run_into(folder, pipeline, cell, observer);
   if (!done.fault.empty()) throw Error(done.fault);
   write_text_file(folder / "key.txt", key + "\n");

@@ -7,6 +7,7 @@
 #include "folder_search.hpp"
 #include "marrow/domain/error.hpp"
 #include "runtime/file_names.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::compare {
 namespace {
@@ -61,7 +62,10 @@ class CaseReader {
     const ExperimentCase& other = experiment_.cases[known->second];
     const std::string names = "'" + one.name + "'" + (other.name == one.name ? "" : " and '" + other.name + "', which is one folder to some file systems");
     yaml_.fault(place, "two cases are named " + names,
-                one.folder.empty() ? "give each seed once" : other.folder.empty() ? "rename the folder" : "they are " + other.folder.string() + " and " + one.folder.string());
+                one.folder.empty() ? "give each seed once"
+                : other.folder.empty()
+                    ? "rename the folder"
+                    : "they are " + printable(other.folder.string()) + " and " + printable(one.folder.string()));
     return false;
   }
 
@@ -87,9 +91,10 @@ class CaseReader {
         if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder, false, 1}, place)) return;
       } else if (fs::is_symlink(folder, error)) {  // not what else lies among the cases: it may have been one
         if (fs::exists(folder, error)) continue;
-        return yaml_.fault(place, "the link " + folder.string() + " leads nowhere", "remove it, or put its target back");
+        return yaml_.fault(place, "the link " + printable(folder.string()) + " leads nowhere",
+                           "remove it, or put its target back");
       } else if (fs::status(folder, error).type() == fs::file_type::none) {
-        return yaml_.fault(place, folder.string() + " cannot be looked at: " + error.message());
+        return yaml_.fault(place, printable(folder.string()) + " cannot be looked at: " + error.message());
       }
     }
     if (!any) yaml_.fault(place, "there is no folder at '" + pattern + "'", "the path starts at the experiment's file");

@@ -8,6 +8,7 @@
 
 #include <cstdlib>
 
+#include "keys.hpp"
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "regular_file.hpp"
@@ -62,6 +63,11 @@ fs::path cached_file(const Digest& library, const Digest& framework, bool make) 
   name.add(library);
   name.add(framework);
   return folder / (name.digest().hex() + ".json");
+}
+
+/// Packages come with another size when they change. What people build themselves may have the same size and do something else.
+bool is_of_the_system(const std::string& library) {
+  return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
 }
 
 /// That the description belongs to this very library and to the libraries that are here now; else why not.
@@ -142,7 +148,7 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   std::string note;
   std::optional<LibraryInfo> known = from_manifest(file, digest, note);
   if (!known) known = from_cache(digest, framework);
-  LibraryInfo info = known ? *known : describe_anew(file, digest, framework);
+  LibraryInfo info = known ? std::move(*known) : describe_anew(file, digest, framework);
   info.file = file;
   info.note = note;
   Hasher build_id;
@@ -151,6 +157,7 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   for (const LinkedLibrary& library : info.linked) {
     build_id.add(fs::path(library.path).filename().string());
     build_id.add(library.size);
+    if (!is_of_the_system(library.path)) build_id.add(path_digest(library.path));
   }
   info.build_id = build_id.digest();
   return info;

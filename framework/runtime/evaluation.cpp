@@ -273,9 +273,10 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   double seconds = 0;
   try {
     if (settings_.cancelled && settings_.cancelled->load()) throw Cancelled();
+    const Digest before = states_of_files(pipeline_.nodes[node]);
     // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
-    check_unchanged(node, inputs, recipe);
+    check_unchanged(node, inputs, recipe, before);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);
     report(RunEvent::Kind::finished, node, item, "", 1, seconds);
@@ -306,10 +307,12 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   return result;
 }
 
-/// What was read must be what the key counts, or the store would keep it for another content for ever.
-void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe) const {
+/// What was read must be what the key counts, or the store would keep it for another content for ever. A file that was changed
+/// and changed back has another state than before.
+void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const Digest& states) const {
   const std::vector<std::string> paths = paths_of(pipeline_.nodes[node]);
-  if (!paths.empty() && recipe_of(pipeline_.nodes[node], inputs) != recipe.recipe)
+  if (paths.empty()) return;
+  if (states_of_files(pipeline_.nodes[node]) != states || recipe_of(pipeline_.nodes[node], inputs) != recipe.recipe)
     throw Error(paths[0] + (paths.size() > 1 ? " or another file of the node" : "") + " changed while it was read; run it again");
 }
 

@@ -71,7 +71,7 @@ class Evaluation {
                                std::vector<std::string>& warnings);
   void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result, double seconds,
             std::vector<std::string> warnings);
-  void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe) const;
+  void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const Digest& states) const;
   static void make_inputs(const NodeDefinition& definition, std::vector<Value>& inputs);
   Context::Hooks make_hooks(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings);
 

@@ -65,12 +65,13 @@ Digest digest_once(const fs::path& file) {
   return digest;
 }
 
-/// Hashes the content of a file, or of every file below a folder with its relative name.
+/// Hashes the content and the name of a file, or of every file below a folder with its name from there. The name may decide
+/// what is made of the content: how it is read, or what an item is called.
 void add_path(Hasher& hasher, const std::string& text) {
   const std::vector<NamedFile> files = files_named_by(text);
   if (files.empty()) hasher.add(std::string("absent"));  // the node itself says so
   for (const NamedFile& file : files) {
-    hasher.add(file.name);
+    hasher.add(file.name == "." ? fs::path(text).filename().string() : file.name);
     hasher.add(file.is_there ? digest_once(file.file) : Digest{});
   }
 }
@@ -95,6 +96,25 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs) {
     hasher.add(node.info.inputs[i].name);
     hasher.add(key_of(inputs[i]));
   }
+  return hasher.digest();
+}
+
+Digest states_of_files(const PipelineNode& node) {
+  Hasher hasher;
+  const auto add_time = [&](const timespec& time) {
+    hasher.add(std::int64_t(time.tv_sec));
+    hasher.add(std::int64_t(time.tv_nsec));
+  };
+  for (const std::string& path : paths_of(node))
+    for (const NamedFile& file : files_named_by(path)) {
+      const FileState state = state_of(file.file).value_or(FileState{});
+      hasher.add(file.name);
+      hasher.add(std::uint64_t(state.device));
+      hasher.add(std::uint64_t(state.number));
+      hasher.add(std::int64_t(state.size));
+      add_time(state.written);
+      add_time(state.changed);
+    }
   return hasher.digest();
 }
 

@@ -9,16 +9,20 @@
 
 namespace marrow {
 
-/// The recipe of one call of a node: its name, the options that affect its result (a path by the content of all that it
-/// names) and the keys of its inputs. Without the build id, so that a rebuilt plugin draws the same random numbers.
+/// The recipe of one call of a node: its name, the options that affect its result (a path by the names and content of all
+/// that it names) and the keys of its inputs. Without the build id, so that a rebuilt plugin draws the same random numbers.
 Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
 
 /// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
 
-/// Of the content of a file, or of all files below a folder with their names. Files are read once in a process, and again
+/// Of the name and content of a file, or of all files below a folder with their names. Files are read once in a process, and again
 /// when they may have changed. Throws Error where a file cannot be read, and as files_named_by() does.
 Digest path_digest(const std::filesystem::path& path);
+
+/// Of the sizes and times of all files that the node's options name: another one where any was written to in the meantime, even
+/// if it holds the same again. Throws Error as files_named_by() does.
+Digest states_of_files(const PipelineNode& node);
 
 /// The key of a function that a call returns.
 Digest function_key(const Digest& result, std::size_t output);

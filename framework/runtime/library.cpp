@@ -18,6 +18,7 @@
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "option_copies.hpp"
 #include "regular_file.hpp"
 #include "trust.hpp"
 
@@ -103,7 +104,7 @@ std::vector<LinkedLibrary> linked_libraries(void* handle) {
   while (first->l_prev) first = first->l_prev;
   for (const link_map* l = first; l; l = l->l_next) {
     const fs::path path(l->l_name);
-    if (!needed.count(path.filename().string()) || path.filename().string().starts_with("libmarrow")) continue;
+    if (!needed.count(path.filename().string()) || path.filename().string().starts_with("libmarrow.so")) continue;
     std::error_code error;
     const fs::path real = fs::canonical(path, error);
     if (!error) result.push_back({real.string(), fs::file_size(real)});
@@ -135,7 +136,7 @@ LibraryInfo describe_here(const fs::path& file) {
     info.linked = linked_libraries(handle);
     Plugin plugin;
     run_registration(plugin, entry);
-    for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
+    for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(copy_of(node.info));
     for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
   } catch (const std::exception& error) {
     info = LibraryInfo{};
@@ -174,13 +175,13 @@ LibraryInfo describe_apart(const fs::path& file) {
 /// What a loaded library registers, and the libraries that it found.
 LibraryInfo registered(const Plugin& plugin, void* handle) {
   LibraryInfo info;
-  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
+  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(copy_of(node.info));
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
   info.linked = linked_libraries(handle);
   return info;
 }
 
-/// The build id counts the linked libraries by name and size.
+/// By name and size.
 std::set<std::pair<std::string, std::uint64_t>> versions_of(const std::vector<LinkedLibrary>& libraries) {
   std::set<std::pair<std::string, std::uint64_t>> result;
   for (const LinkedLibrary& library : libraries) result.insert({fs::path(library.path).filename().string(), library.size});

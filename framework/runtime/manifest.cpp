@@ -171,7 +171,7 @@ NodeInfo node_from(const json& j) {
   for (const json& option : fields.list("options")) node.info.options.push_back(option_from(option));
   detail::check_declaration(node);
   if (!node.faults.empty()) damaged(node.info.name + ": " + node.faults.front());
-  return node.info;
+  return std::move(node.info);
 }
 
 WriterInfo writer_from(const json& j) {

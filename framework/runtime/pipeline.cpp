@@ -11,6 +11,7 @@
 #include "file_names.hpp"
 #include "input_texts.hpp"
 #include "marrow/runtime/kinds.hpp"
+#include "option_copies.hpp"
 #include "pipeline_order.hpp"
 #include "pipeline_text.hpp"
 #include "printable.hpp"
@@ -75,7 +76,7 @@ class Resolver {
     node.id = written.id;
     node.place = written.place;
     if (const NodeInfo* info = catalogue_.find(written.uses)) {
-      node.info = *info;
+      node.info = copy_of(*info);
       resolve_options(written, node);
     } else if (!written.uses.empty()) {
       const std::vector<std::string>& names = node_names();
@@ -117,14 +118,14 @@ class Resolver {
       if (!contains(known, name))
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name), suggested(name, known));
     for (const OptionInfo& option : node.info.options) {
-      OptionValue result = option.default_value;
+      OptionValue result = copy_of(option.default_value);
       const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
       if (given != written.options.end()) {
         const WrittenValue& value = given->second;
         StrictYaml yaml = yaml_of(value);
         const auto substitute = [&](const std::string& text, const Place& place) { return input_texts_.put_into(text, place.line ? place : value.place); };
-        const auto converted = yaml.option(value.value, value.place, option, "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
-        if (converted) result = in_folder(*converted, option.type, value.folder);
+        auto converted = yaml.option(value.value, value.place, option, "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
+        if (converted) result = in_folder(std::move(*converted), option.type, value.folder);
       } else if (option.required) {
         diagnostics_.add(written.place, "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name + " must be given", option.help);
       }

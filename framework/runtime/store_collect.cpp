@@ -66,7 +66,8 @@ void list_keys(const std::vector<Leaf>& leaves, std::vector<Digest>& keys) {
 std::vector<Store::Entry> Store::entries() const {
   std::vector<Entry> entries;
   if (!is_there()) return entries;
-  for (const StoreItem& item : items_of_store(folder_)) {
+  std::string fault;
+  for (const StoreItem& item : items_of_store(folder_, fault)) {
     if (item.kind != Kind::entry) continue;
     const StoreFile file(item.path);
     if (!file.is_open()) continue;
@@ -81,6 +82,7 @@ std::vector<Store::Entry> Store::entries() const {
     }
     entries.push_back(std::move(entry));
   }
+  if (!fault.empty()) throw Error(fault);
   std::sort(entries.begin(), entries.end(), [](const Entry& a, const Entry& b) { return a.used < b.used; });
   return entries;
 }
@@ -92,8 +94,8 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
     fs::file_time_type used;
   };
   Freed freed;
-  if (!is_there()) {
-    freed.fault = fault();
+  if (const FolderState state = examine_store(folder_); !state.is_store) {
+    freed.fault = state.fault;
     return freed;
   }
   std::vector<Kept> all;
@@ -106,7 +108,7 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
     return false;
   };
   std::uint64_t total = 0;
-  for (StoreItem& item : items_of_store(folder_)) {
+  for (StoreItem& item : items_of_store(folder_, freed.fault)) {
     if (item.kind == Kind::temporary) {
       if (is_abandoned(item)) remove(item);
       continue;

@@ -55,9 +55,10 @@ std::optional<TemporaryName> temporary_of_name(const std::string& name) {
   return found;
 }
 
-/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and all else are left out.
+/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and all else are left out. `fault`
+/// says which folder could not be read, unless it already says something.
 template <class Visit>
-void for_each_in(const fs::path& folder, const Visit& visit) {
+void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
     std::error_code gone;
@@ -65,6 +66,8 @@ void for_each_in(const fs::path& folder, const Visit& visit) {
     if (fs::is_regular_file(status) || fs::is_directory(status))
       visit(at->path().filename().string(), at->path(), fs::is_directory(status));
   }
+  if (error && error != std::errc::no_such_file_or_directory && fault.empty())
+    fault = "cannot look into the folder " + folder.string() + ": " + error.message();
 }
 
 /// Whether a folder holds nothing but markers that were being written. Not where it cannot be read.
@@ -179,7 +182,7 @@ fs::path new_folder_beside(const fs::path& final) {
   return temporary;
 }
 
-std::vector<StoreItem> items_of_store(const fs::path& folder) {
+std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault) {
   using Kind = StoreItem::Kind;
   std::vector<StoreItem> items;
   const auto add_temporary = [&](const std::string& name, const fs::path& path, const auto& is_ours) {
@@ -187,18 +190,18 @@ std::vector<StoreItem> items_of_store(const fs::path& folder) {
     if (temporary && is_ours(temporary->final)) items.push_back({Kind::temporary, path, {}, temporary->process});
   };
   const auto is_key = [](const std::string& name) { return key_of_name(name).has_value(); };
-  for_each_in(folder, [&](const std::string& name, const fs::path& path, bool is_folder) {
+  for_each_in(folder, fault, [&](const std::string& name, const fs::path& path, bool is_folder) {
     if (!is_folder) {
       add_temporary(name, path, [](const std::string& final) { return final == kStoreMarker || final == "tidied"; });
     } else if (name == "cases") {
-      for_each_in(path, [&](const std::string& inner, const fs::path& at, bool is_case) {
+      for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_case) {
         if (const auto key = key_of_name(inner); key && is_case)
           items.push_back({Kind::simulated_case, at, *key, 0});
         else if (is_case)
           add_temporary(inner, at, is_key);
       });
     } else if (name == "last" || (name.size() == 2 && is_digits(name, "0123456789abcdef"))) {
-      for_each_in(path, [&](const std::string& inner, const fs::path& at, bool is_other) {
+      for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_other) {
         if (is_other || (name != "last" && !inner.starts_with(name))) return;
         if (const auto key = key_of_name(inner); key && name != "last")
           items.push_back({Kind::entry, at, *key, 0});

@@ -43,7 +43,8 @@ struct StoreItem {
   Digest key;       ///< of an entry or a simulated case
   int process = 0;  ///< that writes a temporary
 };
-/// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there.
-std::vector<StoreItem> items_of_store(const std::filesystem::path& folder);
+/// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there. `fault`: why
+/// there may be more, where a folder of the store could not be read.
+std::vector<StoreItem> items_of_store(const std::filesystem::path& folder, std::string& fault);
 
 }  // namespace marrow

@@ -207,13 +207,16 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
 
 std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what, Diagnostics& diagnostics) {
   try {
-    std::string text = read_text_file(file, kMostSourceBytes, Kinds::files_and_pipes);
+    std::string text = read_text_file(file, kMostSourceBytes);
     diagnostics.remember(file.string(), text);
     return text;
   } catch (const Error& error) {
     const std::string fault = error.what();  // begins with the file's name, which the place says
-    const bool is_there = fault.find(" is longer than ") != std::string::npos;
-    diagnostics.add({file.string()}, what + fault.substr(file.string().size()), is_there ? "" : "check the path");
+    const auto says = [&](const char* part) { return fault.find(part, file.string().size()) != std::string::npos; };
+    const char* hint = says(" is longer than ")  ? ""
+                       : says("no regular file") ? "write the text to a file and give that"
+                                                 : "check the path";
+    diagnostics.add({file.string()}, what + fault.substr(file.string().size()), hint);
     return std::nullopt;
   }
 }

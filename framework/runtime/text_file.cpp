@@ -60,17 +60,23 @@ fs::path free_temporary(const fs::path& file) {
 
 }  // namespace
 
-std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes, Kinds kinds) {
+std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
   const auto unreadable = [&](const std::string& why) { return Error(file.string() + " cannot be read: " + why); };
   const auto too_long = [&] {
     return Error(file.string() + " is longer than " + std::to_string(most_bytes / 1'000'000) + " MB");
   };
-  Descriptor descriptor(file, kinds == Kinds::files ? O_RDONLY | O_NONBLOCK : O_RDONLY);
   struct stat info {};
+  const auto check_kind = [&] {
+    if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
+    if (!S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
+  };
+  // Before it is opened, too, because opening a device may already do something.
+  if (::stat(file.c_str(), &info) != 0) throw unreadable(reason());
+  check_kind();
+  Descriptor descriptor(file, O_RDONLY | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0 || ::fstat(descriptor, &info) != 0) throw unreadable(reason());
-  if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
-  if (kinds == Kinds::files && !S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
-  if (S_ISREG(info.st_mode) && std::uintmax_t(info.st_size) > most_bytes) throw too_long();
+  check_kind();
+  if (std::uintmax_t(info.st_size) > most_bytes) throw too_long();
   std::string text;
   for (std::string block(1 << 16, '\0');;) {
     const ssize_t count = ::read(descriptor, block.data(), block.size());
@@ -82,10 +88,12 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes, Kind
   }
 }
 
-void write_text_file(const fs::path& file, const std::string& text) {
+void write_text_file(const fs::path& file, const std::string& text, Kinds kinds) {
   const auto unwritten = [&](const std::string& why) { return Error("cannot write " + file.string() + ": " + why); };
   struct stat info {};
-  if (::lstat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) && !S_ISLNK(info.st_mode) && !S_ISDIR(info.st_mode)) {
+  // Through links, as /dev/stdout is one.
+  if (kinds == Kinds::files_and_pipes && ::stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) &&
+      !S_ISDIR(info.st_mode)) {
     Descriptor device(file, O_WRONLY);
     if (device < 0 || !write_all(device, text) || !device.close()) throw unwritten(reason());
     return;

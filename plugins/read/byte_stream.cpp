@@ -20,6 +20,7 @@ class PlainBytes final : public ByteStream {
     at_ += count;
     return count;
   }
+  std::uint64_t bytes_behind() const override { return end_ - at_; }
 
  private:
   const InputFile& file_;
@@ -45,6 +46,7 @@ class UnpackedBytes final : public ByteStream {
     }
     return count - left;
   }
+  std::uint64_t bytes_behind() const override { return unpacker_.avail_in + packed_.bytes_behind(); }
 
  private:
   void step() {

@@ -13,6 +13,8 @@ class ByteStream {
   virtual ~ByteStream() = default;
   /// The next bytes: `count` of them, or fewer at the end. Throws Error where the stream is damaged.
   virtual std::size_t take(void* to, std::size_t count) = 0;
+  /// Bytes that lie behind the end of a packed stream; only after all of it was taken.
+  virtual std::uint64_t bytes_behind() const { return 0; }
 };
 
 /// The bytes of a file between two places.

@@ -25,6 +25,7 @@ constexpr DicomTag kHighBit{0x0028, 0x0102, "HighBit", Kind::us};
 constexpr DicomTag kRepresentation{0x0028, 0x0103, "PixelRepresentation", Kind::us};
 constexpr DicomTag kIntercept{0x0028, 0x1052, "RescaleIntercept"};
 constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
+constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
 
 [[noreturn]] void damaged(const std::filesystem::path& path, const std::string& fault) {
   throw Error(path.string() + ": is cut off or damaged: " + fault + "; copy or export it again");
@@ -60,8 +61,12 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
                 "with 16");
   if (representation != 0 && representation != 1) damaged(pixels.path, kRepresentation.text() + " is neither 0 nor 1");
   pixels.is_signed = representation == 1;
-  pixels.slope = header.number(kSlope).value_or(1);
-  pixels.intercept = header.number(kIntercept).value_or(0);
+  const auto slope = header.number(kSlope), intercept = header.number(kIntercept);
+  pixels.slope = slope.value_or(1);
+  pixels.intercept = intercept.value_or(0);
+  pixels.gives_slope = slope.has_value();
+  pixels.gives_intercept = intercept.has_value();
+  pixels.has_table = header.has(kTable);
   if (pixels.slope == 0) damaged(pixels.path, kSlope.text() + " is 0");
 }
 
@@ -101,12 +106,22 @@ void find_frames(const DicomFile& file, DicomPixels& pixels) {
             "which of its " + std::to_string(parts) + " parts of compressed pixels make up a frame is not said");
 }
 
+/// Whether what follows the pixels is filling: a byte to make the length even, or zeros to the end of a block. More are
+/// pixels that the header does not tell of.
+bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
+  const DicomSpan& part = file.pixel_parts()[0];
+  const std::uint64_t more = part.bytes - pixel_bytes;
+  if (more == 1 && pixel_bytes % 2 == 1) return true;
+  return more <= 512 && file.file().text(part.begin + pixel_bytes, std::size_t(more)) == std::string(more, '\0');
+}
+
 void check_plain(const DicomFile& file, const DicomPixels& pixels) {
   const double held = file.pixel_parts().empty() ? 0 : double(file.pixel_parts()[0].bytes);
   // Of colours, a third may be left out (YBR_FULL_422).
   const double expected = double(pixels.rows) * pixels.columns * pixels.channels * pixels.frames *
                           pixels.bits_allocated / 8 * (pixels.channels > 1 ? 1.0 / 3 : 1);
-  if (expected > held)
+  const bool is_too_much = pixels.channels == 1 && held > expected && !is_filled(file, std::uint64_t(expected));
+  if (expected > held || is_too_much)
     damaged(pixels.path, "its header tells of " + std::to_string(std::int64_t(expected)) +
                              " bytes of pixels, but there are " + std::to_string(std::int64_t(held)));
 }

@@ -17,6 +17,8 @@ struct DicomPixels {
   int bits_allocated = 16, bits_stored = 16;
   bool is_signed = false;
   double slope = 1, intercept = 0;
+  bool gives_slope = false, gives_intercept = false;
+  bool has_table = false;                        ///< values go through a table (ModalityLUTSequence), which is not read
   std::vector<DicomSpan> frame_parts;            ///< of plain pixels: one part, all frames
   std::vector<std::size_t> first_part_of_frame;  ///< of compressed ones; one more than there are frames
 };

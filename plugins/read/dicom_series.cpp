@@ -3,8 +3,10 @@
 #include <cmath>
 #include <map>
 #include <set>
+#include <tuple>
 
 #include "dicom_pixels.hpp"
+#include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::read {
@@ -18,7 +20,6 @@ constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
 constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
 constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
 constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
-constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
 
 double dot(const Vector& a, const Vector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -37,14 +38,51 @@ struct Slice {
   Samples samples;         ///< without bytes
   double position_mm = 0;  ///< along the normal of the slices
   bool is_placed = false;  ///< says where it lies
-  bool has_table = false;
 
   const std::filesystem::path& path() const { return pixels.path; }
 };
 
 bool looks_like_dicom(const std::filesystem::path& path) {
-  const InputFile file(path);
+  const InputFile file(path, true);
   return file.size() >= 132 && file.text(128, 4) == "DICM";
+}
+
+/// Whether a file that is not DICOM is by its name no slice either: a licence, a note, a picture. Of any other, such as
+/// "IM5", it may be what is left of a slice.
+bool is_no_slice_by_name(const std::filesystem::path& path) {
+  static const std::set<std::string> kNames{"authors",  "changelog", "checksums",  "copying", "dicomdir",
+                                            "lockfile", "licence",   "license",    "md5sum",  "md5sums",
+                                            "notice",   "readme",    "sha256sums", "version"};
+  static const std::set<std::string> kExtensions{
+      ".bat",  ".bmp", ".csv",  ".db",  ".doc",  ".docx",   ".exe",  ".gif", ".htm", ".html", ".inf",  ".ini",
+      ".jpeg", ".jpg", ".json", ".log", ".m",    ".md",     ".md5",  ".mha", ".nii", ".nrrd", ".obj",  ".pdf",
+      ".ply",  ".png", ".py",   ".rtf", ".sh",   ".sha256", ".stl",  ".svg", ".tif", ".tiff", ".toml", ".tsv",
+      ".txt",  ".vtk", ".vtp",  ".xls", ".xlsx", ".xml",    ".yaml", ".yml", ".zip"};
+  const std::string name = in_small_letters(path.filename().string()),
+                    extension = in_small_letters(path.extension().string());
+  return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
+         (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
+}
+
+[[noreturn]] void refuse_other_file(const std::filesystem::path& path) {
+  const std::uint64_t bytes = InputFile(path, true).size();
+  throw Error(path.string() + ": this file in the series' folder is no whole DICOM file (" +
+              (bytes == 0    ? "it is empty"
+               : bytes < 132 ? "it has " + std::to_string(bytes) + " bytes, at least 132 expected"
+                             : "it has no 'DICM' at byte 128") +
+              "); if it is a slice, it is damaged at its start: fetch it again; if not, remove it from the folder");
+}
+
+/// Slices of a series lie in one folder: one that lies below would be missed.
+void check_folder_below(const std::filesystem::path& folder) {
+  std::error_code failure, none;
+  for (std::filesystem::recursive_directory_iterator entry(folder, failure), end; entry != end && !failure;
+       entry.increment(failure))
+    if (entry->is_regular_file(none) && (!is_no_slice_by_name(entry->path()) || looks_like_dicom(entry->path())))
+      throw Error(folder.string() + ": this folder inside the series' folder holds files that may be slices ('" +
+                  entry->path().lexically_relative(folder).string() +
+                  "'), and only one folder is read; move them beside the other slices, or this folder elsewhere");
+  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
 }
 
 Vector column(const Samples& samples, int k) {
@@ -79,7 +117,6 @@ Slice read_slice(const std::filesystem::path& path) {
   slice.series = header.text(kSeries).value_or("");
   slice.description = header.text(kDescription).value_or("");
   slice.modality = header.text(kModality).value_or("");
-  slice.has_table = header.has(kTable);
   if (slice.pixels.frames != 1)
     throw Error(path.string() + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
   if (slice.pixels.channels != 1) throw Error(path.string() + ": has colours; a CT slice has one value per pixel");
@@ -88,26 +125,37 @@ Slice read_slice(const std::filesystem::path& path) {
   return slice;
 }
 
-/// The DICOM files of a folder by series. Other files (a licence, a note) are passed over.
-std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
+/// All that lies in a folder, sorted, without what is neither a file nor a folder.
+std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
   std::set<std::filesystem::path> paths;
-  std::error_code failure;
+  std::error_code failure, none;
   for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure; entry.increment(failure)) {
     check_stays_inside(folder, entry->path());
-    std::error_code none;
-    if (entry->is_regular_file(none) && (entry->file_size(none) > 0 || entry->path().extension() == ".dcm")) paths.insert(entry->path());
+    if (entry->is_regular_file(none) || entry->is_directory(none)) paths.insert(entry->path());
   }
   if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
+  return paths;
+}
+
+/// The DICOM files of a folder by series. Other files are passed over only where their names say what they are: a slice
+/// that was cut or emptied is the end of a series as easily as a gap in it, and would not be missed there.
+std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
   std::map<std::string, std::vector<Slice>> series;
-  for (const auto& path : paths) {
-    if (path.filename() == "DICOMDIR") continue;
-    if (looks_like_dicom(path)) {
+  std::error_code none;
+  std::vector<std::filesystem::path> folders;
+  for (const auto& path : entries_of(folder)) {
+    if (std::filesystem::is_directory(path, none)) {
+      folders.push_back(path);
+    } else if (in_small_letters(path.filename().string()) == "dicomdir") {
+      continue;
+    } else if (looks_like_dicom(path)) {
       Slice slice = read_slice(path);
       series[slice.series].push_back(std::move(slice));
-    } else if (path.extension() == ".dcm") {
-      throw Error(path.string() + ": is not a DICOM file, or is damaged at its start");
+    } else if (!is_no_slice_by_name(path)) {
+      refuse_other_file(path);
     }
   }
+  for (const auto& below : folders) check_folder_below(below);
   return series;
 }
 
@@ -132,6 +180,18 @@ std::string millimetres(double length) {
   return text;
 }
 
+/// Where one slice says how its values become HU and another does not, one of them lost it.
+void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
+  for (const auto& [name, is_given, first_is_given] :
+       {std::tuple{"RescaleSlope", slice.gives_slope, first.gives_slope},
+        std::tuple{"RescaleIntercept", slice.gives_intercept, first.gives_intercept}}) {
+    if (is_given == first_is_given) continue;
+    const auto& [with, without] = is_given ? std::tie(slice.path, first.path) : std::tie(first.path, slice.path);
+    throw Error(without.string() + ": its header has no " + name + ", but that of " + with.string() +
+                " has one; a series has it in all slices or in none: export it again");
+  }
+}
+
 /// That the slices belong to one grid: same size, same directions, evenly spaced along their normal.
 void check_slices(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
@@ -143,8 +203,10 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
     if (!slice.is_placed)
       throw Error(slice.path().string() +
                   ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
-    if (slice.has_table)
-      throw Error(slice.path().string() + ": its values go through a table (" + kTable.text() + "), which is not read; export it as HU");
+    if (slice.pixels.has_table)
+      throw Error(slice.path().string() +
+                  ": its values go through a table (ModalityLUTSequence), which is not read; export it as HU");
+    check_same_scaling(slice.pixels, first.pixels);
     bool same = slice.samples.size == first.samples.size;
     for (int i = 0; i < 9; ++i) same = same && std::abs(slice.samples.direction[i] - first.samples.direction[i]) < 1e-4;
     for (int i = 0; i < 2; ++i)

@@ -52,6 +52,9 @@ Image read_dicom_image(const fs::path& path, int frame) {
   const DicomPixels pixels = read_dicom_pixels(path);
   check_frame(frame, pixels.frames, path, " frames; name one with frame (from 1)");
   check_one_channel(pixels.channels, path);
+  if (pixels.has_table)
+    throw Error(path.string() +
+                ": its values go through a table (ModalityLUTSequence), which is not read; export it without one");
   const Samples samples = read_dicom_frame(pixels, std::max(1, frame));
   const bool is_signed = samples.type != Samples::Type::u8 && samples.type != Samples::Type::u16;
   if (!is_signed && pixels.slope == 1 && pixels.intercept == 0) return image_of(samples, 1, path);

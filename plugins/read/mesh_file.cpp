@@ -21,6 +21,10 @@ Mesh read_stl_binary(const std::string& bytes, const std::string& what) {
   if (bytes.size() < kHeader + std::size_t(count) * kFacet)
     throw Error(what + ": its header claims " + std::to_string(count) + " triangles, but the file has room for " +
                 std::to_string((bytes.size() - kHeader) / kFacet) + "; it is cut off, or no STL");
+  if (bytes.size() > kHeader + std::size_t(count) * kFacet)
+    throw Error(what + ": its header claims " + std::to_string(count) + " triangles, which end after " +
+                std::to_string(kHeader + std::size_t(count) * kFacet) + " bytes, but the file has " +
+                std::to_string(bytes.size()) + "; it is damaged: export it again");
   MeshBuilder builder(count);
   for (std::size_t i = 0; i < count; ++i) {
     float numbers[9];
@@ -38,23 +42,36 @@ Mesh read_stl_text(const std::string& bytes, const std::string& what) {
   MeshBuilder builder(bytes.size() / 250);
   std::array<std::uint32_t, 3> corner{};
   int corners = 0;
-  bool ended = false;
+  bool ended = false, in_facet = false;  // since the last endsolid; a file may hold several solids
   for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
-    if (word == "vertex") {
+    if (ended != (word == "solid"))
+      throw Error(what + (ended ? ": after 'endsolid' comes neither its end nor another 'solid'"
+                                : ": a 'solid' begins before the 'endsolid' of the one before") +
+                  "; the file is cut off or damaged");
+    if (ended) {
+      words.skip_line();
+      ended = false;
+    } else if (word == "facet") {
+      if (in_facet) throw Error(what + ": a facet begins inside another; the file is cut off or damaged");
+      in_facet = true;
+    } else if (word == "vertex") {
       const auto x = words.number(), y = words.number(), z = words.number();
-      if (!x || !y || !z || corners == 3)
+      if (!x || !y || !z || corners == 3 || !in_facet)
         throw Error(what + ": a facet is not three lines 'vertex x y z'; the file is cut off or damaged");
       corner[std::size_t(corners++)] = builder.vertex({*x, *y, *z});
     } else if (word == "endfacet") {
       if (corners != 3) throw Error(what + ": a facet has " + std::to_string(corners) + " vertices; expected 3");
       builder.triangle(corner[0], corner[1], corner[2]);
       corners = 0;
+      in_facet = false;
     } else if (word == "endsolid") {
+      if (in_facet || corners != 0)
+        throw Error(what + ": its last facet before 'endsolid' has no 'endfacet'; the file is cut off or damaged");
       words.skip_line();
       ended = true;
     }
   }
-  if (!ended) throw Error(what + ": 'endsolid' is missing; the file is cut off, or no STL");
+  if (!ended) throw Error(what + ": 'endsolid' is missing at its end; the file is cut off, or no STL");
   return std::move(builder.mesh);
 }
 

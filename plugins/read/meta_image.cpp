@@ -54,26 +54,35 @@ std::string one_of(const HeaderFields& fields, const std::vector<std::string>& n
 }
 
 void read_grid(const HeaderFields& fields, std::size_t dimensions, Samples& samples) {
-  if (fields.has("elementspacing")) {
-    const auto spacing = fields.numbers("elementspacing", dimensions);
+  // MetaIO, too, takes the size for the spacing where there is no spacing; where there is neither, it takes 1.
+  if (const std::string key = fields.has("elementspacing") ? "elementspacing" : "elementsize"; fields.has(key)) {
+    const auto spacing = fields.numbers(key, dimensions);
     std::copy_n(spacing.begin(), std::min<std::size_t>(3, dimensions), samples.spacing_mm.begin());
+  } else {
+    samples.spacing_field = "ElementSpacing = X Y Z";
   }
   if (const std::string key = one_of(fields, {"offset", "position", "origin"}); !key.empty()) {
     const auto origin = fields.numbers(key, dimensions);
     std::copy_n(origin.begin(), std::min<std::size_t>(3, dimensions), samples.origin_mm.begin());
   }
-  if (const std::string key = one_of(fields, {"transformmatrix", "rotation", "orientation"});
-      !key.empty() && dimensions <= 3) {
+  if (const std::string key = one_of(fields, {"transformmatrix", "rotation", "orientation"}); !key.empty()) {
     const auto axes = fields.numbers(key, dimensions * dimensions);  // one axis after the other
     for (std::size_t axis = 0; axis < dimensions; ++axis)
-      for (std::size_t row = 0; row < dimensions; ++row)
-        samples.direction[row * 3 + axis] = axes[axis * dimensions + row];
+      for (std::size_t row = 0; row < dimensions; ++row) {
+        const double value = axes[axis * dimensions + row];
+        if (axis < 3 && row < 3)
+          samples.direction[row * 3 + axis] = value;
+        else if (axis != row && value != 0)
+          fields.refuse(key, "zeros between the axes of the volume and others");
+      }
   }
 }
 
 void check_fields(const HeaderFields& fields) {
   if (fields.has("objecttype") && in_small_letters(fields.text("objecttype")) != "image")
     fields.refuse("objecttype", "Image");
+  if (const std::string unit = in_small_letters(fields.text_or("distanceunits", "mm")); unit != "mm" && unit != "?")
+    fields.refuse("distanceunits", "mm: save it with its lengths in mm");
   if (const long long count = fields.whole_number_or("elementnumberofchannels", 1); count != 1)
     throw Error(fields.path().string() + ": has " + std::to_string(count) + " values per voxel; a CT has one");
   if (!fields.is_true_or("binarydata", false) && !fields.is_true_or("compresseddata", false))

@@ -34,6 +34,11 @@ class Header {
   }
   int dim(int k) const { return at<std::int16_t>(40 + 2 * std::size_t(k)); }
   double pixdim(int k) const { return double(at<float>(76 + 4 * std::size_t(k))); }
+  /// How many mm a length of the header is.
+  double unit_mm() const {
+    const int unit = at<std::uint8_t>(123) & 7;
+    return unit == 1 ? 1e3 : unit == 3 ? 1e-3 : 1;
+  }
 
  private:
   [[noreturn]] void no_nifti() const {
@@ -136,10 +141,10 @@ Affine qform(const Header& header) {
   return affine;
 }
 
-bool are_near(const Affine& one, const Affine& other) {
+bool are_near(const Affine& one, const Affine& other, double unit_mm) {
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t k = 0; k < 4; ++k)
-      if (!(std::abs(one[row][k] - other[row][k]) < 1e-4)) return false;
+      if (!(std::abs(one[row][k] - other[row][k]) * unit_mm < 1e-4)) return false;
   return true;
 }
 
@@ -151,7 +156,7 @@ Affine affine_of(const Header& header) {
     return {
         {{float(header.pixdim(1)), 0, 0, 0}, {0, float(header.pixdim(2)), 0, 0}, {0, 0, float(header.pixdim(3)), 0}}};
   const Affine q = qform(header), s = sform(header);
-  if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q))) return s;
+  if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q, header.unit_mm()))) return s;
   if (qcode > 0 && is_straight(q)) return q;
   throw Error(header.what() +
               ": its header does not say where it lies, or by a matrix that is sheared or damaged; resample or export "
@@ -159,22 +164,27 @@ Affine affine_of(const Header& header) {
 }
 
 void read_grid(const Header& header, Samples& samples) {
-  const int unit = header.at<std::uint8_t>(123) & 7;
-  const double scale = unit == 1 ? 1e3 : unit == 3 ? 1e-3 : 1;
+  const double unit_mm = header.unit_mm();
   for (int k = 0; k < 3; ++k) {
     const double length = header.pixdim(k + 1);
     if (!std::isfinite(length) || !(length > 0))
       throw Error(header.what() + ": voxel spacing " + std::to_string(length) + " is not a positive length");
-    samples.spacing_mm[std::size_t(k)] = length * scale;
   }
   const Affine affine = affine_of(header);
   for (std::size_t k = 0; k < 3; ++k) {
     double squares = 0;
     for (const auto& row : affine) squares += double(row[k]) * double(row[k]);
+    const double length = std::sqrt(squares), said = header.pixdim(int(k) + 1);
+    if (std::abs(length - said) > 1e-3 * said)  // which of the two is true, no one but its writer knows
+      throw Error(header.what() + ": its header says twice how large a voxel is along axis " + std::to_string(k + 1) +
+                  ": " + std::to_string(length * unit_mm) + " mm by its sform, " + std::to_string(said * unit_mm) +
+                  " mm by its pixdim; set both to the right one, or export it again");
+    samples.spacing_mm[k] = length * unit_mm;
     for (std::size_t row = 0; row < 3; ++row)
-      samples.direction[row * 3 + k] = (row < 2 ? -1.0 : 1.0) * double(affine[row][k]) / std::sqrt(squares);
+      samples.direction[row * 3 + k] = (row < 2 ? -1.0 : 1.0) * double(affine[row][k]) / length;
   }
-  for (std::size_t row = 0; row < 3; ++row) samples.origin_mm[row] = (row < 2 ? -1.0 : 1.0) * double(affine[row][3]);
+  for (std::size_t row = 0; row < 3; ++row)
+    samples.origin_mm[row] = (row < 2 ? -1.0 : 1.0) * double(affine[row][3]) * unit_mm;
 }
 
 void read_scaling(const Header& header, StoredSamples& stored) {
@@ -208,7 +218,6 @@ VolumeSamples read_nifti(const std::filesystem::path& path) {
   stored.count = volume.geometry.count();
   stored.big_endian = header.is_swapped();
   stored.is_packed = file.text(0, 2) == "\x1F\x8B";
-  stored.may_hold_more = true;
   (stored.is_packed ? stored.skip : stored.begin) = std::uint64_t(begin);
   volume.values = read_floats(file, stored);
   return volume;

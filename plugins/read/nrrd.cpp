@@ -166,6 +166,38 @@ void check_units(const HeaderFields& fields, const std::string& key) {
       fields.refuse(key, "mm");
 }
 
+/// By the fields of single axes, which are those of the patient then.
+void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
+  for (const char* key : {"space", "space dimension", "space origin"})
+    if (fields.has(key))
+      throw Error(fields.path().string() + ": its header has '" + key +
+                  "' but no 'space directions', which say how its axes lie there; add 'space directions: (X,0,0) "
+                  "(0,Y,0) (0,0,Z)' "
+                  "with the voxels' sizes (or as its axes lie), and take 'spacings' out");
+  const bool has_ends = fields.has("axis mins") || fields.has("axis maxs");
+  if (!fields.has("spacings")) {
+    if (has_ends)
+      throw Error(fields.path().string() +
+                  ": its header gives the ends of its axes but no 'spacings'; add 'spacings: X Y Z' (mm)");
+    samples.spacing_field = "spacings: X Y Z";
+    return;
+  }
+  const auto spacings = fields.numbers("spacings", 3);
+  std::copy(spacings.begin(), spacings.end(), samples.spacing_mm.begin());
+  if (!has_ends) return;
+  // Of the first voxel's border, unless its field `centers` says nodes.
+  const auto least = fields.numbers("axis mins", 3);
+  const bool are_nodes = in_small_letters(fields.text_or("centers", "")).find("node") != std::string::npos;
+  for (std::size_t k = 0; k < 3; ++k) samples.origin_mm[k] = least[k] + (are_nodes ? 0 : spacings[k] / 2);
+  if (!fields.has("axis maxs")) return;
+  const auto greatest = fields.numbers("axis maxs", 3);
+  for (std::size_t k = 0; k < 3; ++k)
+    if (const double length = spacings[k] * (samples.size[k] - (are_nodes ? 1 : 0));
+        std::abs(greatest[k] - least[k] - length) > 1e-3 * std::abs(length))
+      fields.refuse("axis maxs", "'axis mins' and as many 'spacings' as there are voxels (" +
+                                     std::to_string(least[k] + length) + ")");
+}
+
 void read_grid(const HeaderFields& fields, Samples& samples) {
   check_units(fields, "units");
   check_units(fields, "space units");
@@ -185,14 +217,7 @@ void read_grid(const HeaderFields& fields, Samples& samples) {
     }
     return;
   }
-  if (!fields.has("spacings")) return;
-  const auto spacings = fields.numbers("spacings", 3);
-  std::copy(spacings.begin(), spacings.end(), samples.spacing_mm.begin());
-  if (!fields.has("axis mins")) return;
-  const auto least =
-      fields.numbers("axis mins", 3);  // of the first voxel's border, unless its field `centers` says nodes
-  const bool are_nodes = in_small_letters(fields.text_or("centers", "")).find("node") != std::string::npos;
-  for (std::size_t k = 0; k < 3; ++k) samples.origin_mm[k] = least[k] + (are_nodes ? 0 : spacings[k] / 2);
+  read_grid_without_space(fields, samples);
 }
 
 std::array<long long, 3> size_of(const HeaderFields& fields, long long dimensions) {

@@ -141,10 +141,13 @@ class Body {
   Body(Format format, std::string_view bytes, const std::string& what)
       : format_(format), bytes_(bytes), words_(format == Format::text ? bytes : std::string_view()), what_(what) {}
 
-  /// Throws Error where text is left over: then the header claims too little, or of the wrong kind.
+  /// Throws Error where something is left over: then the header claims too little, or of the wrong kind.
   void finish() {
     if (format_ == Format::text && !words_.is_at_end())
       throw Error(what_ + ": has more numbers than its header claims; it is damaged");
+    if (format_ != Format::text && at_ != bytes_.size())
+      throw Error(what_ + ": its header claims " + std::to_string(at_) + " bytes of numbers, but the file has " +
+                  std::to_string(bytes_.size()) + " after it; it is damaged: export it again");
   }
 
   double next(Number type) {

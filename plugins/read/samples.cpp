@@ -70,9 +70,12 @@ constexpr std::size_t kPart = 1 << 17;  // samples that are converted at once
 void read_plain(const InputFile& file, const StoredSamples& stored, std::vector<float>& values) {
   const std::size_t width = bytes_each(stored.type);
   const std::uint64_t held = file.size() - std::min(file.size(), stored.begin);
-  if (held < stored.count * width)
-    throw Error(file.path().string() + ": is cut off or damaged: " + std::to_string(stored.count * width) +
-                " bytes of samples expected, got " + std::to_string(held) + "; copy or export it again");
+  if (held != stored.count * width)
+    throw Error(file.path().string() + ": is " +
+                (held < stored.count * width ? "cut off or damaged: "
+                                             : "damaged, or its header tells of other samples than it holds: ") +
+                std::to_string(stored.count * width) + " bytes of samples expected, got " + std::to_string(held) +
+                "; copy or export it again");
   values.resize(stored.count);
   tbb::parallel_for(std::size_t(0), (stored.count + kPart - 1) / kPart, [&](std::size_t part) {
     const std::size_t first = part * kPart, count = std::min(kPart, stored.count - first);
@@ -99,9 +102,10 @@ void read_packed(const InputFile& file, const StoredSamples& stored, std::vector
       values.resize(first + count < stored.count / 8 ? std::max(first + count, 2 * values.size()) : stored.count);
     convert(stored, bytes.data(), count, values.data() + first);
   }
-  // The rest is unpacked for the checksum behind it.
-  if (stored.may_hold_more) stream->take(bytes.data(), bytes.size());
-  expect_end(*stream, file);
+  expect_end(*stream, file);  // which verifies the checksum there, too
+  if (const std::uint64_t behind = stream->bytes_behind(); behind > 0)
+    throw Error(file.path().string() + ": is damaged: " + std::to_string(behind) +
+                " bytes follow the end of its compressed samples, none expected; copy or export it again");
 }
 
 }  // namespace

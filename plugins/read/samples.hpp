@@ -19,6 +19,7 @@ struct Samples {
   std::array<double, 9> direction{1, 0, 0, 0, 1, 0, 0, 0, 1};  ///< row by row; columns are the grid's axes
   int dimensions = 0;
   int components = 1;
+  std::string spacing_field;  ///< where the file does not say how large voxels are: what its header would have to say
   enum class Type { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 } type = Type::u8;
   std::vector<std::byte> bytes;  ///< x runs fastest, then y, then z
 
@@ -58,9 +59,8 @@ struct StoredSamples {
   bool big_endian = false;
   std::size_t count = 0;
   double slope = 1, intercept = 0;
-  bool may_hold_more = false;  ///< some bytes of filling behind the packed samples
 };
-/// Throws Error unless all of them are there.
+/// Throws Error unless all of them are there, and nothing behind them.
 std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored);
 
 /// The samples as float.

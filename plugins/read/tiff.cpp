@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <cstring>
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
@@ -48,6 +49,24 @@ void read_page(const InputFile& file, const TiffPages& tiff, const TiffPage& pag
       std::swap_ranges(to + v * row_bytes, to + (v + 1) * row_bytes, to + (page.height - 1 - v) * row_bytes);
 }
 
+template <class T>
+void invert_as(std::vector<std::byte>& bytes) {
+  for (std::size_t at = 0; at < bytes.size(); at += sizeof(T)) {
+    T value;
+    std::memcpy(&value, bytes.data() + at, sizeof value);
+    value = T(~value);
+    std::memcpy(bytes.data() + at, &value, sizeof value);
+  }
+}
+
+/// Of an image whose zero is white, so that, as in others, more is brighter.
+void invert(const std::string& what, Samples& samples) {
+  if (samples.type == Samples::Type::u8) return invert_as<std::uint8_t>(samples.bytes);
+  if (samples.type == Samples::Type::u16) return invert_as<std::uint16_t>(samples.bytes);
+  throw Error(what + ": its zero is white (PhotometricInterpretation WhiteIsZero); that is read for whole numbers of 8 "
+              "and 16 bits without sign only: save it with zero as black");
+}
+
 }  // namespace
 
 Samples read_tiff(const std::filesystem::path& path) {
@@ -68,6 +87,7 @@ Samples read_tiff(const std::filesystem::path& path) {
   samples.bytes.resize(page_bytes * tiff.pages.size());
   for (std::size_t i = 0; i < tiff.pages.size(); ++i)
     read_page(file, tiff, tiff.pages[i], samples.bytes.data() + i * page_bytes);
+  if (first.photometric == 0) invert(what, samples);
   return samples;
 }
 

@@ -5,6 +5,8 @@
 #include "tiff_pages.hpp"
 
 #include <algorithm>
+#include <cstdlib>
+#include <cstring>
 #include <stdexcept>
 #include <unordered_set>
 
@@ -88,6 +90,7 @@ class Walk {
     for (std::uint64_t i = 0; i < entries; ++i) {
       const std::uint64_t entry = first_entry + i * layout_.entry_bytes, tag = number(entry, 2);
       if (tag == 273) places = numbers_of(entry);
+      if (tag == 270) check_description(entry);
       if (tag == 279) lengths = numbers_of(entry);
       if (tag == 322 || tag == 324) page.is_tiled = true;
       if (std::uint64_t* const place = place_of(page, tag))
@@ -99,6 +102,27 @@ class Walk {
     }
     check_strips(places, lengths, page);
     return page;
+  }
+
+  /// ImageJ keeps channels and times as pages of one stack, and says so in the description.
+  void check_description(std::uint64_t entry) {
+    const std::uint64_t type = number(entry + 2, 2), count = number(entry + 4, layout_.width);
+    if (type != 2 || count <= std::uint64_t(layout_.width)) return;
+    const std::uint64_t at = number(entry + 4 + std::uint64_t(layout_.width), layout_.width);
+    const std::uint64_t length = std::min<std::uint64_t>(count, 4096);
+    if (!window_.holds(at, length)) throw std::out_of_range("description");
+    count_bytes(length);
+    const std::string text = "\n" + window_.text(at, length);
+    if (!text.starts_with("\nImageJ=")) return;
+    for (const char* name : {"channels", "frames"}) {
+      const std::size_t found = text.find(std::string("\n") + name + "=");
+      if (found == std::string::npos) continue;
+      const long number_of = std::atol(text.c_str() + found + std::strlen(name) + 2);
+      if (number_of > 1)
+        throw Error(what() + ": is an ImageJ stack of " + std::to_string(number_of) + " " + name +
+                    ", whose pages are not slices of one volume; save one of them alone, or, "
+                    "where they are slices, say so in ImageJ (Image, Properties)");
+    }
   }
 
   static std::uint64_t* place_of(TiffPage& page, std::uint64_t tag) {

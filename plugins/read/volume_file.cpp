@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "volume_file.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -83,6 +84,16 @@ void flip(Volume& volume, int axis) {
                                                    axis == 2 ? nz - 1 - z : z)]);
 }
 
+/// A left-handed grid is run through from the other end of its last axis, so that it is right-handed and each voxel
+/// keeps its value and its place.
+void make_right_handed(Volume& volume) {
+  Grid& grid = volume.grid;
+  if (!(grid.direction.determinant() < 0)) return;
+  flip(volume, 2);
+  grid.origin_mm += grid.direction.col(2) * (grid.spacing_mm[2] * (grid.size[2] - 1));
+  grid.direction.col(2) *= -1;
+}
+
 void check_reading(const VolumeReading& reading) {
   if (!reading.voxel_size_mm.empty() && reading.voxel_size_mm.size() != 3)
     throw Error("voxel_size_mm: expected 3 lengths, got " + std::to_string(reading.voxel_size_mm.size()));
@@ -105,9 +116,13 @@ Volume read_volume_file(const fs::path& path, const VolumeReading& reading) {
                 std::to_string(samples.geometry.dimensions));
   if (is_tiff(lower_extension(file)) && reading.voxel_size_mm.empty())
     throw Error(file.string() + ": a TIFF does not say how large its voxels are; give voxel_size_mm: [x, y, z]");
+  if (!samples.geometry.spacing_field.empty() && reading.voxel_size_mm.empty())
+    throw Error(file.string() + ": its header does not say how large its voxels are; add '" +
+                samples.geometry.spacing_field + "' (mm) to it, or give voxel_size_mm: [x, y, z]");
   Volume volume{grid_of(samples.geometry), std::move(samples.values)};
   for (std::size_t k = 0; k < reading.voxel_size_mm.size(); ++k) volume.grid.spacing_mm[k] = reading.voxel_size_mm[k];
   for (const std::string& axis : reading.flip) flip(volume, axis_of(axis));
+  make_right_handed(volume);
   if (reading.value_offset_hu != 0)
     for (float& value : volume.values) value = float(value + reading.value_offset_hu);
   check_volume(volume, path.string());

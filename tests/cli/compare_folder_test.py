@@ -77,6 +77,36 @@ class Folder(Comparison):
                 self.assertEqual(os.listdir(self.scratch / "mine"), ["marrow-comparison"])
                 shutil.rmtree(self.scratch / "mine")
 
+    def test_what_lies_at_the_place_of_a_file_is_not_opened(self):
+        self.marrow(0, "compare", self.file, "--out", "whole")
+        files = [path.relative_to(self.scratch / "whole") for path in (self.scratch / "whole").rglob("*") if path.is_file()]
+        names = {"report.html", "comparison.json", "cells.jsonl", "cells.csv", "experiment.yaml", "key.txt", "cell.json", "report.json"}
+        files = [file for file in files if file.name in names and file.parts[0:2] not in (("cells", "b"), ("pictures", "b"))]
+        self.assertEqual({file.name for file in files}, names)
+        for make in (os.mkfifo, lambda place: os.symlink("/dev/zero", place)):
+            shutil.rmtree(self.scratch / "out", ignore_errors=True)
+            shutil.copytree(self.scratch / "whole", self.scratch / "out")
+            for file in files:
+                (self.scratch / "out" / file).unlink()
+                make(self.scratch / "out" / file)
+            self.marrow(0, "compare", self.file, "--out", "out", timeout=120)
+            for file in files:
+                self.assertTrue((self.scratch / "out" / file).is_file() and not (self.scratch / "out" / file).is_symlink(), file)
+        self.assertTrue(all((self.scratch / "out" / file).stat().st_size for file in files))
+
+    def test_nothing_is_changed_behind_a_link(self):
+        (self.scratch / "mine" / "0" / "0").mkdir(parents=True)
+        self.write("mine/0/0/notes", "mine")
+        for place in ("cells", "pictures", "cases", "cells/b", "cells/b/0", "pictures/a/1", "cells/b/1/0"):
+            with self.subTest(place):
+                self.marrow(0, "compare", self.file, "--out", "out")
+                shutil.rmtree(self.scratch / "out" / place, ignore_errors=True)
+                (self.scratch / "out" / place).symlink_to(self.scratch / "mine")
+                for command in (["compare", self.file], ["cell", self.file, "b/0/0"]):
+                    self.refused("out/%s is a link, behind which nothing is changed; remove it, or choose another folder with --out" % place, *command, "--out", "out")
+                self.assertEqual([str(path.relative_to(self.scratch / "mine")) for path in (self.scratch / "mine").rglob("*")], ["0", "0/0", "0/0/notes"])
+                shutil.rmtree(self.scratch / "out")
+
     def test_the_folder_of_another_experiment(self):
         self.marrow(0, "compare", self.file, "--out", "out")
         other = self.experiment("other", "{a: {}}")

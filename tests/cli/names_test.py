@@ -120,6 +120,21 @@ class Names(Commands):
         self.assertIn("# \\u009b31m \\u202e", self.expect(2, "check", "p.yaml").stderr, "the line as it is quoted")
         self.assertIn("k\x1b[2J", json.loads(self.expect(2, "check", "--json", "p.yaml").stdout)[0]["message"], "JSON has escapes of its own")
 
+    def test_nor_does_an_argument_or_a_folder(self):
+        name, cache = "a" + ESCAPE.replace("/", "") + "\u202e", self.scratch / "cache\x1b[2J"
+        self.write(name, "x")
+        self.write("p.yaml", "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  w: {uses: test.work, with: {value: 0.01, path: $x}}\noutputs: {o: w}\n")
+        environment = {"MARROW_CACHE": str(cache)}
+        self.expect(0, "run", "p.yaml", "x=" + name, "--out", "o", extra_environment=environment)
+        commands = [[0, "cache", "info"], [0, "cache", "why", ""], [2, "cache", "why", ESCAPE], [2, "cache", "gc", "--keep-gb", ESCAPE], [2, "run", "p.yaml", "--threads", ESCAPE],
+                    [2, "run", "p.yaml", "--seed", ESCAPE], [2, "run", "p.yaml", "--" + ESCAPE], [0, "doctor"]]
+        for code, *arguments in commands:
+            environment["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS) + ":/nowhere" + ESCAPE
+            result = self.expect(code, *arguments, extra_environment=environment)
+            for bad in ("\x1b", "\x07", "\u202e", "\nmarrow: forged"):
+                self.assertNotIn(bad, result.stdout + result.stderr, arguments)
+            self.assertIn("\\x1b[2J", result.stdout + result.stderr, arguments)
+
     def test_names_in_dot_files_and_pages_are_names(self):
         self.write("p.yaml", "marrow: 1\nname: 'a\"b'\nnodes:\n  'c\"; x': {uses: test.constant}\n  s: {uses: test.sides, with: {names: ['</script><script>alert(1)</script>', b]}}\n"
                              "outputs: {'o\"': 'c\"; x', s: s.both}\n")
@@ -174,10 +189,34 @@ class Records(Commands):
 
     def test_wrong_pipelines_are_refused(self):
         for text, why in (("nodes: &a {c: *a}\n", "an alias names a list or map that it is in itself"), ("a: " + "[" * 50000, "nested more than 100 deep"), ("{", "not valid YAML"),
-                          ("x" * 4000001, "longer than 4 MB")):
+                          ("x" * 4000001, "longer than 4 MB"), ("", "it holds no pipeline"), ("root:x:0:0\n", "it holds no pipeline"), ("[a]", "it holds no pipeline"),
+                          ("nodes: x\n", "it holds no pipeline"), ("nodes: {c: x}\n", "its node 'c' is no map"), ("nodes: {d: {uses: a}}\n", "its node 'c' is none of pipeline.yaml")):
             self.write("a/pipeline.yaml", text)
             for command in ("rerun", "diff"):
-                self.assertIn(why, self.expect(2, command, "a", *(["a"] if command == "diff" else [])).stderr)
+                error = self.expect(2, command, "a", *(["a"] if command == "diff" else [])).stderr
+                self.assertIn(why, error)
+                self.assertEqual(error.count("\n"), 1)
+                self.assertNotIn("yaml-cpp", error)
+
+    def test_no_pipe_keeps_a_reader_waiting(self):
+        shutil.copytree(self.scratch / "a", self.scratch / "b")
+        (self.scratch / "a" / "pipeline.yaml").unlink()
+        os.mkfifo(self.scratch / "a" / "pipeline.yaml")
+        os.mkfifo(self.scratch / "a" / "report.html")
+        for command in (["diff", "a", "b"], ["diff", "b", "a"], ["rerun", "a", "--out", "c"]):
+            self.assertIn("a/pipeline.yaml is not what 'marrow run' wrote: the pipeline cannot be read: it is no regular file; run it again",
+                          self.expect(2, *command, timeout=60).stderr)
+        self.expect(0, "show", "a", timeout=60)
+        self.assertEqual(self.shown()["experiment"]["pipeline_text"], "")
+        for name in ("a/pipeline.yaml", "/dev/zero"):
+            for command in ("check", "graph", "run", "plan"):
+                self.assertEqual(self.expect(2, command, name, timeout=60).stderr,
+                                 "%s: error: the pipeline file cannot be read: it is no regular file\n  hint: write the text to a file and give that\n1 error\n" % name)
+            self.assertIn("it is no regular file", self.expect(2, "compare", name, "--out", "c", timeout=60).stderr)
+        self.assertFalse((self.scratch / "c").exists())
+        (self.scratch / "out").symlink_to("/dev/stdout")
+        page = subprocess.run([str(MARROW), "show", "b", "--out", "out"], cwd=self.scratch, capture_output=True, text=True, timeout=60)
+        self.assertIn("</html>", page.stdout, "a pipe that is named as the place of the page")
 
     def test_functions_that_call_each_other_in_a_circle(self):
         node, nodes, pipeline = self.record["nodes"][0], [], "marrow: 1\nname: p\nnodes:\n"
@@ -222,6 +261,19 @@ class Records(Commands):
             if folder == "b":
                 shutil.copytree(self.scratch / "a", self.scratch / "b", symlinks=True)
         self.assertIn("by how much is not known", self.expect(1, "diff", "a", "b").stdout)
+
+    def test_a_page_shows_no_pipeline_from_outside_the_run(self):
+        secret = self.write("secret.yaml", (self.scratch / "a" / "pipeline.yaml").read_text() + "# secret\n")
+        (self.scratch / "a" / "pipeline.yaml").unlink()
+        (self.scratch / "a" / "pipeline.yaml").symlink_to(secret)
+        result = self.expect(0, "show", "a")
+        self.assertEqual(result.stderr, "marrow: warning: pipeline.yaml is not shown: it lies outside the run's folder a\n")
+        self.assertEqual(self.shown()["experiment"]["pipeline_text"], "")
+        self.assertNotIn("graph", self.shown())
+        self.assertNotIn("# secret", (self.scratch / "a" / "report.html").read_text())
+        shutil.move(self.scratch / "a" / "run.json", self.scratch / "run.json")
+        (self.scratch / "a" / "run.json").symlink_to(self.scratch / "run.json")
+        self.assertIn("a/run.json is a link to a file outside of the folder, of which nothing is shown; copy it there", self.expect(2, "show", "a").stderr)
 
     def test_a_scene_fetches_nothing(self):
         scene = {"marrow-scene": 1, "meshes": [], "poses": [], "views": [{"name": "x", "image": "http://example.invalid/x.png"}]}

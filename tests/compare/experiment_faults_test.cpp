@@ -125,6 +125,9 @@ TEST_F(ExperimentFaults, Cases) {
   std::filesystem::create_directories(scratch.path / "more" / "a");
   expect_fault(cases("\n  folders:\n  - cases/*\n  - more/*"), 6, "two cases are named 'a'",
                "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "more/a").string());
+  std::filesystem::create_directories(scratch.path / "odd\nfolder" / "a");
+  expect_fault(cases("\n  folders:\n  - cases/*\n  - odd*/*"), 6, "two cases are named 'a'",
+               "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "odd\\x0afolder/a").string());
   expect_fault(cases("{input: [a], folders: [cases/*]}"), 3, "input: expected a text, got a list");
   read(cases("{input: caes, folders: [cases/*]}"));
   EXPECT_EQ(diagnostics.size(), 2u);

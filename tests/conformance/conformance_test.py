@@ -3,8 +3,10 @@
 import os
 import pathlib
 import re
+import signal
 import subprocess
 import sys
+import tempfile
 import unittest
 
 BUILD = pathlib.Path(sys.argv[1])
@@ -66,9 +68,9 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
 }
 
 
-def conformance(*subjects, seconds=10):
+def conformance(*subjects, seconds=10, **variables):
     """Exit code, and {node: {check: (passed, text)}}."""
-    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS=str(seconds))
+    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS=str(seconds), **variables)
     result = subprocess.run([str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment)
     nodes, checks = {}, {}
     for line in result.stdout.splitlines():
@@ -101,6 +103,34 @@ class Conformance(unittest.TestCase):
         self.assertEqual(texts["nothing_inside"], "it took longer than 10 s")
         texts = {name: text for name, (_, text) in conformance("mesh.fat", seconds=60)[1]["mesh.fat"].items()}
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
+
+    def test_files_lie_in_a_folder_that_nobody_foresees_and_are_removed(self):
+        with tempfile.TemporaryDirectory() as folder:
+            victim = pathlib.Path(folder) / "victim"
+            victim.write_text("mine")
+            temporary = pathlib.Path(folder) / "temporary"
+            for number in range(os.getpid(), os.getpid() + 3000):
+                (temporary / ("marrow-conformance-%d" % number)).mkdir(parents=True)
+                (temporary / ("marrow-conformance-%d" % number) / "board.yaml").symlink_to(victim)
+            before = set(temporary.iterdir())
+            for node in ("camera.plain", "edges.crashing"):
+                conformance(node, seconds=300, TMPDIR=str(temporary))
+                self.assertEqual(victim.read_text(), "mine")
+                self.assertEqual(set(temporary.iterdir()), before)
+            result, _ = conformance("camera.plain", TMPDIR=str(victim))
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("error: ", result.stderr)
+
+    def test_what_is_stopped_leaves_nothing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), TMPDIR=folder)
+            process = subprocess.Popen([str(BUILD / "bin" / "marrow"), "conformance", "mesh.endless"], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            process.stdout.readline()
+            self.assertEqual(len(os.listdir(folder)), 1)
+            self.assertEqual(os.stat(os.path.join(folder, os.listdir(folder)[0])).st_mode & 0o777, 0o700)
+            process.send_signal(signal.SIGINT)
+            self.assertEqual((process.communicate(timeout=60)[1], process.returncode), ("marrow: stopped by Ctrl-C\n", 130))
+            self.assertEqual(os.listdir(folder), [])
 
     def test_right_ones_pass(self):
         for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "project.plain", "segment.plain", "shaft.plain", "similarity.plain"):

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "plugins/read/volume.cpp"
+#include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
 
@@ -71,6 +72,113 @@ TEST(ReadDicom, TwoSeriesAreListedAndOneCanBeNamed) {
               "holds 2 series; name one with series_uid:\n    1.2.3.4 (CT, 4 slices)\n    1.2.3.5 (CT, 4 slices)");
   EXPECT_EQ(read(folder.path(), "1.2.3.5").grid.size[2], 4);
   EXPECT_SAYS(read(folder.path(), "9.9"), "holds no series 9.9; it holds:\n    1.2.3.4");
+}
+
+// What is left of the last slice would not be missed by a gap, whatever it is called.
+TEST(ReadDicom, FilesThatAreNoWholeSliceAreRefused) {
+  const TemporaryFolder elsewhere;
+  write_dicom(elsewhere / "slice.dcm", slice_at(18, 0));
+  const std::string good = marrow::test::bytes_of(elsewhere / "slice.dcm");
+  for (const char* name : {"IM5", "IM5.DCM", "IM5.IMA", "im5.dcm", "IM5.img", "IM5.bak", "im5.dcm.gz"})
+    for (const auto& [content, text] :
+         {std::pair{std::string(), "it is empty"}, std::pair{good.substr(0, 100), "it has 100 bytes"},
+          std::pair{good.substr(0, 128) + "XXXX" + good.substr(132), "it has no 'DICM' at byte 128"}}) {
+      const TemporaryFolder folder;
+      write_series(folder);
+      marrow::test::put(folder / name, content);
+      EXPECT_SAYS(read(folder.path()),
+                  std::string(name) + ": this file in the series' folder is no whole DICOM file (" + text);
+      marrow::test::put(folder / name, good);
+      EXPECT_EQ(read(folder.path()).grid.size[2], 5) << name;
+    }
+}
+
+TEST(ReadDicom, FilesThatAreNoSliceByNameArePassedOver) {
+  const TemporaryFolder folder;
+  write_series(folder);
+  for (const char* name : {"LICENSE", "README", "notes.TXT", "Thumbs.db", ".DS_Store", "._IM5", "DICOMDIR",
+                           "segmentation.nii.gz", "case.yaml", "below/report.pdf"})
+    marrow::test::put(folder / name, "not a slice");
+  marrow::test::put(folder / "empty.txt", "");
+  EXPECT_EQ(read(folder.path()).grid.size[2], 4);
+}
+
+TEST(ReadDicom, SlicesInAFolderBelowAreRefused) {
+  const TemporaryFolder folder;
+  write_series(folder);
+  std::filesystem::create_directories(folder / "more/part");
+  std::filesystem::rename(folder / "slice6.dcm", folder / "more/part/slice6.dcm");
+  EXPECT_SAYS(read(folder.path()),
+              "more: this folder inside the series' folder holds files that may be slices ('part/slice6.dcm')");
+  marrow::test::put(folder / "more/part/slice6.dcm", "");
+  EXPECT_SAYS(read(folder.path()), "('part/slice6.dcm'), and only one folder is read");
+}
+
+/// A CT slice of 4 x 3 pixels, element by element.
+marrow::test::Elements ct_slice(int z) {
+  std::string pixels;
+  for (int i = 0; i < 12; ++i) pixels += marrow::test::little(std::uint32_t(i), 2);
+  return {{0x00080060, "CS:CT"},
+          {0x0020000E, "UI:1.2.9"},
+          {0x00200032, "DS:0\\0\\" + std::to_string(z)},
+          {0x00200037, "DS:1\\0\\0\\0\\1\\0"},
+          {0x00280002, "US:1"},
+          {0x00280004, "CS:MONOCHROME2"},
+          {0x00280010, "US:3"},
+          {0x00280011, "US:4"},
+          {0x00280030, "DS:1\\1"},
+          {0x00280100, "US:16"},
+          {0x00280101, "US:16"},
+          {0x00280102, "US:15"},
+          {0x00280103, "US:0"},
+          {0x00281052, "DS:-1024"},
+          {0x00281053, "DS:1"},
+          {0x7FE00010, "OW:" + pixels}};
+}
+
+void put_slices(const TemporaryFolder& folder, const marrow::test::Elements& changed) {
+  for (int z = 0; z < 3; ++z) {
+    auto elements = ct_slice(z);
+    for (const auto& [tag, value] : changed) elements[tag] = value;
+    marrow::test::put(folder / ("s" + std::to_string(z) + ".dcm"), marrow::test::dicom_file(elements));
+  }
+}
+
+TEST(ReadDicom, PixelsThatTheHeaderDoesNotTellOfAreRefused) {
+  const TemporaryFolder folder;
+  put_slices(folder, {});
+  EXPECT_EQ(read(folder.path()).at(3, 2, 1), 11 - 1024);
+  put_slices(folder, {{0x00280010, "US:2"}});
+  EXPECT_SAYS(read(folder.path()),
+              "s0.dcm: is cut off or damaged: its header tells of 16 bytes of pixels, but there are 24");
+  put_slices(folder, {{0x00280100, "US:8"}, {0x00280101, "US:8"}, {0x00280102, "US:7"}});
+  EXPECT_SAYS(read(folder.path()),
+              "s0.dcm: is cut off or damaged: its header tells of 12 bytes of pixels, but there are 24");
+  const marrow::test::Elements odd{
+      {0x00280100, "US:8"}, {0x00280101, "US:8"}, {0x00280102, "US:7"}, {0x00280011, "US:3"}};
+  auto filled = odd;
+  filled[0x7FE00010] = "OW:" + std::string(10, '\5');  // 9 and one byte of filling
+  put_slices(folder, filled);
+  EXPECT_EQ(read(folder.path()).at(2, 2, 2), 5 - 1024);
+  filled[0x7FE00010] = "OW:" + std::string(12, '\5');
+  put_slices(folder, filled);
+  EXPECT_SAYS(read(folder.path()), "its header tells of 9 bytes of pixels, but there are 12");
+  filled[0x7FE00010] = "OW:" + std::string(9, '\5') + std::string(129, '\0');  // to the end of a block, as some write it
+  put_slices(folder, filled);
+  EXPECT_EQ(read(folder.path()).at(2, 2, 2), 5 - 1024);
+}
+
+TEST(ReadDicom, ScalingOfOnlySomeSlicesIsRefused) {
+  const TemporaryFolder folder;
+  for (const std::uint32_t tag : {0x00281052u, 0x00281053u}) {
+    put_slices(folder, {});
+    auto elements = ct_slice(1);
+    elements.erase(tag);
+    marrow::test::put(folder / "s1.dcm", marrow::test::dicom_file(elements));
+    const std::string name = tag == 0x00281052u ? "RescaleIntercept" : "RescaleSlope";
+    EXPECT_SAYS(read(folder.path()), "s1.dcm: its header has no " + name + ", but that of");
+    EXPECT_SAYS(read(folder.path()), "s0.dcm has one; a series has it in all slices or in none");
+  }
 }
 
 TEST(ReadDicom, MissingAndRepeatedSlicesAreDiagnosed) {

@@ -166,6 +166,7 @@ TEST_F(HostileTexts, NamesThatHarm) {
                "a.yaml:3:3: fragments: a name holds a character that cannot be printed; choose another");
   expect_seeds(named("\"a\\eb\""), "holds a character that cannot be printed");
   expect_seeds(named("\"a\\u202eb\""), "holds a character that cannot be printed");
+  expect_seeds(named("\"a\\0b\""), "a.yaml:3:3: a text holds the character NUL (\\0); take it out");
   expect_seeds(named("\"\""), "a name is empty");
   expect_seeds(named(std::string(101, 'n')), "a name has 101 bytes; at most 100 are taken");
   put(folder / "a.yaml", named("R\xC3\xB6hrenknochen, distal"));

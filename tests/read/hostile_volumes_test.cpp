@@ -144,6 +144,120 @@ TEST_F(Hostile, MetaImageFieldsAreReadStrictly) {
   EXPECT_EQ(volume_at(folder / "b.mha").values[9], 9 * 13 - 1000);
 }
 
+/// `text` without the line that begins with `start`.
+std::string without_line(std::string text, const std::string& start) {
+  const std::size_t at = text.find("\n" + start);
+  EXPECT_NE(at, std::string::npos) << start;
+  return at == std::string::npos ? text : text.erase(at, text.find('\n', at + 1) - at);
+}
+
+TEST_F(Hostile, MetaImageThatDoesNotSayHowLargeVoxelsAre) {
+  ItkGrid<std::int16_t> grid = stack();
+  grid.spacing = {0.5, 0.75, 1.25};
+  write_itk(folder / "a.mha", grid);
+  const std::string bytes = bytes_of(folder / "a.mha"), without = without_line(bytes, "ElementSpacing");
+  const std::string said =
+      "its header does not say how large its voxels are; add 'ElementSpacing = X Y Z' (mm) to it, or give "
+      "voxel_size_mm";
+  expect("b.mha", without, said);
+  expect("b.mha", with(bytes, "ElementSpacing", "ElementSpacng"), said);
+  marrow::read::VolumeReading reading;
+  reading.voxel_size_mm = {1, 2, 3};
+  EXPECT_EQ(marrow::read::read_volume_file(folder / "b.mha", reading).grid.spacing_mm, Eigen::Vector3d(1, 2, 3));
+  put(folder / "b.mha", with(bytes, "ElementSpacing", "ElementSize"));
+  EXPECT_EQ(itk_meta_spacing(folder / "b.mha"), (std::vector<double>{0.5, 0.75, 1.25}));
+  EXPECT_EQ(volume_at(folder / "b.mha").grid.spacing_mm, Eigen::Vector3d(0.5, 0.75, 1.25));
+}
+
+TEST_F(Hostile, MetaImageOfOtherUnitsAndOfFourDimensions) {
+  const std::string bytes = good("a.mha");
+  for (const char* unit : {"cm", "um", "inch"})
+    expect("b.mha", with(bytes, "DimSize", "DistanceUnits = " + std::string(unit) + "\nDimSize"),
+           "expected mm: save it with its lengths in mm");
+  put(folder / "b.mha", with(bytes, "DimSize", "DistanceUnits = mm\nDimSize"));
+  EXPECT_EQ(volume_at(folder / "b.mha").grid.size[0], 8);
+  std::string four = without_line(without_line(without_line(bytes, "Offset"), "CenterOfRotation"), "ElementSpacing");
+  four = with(with(four, "NDims = 3", "NDims = 4"), "DimSize = 8 6 5", "ElementSpacing = 1 1 1 1\nDimSize = 8 6 5 1");
+  const auto turned = [&](const std::string& axes) {
+    return with(without_line(four, "TransformMatrix"), "NDims", "TransformMatrix = " + axes + "\nNDims");
+  };
+  put(folder / "b.mha", turned("0 1 0 0 -1 0 0 0 0 0 1 0 0 0 0 1"));
+  EXPECT_EQ(volume_at(folder / "b.mha").grid.direction.col(0), Eigen::Vector3d(0, 1, 0));
+  EXPECT_EQ(volume_at(folder / "b.mha").grid.direction.col(1), Eigen::Vector3d(-1, 0, 0));
+  expect("b.mha", turned("0 1 0 2 -1 0 0 0 0 0 1 0 0 0 0 1"),
+         "expected zeros between the axes of the volume and others");
+}
+
+TEST_F(Hostile, NrrdThatDoesNotSayHowLargeVoxelsAre) {
+  const std::string bytes = good("a.nrrd"),
+                    bare =
+                        without_line(without_line(without_line(bytes, "space:"), "space directions"), "space origin");
+  const auto adds = [&](const std::string& to, const std::string& lines) {
+    return with(to, "\nendian", "\n" + lines + "endian");
+  };
+  expect("b.nrrd", bare, "does not say how large its voxels are; add 'spacings: X Y Z' (mm) to it");
+  expect("b.nrrd", adds(bare, "axis mins: 0 0 0\naxis maxs: 8 6 5\n"), "gives the ends of its axes but no 'spacings'");
+  const std::string spaced = adds(bare, "spacings: 1 2 3\n");
+  put(folder / "b.nrrd", spaced);
+  EXPECT_EQ(volume_at(folder / "b.nrrd").grid.spacing_mm, Eigen::Vector3d(1, 2, 3));
+  for (const char* line : {"space: RAS\n", "space origin: (1,2,3)\n", "space dimension: 3\n"})
+    expect("b.nrrd", adds(spaced, line), "but no 'space directions', which say how its axes lie there; add");
+  put(folder / "b.nrrd", adds(spaced, "axis mins: 0 0 0\naxis maxs: 8 12 15\ncontent: any\nthicknesses: 9 9 9\n"));
+  EXPECT_EQ(volume_at(folder / "b.nrrd").grid.origin_mm, Eigen::Vector3d(0.5, 1, 1.5));
+  expect("b.nrrd", adds(spaced, "axis mins: 0 0 0\naxis maxs: 8 12 16\n"), "'axis maxs'");
+}
+
+TEST_F(Hostile, SamplesThatTheHeaderDoesNotTellOfAreRefused) {
+  const std::string more = "tells of other samples than it holds: ";
+  expect("b.mha", with(good("a.mha"), "MET_SHORT", "MET_UCHAR"), more + "240 bytes of samples expected, got 480");
+  expect("b.nrrd", good("a.nrrd") + "x", more + "480 bytes of samples expected, got 481");
+  expect("b.nii", good("a.nii") + std::string(16, '\0'), more + "480 bytes of samples expected, got 496");
+  for (const char* name : {"a.nii.gz", "a.mha", "a.nrrd"}) {
+    write_itk(folder / name, stack(), true);
+    expect(name, bytes_of(folder / name) + "junk", "4 bytes follow the end of its compressed samples, none expected");
+  }
+}
+
+TEST_F(Hostile, NiftiInOtherUnitsLiesWhereItSays) {
+  ItkGrid<std::int16_t> grid = stack();
+  grid.spacing = {0.5, 0.75, 1.25};
+  grid.origin = {10, 20, 30};
+  write_itk(folder / "a.nii", grid);
+  const std::string bytes = bytes_of(folder / "a.nii");
+  for (const bool by_sform : {true, false})
+    for (const auto& [unit, scale] : {std::pair{1, 1e3}, std::pair{3, 1e-3}}) {
+      put(folder / "b.nii",
+          replaced(replaced(bytes, 123, std::string(1, char(unit))), by_sform ? 252 : 254, number<std::int16_t>(0)));
+      const marrow::Grid read = volume_at(folder / "b.nii").grid;
+      EXPECT_LT((read.spacing_mm - scale * Eigen::Vector3d(0.5, 0.75, 1.25)).norm(), 1e-6 * scale) << unit;
+      EXPECT_LT((read.origin_mm - scale * Eigen::Vector3d(10, 20, 30)).norm(), 1e-5 * scale) << unit;
+    }
+}
+
+TEST_F(Hostile, NiftiThatSaysTwiceHowLargeVoxelsAre) {
+  const std::string bytes = replaced(good("a.nii"), 252, number<std::int16_t>(0));  // by its sform
+  expect("b.nii", replaced(bytes, 88, number(1.5f)),
+         "says twice how large a voxel is along axis 3: 1.000000 mm by its sform, 1.500000 mm by its pixdim");
+  put(folder / "b.nii", replaced(bytes, 88, number(1.0005f)));
+  EXPECT_EQ(volume_at(folder / "b.nii").grid.spacing_mm[2], 1);
+}
+
+// By its place in space, each voxel keeps its value.
+TEST_F(Hostile, LeftHandedAxesBecomeRightHanded) {
+  ItkGrid<std::int16_t> grid = stack();
+  grid.spacing = {0.5, 0.75, 1.25};
+  grid.origin = {10, 20, 30};
+  grid.axes[2] = {0, 0, -1};
+  for (const char* name : {"a.mha", "a.nrrd", "a.nii"}) {
+    write_itk(folder / name, grid);
+    const marrow::Volume volume = volume_at(folder / name);
+    EXPECT_TRUE(volume.grid.direction.isIdentity(1e-6)) << name;
+    EXPECT_LT((volume.grid.origin_mm - Eigen::Vector3d(10, 20, 30 - 4 * 1.25)).norm(), 1e-5) << name;
+    EXPECT_EQ(volume.at(1, 2, 0), (4 * 48 + 2 * 8 + 1) * 13 - 1000) << name;
+    EXPECT_EQ(volume.at(1, 2, 4), (2 * 8 + 1) * 13 - 1000) << name;
+  }
+}
+
 // A header in any spelling names no file outside the folder.
 TEST_F(Hostile, NothingOutsideTheFolderIsOpened) {
   const TemporaryFolder elsewhere;
@@ -224,6 +338,37 @@ std::string tiff_directory(std::uint32_t next) {
   return number<std::uint16_t>(8) + tiff_entry(256, 4, 1, 2) + tiff_entry(257, 4, 1, 2) + tiff_entry(258, 4, 1, 8) +
          tiff_entry(259, 4, 1, 1) + tiff_entry(262, 4, 1, 1) + tiff_entry(273, 4, 1, 4) + tiff_entry(278, 4, 1, 2) +
          tiff_entry(279, 4, 1, 4) + number(next);
+}
+
+TEST_F(Hostile, TiffWhoseZeroIsWhite) {
+  const std::string start = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(8);  // 4 pixels are the 8
+  const std::uint32_t page = std::uint32_t(tiff_directory(0).size());
+  const auto white = [&](std::string bytes) {
+    for (const std::size_t at : {bytes.find(tiff_entry(262, 4, 1, 1)), bytes.rfind(tiff_entry(262, 4, 1, 1))})
+      bytes.replace(at, 12, tiff_entry(262, 4, 1, 0));
+    return bytes;
+  };
+  put(folder / "a.tif", start + white(tiff_directory(8 + page) + tiff_directory(0)));
+  const auto values = volume_at(folder / "a.tif").values;
+  EXPECT_EQ(values, (std::vector<float>{247, 255, 255, 255, 247, 255, 255, 255}));
+  std::string with_sign = white(tiff_directory(8 + page) + tiff_directory(0));  // SampleFormat instead of RowsPerStrip
+  for (std::size_t at; (at = with_sign.find(tiff_entry(278, 4, 1, 2))) != std::string::npos;)
+    with_sign.replace(at, 12, tiff_entry(339, 4, 1, 2));
+  expect("a.tif", start + with_sign, "its zero is white (PhotometricInterpretation WhiteIsZero)");
+}
+
+TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
+  const std::uint32_t page = std::uint32_t(tiff_directory(0).size());
+  const auto stack = [&](const std::string& description) {
+    std::string bytes = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(8) + tiff_directory(8 + page);
+    bytes += tiff_directory(0);
+    const std::size_t at = bytes.find(tiff_entry(278, 4, 1, 2));  // the default does too
+    return bytes.replace(at, 12, tiff_entry(270, 2, std::uint32_t(description.size()), 8 + 2 * page)) + description;
+  };
+  put(folder / "a.tif", stack("ImageJ=1.54f\nimages=2\nslices=2\nchannels=1\n"));
+  EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2}));
+  expect("a.tif", stack("ImageJ=1.54f\nimages=2\nchannels=2\n"), "is an ImageJ stack of 2 channels");
+  expect("a.tif", stack("ImageJ=1.54f\nimages=2\nframes=2\n"), "is an ImageJ stack of 2 frames");
 }
 
 TEST_F(Hostile, TiffWhosePagesRunInACircle) {

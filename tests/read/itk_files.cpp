@@ -59,6 +59,15 @@ template void write_itk(const std::filesystem::path&, const ItkGrid<std::uint16_
 template void write_itk(const std::filesystem::path&, const ItkGrid<float>&, bool);
 template void write_itk(const std::filesystem::path&, const ItkGrid<double>&, bool);
 
+std::vector<double> itk_meta_spacing(const std::filesystem::path& path) {
+  const auto io = itk::MetaImageIO::New();
+  io->SetFileName(path.string());
+  io->ReadImageInformation();
+  std::vector<double> spacing;
+  for (unsigned k = 0; k < io->GetNumberOfDimensions(); ++k) spacing.push_back(io->GetSpacing(k));
+  return spacing;
+}
+
 void write_dicom(const std::filesystem::path& path, const DicomSlice& slice) {
   const auto io = itk::GDCMImageIO::New();
   itk::MetaDataDictionary& tags = io->GetMetaDataDictionary();

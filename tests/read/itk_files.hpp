@@ -23,6 +23,9 @@ struct ItkGrid {
 template <class T>
 void write_itk(const std::filesystem::path& path, const ItkGrid<T>& grid, bool compressed = false);
 
+/// The distance of samples as ITK reads it from a MetaImage's header.
+std::vector<double> itk_meta_spacing(const std::filesystem::path& path);
+
 struct DicomSlice {
   std::string series = "1.2.3.4", modality = "CT";
   std::array<double, 3> position{0, 0, 0};

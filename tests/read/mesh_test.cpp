@@ -165,4 +165,25 @@ TEST(ReadMesh, HeadersThatClaimTooMuchAreRefused) {
   EXPECT_SAYS(read(folder / "a.obj"), "known are .stl and .ply");
 }
 
+TEST(ReadMesh, MoreThanTheHeaderClaimsIsRefused) {
+  const TemporaryFolder folder;
+  put(folder / "a.stl", stl_binary() + stl_binary().substr(84));
+  EXPECT_SAYS(read(folder / "a.stl"), "claims 4 triangles, which end after 284 bytes, but the file has 484");
+  put(folder / "a.ply", ply_binary(false) + "junk");
+  EXPECT_SAYS(read(folder / "a.ply"), "bytes of numbers, but the file has ");
+}
+
+TEST(ReadMesh, AFileOfSeveralSolidsMustBeWhole) {
+  const TemporaryFolder folder;
+  const std::string two = stl_text() + stl_text();
+  put(folder / "two.stl", two);
+  EXPECT_EQ(read(folder / "two.stl").triangles.size(), 8u);
+  for (const std::size_t end : {two.size() - 10, two.rfind(" endfacet"), two.rfind("   vertex"), two.rfind("solid t") + 3}) {
+    put(folder / "cut.stl", two.substr(0, end));
+    EXPECT_SAYS(read(folder / "cut.stl"), "cut off");
+  }
+  put(folder / "half.stl", with(stl_text(), "  endloop\n endfacet\nendsolid", "endsolid"));
+  EXPECT_SAYS(read(folder / "half.stl"), "has no 'endfacet'");
+}
+
 }  // namespace

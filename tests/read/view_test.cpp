@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
 
@@ -26,6 +27,16 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   camera.width_px = 7;
   EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}),
               "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
+}
+
+TEST(ReadView, ValuesThatGoThroughATableAreRefused) {
+  const marrow::test::TemporaryFolder folder;
+  auto elements = marrow::test::fluoroscopy();
+  elements[0x00283000] = marrow::test::dicom_item({{0x00283002, "US:4"}});
+  marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
+  const marrow::Camera camera;
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "x.dcm", {}, {}, 0}),
+              "x.dcm: its values go through a table (ModalityLUTSequence), which is not read; export it without one");
 }
 
 }  // namespace

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers run apart: whatever a file makes them do is one node's error.
+#include "runtime/apart.hpp"
+
 #include <signal.h>
 #include <unistd.h>
 
@@ -94,6 +96,24 @@ TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
                                              "where the file is good, raise the limit with --file-seconds");
 }
 
+TEST_F(ApartTest, LimitsFollowTheSize) {
+  run("hello");
+  const double slower = marrow::abi_stamp().sanitizers ? 20 : 1;
+  const auto expect = [&](double bytes, double memory_mb, double processor_s) {
+    const marrow::CallLimits limits = marrow::limits_of(pipeline.nodes[0], bytes, settings);
+    EXPECT_EQ(limits.memory_mb, memory_mb * slower) << bytes;
+    EXPECT_EQ(limits.processor_s, processor_s * slower) << bytes;
+    EXPECT_EQ(limits.seconds, 30 + 10 * processor_s * slower) << bytes;
+    EXPECT_EQ(limits.threads, 1) << bytes;
+  };
+  expect(0, 192, 1.5);
+  expect(1e6, 192 + 1024, 2.5);
+  expect(1e8, 4096, 101.5);
+  expect(1e9, 256 + 8000, 1001.5);
+  settings.file_limits = {100, 0.5};
+  expect(1e9, 100, 0.5);
+}
+
 TEST_F(ApartTest, WhatALibraryPrintsIsNoAnswer) { EXPECT_EQ(failure("shout"), ""); }
 
 TEST_F(ApartTest, CtrlCEndsTheProcess) {
@@ -114,6 +134,11 @@ TEST_F(ApartTest, FileThatChangesWhileItIsReadGivesNoResult) {
   EXPECT_EQ(failure("change"), " changed while it was read; run it again");
   const auto entries = store.entries();
   EXPECT_TRUE(std::none_of(entries.begin(), entries.end(), [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
+}
+
+TEST_F(ApartTest, FileThatIsAsBeforeWhenItHasBeenReadMayHaveBeenAnotherOne) {
+  EXPECT_EQ(failure("change_back"), " changed while it was read; run it again");
+  EXPECT_EQ(std::filesystem::file_size(file), std::string("change_back").size());
 }
 
 TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {

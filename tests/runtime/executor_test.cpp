@@ -143,12 +143,13 @@ TEST_F(ExecutorTest, KeysFollowContentNotRecipe) {
   EXPECT_NE(key, output(run("  c: {uses: test.constant, with: {value: 4}}\n", "o: c")).key);
 }
 
-TEST_F(ExecutorTest, PathCountsByContent) {
-  const auto file = scratch.write("data.txt", "one");
-  const std::string nodes = "  c: {uses: test.constant, with: {path: " + file.string() + "}}\n  d: {uses: test.constant, with: {path: " + scratch.write("other.txt", "one").string() + "}}\n";
+TEST_F(ExecutorTest, PathCountsByNameAndContent) {
+  std::filesystem::create_directory(scratch.path / "below");
+  const auto file = scratch.write("data.txt", "one"), copy = scratch.write("below/data.txt", "one");
+  const std::string nodes = "  c: {uses: test.constant, with: {path: " + file.string() + "}}\n  d: {uses: test.constant, with: {path: " + copy.string() + "}}\n";
   const RunResult same = run(nodes, "c: c, d: d");
-  EXPECT_EQ(same.nodes[0].calls + same.nodes[1].calls, 1) << "same content at another path";
-  scratch.write("other.txt", "two");
+  EXPECT_EQ(same.nodes[0].calls + same.nodes[1].calls, 1) << "the same in another folder";
+  scratch.write("below/data.txt", "two");
   const RunResult changed = run(nodes, "c: c, d: d");
   EXPECT_EQ(changed.nodes[0].calls + changed.nodes[1].calls, 2);
 }

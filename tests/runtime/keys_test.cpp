@@ -134,6 +134,9 @@ TEST_F(Keys, FilesCountByTheirContentAndNames) {
   EXPECT_EQ(recipe(), before);
   option("file") = write("elsewhere/file", "content");
   EXPECT_EQ(recipe(), before) << "where it lies is no part of it";
+  option("file") = write("elsewhere/other", "content");
+  EXPECT_TRUE(seen.insert(recipe()).second) << "what it is called may name an item, or say how it is read";
+  option("file") = write("file", "content");
   write("second", "3");
   EXPECT_TRUE(seen.insert(recipe()).second) << "the content of a second file";
   write("second", "2");

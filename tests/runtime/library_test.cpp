@@ -180,6 +180,15 @@ TEST_F(LibraryTest, LinkedLibraryThatIsKeptBackIsFoundOut) {
   expect_load_refused([](json& j) { j["linked"].erase(j["linked"].size() - 1); },
                       "it loads another " + name + " (" + std::to_string(linked.back().size) + " bytes)");
 }
+TEST_F(LibraryTest, LinkedLibraryOfTheSameSizeThatIsAnotherOneChangesTheBuildId) {
+  const fs::path helper = scratch.write("libmarrow_helper.so", "first");
+  const fs::path file = copy_with_invented([&](json& j) { j["linked"].push_back({{"path", helper.string()}, {"size", 5}}); });
+  const marrow::Digest first = marrow::library_info(file, framework).build_id;
+  EXPECT_EQ(marrow::library_info(file, framework).build_id, first);
+  scratch.write("libmarrow_helper.so", "other");
+  EXPECT_NE(marrow::library_info(file, framework).build_id, first);
+  EXPECT_EQ(marrow::library_info(file, framework).note, "");
+}
 TEST_F(LibraryTest, LinkedLibraryThatIsNoFileMakesTheManifestStale) {
   for (const std::string path : {"/dev/zero", "/", "/nonexistent/lib.so"}) {
     const fs::path file = copy_with_invented([&](json& j) { j["linked"].push_back({{"path", path}, {"size", 0}}); });

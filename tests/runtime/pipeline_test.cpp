@@ -313,8 +313,9 @@ TEST_F(PipelineTest, AliasesThatMultiplyAreSaid) {
   EXPECT_EQ(std::get<double>(p.nodes[1].options[0]), 7.0) << "aliases are good for something";
 }
 
-TEST_F(PipelineTest, SecondDocumentIsSaid) {
+TEST_F(PipelineTest, SecondDocumentAndNulAreSaid) {
   expect_fault(with_key("help: x") + "---\nmarrow: 1\n", 6, 1, "the file goes on after the end of its first document");
+  expect_fault(with_key("help: \"a\\0b\""), 2, 7, "a text holds the character NUL (\\0); take it out");
   read(with_key("help: x") + "...\n# the end\n");
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }

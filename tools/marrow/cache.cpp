@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "commands.hpp"
+#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -15,7 +16,7 @@ struct Share {
 
 /// The command's exit code; says what is at fault, where anything is.
 int code_after(const std::string& fault) {
-  if (!fault.empty()) std::fprintf(stderr, "marrow: error: %s\n", fault.c_str());
+  if (!fault.empty()) std::fprintf(stderr, "marrow: error: %s\n", printable_lines(fault).c_str());
   return fault.empty() ? 0 : 2;
 }
 
@@ -24,7 +25,7 @@ double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
 }  // namespace
 
 bool can_keep_results(const std::string& fault_of_store, bool quiet) {
-  if (!fault_of_store.empty() && !quiet) std::fprintf(stderr, "marrow: note: results are not kept: %s\n", fault_of_store.c_str());
+  if (!fault_of_store.empty() && !quiet) std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
   return fault_of_store.empty();
 }
 
@@ -39,9 +40,9 @@ int cache_info() {
       share->bytes += entry.bytes;
       share->seconds += entry.provenance.seconds;
     }
-  std::printf("%s\n\n%-34s %8s %12s %12s\n", store.folder().c_str(), "node", "results", "MB", "seconds");
+  std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(store.folder().string()).c_str(), "node", "results", "MB", "seconds");
   const auto print = [](const std::string& name, const Share& share) {
-    std::printf("%-34s %8zu %12.2f %12.2f\n", name.c_str(), share.entries, megabytes(share.bytes), share.seconds);
+    std::printf("%-34s %8zu %12.2f %12.2f\n", printable(name).c_str(), share.entries, megabytes(share.bytes), share.seconds);
   };
   for (const auto& [name, share] : shares) print(name.empty() ? "(damaged or of another version)" : name, share);
   print("all", all);
@@ -57,16 +58,15 @@ int cache_why(const std::string& key) {
     if (!is_meant(entry.key) && std::none_of(entry.outputs.begin(), entry.outputs.end(), is_meant)) continue;
     ++found;
     const Provenance& from = entry.provenance;
-    std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), from.node.c_str(), megabytes(entry.bytes), from.seconds,
+    std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), printable(from.node).c_str(), megabytes(entry.bytes), from.seconds,
                 from.build_id.hex().c_str());
-    for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", name.c_str(), value.c_str());
-    for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", name.c_str(), digest.hex().c_str());
+    for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", printable(name).c_str(), printable(value).c_str());
+    for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", printable(name).c_str(), digest.hex().c_str());
     for (const Digest& digest : entry.outputs) std::printf("  output %s\n", digest.hex().c_str());
     if (from.random) std::printf("  seed   %llu\n", static_cast<unsigned long long>(from.seed));
-    for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", warning.c_str());
+    for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
   }
-  if (!found) std::fprintf(stderr, "marrow: error: the store %s holds no result with a key that begins with '%s'\n", store.folder().c_str(), key.c_str());
-  return found ? 0 : 2;
+  return found ? 0 : code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
 }
 
 int cache_collect(const std::string& keep_gb) {

@@ -183,7 +183,7 @@ int doctor(bool as_json) {
   for (const auto& folder : catalogue.folders()) {
     const bool there = std::filesystem::is_directory(folder);
     all["folders"].push_back({{"path", folder.string()}, {"exists", there}});
-    if (!as_json) std::printf("  %s%s\n", folder.c_str(), there ? "" : "  (does not exist)");
+    if (!as_json) std::printf("  %s%s\n", printable(folder.string()).c_str(), there ? "" : "  (does not exist)");
   }
   if (!as_json) std::printf("\nLibraries:\n");
   for (const LibraryInfo& library : catalogue.libraries()) {

@@ -54,7 +54,7 @@ int doctor(bool json);
 /// Nodes, kinds or libraries; each node must pass the suite of its kind.
 int run_conformance(const std::vector<std::string>& subjects);
 /// Takes single checks from the standard input; started by conformance.
-int check_worker();
+int check_worker(const std::filesystem::path& files_folder);
 /// The checks that a node of this kind must pass, with their limits.
 void print_limits(const NodeInfo& node);
 int describe(const std::filesystem::path& library, bool write);

@@ -38,6 +38,10 @@ int run_program(int argc, char** argv) {
   CLI::App app{"marrow finds the 3D pose of bone fragments in X-ray images, by pipelines of plugins described in YAML."};
   app.require_subcommand(1);
   app.footer("Plugins are looked for in the folders of MARROW_PLUGIN_PATH and beside the program's library; see 'marrow doctor'.");
+  app.failure_message([](const CLI::App* failed, const CLI::Error& error) {
+    return CLI::FailureMessage::simple(
+        failed, CLI::Error(error.get_name(), marrow::printable(error.what()), error.get_exit_code()));
+  });
   int code = 0;
 
   RunRequest run_request;
@@ -163,7 +167,9 @@ int run_program(int argc, char** argv) {
 
   auto* check_worker_command = app.add_subcommand("check-worker", "take checks from the standard input; started by conformance");
   check_worker_command->group("");
-  check_worker_command->callback([&] { code = check_worker(); });
+  std::filesystem::path files_folder;
+  check_worker_command->add_option("folder", files_folder, "where checks may write files")->required();
+  check_worker_command->callback([&] { code = check_worker(files_folder); });
 
   std::filesystem::path library;
   bool write = false;

@@ -37,6 +37,8 @@ void refuse_record(const fs::path& folder, const std::string& why) {
 
 nlohmann::json read_record(const fs::path& folder) {
   const fs::path file = folder / "run.json";
+  if (leads_outside(folder, "run.json"))
+    throw Error(file.string() + " is a link to a file outside of the folder, of which nothing is shown; copy it there");
   nlohmann::json record;
   try {
     record = parse_json(read_text_file(file, kMostRecordBytes), file.string());

@@ -106,7 +106,7 @@ int schema(const std::filesystem::path& file) {
     std::fputs(text.c_str(), stdout);
     return 0;
   }
-  write_text_file(file, text);
+  write_text_file(file, text, Kinds::files_and_pipes);
   return 0;
 }
 

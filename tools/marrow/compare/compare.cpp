@@ -111,7 +111,7 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   try {
     runner.draw(*cell);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "marrow: no pictures of %s: %s\n", id.c_str(), error.what());
+    std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable_lines(error.what()).c_str());
   }
   return 0;
 }

@@ -11,6 +11,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/hash.hpp"
+#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {
@@ -42,6 +43,30 @@ bool holds_only_the_marker(const fs::path& folder) {
   return !error;
 }
 
+/// What is behind a link is not this comparison's, to change and to remove.
+void refuse_links(const fs::path& folder, const compare::Experiment& experiment) {
+  std::error_code ignored;
+  const auto check = [&](const fs::path& place) {
+    if (fs::is_symlink(place, ignored))
+      throw Error(place.string() +
+                  " is a link, behind which nothing is changed; remove it, or choose another folder with --out");
+  };
+  for (const char* part : {"cells", "pictures", "cases"}) check(folder / part);
+  for (const char* part : {"cells", "pictures"}) {
+    if (!fs::is_directory(folder / part, ignored)) continue;
+    for (const auto& variant : experiment.variants) {
+      const fs::path of_variant = folder / part / variant.name;
+      check(of_variant);
+      if (!fs::is_directory(of_variant, ignored)) continue;
+      for (const auto& one : experiment.cases) {
+        check(of_variant / one.name);
+        if (!fs::is_directory(of_variant / one.name, ignored)) continue;
+        for (const auto& start : experiment.starts) check(of_variant / one.name / start.name);
+      }
+    }
+  }
+}
+
 /// Of tables whose writing was ended by force.
 void remove_parts(const fs::path& folder) {
   std::error_code error, ignored;
@@ -60,6 +85,7 @@ ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experi
     if (!lock(kUse, use == Use::alone ? F_WRLCK : F_RDLCK, false))
       throw Error("another " + std::string(use == Use::alone ? "comparison or cell" : "comparison") +
                   " is running in " + folder.string() + "; wait for it, or choose another folder with --out");
+    refuse_links(folder, experiment);
     if (use == Use::alone) remove_parts(folder);
     std::error_code error;
     fs::create_directories(folder / "cells", error);
@@ -143,7 +169,7 @@ bool ComparisonFolder::lock(long byte, short type, bool wait) {
     if (errno == EAGAIN || errno == EACCES) return false;
     if (errno == EINTR) continue;
     std::fprintf(stderr, "marrow: %s cannot be locked (%s); start nothing else in this folder\n",
-                 (folder_ / kMarker).c_str(), std::strerror(errno));
+                 printable((folder_ / kMarker).string()).c_str(), std::strerror(errno));
     return true;
   }
   return true;

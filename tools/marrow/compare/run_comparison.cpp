@@ -33,7 +33,7 @@ class Progress {
     last_ = now;
     const double seconds = std::chrono::duration<double>(now - start_).count();
     std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number, all_, seconds,
-                 number ? seconds * double(all_ - number) / double(number) : 0.0, what.c_str(), is_terminal_ && number < all_ ? "" : "\n");
+                 number ? seconds * double(all_ - number) / double(number) : 0.0, printable(what).c_str(), is_terminal_ && number < all_ ? "" : "\n");
   }
 
  private:
@@ -49,7 +49,7 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   pool.memory_limit_mb = request.memory_limit_mb;
   pool.cancelled = &stop_on_signals();
   pool.waits = [](const Job&, const std::string& where) {
-    std::fprintf(stderr, "  %s waits for another run that is making the same result\n", where.empty() ? "a cell" : where.c_str());
+    std::fprintf(stderr, "  %s waits for another run that is making the same result\n", where.empty() ? "a cell" : printable(where).c_str());
   };
   pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
@@ -79,7 +79,8 @@ class Comparison {
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());
     print_failures(rows);
-    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n", folder_.c_str(), fs::absolute(folder_ / "report.html").lexically_normal().c_str());
+    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n", printable(folder_.string()).c_str(),
+                printable(fs::absolute(folder_ / "report.html").lexically_normal().string()).c_str());
     return 0;
   }
 
@@ -124,7 +125,7 @@ class Comparison {
       const CellIndex& cell = cells_[job.number];
       CellRow row = row_of(cell, end);
       runner_.write(cell, row);
-      progress.done(++done, printable(row.id + (row.failed.empty() ? "" : " failed: " + row.failed)));
+      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
       rows_[job.number] = std::move(row);
     });
   }

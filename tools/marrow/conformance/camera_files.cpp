@@ -1,39 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "conformance/camera_files.hpp"
 
-#include <unistd.h>
-
-#include <fstream>
 #include <random>
 #include <sstream>
 
 #include "marrow/domain/error.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::conformance {
 namespace {
 
-/// Removed by the process that made it, at its end.
-class Folder {
- public:
-  Folder() : owner_(getpid()), path_(std::filesystem::temp_directory_path() / ("marrow-conformance-" + std::to_string(owner_))) {
-    std::filesystem::create_directories(path_);
-  }
-  ~Folder() {
-    std::error_code ignored;
-    if (getpid() == owner_) std::filesystem::remove_all(path_, ignored);
-  }
-  const std::filesystem::path& path() const { return path_; }
-
- private:
-  pid_t owner_;
-  std::filesystem::path path_;
-};
+std::filesystem::path files_folder;
 
 std::filesystem::path written(const std::string& name, const std::string& text) {
-  static const Folder folder;
-  const std::filesystem::path path = folder.path() / name;
-  std::ofstream(path, std::ios::binary) << text;
-  if (std::filesystem::file_size(path) != text.size()) throw Error(path.string() + ": cannot be written");
+  if (files_folder.empty()) throw Error("there is no folder for the files that the check needs");
+  const std::filesystem::path path = files_folder / name;
+  write_text_file(path, text);
   return path;
 }
 
@@ -52,6 +34,10 @@ std::string element(std::uint32_t tag, const std::string& kind, std::string valu
 }
 
 }  // namespace
+
+void write_files_to(const std::filesystem::path& folder) {
+  files_folder = folder;
+}
 
 const std::vector<Bead>& board_beads() {
   static const std::vector<Bead> kBeads = [] {

@@ -16,7 +16,10 @@ struct Bead {
 
 /// 24 balls on either side of a board, 80 mm apart, 6 of each side larger.
 const std::vector<Bead>& board_beads();
-/// The board in a file (docs/case.md). Files lie in a folder of this process, which is removed when it ends.
+/// To be called before the files below are asked for: they are written to this folder, which its maker removes.
+void write_files_to(const std::filesystem::path& folder);
+
+/// The board in a file (docs/case.md).
 std::filesystem::path board_file();
 /// Where these views, called a and b, show the board's beads; `mirrored` as an image shows them that is turned left to right.
 std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrored);

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // marrow conformance: runs the suite of a node's kind in a worker, so that a node that crashes or hangs fails that check and no
 // other.
+#include <stdlib.h>
+
+#include <cerrno>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -8,8 +11,10 @@
 #include <memory>
 
 #include "commands.hpp"
+#include "conformance/camera_files.hpp"
 #include "conformance/suite.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "process.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -47,10 +52,33 @@ std::string measured(const NodeDefinition& node, const OptionValues& options, co
   }
 }
 
+/// For files that checks write. Under a name that nobody could foresee, so that nothing was laid there, and for this
+/// user alone. Removed here and not by a worker, which may crash or be ended.
+class FilesFolder {
+ public:
+  FilesFolder() : path_((std::filesystem::temp_directory_path() / "marrow-conformance-XXXXXX").string()) {
+    if (!mkdtemp(path_.data()))
+      throw Error("cannot make a folder for the files that checks need in " +
+                  std::filesystem::path(path_).parent_path().string() + ": " + std::strerror(errno) +
+                  "; name another one in TMPDIR");
+  }
+  ~FilesFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  FilesFolder(const FilesFolder&) = delete;
+  FilesFolder& operator=(const FilesFolder&) = delete;
+  const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
 /// The checks of one node, one after the other in a worker.
 class Checks {
  public:
-  explicit Checks(std::string node) : node_(std::move(node)) {}
+  Checks(std::string node, const FilesFolder& files, const std::atomic<bool>& stopped)
+      : node_(std::move(node)), files_(files), stopped_(stopped) {}
 
   Outcome run(std::size_t number) {
     const bool was_fresh = !worker_;
@@ -66,14 +94,19 @@ class Checks {
 
  private:
   WorkerEnd ask(std::size_t number) {
-    if (!worker_) worker_ = std::make_unique<Worker>(WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker"}});
+    if (!worker_)
+      worker_ = std::make_unique<Worker>(
+          WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker", files_.path()}});
     worker_->ask({{"do", "check"}, {"node", node_}, {"check", number}});
-    const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, nullptr, nullptr);
+    const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
+    if (stopped_.load()) throw Cancelled();  // a terminal's Ctrl-C ends the worker, too
     if (end.died) worker_.reset();
     return end;
   }
 
   std::string node_;
+  const FilesFolder& files_;
+  const std::atomic<bool>& stopped_;
   std::unique_ptr<Worker> worker_;
 };
 
@@ -102,7 +135,8 @@ void print_limits(const NodeInfo& node) {
   }
 }
 
-int check_worker() {
+int check_worker(const std::filesystem::path& files_folder) {
+  conformance::write_files_to(files_folder);
   const Catalogue catalogue;
   return serve_worker({{"check", [&](const json& request, WorkerReports&) {
                           const std::string name = request.at("node");
@@ -113,8 +147,10 @@ int check_worker() {
                         }}});
 }
 
-int run_conformance(const std::vector<std::string>& subjects) {
+int run_conformance(const std::vector<std::string>& subjects) try {
   const Catalogue catalogue;
+  const std::atomic<bool>& stopped = stop_on_signals();
+  const FilesFolder files;
   std::map<char, int> count;
   for (const std::string& subject : subjects)
     for (const std::string& name : nodes_of(catalogue, subject)) {
@@ -125,7 +161,7 @@ int run_conformance(const std::vector<std::string>& subjects) {
       }
       std::printf("%s\n", name.c_str());
       const std::vector<Check> all = conformance::checks_of(*suite);
-      Checks checks(name);
+      Checks checks(name, files, stopped);
       for (std::size_t i = 0; i < all.size(); ++i) {
         const Check& check = all[i];
         const Outcome outcome = checks.run(i);
@@ -136,6 +172,9 @@ int run_conformance(const std::vector<std::string>& subjects) {
     }
   std::printf("%d passed, %d do not apply, %d failed\n", count['+'], count['~'], count['-']);
   return count['-'] ? 1 : 0;
+} catch (const Cancelled&) {
+  std::fprintf(stderr, "marrow: %s\n", stopped_text().c_str());
+  return 130;
 }
 
 }  // namespace marrow::cli

@@ -95,12 +95,21 @@ void add_record(const json& recorded, RecordedNode& node) {
     node.files[option] = content.is_null() ? std::nullopt : std::optional(digest_of(content));
 }
 
+[[noreturn]] void refuse_pipeline(const fs::path& file, const std::string& why) {
+  throw Error(file.string() + " is not what 'marrow run' wrote: " + why + "; run it again");
+}
+
 /// The resolved pipeline that the run wrote, read with all that could bring a reader down refused.
 YAML::Node pipeline_of(const fs::path& file) {
   Diagnostics faults;
   YAML::Node pipeline;
   if (const auto text = read_source(file, "the pipeline", faults)) pipeline = StrictYaml(file.string(), faults).parse(*text);
-  if (!faults.empty()) throw Error(file.string() + " is not what 'marrow run' wrote: " + faults.sorted()[0].message + "; run it again");
+  if (!faults.empty()) refuse_pipeline(file, faults.sorted()[0].message);
+  if (!pipeline.IsMap() || !pipeline["nodes"].IsDefined() || !pipeline["nodes"].IsMap())
+    refuse_pipeline(file, "it holds no pipeline");
+  for (const auto& node : pipeline["nodes"])
+    if (!node.second.IsMap())
+      refuse_pipeline(file, "its node " + in_quotes(printable(node.first.Scalar())) + " is no map");
   return pipeline;
 }
 
@@ -121,6 +130,8 @@ void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) 
     run.places.emplace(node.id, run.nodes.size());
     run.nodes.push_back(std::move(node));
   }
+  for (const auto& [id, one] : recorded)
+    if (!run.places.contains(id)) throw Error("its node " + in_quotes(printable(id)) + " is none of pipeline.yaml");
 }
 
 void check_age(const fs::path& folder, const json& record) {
@@ -195,8 +206,8 @@ RunRecord read_run(const fs::path& folder) {
     refuse_record(folder, fault.what());
   } catch (const json::exception&) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
-  } catch (const YAML::Exception& fault) {
-    throw Error((folder / "pipeline.yaml").string() + " is not what 'marrow run' wrote: " + fault.what() + "; run it again");
+  } catch (const YAML::Exception&) {  // which speaks of its own operators
+    refuse_pipeline(folder / "pipeline.yaml", "what it should say is missing in it, or of another type");
   }
 }
 

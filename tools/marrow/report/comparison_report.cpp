@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fstream>
-#include <sstream>
 #include <thread>
 
 #include "marrow/domain/error.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -16,9 +15,11 @@ using compare::Experiment;
 using nlohmann::json;
 
 std::string text_of_file(const fs::path& file) {
-  std::ostringstream text;
-  text << std::ifstream(file, std::ios::binary).rdbuf();
-  return text.str();
+  try {
+    return read_text_file(file, kMostSourceBytes);
+  } catch (const Error&) {
+    return "";  // the page does without
+  }
 }
 
 json of(const std::optional<double>& value) { return value ? json(*value) : json(); }

@@ -98,12 +98,17 @@ void ReportMaterial::add_run(const fs::path& run_folder, json& cell) {
   }
   for (const std::string& name : names) {
     const auto path = file_of_run(run_folder, name);
-    if (!path && leads_outside(run_folder, name)) left_out.push_back(name + " is not shown: it lies outside the run's folder " + run_folder.string());
+    if (!path) note_if_outside(run_folder, name);
     try {
       if (path) add_file(*path, name, cell);
     } catch (const std::exception&) {  // a picture of 16 bits as TIFF, a damaged file: the report shows the others
     }
   }
+}
+
+void ReportMaterial::note_if_outside(const fs::path& run_folder, const std::string& name) {
+  if (leads_outside(run_folder, name))
+    left_out.push_back(name + " is not shown: it lies outside the run's folder " + run_folder.string());
 }
 
 void ReportMaterial::print_left_out() const {
@@ -121,7 +126,9 @@ void ReportMaterial::prepare(const fs::path& run_folder) {
 void ReportMaterial::add_prepared(const fs::path& run_folder, json& cell) {
   json prepared;
   try {
-    prepared = parse_json(read_text_file(run_folder / "report.json", kMostRecordBytes), "report.json");
+    const auto file = file_of_run(run_folder, "report.json");
+    if (!file) throw Error("not there");
+    prepared = parse_json(read_text_file(*file, kMostRecordBytes), "report.json");
     for (const char* part : {"cell", "pictures", "geometries", "scenes"})
       if (!prepared.at(part).is_object()) throw Error("damaged");
   } catch (const std::exception&) {  // not there, or damaged

@@ -15,7 +15,7 @@ extern "C" const char marrow_report_page[], marrow_report_page_end[];
 
 namespace marrow::cli {
 
-void write_page(const nlohmann::json& data, const std::filesystem::path& file) {
+void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds) {
   static constexpr std::string_view kMarker = "<!-- marrow:data -->";
   const std::string_view page(marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page));
   const std::size_t at = page.find(kMarker);
@@ -25,7 +25,7 @@ void write_page(const nlohmann::json& data, const std::filesystem::path& file) {
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
   write_text_file(file, std::string(page.substr(0, at)) + "<script type=\"application/json\" id=\"data\">" + safe + "</script>" +
-                            std::string(page.substr(at + kMarker.size())));
+                            std::string(page.substr(at + kMarker.size())), kinds);
 }
 
 }  // namespace marrow::cli

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "compare/comparison.hpp"
+#include "runtime/text_file.hpp"
 
 namespace marrow::cli {
 
@@ -17,6 +18,8 @@ struct ReportMaterial {
   nlohmann::json geometries = nlohmann::json::object();
   nlohmann::json scenes = nlohmann::json::object();
   std::vector<std::string> left_out;  ///< sentences about files that a record names outside its run's folder
+  /// That a file of the run is left out, because its name or a link leads out of the run's folder.
+  void note_if_outside(const std::filesystem::path& run_folder, const std::string& name);
   void print_left_out() const;
 
   /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left out.
@@ -35,7 +38,7 @@ struct ReportMaterial {
 std::string picture_url(const std::filesystem::path& png_file, int size_px);
 
 /// Writes the page with these data in it.
-void write_page(const nlohmann::json& data, const std::filesystem::path& file);
+void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds = Kinds::files);
 
 /// {nodes, edges} of a pipeline, with what each of `variants` makes otherwise.
 nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants);

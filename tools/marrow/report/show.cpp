@@ -57,10 +57,10 @@ json figures_of(const fs::path& folder, const json& record) {
   return tables;
 }
 
-json graph_of_run(const fs::path& folder) {
+json graph_of_run(const fs::path& file) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
-  const Pipeline pipeline = read_pipeline(folder / "pipeline.yaml", {}, catalogue, diagnostics);
+  const Pipeline pipeline = read_pipeline(file, {}, catalogue, diagnostics);
   return diagnostics.empty() ? graph_of(pipeline, {}) : json();  // a plugin that is no longer there
 }
 
@@ -70,9 +70,9 @@ std::string reason_of(const json& record) {
   return "it was stopped before it was done";
 }
 
-std::string pipeline_text_of(const fs::path& folder) {
+std::string pipeline_text_of(const fs::path& file) {
   try {
-    return read_text_file(folder / "pipeline.yaml", kMostSourceBytes);
+    return read_text_file(file, kMostSourceBytes);
   } catch (const Error&) {
     return "";  // the page does without
   }
@@ -91,11 +91,13 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   data["pictures"] = std::move(material.pictures);
   data["geometries"] = std::move(material.geometries);
   data["scenes"] = std::move(material.scenes);
-  const json graph = graph_of_run(folder);
+  const auto pipeline = file_of_run(folder, "pipeline.yaml");
+  if (!pipeline) material.note_if_outside(folder, "pipeline.yaml");
+  const json graph = pipeline ? graph_of_run(*pipeline) : json();
   if (graph.is_object()) data["graph"] = graph;
   json plugins = json::array();
   for (const json& plugin : record.value("plugins", json::array())) plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
-  data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", pipeline_text_of(folder)}, {"seed", record.contains("seed") ? record["seed"] : json(1)},
+  data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", pipeline ? pipeline_text_of(*pipeline) : ""}, {"seed", record.contains("seed") ? record["seed"] : json(1)},
                         {"finished", record.value("finished", "")}, {"command", "marrow rerun " + shell_path(folder)}, {"folder", cell["folder"]},
                         {"machine", machine_of(record)}, {"plugins", plugins}};
   return data;
@@ -108,10 +110,11 @@ int show(const fs::path& folder, fs::path file) {
   if (!fs::exists(folder / "run.json", error))
     throw Error(folder.string() + " is not the folder of a run: it has no run.json; give the folder that marrow run wrote");
   const json record = read_record(folder);
+  const Kinds kinds = file.empty() ? Kinds::files : Kinds::files_and_pipes;
   if (file.empty()) file = folder / "report.html";
   ReportMaterial material;
   try {
-    write_page(page_of(folder, record, material), file);
+    write_page(page_of(folder, record, material), file, kinds);
   } catch (const json::exception&) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
   }

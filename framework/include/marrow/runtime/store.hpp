@@ -108,7 +108,7 @@ class Store {
     Provenance provenance;        ///< empty for an entry that is not whole
     std::vector<Digest> outputs;  ///< content hashes
   };
-  /// All entries, the least recently used first.
+  /// All entries, the least recently used first. Throws Error where a folder of the store cannot be read.
   std::vector<Entry> entries() const;
   struct Freed {
     std::size_t entries = 0;
