@@ -18,7 +18,6 @@
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
-#include "option_copies.hpp"
 #include "regular_file.hpp"
 #include "trust.hpp"
 
@@ -136,7 +135,7 @@ LibraryInfo describe_here(const fs::path& file) {
     info.linked = linked_libraries(handle);
     Plugin plugin;
     run_registration(plugin, entry);
-    for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(copy_of(node.info));
+    for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
     for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
   } catch (const std::exception& error) {
     info = LibraryInfo{};
@@ -175,7 +174,7 @@ LibraryInfo describe_apart(const fs::path& file) {
 /// What a loaded library registers, and the libraries that it found.
 LibraryInfo registered(const Plugin& plugin, void* handle) {
   LibraryInfo info;
-  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(copy_of(node.info));
+  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
   info.linked = linked_libraries(handle);
   return info;

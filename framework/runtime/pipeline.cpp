@@ -11,7 +11,6 @@
 #include "file_names.hpp"
 #include "input_texts.hpp"
 #include "marrow/runtime/kinds.hpp"
-#include "option_copies.hpp"
 #include "pipeline_order.hpp"
 #include "pipeline_text.hpp"
 #include "printable.hpp"
@@ -76,7 +75,7 @@ class Resolver {
     node.id = written.id;
     node.place = written.place;
     if (const NodeInfo* info = catalogue_.find(written.uses)) {
-      node.info = copy_of(*info);
+      node.info = *info;
       resolve_options(written, node);
     } else if (!written.uses.empty()) {
       const std::vector<std::string>& names = node_names();
@@ -118,7 +117,7 @@ class Resolver {
       if (!contains(known, name))
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name), suggested(name, known));
     for (const OptionInfo& option : node.info.options) {
-      OptionValue result = copy_of(option.default_value);
+      OptionValue result = option.default_value;
       const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
       if (given != written.options.end()) {
         const WrittenValue& value = given->second;

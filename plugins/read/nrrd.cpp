@@ -198,6 +198,17 @@ void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
                                      std::to_string(least[k] + length) + ")");
 }
 
+/// The format allows no 'spacings' beside 'space directions'; those that say the same, or nothing, do no harm.
+void check_spacings(const HeaderFields& fields, const std::array<double, 3>& lengths_mm) {
+  const std::vector<std::string> spacings = words_of(fields.text_or("spacings", ""));
+  for (std::size_t k = 0; k < spacings.size(); ++k) {
+    if (in_small_letters(spacings[k]) == "nan") continue;
+    const auto spacing = number_of(spacings[k]);
+    if (k >= 3 || !spacing || std::abs(*spacing - lengths_mm[k]) > 1e-3 * lengths_mm[k])
+      fields.refuse("spacings", "the lengths of the 'space directions' (or take 'spacings' out)");
+  }
+}
+
 void read_grid(const HeaderFields& fields, Samples& samples) {
   check_units(fields, "units");
   check_units(fields, "space units");
@@ -211,6 +222,7 @@ void read_grid(const HeaderFields& fields, Samples& samples) {
       for (std::size_t row = 0; row < 3; ++row)
         samples.direction[row * 3 + k] = signs[row] * (axes[k][row] * (1.0 / length));
     }
+    check_spacings(fields, samples.spacing_mm);
     if (fields.has("space origin")) {
       const auto origin = vectors(fields, "space origin", 1)[0];
       for (std::size_t row = 0; row < 3; ++row) samples.origin_mm[row] = signs[row] * origin[row];

@@ -207,6 +207,17 @@ TEST_F(Hostile, NrrdThatDoesNotSayHowLargeVoxelsAre) {
   expect("b.nrrd", adds(spaced, "axis mins: 0 0 0\naxis maxs: 8 12 16\n"), "'axis maxs'");
 }
 
+TEST_F(Hostile, NrrdThatSaysTwiceHowLargeVoxelsAre) {
+  const std::string bytes = good("a.nrrd");  // of voxels of 1 mm
+  const auto spaced = [&](const std::string& value) { return with(bytes, "\nendian", "\nspacings: " + value + "\nendian"); };
+  for (const char* value : {"1 1 2", "1 x 1", "1 1 1 1", "1 1 0"})
+    expect("b.nrrd", spaced(value), "expected the lengths of the 'space directions' (or take 'spacings' out)");
+  for (const char* value : {"1 1 1", "nan NaN nan", "1.0005 1 1"}) {
+    put(folder / "b.nrrd", spaced(value));
+    EXPECT_EQ(volume_at(folder / "b.nrrd").grid.spacing_mm, Eigen::Vector3d::Ones()) << value;
+  }
+}
+
 TEST_F(Hostile, SamplesThatTheHeaderDoesNotTellOfAreRefused) {
   const std::string more = "tells of other samples than it holds: ";
   expect("b.mha", with(good("a.mha"), "MET_SHORT", "MET_UCHAR"), more + "240 bytes of samples expected, got 480");

@@ -23,8 +23,21 @@ struct PortInfo {
 };
 
 enum class OptionType { boolean, integer, number, text, path, numbers, texts, paths };
-using OptionValue =
+using OptionVariant =
     std::variant<bool, std::int64_t, double, std::string, std::vector<double>, std::vector<std::string>>;
+
+/// The value of an option: a variant whose copies survive a lack of memory. In libstdc++ 12, where a text or list that is
+/// copied into a new variant gets no memory, the variant destroys what was never made. An assignment copies the text first.
+struct OptionValue : OptionVariant {
+  using OptionVariant::OptionVariant;
+  using OptionVariant::operator=;
+  OptionValue() = default;
+  OptionValue(const OptionValue& other) : OptionVariant() { OptionVariant::operator=(other); }
+  OptionValue(OptionValue&&) noexcept = default;
+  OptionValue& operator=(const OptionValue&) = default;
+  OptionValue& operator=(OptionValue&&) noexcept = default;
+  ~OptionValue() = default;
+};
 
 struct OptionInfo {
   std::string name;
