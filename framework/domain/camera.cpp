@@ -7,6 +7,11 @@
 #include "marrow/domain/error.hpp"
 
 namespace marrow {
+namespace {
+
+constexpr int kLargestSide_px = 65536;
+
+}  // namespace
 
 Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& world_mm) {
   const Eigen::Vector3d x = camera.camera_from_world * world_mm;
@@ -40,8 +45,14 @@ void check_camera(const Camera& camera, const std::string& what) {
   if (camera.width_px <= 0 || camera.height_px <= 0)
     throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
                 " pixels is not positive");
+  if (camera.width_px > kLargestSide_px || camera.height_px > kLargestSide_px)
+    throw Error(what + ": image size " + std::to_string(camera.width_px) + " x " + std::to_string(camera.height_px) +
+                " pixels; expected at most " + std::to_string(kLargestSide_px) + " each way");
   if (!camera.intrinsics.allFinite() || !(camera.intrinsics(0, 0) > 0) || !(camera.intrinsics(1, 1) > 0))
     throw Error(what + ": the camera matrix needs positive focal lengths in its first two diagonal places");
+  if (camera.intrinsics(1, 0) != 0 || camera.intrinsics.row(2) != Eigen::RowVector3d(0, 0, 1))
+    throw Error(what + ": the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1], row by row" +
+                (camera.intrinsics(2, 0) != 0 || camera.intrinsics(2, 1) != 0 ? "; it looks transposed" : ""));
   check_rigid(camera.camera_from_world, what);
 }
 

@@ -5,11 +5,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "marrow/domain/error.hpp"
 
 namespace marrow {
 namespace {
+
+constexpr double kFarthest_mm = 1e6;  // beyond any room; sums of squares are exact enough up to here
+
+std::string in_metres(double length_mm) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g m", length_mm / 1000);
+  return text;
+}
 
 /// Twice the area of a triangle, as a vector along its outward normal.
 Eigen::Vector3d area_vector(const Mesh& mesh, const std::array<std::uint32_t, 3>& t) {
@@ -27,7 +36,11 @@ void check_mesh(const Mesh& mesh, const std::string& what) {
         throw Error(what + ": a triangle names vertex " + std::to_string(corner) + ", but there are only " +
                     std::to_string(mesh.vertices_mm.size()));
   for (const auto& vertex : mesh.vertices_mm)
-    if (!vertex.allFinite()) throw Error(what + ": a vertex is not finite");
+    if (!vertex.allFinite())
+      throw Error(what + ": a vertex is not finite");
+    else if (!(vertex.cwiseAbs().maxCoeff() <= kFarthest_mm))
+      throw Error(what + ": a vertex lies " + in_metres(vertex.cwiseAbs().maxCoeff()) +
+                  " from the origin; expected coordinates in mm, of at most 1 km");
 }
 
 bool is_closed(const Mesh& mesh) {

@@ -3,11 +3,23 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace marrow {
+namespace {
+
+constexpr double kFinest_mm = 0.001, kCoarsest_mm = 100, kFarthest_mm = 1e6;
+
+std::string shortest(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", number);
+  return text;
+}
+
+}  // namespace
 
 float sample_trilinear(const Grid& grid, const std::vector<float>& values, const Eigen::Vector3d& index) {
   int base[3];
@@ -37,10 +49,16 @@ void check_volume(const Volume& volume, const std::string& what) {
                                        std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + ")");
     if (!(grid.spacing_mm[k] > 0) || !std::isfinite(grid.spacing_mm[k]))
       throw Error(what + ": voxel spacing " + std::to_string(grid.spacing_mm[k]) + " mm is not a positive length");
+    if (grid.spacing_mm[k] < kFinest_mm || grid.spacing_mm[k] > kCoarsest_mm)
+      throw Error(what + ": voxel spacing " + shortest(grid.spacing_mm[k]) + " mm; expected " + shortest(kFinest_mm) +
+                  " to " + shortest(kCoarsest_mm) + " mm: is it in another unit?");
   }
   if (volume.values.size() != grid.count())
     throw Error(what + ": " + std::to_string(grid.count()) + " voxels expected from its size, got " +
                 std::to_string(volume.values.size()));
+  if (grid.origin_mm.cwiseAbs().maxCoeff() > kFarthest_mm)
+    throw Error(what + ": the volume begins " + shortest(grid.origin_mm.cwiseAbs().maxCoeff()) +
+                " mm from the origin; expected at most 1 km");
   check_rigid({grid.frame, "grid", grid.direction, grid.origin_mm}, what);
   const auto bad = std::find_if(volume.values.begin(), volume.values.end(), [](float v) { return !std::isfinite(v); });
   if (bad != volume.values.end()) {

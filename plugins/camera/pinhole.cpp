@@ -20,10 +20,6 @@ marrow::Camera pinhole(const Options& options) {
   camera.width_px = options.width_px;
   camera.height_px = options.height_px;
   camera.intrinsics = Eigen::Map<const RowMajor>(options.intrinsics.data());
-  if (camera.intrinsics(1, 0) != 0 || camera.intrinsics.row(2) != Eigen::RowVector3d(0, 0, 1))
-    throw marrow::Error(
-        "intrinsics: expected [f_u s u_0  0 f_v v_0  0 0 1] row by row; entry (2, 1) must be 0 and the "
-        "last row 0 0 1");
   camera.camera_from_world.rotation = Eigen::Map<const RowMajor>(options.rotation.data());
   camera.camera_from_world.translation_mm = Eigen::Map<const Eigen::Vector3d>(options.translation_mm.data());
   marrow::check_camera(camera, "camera.pinhole");

@@ -32,6 +32,14 @@ class XmalabText {
     if (line != expected) fail("expected '" + expected + "', got '" + line.substr(0, 40) + "'");
   }
 
+  /// Expects that only empty lines are left: what a further block would tell must not be lost.
+  void end() {
+    while (stream_)
+      if (const std::string line = next_line(); !line.empty())
+        fail("expected the end of the file after the translation, got '" + line.substr(0, 40) + "', which is not read" +
+             (line.rfind("undistortion", 0) == 0 ? ": give images that are already undistorted, and take the block out" : ""));
+  }
+
   std::vector<double> numbers(std::size_t count) {
     const std::string line = next_line();
     std::vector<double> values;
@@ -82,10 +90,10 @@ Camera read_xmalab(const std::filesystem::path& path) {
   XmalabText text(path);
   Camera camera;
   text.title("image size");
-  const std::vector<double> size = text.numbers(2);  // height, width (equal in every file seen)
+  const std::vector<double> size = text.numbers(2);  // width, height, as XMALab writes them
   if (size[0] < 1 || size[1] < 1 || size[0] > 65536 || size[1] > 65536) text.fail("the image size is out of range");
-  camera.height_px = int(size[0]);
-  camera.width_px = int(size[1]);
+  camera.width_px = int(size[0]);
+  camera.height_px = int(size[1]);
   text.title("camera matrix");
   camera.intrinsics = read_matrix(text);
   text.title("rotation");
@@ -98,6 +106,7 @@ Camera read_xmalab(const std::filesystem::path& path) {
   camera.camera_from_world.rotation = nearest_rotation;
   text.title("translation");
   for (int i = 0; i < 3; ++i) camera.camera_from_world.translation_mm[i] = text.numbers(1)[0];
+  text.end();
   check_camera(camera, path.string());
   return camera;
 }

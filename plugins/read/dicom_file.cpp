@@ -158,6 +158,7 @@ class DicomWalk {
       const bool are_pixels = element.tag == kPixels && depth == 0;
       if (are_pixels && into_.has_pixels_) damaged("it has its pixels twice");
       into_.has_pixels_ = into_.has_pixels_ || are_pixels;
+      if (are_pixels) into_.pixels_are_words_ = element.kind == "OW";
       if (element.length == kUndefined && are_pixels) {
         fragments(syntax, end);
       } else if (element.length == kUndefined) {

@@ -37,6 +37,8 @@ class DicomFile {
   /// table's.
   bool has_pixels() const { return has_pixels_; }
   bool is_compressed() const { return is_compressed_; }
+  /// Written as numbers of 2 bytes (OW), also where a pixel has one.
+  bool pixels_are_words() const { return pixels_are_words_; }
   const std::vector<DicomSpan>& pixel_parts() const { return pixel_parts_; }
   const DicomSpan& offset_table() const { return offset_table_; }
 
@@ -44,7 +46,7 @@ class DicomFile {
   friend class DicomWalk;
   InputFile file_;
   std::string transfer_syntax_;
-  bool big_endian_ = false, has_pixels_ = false, is_compressed_ = false;
+  bool big_endian_ = false, has_pixels_ = false, is_compressed_ = false, pixels_are_words_ = false;
   DicomElements elements_;
   std::vector<DicomSpan> pixel_parts_;
   DicomSpan offset_table_;

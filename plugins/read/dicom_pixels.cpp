@@ -202,8 +202,8 @@ std::vector<std::byte> decode_rle(const CodedImage& image) {
   return bytes;
 }
 
-DicomPixels read_dicom_pixels(const DicomFile& file) {
-  const DicomHeader header(file, 1);
+DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
+  const DicomHeader header(file, frame);
   DicomPixels pixels;
   pixels.path = file.path();
   pixels.file_bytes = file.file().size();
@@ -218,13 +218,16 @@ DicomPixels read_dicom_pixels(const DicomFile& file) {
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";
   if (file.is_compressed() != should_be_compressed)
     damaged(pixels.path, "its pixels are not written as its transfer syntax says");
+  if (pixels.big_endian && pixels.bits_allocated == 8 && file.pixels_are_words())
+    throw Error(pixels.path.string() + ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
+                "read; convert it: gdcmconv --raw IN OUT");
   pixels.frame_parts = file.pixel_parts();
   file.is_compressed() ? find_frames(file, pixels) : check_plain(file, pixels);
   return pixels;
 }
 
-DicomPixels read_dicom_pixels(const std::filesystem::path& path) {
-  return read_dicom_pixels(DicomFile(path));
+DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame) {
+  return read_dicom_pixels(DicomFile(path), frame);
 }
 
 Samples read_dicom_frame(const DicomPixels& pixels, int frame) {

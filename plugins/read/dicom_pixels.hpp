@@ -23,9 +23,10 @@ struct DicomPixels {
   std::vector<std::size_t> first_part_of_frame;  ///< of compressed ones; one more than there are frames
 };
 
-/// Throws Error where the header contradicts itself or the file.
-DicomPixels read_dicom_pixels(const std::filesystem::path& path);
-DicomPixels read_dicom_pixels(const DicomFile& file);
+/// With the values that the header gives for this frame (from 1). Throws Error where the header contradicts itself or the
+/// file.
+DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame);
+DicomPixels read_dicom_pixels(const DicomFile& file, int frame);
 
 /// One frame (from 1) as unsigned or signed integers, of which only the bits that count are kept. Throws Error.
 Samples read_dicom_frame(const DicomPixels& pixels, int frame);

@@ -14,12 +14,15 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
+constexpr double kFarthestOff_mm = 0.1;  // of a slice from its place in an even, straight grid
+
 constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kDescription{0x0008, 0x103E, "SeriesDescription"};
 constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
 constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
 constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
 constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
+constexpr DicomTag kRescaleType{0x0028, 0x1054, "RescaleType"};
 
 double dot(const Vector& a, const Vector& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
@@ -34,6 +37,7 @@ Vector normalized(const Vector& a) {
 
 struct Slice {
   std::string series, description, modality;
+  std::string unit;  ///< of its values: HU, US (unspecified), or empty where the header does not say
   DicomPixels pixels;
   Samples samples;         ///< without bytes
   double position_mm = 0;  ///< along the normal of the slices
@@ -113,10 +117,11 @@ Slice read_slice(const std::filesystem::path& path) {
   const DicomFile file(path);
   const DicomHeader header(file, 1);
   Slice slice;
-  slice.pixels = read_dicom_pixels(file);
+  slice.pixels = read_dicom_pixels(file, 1);
   slice.series = header.text(kSeries).value_or("");
   slice.description = header.text(kDescription).value_or("");
   slice.modality = header.text(kModality).value_or("");
+  slice.unit = header.text(kRescaleType).value_or("");
   if (slice.pixels.frames != 1)
     throw Error(path.string() + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
   if (slice.pixels.channels != 1) throw Error(path.string() + ": has colours; a CT slice has one value per pixel");
@@ -192,6 +197,32 @@ void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
   }
 }
 
+/// The distance between slices of the volume that is made of them.
+double spacing_of(const std::vector<Slice>& slices) {
+  return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
+}
+
+/// Steps that are each a little off add up over a long bone.
+void check_places(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
+  const Slice& first = slices[0];
+  const Vector normal = column(first.samples, 2);
+  const double spacing_mm = spacing_of(slices);
+  double sideways_mm = 0, along_mm = 0;
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    Vector off = slices[i].samples.origin_mm;
+    for (std::size_t k = 0; k < 3; ++k) off[k] -= first.samples.origin_mm[k];
+    const double along = dot(off, normal);
+    sideways_mm = std::max(sideways_mm, std::sqrt(std::max(0.0, dot(off, off) - along * along)));
+    along_mm = std::max(along_mm, std::abs(along - spacing_mm * double(i)));
+  }
+  if (sideways_mm > kFarthestOff_mm)
+    throw Error(folder.string() + ": the slices are shifted sideways, by up to " + millimetres(sideways_mm) +
+                " (a tilted gantry); resample the series to a straight grid first");
+  if (along_mm > kFarthestOff_mm)
+    throw Error(folder.string() + ": the slices are unevenly spaced; some lie up to " + millimetres(along_mm) +
+                " from where even ones of " + millimetres(spacing_mm) + " would; resample the series to an even grid first");
+}
+
 /// That the slices belong to one grid: same size, same directions, evenly spaced along their normal.
 void check_slices(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
@@ -200,6 +231,9 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
     if (slice.modality != "CT")
       throw Error(slice.path().string() + ": is of modality '" + slice.modality +
                   "'; expected CT, whose values are Hounsfield units");
+    if (!slice.unit.empty() && slice.unit != "HU" && slice.unit != "US")
+      throw Error(slice.path().string() + ": its values are no Hounsfield units: " + kRescaleType.text() + " is '" +
+                  shown(slice.unit) + "', expected HU; choose the series with the CT itself");
     if (!slice.is_placed)
       throw Error(slice.path().string() +
                   ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
@@ -233,6 +267,7 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
                     " (a tilted gantry); resample the series to a straight grid first");
     }
   }
+  check_places(folder, slices);
 }
 
 }  // namespace
@@ -246,7 +281,7 @@ VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::
   series.geometry = slices[0].samples;
   series.geometry.dimensions = 3;
   series.geometry.size[2] = int(slices.size());
-  series.geometry.spacing_mm[2] = (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
+  series.geometry.spacing_mm[2] = spacing_of(slices);
   const std::size_t pixels = slices[0].samples.count();
   for (std::size_t k = 0; k < slices.size(); ++k) {
     const Samples slice = read_dicom_frame(slices[k].pixels, 1);

@@ -49,7 +49,7 @@ Image image_of(const Samples& samples, int frame, const fs::path& path) {
 }
 
 Image read_dicom_image(const fs::path& path, int frame) {
-  const DicomPixels pixels = read_dicom_pixels(path);
+  const DicomPixels pixels = read_dicom_pixels(path, std::max(1, frame));
   check_frame(frame, pixels.frames, path, " frames; name one with frame (from 1)");
   check_one_channel(pixels.channels, path);
   if (pixels.has_table)
@@ -64,8 +64,8 @@ Image read_dicom_image(const fs::path& path, int frame) {
   return image;
 }
 
-Image as_its_camera_sees(Image image, const fs::path& path) {
-  const XrayPixels stored = read_xray_pixels(path);
+Image as_its_camera_sees(Image image, const fs::path& path, int frame) {
+  const XrayPixels stored = read_xray_pixels(path, std::max(1, frame));
   if (stored.mirrored) {
     cv::Mat mirrored;
     cv::flip(image.pixels, mirrored, 1);
@@ -83,7 +83,7 @@ Image as_its_camera_sees(Image image, const fs::path& path) {
 
 Image read_image_file(const fs::path& path, int frame) {
   const std::string extension = in_small_letters(path.extension().string());
-  if (extension == ".dcm" || extension == ".dicom") return as_its_camera_sees(read_dicom_image(path, frame), path);
+  if (extension == ".dcm" || extension == ".dicom") return as_its_camera_sees(read_dicom_image(path, frame), path, frame);
   if (extension != ".tif" && extension != ".tiff" && extension != ".png")
     throw Error(path.string() + ": not an image that can be read; known are .png, .tif and .dcm");
   const Samples samples = extension == ".png" ? read_png(path) : read_tiff(path);

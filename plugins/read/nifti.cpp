@@ -106,7 +106,7 @@ bool is_straight(const Affine& affine) {
   if (!is_finite(affine)) return false;
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t b = a; b < 3; ++b) {
-      if (a == b ? !(dot(a, a) > 0) : std::abs(dot(a, b)) > 1e-4 * std::sqrt(dot(a, a) * dot(b, b))) return false;
+      if (a == b ? !(dot(a, a) > 0) : std::abs(dot(a, b)) > kRoundedDirection * std::sqrt(dot(a, a) * dot(b, b))) return false;
     }
   return true;
 }
@@ -152,9 +152,10 @@ bool are_near(const Affine& one, const Affine& other, double unit_mm) {
 /// for the scanner.
 Affine affine_of(const Header& header) {
   const int qcode = header.at<std::int16_t>(252), scode = header.at<std::int16_t>(254);
-  if (qcode <= 0 && scode <= 0)  // says nothing: RAS along the axes of the grid
-    return {
-        {{float(header.pixdim(1)), 0, 0, 0}, {0, float(header.pixdim(2)), 0, 0}, {0, 0, float(header.pixdim(3)), 0}}};
+  if (qcode <= 0 && scode <= 0)  // programs differ in what they take then, and one of them mirrors the bone
+    throw Error(header.what() +
+                ": its header does not say which axis is left or right, front or back, up or down (qform_code and "
+                "sform_code are 0); export it again with one of them, or as MHA");
   const Affine q = qform(header), s = sform(header);
   if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q, header.unit_mm()))) return s;
   if (qcode > 0 && is_straight(q)) return q;

@@ -278,6 +278,8 @@ Mesh read_ply(const std::string& bytes, const std::string& what) {
       index = read_vertices(element, body, builder, what);
     } else if (element.name == "face") {
       read_faces(element, body, builder, index, what);
+    } else if (element.name == "tristrips" && element.count > 0) {
+      throw Error(what + ": has strips of triangles ('tristrips'), which are not read; save it with faces");
     } else {
       for (std::size_t i = 0; i < element.count; ++i)
         for (const Property& property : element.properties) body.skip(property);

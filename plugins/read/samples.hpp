@@ -20,11 +20,16 @@ struct Samples {
   int dimensions = 0;
   int components = 1;
   std::string spacing_field;  ///< where the file does not say how large voxels are: what its header would have to say
+  std::string other_pages;    ///< of a TIFF whose pages are not the slices of one volume: what they are
   enum class Type { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 } type = Type::u8;
   std::vector<std::byte> bytes;  ///< x runs fastest, then y, then z
 
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
 };
+
+/// Headers give directions with as few as four digits: the product of two axes may be so far from 0, and is made 0. At
+/// the ends of 400 mm this is 0.1 mm.
+constexpr double kRoundedDirection = 5e-4;
 
 std::size_t bytes_each(Samples::Type type);
 

@@ -76,6 +76,7 @@ Samples read_tiff(const std::filesystem::path& path) {
   const std::string what = path.string();
   Samples samples;
   samples.dimensions = tiff.pages.size() > 1 ? 3 : 2;
+  samples.other_pages = tiff.other_pages;
   samples.size = {int(first.width), int(first.height), int(tiff.pages.size())};
   samples.components = int(std::min<std::uint64_t>(first.samples, 1000));
   if (first.photometric > 1) samples.components = std::max(samples.components, 3);  // a palette

@@ -5,17 +5,17 @@
 #include "tiff_pages.hpp"
 
 #include <algorithm>
-#include <cstdlib>
-#include <cstring>
 #include <stdexcept>
 #include <unordered_set>
 
 #include "marrow/domain/error.hpp"
+#include "tiff_description.hpp"
 
 namespace marrow::read {
 namespace {
 
 constexpr std::size_t kMostPages = 100000;
+constexpr std::uint64_t kLongestDescription = 65536;
 
 /// The widths of places and entries: BigTIFF (43) has 8-byte places and 20-byte entries, TIFF (42) 4 and 12.
 struct Layout {
@@ -93,36 +93,32 @@ class Walk {
       if (tag == 270) check_description(entry);
       if (tag == 279) lengths = numbers_of(entry);
       if (tag == 322 || tag == 324) page.is_tiled = true;
-      if (std::uint64_t* const place = place_of(page, tag))
-        if (const auto numbers = numbers_of(entry); !numbers.empty()) {
-          *place = numbers[0];
-          // Samples of a pixel may each have a width and a format of their own.
-          if (std::any_of(numbers.begin(), numbers.end(), [&](std::uint64_t n) { return n != numbers[0]; })) *place = 0;
-        }
+      if (std::uint64_t* const place = place_of(page, tag)) {
+        const auto numbers = numbers_of(entry);
+        if (numbers.empty())
+          throw Error(what() + ": its field " + std::to_string(tag) + " has no number of a kind that is read; it is "
+                      "damaged, or save it anew as a plain TIFF");
+        *place = numbers[0];
+        // Samples of a pixel may each have a width and a format of their own.
+        if (std::any_of(numbers.begin(), numbers.end(), [&](std::uint64_t n) { return n != numbers[0]; })) *place = 0;
+      }
     }
     check_strips(places, lengths, page);
     return page;
   }
 
-  /// ImageJ keeps channels and times as pages of one stack, and says so in the description.
   void check_description(std::uint64_t entry) {
     const std::uint64_t type = number(entry + 2, 2), count = number(entry + 4, layout_.width);
     if (type != 2 || count <= std::uint64_t(layout_.width)) return;
     const std::uint64_t at = number(entry + 4 + std::uint64_t(layout_.width), layout_.width);
-    const std::uint64_t length = std::min<std::uint64_t>(count, 4096);
+    const std::uint64_t length = std::min(count, kLongestDescription);
     if (!window_.holds(at, length)) throw std::out_of_range("description");
     count_bytes(length);
-    const std::string text = "\n" + window_.text(at, length);
-    if (!text.starts_with("\nImageJ=")) return;
-    for (const char* name : {"channels", "frames"}) {
-      const std::size_t found = text.find(std::string("\n") + name + "=");
-      if (found == std::string::npos) continue;
-      const long number_of = std::atol(text.c_str() + found + std::strlen(name) + 2);
-      if (number_of > 1)
-        throw Error(what() + ": is an ImageJ stack of " + std::to_string(number_of) + " " + name +
-                    ", whose pages are not slices of one volume; save one of them alone, or, "
-                    "where they are slices, say so in ImageJ (Image, Properties)");
-    }
+    const TiffDescription description = read_tiff_description(window_.text(at, length));
+    if (description.is_truncated)
+      throw Error(what() + ": its first page stands for several, of which the others have no directory (tifffile's "
+                  "'truncated'); save it without");
+    if (tiff_.other_pages.empty()) tiff_.other_pages = description.other_pages;
   }
 
   static std::uint64_t* place_of(TiffPage& page, std::uint64_t tag) {

@@ -28,6 +28,7 @@ struct TiffPage {
 struct TiffPages {
   bool big_endian = false;
   std::vector<TiffPage> pages;
+  std::string other_pages;  ///< where pages are not the slices of one volume: what they are
 };
 
 /// Throws Error when pages are missing at the file's end, differ in size, or claim more than the file holds.

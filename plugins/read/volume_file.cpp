@@ -2,6 +2,7 @@
 #include "volume_file.hpp"
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
@@ -13,6 +14,7 @@ namespace marrow::read {
 namespace {
 
 namespace fs = std::filesystem;
+
 
 std::string lower_extension(const fs::path& path) {
   return in_small_letters(path.extension().string());
@@ -32,6 +34,10 @@ VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
     VolumeSamples volume{read_tiff(path), {}};
     if (volume.geometry.components != 1)
       throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) + " values per voxel; a CT has one");
+    if (!volume.geometry.other_pages.empty())
+      throw Error(path.string() + ": is " + volume.geometry.other_pages +
+                  ", whose pages are not slices of one volume; save one of them alone, or, where they are slices, save "
+                  "them as such (in ImageJ: Image, Properties)");
     volume.values = to_float(volume.geometry);
     volume.geometry.bytes = {};
     return volume;
@@ -63,6 +69,11 @@ Grid grid_of(const Samples& samples) {
   grid.spacing_mm = Eigen::Map<const Eigen::Vector3d>(samples.spacing_mm.data());
   grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(samples.origin_mm.data());
   grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(samples.direction.data());
+  const Eigen::Matrix3d defect = grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity();
+  if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection && defect.cwiseAbs().maxCoeff() > 1e-12) {
+    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(grid.direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
+    grid.direction = svd.matrixU() * svd.matrixV().transpose();
+  }
   return grid;
 }
 

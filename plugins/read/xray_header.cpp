@@ -168,7 +168,7 @@ void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
 
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
   const DicomFile file(path);
-  read_dicom_pixels(file);  // whether the header agrees with itself and the file
+  read_dicom_pixels(file, frame);  // whether the header agrees with itself and the file
   const DicomHeader header(file, frame);
   check_modality(header);
   check_motion(header, frame);
@@ -205,9 +205,9 @@ XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, co
   return geometry;
 }
 
-XrayPixels read_xray_pixels(const std::filesystem::path& path) {
+XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
   const DicomFile file(path);
-  const DicomHeader header(file, 1);
+  const DicomHeader header(file, frame);
   XrayPixels pixels;
   const auto sign = header.number(kIntensitySign);
   pixels.inverted = sign && *sign < 0;

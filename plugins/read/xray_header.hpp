@@ -24,11 +24,11 @@ struct XrayGeometry {
 /// missing.
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides);
 
-/// What the pixels need to become the image that the camera sees, bright = air.
+/// What the pixels of a frame (from 1) need to become the image that the camera sees, bright = air.
 struct XrayPixels {
   bool mirrored = false;
   bool inverted = false;  ///< higher values stand for less radiation
 };
-XrayPixels read_xray_pixels(const std::filesystem::path& path);
+XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame);
 
 }  // namespace marrow::read

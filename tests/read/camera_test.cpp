@@ -18,7 +18,7 @@ marrow::Camera read(const std::filesystem::path& path) {
 }
 
 const std::string kXmalab =
-    "image size\n480,640\n\ncamera matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\n"
+    "image size\n640,480\n\ncamera matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\n"
     "translation\n1\n-2.5\n900\n\n";
 
 TEST(ReadCamera, XmalabText) {
@@ -75,10 +75,13 @@ TEST(ReadCamera, DiagnosesXmalabFaultsAtTheirLine) {
   expect(with(kXmalab, "camera matrix", "camera"), "cam.txt:4: expected 'camera matrix', got 'camera'");
   expect(with(kXmalab, "1000,0,320", "1000,0"), "cam.txt:5: expected 3 numbers, got '1000,0'");
   expect(with(kXmalab, "-2.5", "nan"), "cam.txt:16: expected 1 numbers, got 'nan'");
-  expect(with(kXmalab, "480,640", "-480,640"), "cam.txt:2: the image size is out of range");
+  expect(with(kXmalab, "640,480", "-640,480"), "cam.txt:2: the image size is out of range");
   expect(with(kXmalab, "0,-1,0", "0,-2,0"), "the matrix under 'rotation' is not a rotation");
   expect(with(kXmalab, "1000,0,320", "-1000,0,320"), "positive focal lengths");
   expect(kXmalab.substr(0, 100), "cam.txt:");
+  expect(kXmalab + kXmalab, "cam.txt:19: expected the end of the file after the translation, got 'image size', which is not read");
+  expect(kXmalab + "undistortion\n0\n0\n", "got 'undistortion', which is not read: give images that are already undistorted");
+  expect(with(with(kXmalab, "1000,0,320", "1000,0,0"), "0,0,1", "320,240,1"), "is not [f_u s u_0; 0 f_v v_0; 0 0 1], row by row; it looks transposed");
   expect("", "expected 'image size', got ''");
   expect(std::string(100000, 'x'), "expected a camera file");
   EXPECT_SAYS(read(folder / "absent.txt"), "there is no such file");

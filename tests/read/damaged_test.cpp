@@ -262,8 +262,8 @@ TEST(Damaged, Texts) {
   const TemporaryFolder folder;
   expect_handled(folder, text_sample("camera.yaml", kCamera, {{"640", "64000000000000"}, {"[1000, 0, 320]", "[1000, 0]"}, {"900", ".nan"}, {"900", "1e999"}, {"640", "-640"}}),
                  [](const Path& path) { marrow::read::read_camera_file(path); });
-  expect_handled(folder, text_sample("camera.txt", "image size\n480,640\n\ncamera matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\ntranslation\n1\n-2.5\n900\n\n",
-                                     {{"480,640", "48000000,640"}, {"1000,0,320", "1000,0,320,7"}, {"0,-1,0", "0,-1,nan"}}),
+  expect_handled(folder, text_sample("camera.txt", "image size\n640,480\n\ncamera matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\ntranslation\n1\n-2.5\n900\n\n",
+                                     {{"640,480", "64000000,480"}, {"1000,0,320", "1000,0,320,7"}, {"0,-1,0", "0,-1,nan"}}),
                  [](const Path& path) { marrow::read::read_camera_file(path); });
   expect_handled(folder, text_sample("calibration.yaml", "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics: [[1000, 0, 320], [0, 1001, 240], [0, 0, 1]]\nradial_distortion: [0.1, 0, 0]\n",
                                      {{"640", "1e10"}, {"[0.1, 0, 0]", "[-100, 0, 0]"}}),

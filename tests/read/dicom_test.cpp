@@ -181,6 +181,36 @@ TEST(ReadDicom, ScalingOfOnlySomeSlicesIsRefused) {
   }
 }
 
+TEST(ReadDicom, ValuesThatAreNoHounsfieldUnitsAreRefused) {
+  const TemporaryFolder folder;
+  for (const char* unit : {"HU", "US", ""}) {
+    put_slices(folder, {{0x00281054, "LO:" + std::string(unit)}});
+    EXPECT_EQ(read(folder.path()).at(3, 2, 1), 11 - 1024) << unit;
+  }
+  put_slices(folder, {{0x00281054, "LO:Z_EFF"}});
+  EXPECT_SAYS(read(folder.path()),
+              "s0.dcm: its values are no Hounsfield units: RescaleType (0028,1054) is 'Z_EFF', expected HU");
+}
+
+// Each step is within what rounding makes of even ones.
+TEST(ReadDicom, SmallStepsThatAddUpAreRefused) {
+  const auto series = [](int count, auto place) {
+    const TemporaryFolder folder;
+    for (int k = 0; k < count; ++k) {
+      DicomSlice slice = slice_at(0, 0);
+      slice.position = place(k);
+      write_dicom(folder / ("s" + std::to_string(1000 + k) + ".dcm"), slice);
+    }
+    return marrow::test::message_of([&] { read(folder.path()); });
+  };
+  using Place = std::array<double, 3>;
+  EXPECT_EQ(series(20, [](int k) { return Place{0, k % 2 * 0.01, 3.0 * k + (k % 2) * 0.002}; }), "");
+  const std::string tilted = series(60, [](int k) { return Place{0, 0.02 * k, 3.0 * k}; });
+  EXPECT_NE(tilted.find("the slices are shifted sideways, by up to 1.18 mm (a tilted gantry)"), std::string::npos) << tilted;
+  const std::string uneven = series(60, [](int k) { return Place{0, 0, 3.0 * k + (k > 30 ? 0.02 * (k - 30) : 0)}; });
+  EXPECT_NE(uneven.find("the slices are unevenly spaced; some lie up to 0.29"), std::string::npos) << uneven;
+}
+
 TEST(ReadDicom, MissingAndRepeatedSlicesAreDiagnosed) {
   const TemporaryFolder folder;
   for (const double z : {0.0, 1.0, 2.0, 4.0, 5.0})

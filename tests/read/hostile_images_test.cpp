@@ -143,6 +143,31 @@ TEST_F(HostileDicom, KindsOfValuesThatThereAreNot) {
            "an element is of a kind that there is not");
 }
 
+TEST_F(HostileDicom, BytesInWordsOfTheOtherOrder) {
+  const auto big = [](std::uint32_t tag, const std::string& kind, std::string value) {
+    const auto turned = [](std::uint32_t number, int width) {
+      const std::string bytes = little(number, width);
+      return std::string(bytes.rbegin(), bytes.rend());
+    };
+    if (kind == "US") value = turned(std::uint32_t(std::stoi(value)), 2);
+    if (value.size() % 2) value += ' ';
+    return turned(tag >> 16, 2) + turned(tag & 0xFFFF, 2) + kind +
+           (kind[0] == 'O' ? std::string(2, '\0') + turned(std::uint32_t(value.size()), 4) : turned(std::uint32_t(value.size()), 2)) + value;
+  };
+  const auto file = [&](const std::string& kind) {
+    const std::string meta = dicom_element(0x00020010, "UI", "1.2.840.10008.1.2.2");
+    std::string bytes = std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta +
+                        big(0x00080060, "CS", "XA");
+    for (const auto& [tag, value] : {std::pair{0x00280002u, "1"}, {0x00280010u, "2"}, {0x00280011u, "2"}, {0x00280100u, "8"},
+                                     {0x00280101u, "8"}, {0x00280102u, "7"}, {0x00280103u, "0"}})
+      bytes += big(tag, "US", value);
+    return bytes + big(0x7FE00010, kind, "\1\2\3\4");
+  };
+  put(folder / "a.dcm", file("OB"));
+  EXPECT_EQ(image_at(folder / "a.dcm").pixels.at<std::uint8_t>(0, 1), 2);
+  expect(file("OW"), "its pixels of 8 bits are written in pairs");
+}
+
 TEST_F(HostileDicom, BitsThatContradictEachOther) {
   const auto changed = [&](std::uint32_t tag, const std::string& value) {
     Elements elements = image_of(16);

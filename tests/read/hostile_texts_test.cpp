@@ -46,6 +46,12 @@ TEST_F(HostileTexts, PlyElementsWithoutProperties) {
   expect_mesh(head + "element vertex -1\nend_header\n", "expected 'element NAME COUNT'");
 }
 
+TEST_F(HostileTexts, PlyStripsAreNotLost) {
+  const std::string head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+                           "element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\nproperty list int int vertex_indices\n";
+  expect_mesh(head + "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n4 0 1 2 3\n", "has strips of triangles ('tristrips'), which are not read");
+}
+
 TEST_F(HostileTexts, PlyListsThatAreTooLong) {
   std::string head =
       "ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty double x\nproperty double y\nproperty double "

@@ -231,18 +231,55 @@ TEST_F(Hostile, SamplesThatTheHeaderDoesNotTellOfAreRefused) {
 
 TEST_F(Hostile, NiftiInOtherUnitsLiesWhereItSays) {
   ItkGrid<std::int16_t> grid = stack();
-  grid.spacing = {0.5, 0.75, 1.25};
-  grid.origin = {10, 20, 30};
-  write_itk(folder / "a.nii", grid);
-  const std::string bytes = bytes_of(folder / "a.nii");
-  for (const bool by_sform : {true, false})
-    for (const auto& [unit, scale] : {std::pair{1, 1e3}, std::pair{3, 1e-3}}) {
-      put(folder / "b.nii",
-          replaced(replaced(bytes, 123, std::string(1, char(unit))), by_sform ? 252 : 254, number<std::int16_t>(0)));
+  for (const auto& [unit, scale] : {std::pair{1, 1e3}, std::pair{3, 1e-3}}) {
+    grid.spacing = {0.5 / scale, 0.75 / scale, 1.25 / scale};
+    grid.origin = {10 / scale, 20 / scale, 30 / scale};
+    write_itk(folder / "a.nii", grid);
+    const std::string bytes = replaced(bytes_of(folder / "a.nii"), 123, std::string(1, char(unit)));
+    for (const bool by_sform : {true, false}) {
+      put(folder / "b.nii", replaced(bytes, by_sform ? 252 : 254, number<std::int16_t>(0)));
       const marrow::Grid read = volume_at(folder / "b.nii").grid;
-      EXPECT_LT((read.spacing_mm - scale * Eigen::Vector3d(0.5, 0.75, 1.25)).norm(), 1e-6 * scale) << unit;
-      EXPECT_LT((read.origin_mm - scale * Eigen::Vector3d(10, 20, 30)).norm(), 1e-5 * scale) << unit;
+      EXPECT_LT((read.spacing_mm - Eigen::Vector3d(0.5, 0.75, 1.25)).norm(), 1e-6) << unit;
+      EXPECT_LT((read.origin_mm - Eigen::Vector3d(10, 20, 30)).norm(), 1e-5) << unit;
     }
+  }
+}
+
+TEST_F(Hostile, NiftiThatDoesNotSayWhichSideIsLeft) {
+  expect("b.nii", replaced(replaced(good("a.nii"), 252, number<std::int16_t>(0)), 254, number<std::int16_t>(0)),
+         "does not say which axis is left or right, front or back, up or down (qform_code and sform_code are 0)");
+}
+
+// Directions as programs print them: each number rounded to four digits.
+TEST_F(Hostile, RoundedDirectionsAreMadeExact) {
+  const Eigen::Matrix3d exact = (Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, -2, 0.5).normalized())).toRotationMatrix();
+  const Eigen::Matrix3d rounded = (exact * 1e4).array().round() / 1e4;
+  std::string text;
+  char number_text[32];
+  for (int axis = 0; axis < 3; ++axis)
+    for (int row = 0; row < 3; ++row) {
+      std::snprintf(number_text, sizeof number_text, " %.4f", exact(row, axis));
+      text += number_text;
+    }
+  put(folder / "b.mha", with(good("a.mha"), "TransformMatrix = 1 0 0 0 1 0 0 0 1", "TransformMatrix =" + text));
+  std::string nifti = replaced(good("a.nii"), 252, number<std::int16_t>(0));
+  for (int row = 0; row < 3; ++row)
+    for (int axis = 0; axis < 3; ++axis)
+      nifti = replaced(nifti, 280 + 16 * std::size_t(row) + 4 * std::size_t(axis), number(float(row < 2 ? -rounded(row, axis) : rounded(row, axis))));
+  put(folder / "b.nii", nifti);
+  for (const char* name : {"b.mha", "b.nii"}) {
+    const marrow::Grid grid = volume_at(folder / name).grid;
+    EXPECT_LT((grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity()).norm(), 1e-12) << name;
+    EXPECT_LT((grid.direction - exact).norm(), 3e-4) << name;
+  }
+}
+
+TEST_F(Hostile, VoxelsOfImpossibleSizes) {
+  const std::string bytes = good("a.mha");
+  for (const auto& [length, said] : {std::pair{"1e-300", "voxel spacing 1e-300 mm; expected 0.001 to 100 mm: is it in another unit?"},
+                                     {"0.0005", "voxel spacing 0.0005 mm; expected"}, {"1e308", "voxel spacing 1e+308 mm; expected"}})
+    expect("b.mha", with(bytes, "ElementSpacing = 1 1 1", "ElementSpacing = 1 1 " + std::string(length)), said);
+  expect("b.mha", with(bytes, "Offset = 0 0 0", "Offset = 0 0 1e308"), "the volume begins 1e+308 mm from the origin; expected at most 1 km");
 }
 
 TEST_F(Hostile, NiftiThatSaysTwiceHowLargeVoxelsAre) {
@@ -380,6 +417,23 @@ TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
   EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2}));
   expect("a.tif", stack("ImageJ=1.54f\nimages=2\nchannels=2\n"), "is an ImageJ stack of 2 channels");
   expect("a.tif", stack("ImageJ=1.54f\nimages=2\nframes=2\n"), "is an ImageJ stack of 2 frames");
+  expect("a.tif", stack("<?xml?><OME><Image><Pixels SizeX=\"2\" SizeZ=\"1\" SizeC=\"2\" SizeT=\"1\"/></Image></OME>"),
+         "is an OME stack of 2 channels, whose pages are not slices of one volume");
+  expect("a.tif", stack("<OME><Pixels SizeC=\"1\" SizeT=\"2\"/></OME>"), "is an OME stack of 2 times");
+  expect("a.tif", stack("{\"shape\": [2, 1, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 1, 2, 2, 2]");
+  expect("a.tif", stack("{\"shape\": [2, 2, 2], \"axes\": \"TYX\"}"), "is a stack of times");
+  expect("a.tif", stack("{\"shape\": [2, 2, 2], \"truncated\": true}"), "its first page stands for several");
+  for (const char* slices : {"{\"shape\": [2, 2, 2]}", "{\"shape\": [1, 2, 2, 2], \"axes\": \"TZYX\"}",
+                             "{\"shape\": [2, 2, 2], \"axes\": \"ZYX\"}", "<OME><Pixels SizeC=\"1\" SizeT=\"1\"/></OME>"}) {
+    put(folder / "a.tif", stack(slices));
+    EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2})) << slices;
+  }
+}
+
+TEST_F(Hostile, TiffFieldsOfKindsThatAreNotRead) {
+  std::string bytes = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(8) + tiff_directory(0);
+  const std::size_t at = bytes.find(tiff_entry(278, 4, 1, 2));
+  expect("a.tif", bytes.replace(at, 12, tiff_entry(339, 8, 1, 2)), "its field 339 has no number of a kind that is read");
 }
 
 TEST_F(Hostile, TiffWhosePagesRunInACircle) {

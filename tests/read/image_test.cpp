@@ -142,4 +142,25 @@ TEST(ReadImage, DicomFrames) {
   EXPECT_SAYS(image({folder / "x.dcm", 3}), "has 2 frames; there is no frame 3");
 }
 
+// What an enhanced file says of each frame: values, what they stand for, and whether it is mirrored.
+TEST(ReadImage, DicomFramesHaveTheirOwnValues) {
+  using marrow::test::dicom_item;
+  const TemporaryFolder folder;
+  auto elements = marrow::test::fluoroscopy();
+  elements[0x00280008] = "IS:2";
+  elements[0x7FE00010] += elements[0x7FE00010].substr(3);
+  elements.erase(0x00181510);
+  elements.erase(0x00181511);
+  const auto groups = [](const char* slope, const char* sign, const char* primary) {
+    return dicom_item({{0x00189405, dicom_item({{0x00181510, primary}, {0x00181511, "DS:0"}})},
+                       {0x00289145, dicom_item({{0x00281052, "DS:0"}, {0x00281053, slope}})},
+                       {0x00289443, dicom_item({{0x00281041, sign}})}});
+  };
+  elements[0x52009230] = groups("DS:1", "SS:1", "DS:0") + groups("DS:2", "SS:-1", "DS:180").substr(3);
+  marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
+  EXPECT_EQ(image({folder / "x.dcm", 1}).pixels.at<std::uint16_t>(3, 1), 301);
+  // Of the second one: twice the values, the highest the darkest; from behind, "R\\F" is mirrored.
+  EXPECT_EQ(image({folder / "x.dcm", 2}).pixels.at<float>(3, 1), 2 * 305 - 2 * 304);
+}
+
 }  // namespace

@@ -14,7 +14,7 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   const marrow::test::ItkGrid<std::uint8_t> pixels{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)};
   write_itk(folder / "a.png", pixels);
   marrow::test::put(folder / "a.txt",
-                    "image size\n4,6\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
+                    "image size\n6,4\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
                     "translation\n0\n0\n600\n");
   const marrow::View from_file = view(nullptr, {"frontal", folder / "a.png", folder / "a.txt", {}, 0});
   EXPECT_EQ(from_file.name, "frontal");

@@ -20,7 +20,7 @@ class ReadViews : public testing::Test {
       write_itk(folder / name, ItkGrid<std::uint8_t>{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 9)});
     for (const char* name : {"a.txt", "b.txt"})
       put(folder / name,
-          "image size\n4,6\n\ncamera "
+          "image size\n6,4\n\ncamera "
           "matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
     options.names = {"one", "two"};
     options.images = {folder / "a.png", folder / "b.png"};

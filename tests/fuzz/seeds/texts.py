@@ -24,7 +24,7 @@ ct: ct.mha
     start: {PLACE}
     truth: {{target: world, source: ct, {MATRIX}}}
 """
-XMALAB = "image size\n480,640\n\ncamera matrix\n1000,0,320\n0,1000,240\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n900\n"
+XMALAB = "image size\n640,480\n\ncamera matrix\n1000,0,320\n0,1000,240\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n900\n"
 CALIBRATION = """marrow-calibration: 1
 width_px: 640
 height_px: 480
