@@ -6,6 +6,8 @@
 namespace marrow::read {
 namespace {
 
+constexpr const char* kShape = "\"shape\": [";
+
 /// The whole number behind `name`, or 1.
 long number_behind(const std::string& text, const std::string& name) {
   const std::size_t found = text.find(name);
@@ -27,8 +29,8 @@ std::string of_ome(const std::string& text) {
 }
 
 std::string of_tifffile(const std::string& text) {
-  const std::size_t begin = text.find('['), end = text.find(']');
-  if (begin > end || end == std::string::npos) return {};
+  const std::size_t begin = text.find('[', text.find(kShape)), end = text.find(']', begin);
+  if (end == std::string::npos) return {};
   const std::string shape = text.substr(begin, end - begin + 1);
   int dimensions = 0;
   for (const char* at = shape.c_str() + 1; *at;) {
@@ -50,7 +52,7 @@ TiffDescription read_tiff_description(const std::string& text) {
   TiffDescription description;
   if (text.starts_with("ImageJ=")) description.other_pages = of_imagej(text);
   if (text.find("<OME") != std::string::npos) description.other_pages = of_ome(text);
-  if (text.starts_with("{\"shape\": [")) {
+  if (text.starts_with("{") && text.find(kShape) != std::string::npos) {
     description.other_pages = of_tifffile(text);
     description.is_truncated = text.find("\"truncated\": true") != std::string::npos;
   }

@@ -421,6 +421,7 @@ TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
          "is an OME stack of 2 channels, whose pages are not slices of one volume");
   expect("a.tif", stack("<OME><Pixels SizeC=\"1\" SizeT=\"2\"/></OME>"), "is an OME stack of 2 times");
   expect("a.tif", stack("{\"shape\": [2, 1, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 1, 2, 2, 2]");
+  expect("a.tif", stack("{\"axes\": \"TZYX\", \"shape\": [2, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 2, 2, 2]");
   expect("a.tif", stack("{\"shape\": [2, 2, 2], \"axes\": \"TYX\"}"), "is a stack of times");
   expect("a.tif", stack("{\"shape\": [2, 2, 2], \"truncated\": true}"), "its first page stands for several");
   for (const char* slices : {"{\"shape\": [2, 2, 2]}", "{\"shape\": [1, 2, 2, 2], \"axes\": \"TZYX\"}",
