@@ -69,11 +69,9 @@ int cache_why(const std::string& key) {
   return found ? 0 : code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
 }
 
-int cache_collect(const std::string& keep_gb) {
-  const auto keep_bytes = bytes_of_gigabytes(keep_gb);
-  if (!keep_bytes) return code_after("--keep-gb is '" + keep_gb + "', but must be a number of gigabytes from 0 to 1000000; nothing is removed");
+int cache_collect(double keep_gb) {
   const Store store;
-  const Store::Freed freed = store.collect(*keep_bytes);
+  const Store::Freed freed = store.collect(std::uint64_t(keep_gb * 1e9));
   if (freed.fault.empty() || freed.entries) std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
   return code_after(freed.fault);
 }

@@ -44,7 +44,7 @@ int diff(const std::filesystem::path& before, const std::filesystem::path& now, 
 int plan(const PipelineRequest& request, std::uint64_t seed);
 int cache_info();
 int cache_why(const std::string& key);
-int cache_collect(const std::string& keep_gb);
+int cache_collect(double keep_gb);
 int check(const PipelineRequest& request, bool json);
 int list(const std::string& kind, bool json);
 int inspect(const std::string& node, bool yaml, bool json);

@@ -6,11 +6,16 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
+#include "number_options.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/printable.hpp"
 
 namespace {
+
+using marrow::cli::add_amount;
+using marrow::cli::add_whole_number;
+using marrow::cli::show_default;
 
 void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& request) {
   command->add_option("pipeline", request.file, "pipeline file (YAML)")->required();
@@ -20,15 +25,14 @@ void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& req
 }
 
 void add_file_limits(CLI::App* command, marrow::FileLimits& limits) {
-  command->add_option("--file-memory", limits.memory_mb, "megabytes that reading a file may use (default: by its size)")->check(CLI::PositiveNumber);
-  command->add_option("--file-seconds", limits.seconds, "seconds of processor time that reading a file may use (default: by its size)")
-      ->check(CLI::PositiveNumber);
+  add_amount(command, "--file-memory", limits.memory_mb, "megabytes", "megabytes that reading a file may use (default: by its size)");
+  add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time that reading a file may use (default: by its size)");
 }
 
 void add_compare_arguments(CLI::App* command, marrow::cli::CompareRequest& request) {
   command->add_option("experiment", request.file, "experiment file (YAML)")->required();
   command->add_option("--out", request.folder, "folder of the comparison, new or to be continued (default: runs/compare/NAME)");
-  command->add_option("--threads", request.threads, "threads of each cell")->capture_default_str()->check(CLI::Range(1, 1024));
+  show_default(add_whole_number(command, "--threads", request.threads, "threads of each cell", 1, 1024), request.threads);
   command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
   add_file_limits(command, request.file_limits);
 }
@@ -48,8 +52,8 @@ int run_program(int argc, char** argv) {
   auto* run_command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
   add_pipeline_arguments(run_command, run_request.pipeline);
   run_command->add_option("--out", run_request.folder, "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
-  run_command->add_option("--seed", run_request.seed, "seed of all randomness")->capture_default_str();
-  run_command->add_option("--threads", run_request.threads, "threads to use (default: all)")->check(CLI::Range(1, 1024));
+  show_default(add_whole_number(run_command, "--seed", run_request.seed, "seed of all randomness"), run_request.seed);
+  add_whole_number(run_command, "--threads", run_request.threads, "threads to use (default: all)", 1, 1024);
   run_command->add_flag("--no-cache", run_request.no_cache, "neither read nor keep results of nodes");
   run_command->add_flag("--quiet", run_request.quiet, "print only errors");
   run_command->add_flag("--json", run_request.json, "print events as JSON, one a line");
@@ -59,10 +63,10 @@ int run_program(int argc, char** argv) {
   CompareRequest compare_request;
   auto* compare_command = app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
   add_compare_arguments(compare_command, compare_request);
-  compare_command->add_option("--jobs", compare_request.jobs, "cells at once (default: as many as there are cores)")->check(CLI::Range(1, 1024));
-  compare_command->add_option("--time-limit", compare_request.time_limit_s, "seconds that one cell may take")->capture_default_str()->check(CLI::PositiveNumber);
-  compare_command->add_option("--memory-limit", compare_request.memory_limit_mb, "megabytes that one cell may use")->capture_default_str()->check(CLI::PositiveNumber);
-  compare_command->add_option("--shown", compare_request.shown, "cases and starts whose pictures go into the report")->capture_default_str()->check(CLI::Range(0, 10000));
+  add_whole_number(compare_command, "--jobs", compare_request.jobs, "cells at once (default: as many as there are cores)", 1, 1024);
+  show_default(add_amount(compare_command, "--time-limit", compare_request.time_limit_s, "seconds", "seconds that one cell may take"), compare_request.time_limit_s);
+  show_default(add_amount(compare_command, "--memory-limit", compare_request.memory_limit_mb, "megabytes", "megabytes that one cell may use"), compare_request.memory_limit_mb);
+  show_default(add_whole_number(compare_command, "--shown", compare_request.shown, "cases and starts whose pictures go into the report", 0, 10000), compare_request.shown);
   compare_command->add_flag("--dry-run", compare_request.dry_run, "say what there is to do, and how long that took before");
   compare_command->add_flag("--quiet", compare_request.quiet, "no progress");
   compare_command->callback([&] { code = compare_variants(compare_request); });
@@ -113,11 +117,11 @@ int run_program(int argc, char** argv) {
   std::uint64_t plan_seed = 1;
   auto* plan_command = app.add_subcommand("plan", "show what a run would compute, what it would read back, and why");
   add_pipeline_arguments(plan_command, plan_request);
-  plan_command->add_option("--seed", plan_seed, "seed of all randomness")->capture_default_str();
+  show_default(add_whole_number(plan_command, "--seed", plan_seed, "seed of all randomness"), plan_seed);
   plan_command->callback([&] { code = plan(plan_request, plan_seed); });
 
   std::string cache_key;
-  std::string keep_gb = "10";
+  double keep_gb = 10;
   auto* cache_command = app.add_subcommand("cache", "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store), and tidy it up");
   cache_command->require_subcommand(1);
   cache_command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&] { code = cache_info(); });
@@ -125,7 +129,8 @@ int run_program(int argc, char** argv) {
   why_command->add_option("key", cache_key, "key of a result or of one of its outputs (run.json shows those), or its first digits")->required();
   why_command->callback([&] { code = cache_why(cache_key); });
   auto* gc_command = cache_command->add_subcommand("gc", "remove the least recently used results");
-  gc_command->add_option("--keep-gb", keep_gb, "size to keep, in gigabytes")->capture_default_str();
+  const auto take_keep_gb = [&](const std::string& text) { keep_gb = number("--keep-gb", text, 0, 1e6, "gigabytes", "; nothing is removed"); };
+  show_default(gc_command->add_option_function<std::string>("--keep-gb", take_keep_gb, "size to keep, in gigabytes")->type_name("NUMBER"), keep_gb);
   gc_command->callback([&] { code = cache_collect(keep_gb); });
 
   std::string kind;
