@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <map>
@@ -7,6 +8,7 @@
 #include "folder_search.hpp"
 #include "marrow/domain/error.hpp"
 #include "runtime/file_names.hpp"
+#include "runtime/plain_path.hpp"
 #include "runtime/printable.hpp"
 
 namespace marrow::compare {
@@ -77,7 +79,10 @@ class CaseReader {
   void add_folders(const std::string& pattern, const Place& place) {
     std::vector<fs::path> found;
     try {
-      found = search_.matches((folder_ / pattern).lexically_normal());
+      found = search_.matches(plain_path(folder_ / pattern));
+      std::transform(found.begin(), found.end(), found.begin(), plain_path);  // '..' after a '*' leads to one folder again and again
+      std::sort(found.begin(), found.end());
+      found.erase(std::unique(found.begin(), found.end()), found.end());
     } catch (const Error& error) {
       return yaml_.fault(place, "the cases at '" + (pattern.size() > 100 ? pattern.substr(0, 80) + "..." : pattern) + "' cannot be found: " + error.what());
     }

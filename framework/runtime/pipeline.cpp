@@ -13,6 +13,7 @@
 #include "marrow/runtime/kinds.hpp"
 #include "pipeline_order.hpp"
 #include "pipeline_text.hpp"
+#include "plain_path.hpp"
 #include "printable.hpp"
 
 namespace marrow {
@@ -133,7 +134,7 @@ class Resolver {
   }
 
   static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
-    const auto full = [&](const std::string& text) { return text.empty() ? text : (folder / text).lexically_normal().string(); };
+    const auto full = [&](const std::string& text) { return text.empty() ? text : plain_path(folder / text).string(); };
     if (type == OptionType::path) return full(std::get<std::string>(value));
     if (type == OptionType::paths)
       for (std::string& text : std::get<std::vector<std::string>>(value)) text = full(text);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "file_names.hpp"
+#include "plain_path.hpp"
 #include "printable.hpp"
 
 namespace marrow {
@@ -119,7 +120,7 @@ class Reader {
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
     if (!yaml_.option(value->value, value->place, info, "input " + in_quotes(input.key), no_names)) return;
     std::string text = value->value.Scalar();
-    if (info.type == OptionType::path) text = (value->folder / text).lexically_normal().string();
+    if (info.type == OptionType::path) text = plain_path(value->folder / text).string();
     pipeline_.inputs[input.key] = text;
   }
 

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <new>
 
+#include "plain_path.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
 #include "user_folder.hpp"
@@ -28,7 +29,7 @@ constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes
 
 }  // namespace
 
-Store::Store(fs::path folder) : folder_(folder.empty() ? folder : fs::absolute(folder).lexically_normal()) {}
+Store::Store(fs::path folder) : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))) {}
 
 fs::path Store::default_folder() {
   const char* folder = std::getenv("MARROW_CACHE");

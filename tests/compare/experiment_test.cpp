@@ -25,6 +25,20 @@ TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
   EXPECT_EQ(arguments.overrides[0].key + "=" + arguments.overrides[0].value, "c.value=2");
 }
 
+TEST_F(ExperimentFiles, APathThroughALinkIsWhatTheSystemFinds) {
+  namespace fs = std::filesystem;
+  fs::create_directories(scratch.path / "other" / "inner");
+  fs::create_directories(scratch.path / "other" / "cases" / "c");
+  fs::create_directory_symlink("other/inner", scratch.path / "link");
+  fs::copy_file(scratch.path / "p.yaml", scratch.path / "other" / "p.yaml");
+  const Experiment e = read("experiment: 1\npipeline: link/../p.yaml\ncases: {folders: [link/../cases/*]}\n" + std::string(kVariants) + kMetrics);
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  EXPECT_TRUE(fs::equivalent(e.pipeline, scratch.path / "other" / "p.yaml"));
+  ASSERT_EQ(e.cases.size(), 1u);
+  EXPECT_EQ(e.cases[0].name, "c");
+  EXPECT_EQ(read(std::string(kHead) + "cases: {folders: [cases/*/../*]}\n" + kVariants + kMetrics).cases.size(), 2u) << "each once";
+}
+
 TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
   const Experiment e = read(std::string(kHead) + kCases + kVariants + "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();

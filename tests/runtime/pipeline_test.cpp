@@ -83,6 +83,24 @@ TEST_F(PipelineTest, TwoDollarsAreOneAndNoNameOfAnInput) {
   EXPECT_EQ(std::get<std::vector<std::string>>(p.nodes[0].options[0]), (std::vector<std::string>{"$a", "x$a", "x$a$", "$x$a"}));
 }
 
+TEST_F(PipelineTest, APathThroughALinkStaysTheOneThatWasWritten) {
+  namespace fs = std::filesystem;
+  const fs::path here = scratch.path / "here", link = here / "link";
+  fs::create_directories(scratch.path / "real" / "inner");
+  fs::create_directory(here);
+  fs::create_directory_symlink(scratch.path / "real" / "inner", link);
+  const std::string text = "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\n"
+                           "  d: {uses: test.constant, with: {path: here/link/../f}}\noutputs: {c: c, d: d}\n";
+  const auto path_read = [&](const std::string& given, std::size_t node) {
+    const Pipeline p = read(text, {{{"x", given}}, {}});
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    return p.nodes.empty() ? "" : std::get<std::string>(p.nodes[node].options[6]);
+  };
+  EXPECT_EQ(path_read((link / "../f").string(), 0), (link / "../f").string()) << "real/f, as the system has it";
+  EXPECT_EQ(path_read((here / "./../f").string(), 0), (scratch.path / "f").string());
+  EXPECT_EQ(path_read("x", 1), (link / "../f").string());
+}
+
 TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
   read("marrow: 1\nnodes:\n  lefft: {uses: test.constant}\n  n: {uses: test.add, in: {a: left, b: left}}\noutputs: {o: n}\n");
   const std::vector<marrow::Diagnostic> faults = diagnostics.sorted();

@@ -6,6 +6,7 @@
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
+#include "runtime/plain_path.hpp"
 #include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
@@ -81,7 +82,7 @@ std::string pipeline_text_of(const fs::path& file) {
 json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
   const std::string name = fs::absolute(folder / ".").parent_path().filename().string();
   json cell = {{"id", name}, {"variant", 0}, {"case", 0}, {"start", 0}, {"tries", 1}, {"values", json::array()}, {"seconds", record.value("seconds", 0.0)},
-               {"status", record.value("status", "") == "done" ? "done" : "failed"}, {"success", nullptr}, {"folder", fs::absolute(folder).lexically_normal().string()}};
+               {"status", record.value("status", "") == "done" ? "done" : "failed"}, {"success", nullptr}, {"folder", plain_path(fs::absolute(folder)).string()}};
   if (cell["status"] == "failed") cell["reason"] = reason_of(record);
   json data = {{"marrow", record.value("marrow", "")}, {"format", 1}, {"kind", "run"}, {"metrics", json::array()}, {"cases", {name}}, {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
@@ -119,7 +120,7 @@ int show(const fs::path& folder, fs::path file) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
   }
   material.print_left_out();
-  std::printf("%s\n", printable(fs::absolute(file).lexically_normal().string()).c_str());
+  std::printf("%s\n", printable(plain_path(fs::absolute(file)).string()).c_str());
   return 0;
 }
 
