@@ -8,10 +8,12 @@
 
 #include <cstdlib>
 
+#include "json_text.hpp"
 #include "keys.hpp"
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "regular_file.hpp"
+#include "text_file.hpp"
 #include "trust.hpp"
 
 namespace marrow {
@@ -140,6 +142,15 @@ LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Dige
   return info;
 }
 
+/// Whether marrow wrote the file, be it stale or of another version.
+bool is_manifest(const fs::path& file) {
+  try {
+    return parse_json(read_text_file(file, kMostManifest_bytes), file.string()).contains("marrow_manifest");
+  } catch (const Error&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 LibraryInfo library_info(const fs::path& file, const Digest& framework) {
@@ -177,7 +188,15 @@ std::string cure_of_description(const fs::path& library) {
 }
 
 void write_manifest(const LibraryInfo& info) {
-  write_text(manifest_beside(info.file), manifest_text(info), 0644);
+  const fs::path manifest = manifest_beside(info.file);
+  if (info.file.extension() != ".so")
+    throw Error("a manifest is written only beside a library whose name ends in .so, got " + info.file.string() +
+                "; rename it");
+  std::error_code error;
+  if (fs::exists(fs::symlink_status(manifest, error)) && !is_manifest(manifest))
+    throw Error(manifest.string() + " is there already and is no manifest that marrow wrote; move it away, or rename " +
+                info.file.string());
+  write_text(manifest, manifest_text(info), 0644);
 }
 
 }  // namespace marrow

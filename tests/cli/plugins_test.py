@@ -124,6 +124,28 @@ class Plugins(Case):
         self.assertEqual(sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left")
         self.assertEqual(manifest.stat().st_mode & 0o777, 0o644)
 
+    def test_a_manifest_replaces_no_other_file(self):
+        folder = self.unknown_library()
+        library, manifest = folder / "marrow_test_numbers.so", folder / "marrow_test_numbers.json"
+        describe = lambda file: marrow("describe", file, "--write", extra_environment=self.own())
+        for foreign in ("my own notes", "", "[1]", '{"a": 1}'):
+            manifest.write_text(foreign)
+            result = describe(library)
+            self.assertEqual(result.returncode, 2, foreign)
+            self.assertEqual(result.stderr, "marrow: error: %s is there already and is no manifest that marrow wrote; move it away, or rename %s\n" % (manifest, library))
+            self.assertEqual(manifest.read_text(), foreign)
+        manifest.write_text('{"marrow_manifest": 0}')  # of another version
+        for _ in range(2):
+            self.assertEqual(describe(library).returncode, 0)
+            self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 15)
+        for name in ("library.json", "library", "library.so.1"):
+            other = folder / name
+            other.write_bytes(library.read_bytes())
+            result = describe(other)
+            self.assertEqual(result.returncode, 2, name)
+            self.assertIn("a manifest is written only beside a library whose name ends in .so, got %s; rename it" % other, result.stderr)
+            self.assertEqual(other.read_bytes(), library.read_bytes())
+
     def test_a_manifest_on_a_full_disk(self):
         folder = self.unknown_library()
         limited = subprocess.run([MARROW, "describe", folder / "marrow_test_numbers.so", "--write"], capture_output=True, text=True,
