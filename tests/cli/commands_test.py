@@ -37,6 +37,29 @@ class Commands(Case):
         self.assertEqual(result.returncode, 2)
         self.assertIn("did you mean 'mesh.marching_cubes'?", result.stderr)
 
+    def test_no_folder_that_is_read_is_written_to(self):
+        case = self.scratch / "case"
+        (case / "inner").mkdir(parents=True)
+        self.write("case/data", "1")
+        os.symlink("case", self.scratch / "link")
+        self.write("p.yaml", "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\noutputs: {number: c}\n")
+        run = lambda *arguments, cache="", cwd=self.scratch: marrow("run", self.scratch / "p.yaml", "--quiet", *arguments, plugins=[TEST_PLUGINS], cwd=cwd,
+                                                                   extra_environment={"MARROW_CACHE": str(cache or self.scratch / "cache")})
+        sentence = "marrow: error: %%s %%s lies in %s, a folder that node 'c' reads, which would change while it is read; %%s\n" % case
+        for out, arguments, cwd in (("runs", ["x=."], case), ("case/out", ["x=case"], self.scratch), ("link/inner", ["x=case/"], self.scratch), ("case/new/out", ["x=link"], self.scratch)):
+            result = run(*arguments, *([] if out == "runs" else ["--out", out]), cwd=cwd)
+            self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the output folder", out, "choose another with --out")))
+        result = run("x=case", "--out", "out", cache=case / "cache")
+        self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the store of results", case / "cache", "set MARROW_CACHE to another folder, or give --no-cache")))
+        self.assertEqual(sorted(path.name for path in self.scratch.rglob("*")), ["case", "data", "inner", "link", "p.yaml"], "nothing is made")
+        self.assertEqual(run("x=case", "--out", "case-out").returncode, 0)
+        self.assertEqual(run("x=case/data", "--out", "case/out").returncode, 0, "a file does not change by what is beside it")
+        self.assertEqual(run("x=case", "--out", "again", "--no-cache", cache=case / "cache").returncode, 0)
+        (self.scratch / "runs" / "p").mkdir(parents=True)
+        self.assertEqual(run("x=runs/p").returncode, 0, "the results go to another folder beside it")
+        result = marrow("rerun", "case-out", "--out", "case/again", plugins=[TEST_PLUGINS], cwd=self.scratch)
+        self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the output folder", "case/again", "choose another with --out")))
+
     def test_list_check_inspect_load_no_plugin_and_are_quick(self):
         for command in (["list"], ["check", SOURCE / "pipelines" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
             loads = marrow(*command, extra_environment={"LD_DEBUG": "files"})

@@ -75,6 +75,9 @@ struct RunOutcome {
 RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
                    RunFolder& folder);
 
+/// That the pipeline reads no folder to which the run writes; an empty one is below runs/. Throws Error.
+void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
+
 /// "edge_map", "list of view over view".
 std::string port_text(const PortInfo& port);
 /// An option's default as it is written in YAML.

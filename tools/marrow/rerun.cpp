@@ -11,6 +11,7 @@ int rerun(const RerunRequest& request) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load({request.run / "pipeline.yaml", {}, {}}, catalogue, pipeline, true)) return 2;
+  expect_good_place(pipeline, request.folder, nullptr);
   RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / (pipeline.name + "-rerun"), pipeline)
                                             : RunFolder(request.folder, pipeline);
   RunRequest how;

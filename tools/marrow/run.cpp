@@ -10,6 +10,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "process.hpp"
+#include "runtime/place_of_results.hpp"
 #include "runtime/printable.hpp"
 
 namespace marrow::cli {
@@ -165,6 +166,12 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   return outcome;
 }
 
+void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store) {
+  expect_nothing_reads(pipeline, folder.empty() ? "runs" : folder, "the output folder", "choose another with --out");
+  if (store && store->fault().empty())
+    expect_nothing_reads(pipeline, store->folder(), "the store of results", "set MARROW_CACHE to another folder, or give --no-cache");
+}
+
 int run(const RunRequest& request) {
   const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
@@ -174,8 +181,9 @@ int run(const RunRequest& request) {
     std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
     return 130;
   }
-  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline) : RunFolder(request.folder, pipeline);
   const Store store;
+  expect_good_place(pipeline, request.folder, request.no_cache ? nullptr : &store);
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline) : RunFolder(request.folder, pipeline);
   const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline), request.no_cache ? nullptr : &store, folder);
   if (request.json) print_json_summary(outcome.result, outcome.written, folder);
   else if (!request.quiet) print_summary(pipeline, outcome.result, outcome.written, folder);

@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "place_of_results.hpp"
+
+#include <algorithm>
+
+#include "marrow/domain/error.hpp"
+#include "named_files.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Without a slash at its end; with all links followed, as far as it is there.
+fs::path real_path(const fs::path& path) {
+  std::error_code error;
+  const fs::path real = fs::weakly_canonical(fs::absolute(path, error), error);
+  return real.has_filename() ? real : real.parent_path();
+}
+
+bool is_in(const fs::path& folder, const fs::path& place) {
+  return std::mismatch(folder.begin(), folder.end(), place.begin(), place.end()).first == folder.end();
+}
+
+}  // namespace
+
+void expect_nothing_reads(const Pipeline& pipeline, const fs::path& place, const std::string& what,
+                          const std::string& advice) {
+  const fs::path real_place = real_path(place);
+  const std::vector<bool> needed = pipeline.needed();
+  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
+    if (!needed[i]) continue;
+    for (const std::string& path : paths_of(pipeline.nodes[i])) {
+      std::error_code error;
+      const fs::path folder = real_path(path);
+      if (folder.empty() || !fs::is_directory(folder, error) || !is_in(folder, real_place)) continue;
+      throw Error(what + " " + place.string() + " lies in " + folder.string() + ", a folder that node '" +
+                  pipeline.nodes[i].id + "' reads, which would change while it is read; " + advice);
+    }
+  }
+}
+
+}  // namespace marrow
