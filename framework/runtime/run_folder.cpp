@@ -275,6 +275,9 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i], catalogue));
     record["nodes"].back()["inputs"] = inputs_of(pipeline.nodes[i], result);
   }
+  // What a file may use decides whether it is read at all.
+  if (settings.file_limits.memory_mb > 0) record["file_memory_mb"] = settings.file_limits.memory_mb;
+  if (settings.file_limits.seconds > 0) record["file_seconds"] = settings.file_limits.seconds;
   for (std::size_t i = 0; i < written.size(); ++i) {
     json output = {{"name", written[i].output}, {"files", written[i].files}, {"items", json::array()}};
     if (!written[i].fault.empty()) output["fault"] = written[i].fault;

@@ -3,7 +3,7 @@
 import json
 
 from diff_test import CHAIN, Runs
-from marrow_cli import CACHE, TEST_PLUGINS, main
+from marrow_cli import CACHE, IS_SANITIZED, TEST_PLUGINS, main
 
 
 class Rerun(Runs):
@@ -67,6 +67,27 @@ class Rerun(Runs):
                       "it does not give the same result each time\n  number  value", told)
         self.assertNotIn("(by the files in outputs/)", told)
         self.assertEqual(sorted(path.name for path in CACHE.rglob("*")), stored, "the first result is still kept, the second is not")
+
+    def test_with_the_limits_of_the_run(self):
+        text = "marrow: 1\nnodes:\n  r: {uses: read.mesh, with: {path: a.ply}}\noutputs: {r: r}\n"
+        self.write("a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement face 4\n"
+                   "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")
+        self.run_into("plain", text)
+        self.run_into("a", text, "--file-memory", 900, "--file-seconds", "7.5")
+        limits = lambda name: [json.loads((self.scratch / name / "run.json").read_text()).get(limit) for limit in ("file_memory_mb", "file_seconds")]
+        self.assertEqual([limits("plain"), limits("a")], [[None, None], [900, 7.5]])
+        self.rerun(0, "a", "--out", "b")
+        self.rerun(0, "a", "--out", "c", "--file-memory", 800)
+        self.assertEqual([limits("b"), limits("c")], [[900, 7.5], [800, 7.5]])
+        record = json.loads((self.scratch / "a" / "run.json").read_text())
+        for wrong in (-1, 0, "900", 1e30):
+            self.write("a/run.json", json.dumps({**record, "file_memory_mb": wrong}))
+            self.assertIn("its 'file_memory_mb' is no number from 0.001 to 1000000000", self.rerun(2, "a").stderr)
+        if IS_SANITIZED:
+            return  # memory has no limit there
+        self.write("a/run.json", json.dumps({**record, "file_memory_mb": 1}))
+        self.assertIn("raise the limit with --file-memory", self.rerun(1, "a", "--out", "d").stdout)
+        self.rerun(0, "a", "--out", "e", "--file-memory", 900)
 
     def test_a_failed_run(self):
         self.run_into("a", "marrow: 1\nnodes:\n  c: {uses: test.constant}\n  f: {uses: test.fail_above, in: {a: c}, with: {value: 0}}\noutputs: {c: c, f: f}\n", code=1)

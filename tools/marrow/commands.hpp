@@ -34,6 +34,7 @@ struct RerunRequest {
   std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number where that is taken
   bool quiet = false;
   bool json = false;
+  FileLimits file_limits;        ///< instead of those of the run
 };
 
 int run(const RunRequest& request);

@@ -24,9 +24,10 @@ void add_pipeline_arguments(CLI::App* command, marrow::cli::PipelineRequest& req
       ->take_all()->expected(1)->type_name("NODE.OPTION=VALUE");
 }
 
-void add_file_limits(CLI::App* command, marrow::FileLimits& limits) {
-  add_amount(command, "--file-memory", limits.memory_mb, "megabytes", "megabytes that reading a file may use (default: by its size)");
-  add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time that reading a file may use (default: by its size)");
+void add_file_limits(CLI::App* command, marrow::FileLimits& limits, const std::string& otherwise = "by its size") {
+  const std::string end = " that reading a file may use (default: " + otherwise + ")";
+  add_amount(command, "--file-memory", limits.memory_mb, "megabytes", "megabytes" + end);
+  add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time" + end);
 }
 
 void add_compare_arguments(CLI::App* command, marrow::cli::CompareRequest& request) {
@@ -90,6 +91,7 @@ int run_program(int argc, char** argv) {
   rerun_command->add_option("--out", rerun_request.folder, "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... where that is there)");
   rerun_command->add_flag("--quiet", rerun_request.quiet, "no progress");
   rerun_command->add_flag("--json", rerun_request.json, "print the differences as JSON");
+  add_file_limits(rerun_command, rerun_request.file_limits, "as the run had it");
   rerun_command->callback([&] { code = rerun(rerun_request); });
 
   std::filesystem::path first_run, second_run;

@@ -6,8 +6,6 @@
 namespace marrow::cli {
 namespace {
 
-constexpr double kLeastAmount = 0.001, kMostAmount = 1e9;
-
 /// Without trailing zeros.
 std::string text_of(double value) {
   char text[32];

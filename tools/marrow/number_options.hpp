@@ -22,7 +22,9 @@ CLI::Option* add_whole_number(CLI::App* command, const std::string& option, T& t
   return command->add_option_function<std::string>(option, take, help)->type_name("WHOLE NUMBER");
 }
 
-/// For megabytes and seconds: more than nothing, and less than what a clock or a counter cannot hold.
+/// Of megabytes and seconds: more than nothing, and less than what a clock or a counter cannot hold.
+inline constexpr double kLeastAmount = 0.001, kMostAmount = 1e9;
+
 CLI::Option* add_amount(CLI::App* command, const std::string& option, double& target, const std::string& unit,
                         const std::string& help);
 

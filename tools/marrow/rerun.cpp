@@ -17,6 +17,9 @@ int rerun(const RerunRequest& request) {
   RunRequest how;
   how.seed = before.seed;
   how.threads = before.threads;
+  how.file_limits = before.file_limits;
+  if (request.file_limits.memory_mb > 0) how.file_limits.memory_mb = request.file_limits.memory_mb;
+  if (request.file_limits.seconds > 0) how.file_limits.seconds = request.file_limits.seconds;
   how.quiet = request.quiet || request.json;
   // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the first one.
   const RunOutcome outcome = execute(pipeline, catalogue, how, before.arguments, nullptr, folder);

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "marrow/domain/error.hpp"
+#include "number_options.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/printable.hpp"
@@ -70,6 +71,14 @@ json map_in(const json& object, const char* name) {
   const json map = object.value(name, json::object());
   if (!map.is_object()) throw Error("its '" + std::string(name) + "' is no object");
   return map;
+}
+
+/// What reading a file may use; 0 where the run had no such limit.
+double limit_in(const json& record, const char* name) {
+  if (!record.contains(name)) return 0;
+  const double limit = record[name].is_number() ? record[name].get<double>() : 0;
+  if (!(limit >= kLeastAmount && limit <= kMostAmount)) throw Error("its '" + std::string(name) + "' is no number from 0.001 to 1000000000");
+  return limit;
 }
 
 std::vector<RecordedItem> items_of(const json& list) {
@@ -155,6 +164,7 @@ RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const js
   for (const auto& [name, value] : inputs.items()) run.arguments.inputs.push_back({name, value});
   for (const std::string text : list_in(record, "overrides")) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
   for (const json& plugin : list_in(record, "plugins")) run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
+  run.file_limits = {limit_in(record, "file_memory_mb"), limit_in(record, "file_seconds")};
   for (const json& output : list_in(record, "outputs"))
     run.results.push_back({output.at("name"), output.value("fault", ""), items_of(list_in(output, "items")), output.value("files", std::vector<std::string>())});
   read_nodes(pipeline, record, run);

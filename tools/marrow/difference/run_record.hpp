@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/pipeline.hpp"
 
 namespace marrow::cli {
@@ -57,6 +58,7 @@ struct RunRecord {
   std::string pipeline, status, framework, cpu_level;
   std::uint64_t seed = 1;
   int threads = 0;
+  FileLimits file_limits;
   PipelineArguments arguments;
   std::map<std::string, std::string> plugins;  ///< file name -> build id
   std::vector<RecordedNode> nodes;             ///< that took part, in the pipeline's order
