@@ -20,6 +20,7 @@
 #include "marrow/domain/error.hpp"
 #include "printable.hpp"
 #include "text_file.hpp"
+#include "written_content.hpp"
 
 namespace marrow {
 namespace {
@@ -124,6 +125,17 @@ json files_of(const PipelineNode& node) {
     files[node.info.options[i].name] = all_there ? json(hasher.digest().hex()) : json();
   }
   return files;
+}
+
+/// The contents of files that were written, so that it can be told when one is damaged later; null for what cannot be read.
+json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
+  json digests = json::array();
+  for (const std::string& file : files) try {
+      digests.push_back(content_of(folder / file).hex());
+    } catch (const Error&) {
+      digests.push_back(json());
+    }
+  return digests;
 }
 
 bool took_part(const NodeRecord& record) {
@@ -280,6 +292,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
   if (settings.file_limits.seconds > 0) record["file_seconds"] = settings.file_limits.seconds;
   for (std::size_t i = 0; i < written.size(); ++i) {
     json output = {{"name", written[i].output}, {"files", written[i].files}, {"items", json::array()}};
+    output["digests"] = digests_of(folder_, written[i].files);
     if (!written[i].fault.empty()) output["fault"] = written[i].fault;
     try {
       output["items"] = items_of(value_of(result, pipeline.outputs.at(i).source));

@@ -273,6 +273,40 @@ class Diff(Runs):
         self.assertTrue(told.endswith("\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  "
                                       "marrow run a/pipeline.yaml --seed 3\n"), told)
 
+    def test_output_files_that_are_damaged_or_gone(self):
+        text = CHAIN.replace("outputs: {", "  s: {uses: test.sides, with: {names: [one, two]}}\noutputs: {both: s.both, ")
+        self.run_into("a", text)
+        self.run_into("b", text)
+        (self.scratch / "a" / "outputs" / "sum.json").unlink()
+        drawn, item = self.scratch / "b" / "outputs" / "drawn.json", self.scratch / "b" / "outputs" / "both" / "two.json"
+        whole = drawn.read_bytes()
+        drawn.write_bytes(whole[:-1] + b" ")
+        item.unlink()
+        item.symlink_to(self.scratch / "p.yaml")
+        damaged = ["a/outputs/sum.json is missing", "b/outputs/both/two.json leads out of the folder", "b/outputs/drawn.json was changed since the run wrote it"]
+        told = self.diff(1, "a", "b")
+        self.assertTrue(told.startswith("first run (was): a\nsecond run (is): b\n\n" + "\n".join(damaged) + "\nAll else is by what the runs came to, not by these files\n\n"
+                                        "What took part in both runs came out the same: 6 nodes\n"), told)
+        self.assertNotIn("identical", told)
+        told = json.loads(self.diff(1, "a", "b", "--json"))
+        self.assertEqual((told["identical"], told["damaged_files"]), (False, damaged))
+        self.assertIn("a/outputs/sum.json is missing\n", self.diff(1, "a", "a"))
+        shutil.copy(self.scratch / "b" / "outputs" / "sum.json", self.scratch / "a" / "outputs")
+        item.unlink()
+        shutil.copy(self.scratch / "a" / "outputs" / "both" / "two.json", item)
+        drawn.write_bytes(whole)
+        self.assertIn("identical: all 6 nodes came out the same\n", self.diff(0, "a", "b"))
+
+    def test_a_record_without_digests_is_compared_by_keys(self):
+        self.run_into("a", CHAIN)
+        shutil.copytree(self.scratch / "a", self.scratch / "b")
+        record = json.loads((self.scratch / "b" / "run.json").read_text())
+        for output in record["outputs"]:
+            self.assertEqual(len(output.pop("digests")), 1)
+        self.write("b/run.json", json.dumps(record))
+        (self.scratch / "b" / "outputs" / "sum.json").unlink()
+        self.assertIn("identical", self.diff(0, "a", "b"))
+
     def test_for_scripts(self):
         self.run_into("a", CHAIN)
         self.run_into("b", CHAIN, "--set", "other.value=4.25")

@@ -118,7 +118,7 @@ json json_of(const Root& root) {
 Findings::Findings(RunRecord before_run, RunRecord now_run) : before(std::move(before_run)), now(std::move(now_run)), difference(difference_of(before, now)) {}
 
 bool Findings::identical() const {
-  return difference.is_none() && std::all_of(results.begin(), results.end(), [](const OutputDifference& output) { return output.is_none(); });
+  return damaged.empty() && difference.is_none() && std::all_of(results.begin(), results.end(), [](const OutputDifference& output) { return output.is_none(); });
 }
 
 Findings find_differences(RunRecord before, RunRecord now, KnownValues& values) {
@@ -135,6 +135,9 @@ Findings find_differences(RunRecord before, RunRecord now, KnownValues& values) 
   }
   for (const RecordedResult& result : findings.now.results)
     if (!named(findings.before.results, result.name)) findings.results.push_back(finder.compare(result.name, none, result.items));
+  findings.damaged = damaged_files(findings.before);
+  if (findings.before.folder != findings.now.folder)
+    for (std::string& file : damaged_files(findings.now)) findings.damaged.push_back(std::move(file));
   return findings;
 }
 
@@ -153,7 +156,8 @@ json json_of(const Findings& findings) {
                  {"other_changes", others},
                  {"rebuilt_plugins", rebuilt},
                  {"framework_rebuilt", findings.before.framework != findings.now.framework},
-                 {"outputs", json_of(findings.results)}};
+                 {"outputs", json_of(findings.results)},
+                 {"damaged_files", findings.damaged}};
   if (!roots.empty()) {
     result["first"] = roots[0];
     result["first"]["outputs"] = json_of(findings.first);

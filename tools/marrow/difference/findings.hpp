@@ -31,6 +31,7 @@ struct Findings {
   RunDifference difference;               ///< refers to nodes of both
   std::vector<OutputDifference> first;    ///< outputs of the first root that differ
   std::vector<OutputDifference> results;  ///< of the run, all of them
+  std::vector<std::string> damaged;       ///< files of either run that are not what it wrote
 
   bool identical() const;
   Findings(RunRecord before, RunRecord now);

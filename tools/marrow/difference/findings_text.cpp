@@ -146,6 +146,8 @@ void print(const Findings& findings) {
     print_other_changes(findings);
     return;
   }
+  for (const std::string& file : findings.damaged) std::printf("%s\n", printable(file).c_str());
+  if (!findings.damaged.empty()) std::printf("All else is by what the runs came to, not by these files\n\n");
   std::set<std::pair<std::string, std::string>> shown;
   if (difference.roots.empty()) std::printf("What took part in both runs came out the same: %s\n", nodes.c_str());
   print_roots(findings, shown);

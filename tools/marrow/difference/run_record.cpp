@@ -12,6 +12,7 @@
 #include "runtime/json_text.hpp"
 #include "runtime/printable.hpp"
 #include "runtime/strict_yaml.hpp"
+#include "runtime/written_content.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -151,6 +152,14 @@ void check_age(const fs::path& folder, const json& record) {
               (record.contains("seed") && record["seed"].is_number() ? record["seed"].dump() : "1"));
 }
 
+bool holds(const fs::path& file, const std::string& content) {
+  try {
+    return content_of(file).hex() == content;
+  } catch (const Error&) {  // it could be read once
+    return false;
+  }
+}
+
 RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const json& record) {
   RunRecord run;
   run.folder = folder;
@@ -165,8 +174,10 @@ RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const js
   for (const std::string text : list_in(record, "overrides")) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
   for (const json& plugin : list_in(record, "plugins")) run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
   run.file_limits = {limit_in(record, "file_memory_mb"), limit_in(record, "file_seconds")};
-  for (const json& output : list_in(record, "outputs"))
-    run.results.push_back({output.at("name"), output.value("fault", ""), items_of(list_in(output, "items")), output.value("files", std::vector<std::string>())});
+  for (const json& output : list_in(record, "outputs")) {
+    run.results.push_back({output.at("name"), output.value("fault", ""), items_of(list_in(output, "items")), output.value("files", std::vector<std::string>()), {}});
+    for (const json& content : list_in(output, "digests")) run.results.back().contents.push_back(content.is_null() ? "" : digest_of(content));
+  }
   read_nodes(pipeline, record, run);
   return run;
 }
@@ -186,7 +197,11 @@ fs::path RecordedResult::file_of(const fs::path& folder, const std::string& plac
   if (present != files.size()) return {};  // one of them could not be written
   for (const RecordedItem& item : items) {
     if (item.is_absent()) continue;
-    if (item.place == place) return file_of_run(folder, files[at]).value_or(fs::path());
+    if (item.place == place) {
+      const fs::path file = file_of_run(folder, files[at]).value_or(fs::path());
+      const bool is_damaged = at < contents.size() && !contents[at].empty() && !holds(file, contents[at]);
+      return is_damaged ? fs::path() : file;
+    }
     ++at;
   }
   return {};
@@ -195,6 +210,20 @@ fs::path RecordedResult::file_of(const fs::path& folder, const std::string& plac
 const RecordedNode* RunRecord::find(const std::string& id) const {
   const auto found = places.find(id);
   return found == places.end() ? nullptr : &nodes[found->second];
+}
+
+std::vector<std::string> damaged_files(const RunRecord& run) {
+  std::vector<std::string> damaged;
+  for (const RecordedResult& result : run.results)
+    for (std::size_t i = 0; i < std::min(result.files.size(), result.contents.size()); ++i) {
+      if (result.contents[i].empty()) continue;
+      const std::string name = (run.folder / result.files[i]).string();
+      std::error_code error;
+      if (leads_outside(run.folder, result.files[i])) damaged.push_back(name + " leads out of the folder");
+      else if (!fs::exists(run.folder / result.files[i], error)) damaged.push_back(name + " is missing");
+      else if (!holds(run.folder / result.files[i], result.contents[i])) damaged.push_back(name + " was changed since the run wrote it");
+    }
+  return damaged;
 }
 
 RunRecord read_run(const fs::path& folder) {

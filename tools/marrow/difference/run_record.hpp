@@ -48,6 +48,7 @@ struct RecordedResult {
   std::string name, fault;
   std::vector<RecordedItem> items;
   std::vector<std::string> files;  ///< below the folder, in the order of the items that are not absent
+  std::vector<std::string> contents;  ///< of the files when they were written; empty where that is not known
 
   /// The file that holds an item; empty where it cannot be told.
   std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& place) const;
@@ -67,6 +68,9 @@ struct RunRecord {
 
   const RecordedNode* find(const std::string& id) const;
 };
+
+/// The files below outputs/ that are not there any more, or not as the run wrote them, each in a sentence.
+std::vector<std::string> damaged_files(const RunRecord& run);
 
 /// Throws Error for a folder that no run has written, or whose files cannot be read.
 RunRecord read_run(const std::filesystem::path& folder);
