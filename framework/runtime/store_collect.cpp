@@ -6,6 +6,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
+#include <optional>
 
 #include "folder_use.hpp"
 #include "store_entry.hpp"
@@ -54,6 +55,14 @@ bool remove_item(const StoreItem& item, std::error_code& error) {
   }
   if (!error) fs::remove_all(path, error);
   return !error;
+}
+
+/// Of what nodes last came to. It is written when a call begins, which may take long: only where it is much older than all
+/// results that are kept, its own is gone.
+void remove_older(const std::vector<StoreItem>& remembered, fs::file_time_type oldest) {
+  std::error_code error;
+  for (const StoreItem& item : remembered)
+    if (fs::last_write_time(item.path, error) < oldest && !error) remove_item(item, error);
 }
 
 void list_keys(const std::vector<Leaf>& leaves, std::vector<Digest>& keys) {
@@ -108,9 +117,14 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
     return false;
   };
   std::uint64_t total = 0;
+  std::vector<StoreItem> remembered;
   for (StoreItem& item : items_of_store(folder_, freed.fault)) {
     if (item.kind == Kind::temporary) {
       if (is_abandoned(item)) remove(item);
+      continue;
+    }
+    if (item.kind == Kind::remembered) {
+      remembered.push_back(std::move(item));
       continue;
     }
     Kept kept{item, bytes_of(item.path), fs::last_write_time(item.path, error)};
@@ -119,14 +133,20 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
     all.push_back(std::move(kept));
   }
   std::sort(all.begin(), all.end(), [](const Kept& a, const Kept& b) { return a.used < b.used; });
+  std::optional<fs::file_time_type> oldest_kept;
   for (const Kept& one : all) {
-    if (total <= keep_bytes) break;
+    if (total <= keep_bytes) {
+      oldest_kept = one.used;
+      break;
+    }
     const bool is_removed = remove(one.item);
     if (is_removed || error == std::errc::no_such_file_or_directory) total -= one.bytes;
     if (!is_removed) continue;
     freed.bytes += one.bytes;
     ++freed.entries;
   }
+  if (keep_bytes == 0) oldest_kept = fs::file_time_type::max();
+  if (oldest_kept) remove_older(remembered, *oldest_kept - kDay);
   return freed;
 }
 

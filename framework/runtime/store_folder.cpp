@@ -203,9 +203,9 @@ std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault
     } else if (name == "last" || (name.size() == 2 && is_digits(name, "0123456789abcdef"))) {
       for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_other) {
         if (is_other || (name != "last" && !inner.starts_with(name))) return;
-        if (const auto key = key_of_name(inner); key && name != "last")
-          items.push_back({Kind::entry, at, *key, 0});
-        else if (!key)
+        if (const auto key = key_of_name(inner))
+          items.push_back({name == "last" ? Kind::remembered : Kind::entry, at, *key, 0});
+        else
           add_temporary(inner, at, is_key);
       });
     }

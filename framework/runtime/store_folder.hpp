@@ -37,10 +37,10 @@ std::filesystem::path new_folder_beside(const std::filesystem::path& final);
 
 /// Something in a store that can be removed.
 struct StoreItem {
-  enum class Kind { entry, simulated_case, temporary };
+  enum class Kind { entry, simulated_case, remembered, temporary };
   Kind kind = Kind::entry;
   std::filesystem::path path;
-  Digest key;       ///< of an entry or a simulated case
+  Digest key;       ///< of an entry or a simulated case; what names a place in last/
   int process = 0;  ///< that writes a temporary
 };
 /// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there. `fault`: why

@@ -359,6 +359,30 @@ TEST_F(StoreTest, TheLeastRecentlyUsedGoFirst) {
   EXPECT_TRUE(store.find(marrow::hash_of(3)));
 }
 
+TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
+  const auto remembered = [&] {
+    std::set<std::string> places;
+    for (const char* place : {"old", "young"})
+      if (store.last(place)) places.insert(place);
+    return places;
+  };
+  for (int i = 0; i < 2; ++i) store.save(marrow::hash_of(i), {many(1000)}, {});
+  for (const char* place : {"old", "young"}) store.remember(place, {});
+  const auto now = fs::file_time_type::clock::now();
+  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(), now - std::chrono::hours(72));
+  const std::uint64_t one = store.entries()[0].bytes;
+  for (const Store::Entry& entry : store.entries())
+    fs::last_write_time(store.folder() / entry.key.hex().substr(0, 2) / entry.key.hex(), now - std::chrono::hours(60));
+  EXPECT_EQ(store.collect(one).entries, 1u);
+  EXPECT_EQ(remembered().size(), 2u) << "the call of the result that is kept may have begun then";
+  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(), now - std::chrono::hours(90));
+  EXPECT_EQ(store.collect(2 * one).entries, 0u);
+  EXPECT_EQ(remembered(), (std::set<std::string>{"young"}));
+  EXPECT_EQ(store.collect(0).entries, 1u);
+  EXPECT_TRUE(remembered().empty());
+  EXPECT_TRUE(fs::is_empty(store.folder() / "last"));
+}
+
 TEST_F(StoreTest, PlanSaysWhatRunsAndWhy) {
   std::vector<PlannedNode> planned = plan(kChain, "n: n");
   EXPECT_EQ(planned[0].what, What::runs);
@@ -379,7 +403,7 @@ TEST_F(StoreTest, PlanSaysWhatRunsAndWhy) {
   EXPECT_EQ(planned[3].waits_for, (std::set<std::string>{"c"})) << "through the function";
   EXPECT_EQ(planned[4].what, What::depends);
 
-  store.collect(0);
+  store.collect(1);
   planned = plan(kChain, "n: n");
   EXPECT_EQ(planned[0].why, "its result is no longer in the store");
 }
