@@ -47,6 +47,23 @@ class Cache(Case):
         self.assertIn("0 results removed", self.marrow("cache", "gc", "--keep-gb", "1e6").stdout)
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
 
+    def test_what_is_mounted_in_the_store_is_left(self):
+        self.assertEqual(self.run_pipeline().returncode, 0)
+        inner = self.cache / "cases" / ("0" * 32) / "outputs"
+        inner.mkdir(parents=True)
+        (self.scratch / "precious").mkdir()
+        self.write("precious/data", "mine")
+        script = 'mount --bind "$1" "$2" && "$3" cache gc --keep-gb 0'
+        command = ["unshare", "-m", "sh", "-c", script, "sh", self.scratch / "precious", inner, MARROW]
+        if subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode != 0:
+            self.skipTest("only root can mount")
+        result = subprocess.run(list(map(str, command)), capture_output=True, text=True, env={**os.environ, "MARROW_CACHE": str(self.cache)})
+        self.assertEqual(result.returncode, 2, result.stderr)
+        self.assertIn("%s is left, because something is mounted in it; unmount that first" % inner.parent, result.stderr)
+        self.assertEqual((self.scratch / "precious" / "data").read_text(), "mine")
+        self.assertTrue(inner.is_dir())
+        self.assertIn("1 results removed", result.stdout, "all else is")
+
     def test_a_wrong_limit_is_said_and_removes_nothing(self):
         for wrong in WRONG_NUMBERS[:-1]:
             (self.cache / "tidied").unlink(missing_ok=True)
