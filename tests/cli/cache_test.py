@@ -47,6 +47,27 @@ class Cache(Case):
         self.assertIn("0 results removed", self.marrow("cache", "gc", "--keep-gb", "1e6").stdout)
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
 
+    def test_why_tells_of_one_key(self):
+        for value in range(9):
+            self.assertEqual(self.marrow("run", self.pipeline, "--out", "of-%d" % value, "--set", "c.value=%d" % value).returncode, 0)
+        text = self.marrow("cache", "why", "")
+        self.assertEqual((text.returncode, text.stdout), (2, ""))
+        self.assertIn("the key is empty; give that of a result or of one of its outputs, or its first digits", text.stderr)
+        entries = sorted(path.name for path in self.cache.rglob("*") if len(path.name) == 32 and path.parent.name == path.name[:2])
+        keys = set(entries)
+        for entry in entries:
+            told = self.marrow("cache", "why", entry)
+            self.assertEqual(told.returncode, 0, told.stderr)
+            self.assertTrue(told.stdout.startswith(entry + ": test.constant"), told.stdout)
+            keys.update(re.findall(r"^  output (\w+)$", told.stdout, re.M))
+        self.assertEqual(len(keys), 18)
+        digit = max("0123456789abcdef", key=lambda one: sum(key.startswith(one) for key in keys))  # of 18 keys, some share one
+        several = sorted(key for key in keys if key.startswith(digit))
+        told = self.marrow("cache", "why", digit)
+        self.assertEqual((told.returncode, told.stdout), (2, ""))
+        self.assertEqual(told.stderr, "marrow: error: %d keys begin with '%s'; give more digits of one of them:\n" % (len(several), digit)
+                         + "".join("  %s\n" % key for key in several[:5]) + ("  ...\n" if len(several) > 5 else ""))
+
     def test_what_is_mounted_in_the_store_is_left(self):
         self.assertEqual(self.run_pipeline().returncode, 0)
         inner = self.cache / "cases" / ("0" * 32) / "outputs"

@@ -126,7 +126,8 @@ class Names(Commands):
         self.write("p.yaml", "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  w: {uses: test.work, with: {value: 0.01, path: $x}}\noutputs: {o: w}\n")
         environment = {"MARROW_CACHE": str(cache)}
         self.expect(0, "run", "p.yaml", "x=" + name, "--out", "o", extra_environment=environment)
-        commands = [[0, "cache", "info"], [0, "cache", "why", ""], [2, "cache", "why", ESCAPE], [2, "cache", "gc", "--keep-gb", ESCAPE], [2, "run", "p.yaml", "--threads", ESCAPE],
+        key = json.loads((self.scratch / "o" / "run.json").read_text())["nodes"][0]["keys"]["number"]
+        commands = [[0, "cache", "info"], [0, "cache", "why", key], [2, "cache", "why", ESCAPE], [2, "cache", "gc", "--keep-gb", ESCAPE], [2, "run", "p.yaml", "--threads", ESCAPE],
                     [2, "run", "p.yaml", "--seed", ESCAPE], [2, "run", "p.yaml", "--" + ESCAPE], [0, "doctor"]]
         for code, *arguments in commands:
             environment["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS) + ":/nowhere" + ESCAPE

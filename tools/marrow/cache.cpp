@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
+#include <set>
 
 #include "commands.hpp"
 #include "runtime/printable.hpp"
@@ -21,6 +22,27 @@ int code_after(const std::string& fault) {
 }
 
 double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
+
+void print(const Store::Entry& entry) {
+  const Provenance& from = entry.provenance;
+  std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), printable(from.node).c_str(), megabytes(entry.bytes), from.seconds,
+              from.build_id.hex().c_str());
+  for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", printable(name).c_str(), printable(value).c_str());
+  for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", printable(name).c_str(), digest.hex().c_str());
+  for (const Digest& digest : entry.outputs) std::printf("  output %s\n", digest.hex().c_str());
+  if (from.random) std::printf("  seed   %llu\n", static_cast<unsigned long long>(from.seed));
+  for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
+}
+
+/// That no one can tell which of them is meant.
+std::string several(const std::string& key, const std::set<std::string>& keys) {
+  constexpr std::size_t kMostShown = 5;
+  std::string text = std::to_string(keys.size()) + " keys begin with '" + key + "'; give more digits of one of them:";
+  std::size_t shown = 0;
+  for (const std::string& one : keys)
+    if (shown++ < kMostShown) text += "\n" + one;
+  return keys.size() > kMostShown ? text + "\n..." : text;
+}
 
 }  // namespace
 
@@ -50,23 +72,22 @@ int cache_info() {
 }
 
 int cache_why(const std::string& key) {
+  if (key.empty()) return code_after("the key is empty; give that of a result or of one of its outputs, or its first digits");
   const Store store;
   if (const int code = code_after(store.fault())) return code;
-  int found = 0;
-  for (const Store::Entry& entry : store.entries()) {
-    const auto is_meant = [&](const Digest& digest) { return digest.hex().starts_with(key); };
-    if (!is_meant(entry.key) && std::none_of(entry.outputs.begin(), entry.outputs.end(), is_meant)) continue;
-    ++found;
-    const Provenance& from = entry.provenance;
-    std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), printable(from.node).c_str(), megabytes(entry.bytes), from.seconds,
-                from.build_id.hex().c_str());
-    for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", printable(name).c_str(), printable(value).c_str());
-    for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", printable(name).c_str(), digest.hex().c_str());
-    for (const Digest& digest : entry.outputs) std::printf("  output %s\n", digest.hex().c_str());
-    if (from.random) std::printf("  seed   %llu\n", static_cast<unsigned long long>(from.seed));
-    for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
+  std::vector<Store::Entry> meant;
+  std::set<std::string> keys;  // several results may have one and the same output
+  for (Store::Entry& entry : store.entries()) {
+    std::vector<Digest> all = entry.outputs;
+    all.push_back(entry.key);
+    std::erase_if(all, [&](const Digest& digest) { return !digest.hex().starts_with(key); });
+    for (const Digest& digest : all) keys.insert(digest.hex());
+    if (!all.empty()) meant.push_back(std::move(entry));
   }
-  return found ? 0 : code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
+  if (keys.empty()) return code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
+  if (keys.size() > 1) return code_after(several(key, keys));
+  for (const Store::Entry& entry : meant) print(entry);
+  return 0;
 }
 
 int cache_collect(double keep_gb) {
