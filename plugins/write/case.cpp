@@ -2,6 +2,7 @@
 // Folders: a view, and a whole case as read.case takes it (docs/case.md).
 #include <algorithm>
 #include <cctype>
+#include <map>
 #include <marrow/domain/names.hpp>
 #include <marrow/plugin.hpp>
 
@@ -49,9 +50,17 @@ bool is_plain(const std::string& name) {
   });
 }
 
+/// Names that differ by capital letters alone are one file to some file systems.
+std::string in_small_letters(std::string name) {
+  for (char& c : name)
+    if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
+  return name;
+}
+
 /// The views' names as the names of their files; where one cannot be, a number that no other view has.
 std::vector<std::string> file_stems(const std::vector<std::string>& names) {
-  std::vector<std::string> stems, taken = names;
+  std::vector<std::string> stems, taken;
+  for (const std::string& name : names) taken.push_back(in_small_letters(name));
   for (std::size_t i = 0; i < names.size(); ++i) {
     std::string stem = names[i];
     for (std::size_t number = i + 1; !is_plain(names[i]) && (stem == names[i] || std::count(taken.begin(), taken.end(), stem)); ++number)
@@ -100,6 +109,11 @@ void check_case(const marrow::Case& value, const std::string& path) {
         throw marrow::Error(path + ": two " + what + "s are named '" + names[i] + "'");
   };
   check_names(value.views.names(), "view");
+  std::map<std::string, std::string> files;  // by small letters
+  for (const std::string& name : value.views.names())
+    if (const auto [other, is_new] = files.emplace(in_small_letters(name), name); !is_new)
+      throw marrow::Error(path + ": the views '" + other->second + "' and '" + name +
+                          "' are one file to some file systems; rename one of them");
   check_names(value.seeds.names(), "fragment");
   const auto check = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
