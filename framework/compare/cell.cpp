@@ -6,6 +6,7 @@
 #include <set>
 #include <sstream>
 
+#include "cell_key.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
@@ -19,19 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+const std::string kChanged = "a file that the cell needs was changed while it ran; run it again";
+
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
   for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
   return parts;
-}
-
-/// All that a run of the pipeline depends on, but for the data that its paths name.
-void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const Catalogue& catalogue) {
-  hasher.add(resolved_yaml(pipeline));
-  std::set<Digest> build_ids;
-  for (const PipelineNode& node : pipeline.nodes) build_ids.insert(catalogue.library_of(node.info.name)->build_id);
-  for (const Digest& id : build_ids) hasher.add(id);
 }
 
 Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue) {
@@ -84,6 +79,9 @@ int evaluations_in(const Value& value) {
   if (!value.is_list() && !value.is_absent() && value.type == TypeInfo::of<Pose>()) sum += value.as<Pose>().evaluations;
   return sum;
 }
+
+/// Of a simulated case, by where its outputs lie.
+fs::path case_folder_of(const fs::path& outputs) { return outputs.parent_path().parent_path(); }
 
 /// A case lies beside the hash of its content, which is written last: one that is not whole is made again.
 std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
@@ -149,20 +147,11 @@ std::uint64_t CellRunner::seed_of(std::size_t index) const {
   return one.is_simulated || !one.folder.empty() ? 1 : one.seed;
 }
 
-fs::path CellRunner::case_place(std::size_t index) const {
-  const ExperimentCase& one = experiment_.cases[index];
-  if (!one.is_simulated) return one.folder;
-  Hasher hasher;
-  add_pipeline(hasher, simulation_of(index), catalogue_);
-  hasher.add(one.seed);
-  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" / experiment_.simulation.output;
-}
-
 fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
   if (!one.is_simulated) return one.folder;
   FoundCase& found = simulated_[index];
-  const fs::path outputs = found.use ? found.outputs : case_place(index), folder = outputs.parent_path().parent_path();
+  const fs::path outputs = found.use ? found.outputs : case_place(index), folder = case_folder_of(outputs);
   // Another process may tidy the store up until this one uses the folder.
   for (int tries = 0; !found.use; ++tries) {
     std::shared_ptr<const void> use = use_folder(folder);
@@ -179,6 +168,7 @@ fs::path CellRunner::case_folder(std::size_t index) {
 void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   const ExperimentCase& one = experiment_.cases[index];
   const Pipeline pipeline = simulation_of(index);
+  const Digest states = states_of_files(pipeline);
   RunSettings settings;
   settings.seed = one.seed;
   settings.threads = threads_;
@@ -187,6 +177,8 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
     throw Error("case '" + one.name + "' cannot be written: " + fault);
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
+  if (states_of_files(pipeline) != states || case_folder_of(place_of_simulated(index, Look::anew)) != folder)
+    throw Error("case '" + one.name + "' cannot be simulated: what it is made from was changed meanwhile; run it again");
   const TemporaryFolder temporary(folder);
   RunFolder written(temporary.path, pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
@@ -217,21 +209,10 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
   return pipeline;
 }
 
-std::string CellRunner::key_of(const CellIndex& cell, const Pipeline& pipeline) {
-  Hasher hasher;
-  add_pipeline(hasher, pipeline, catalogue_);
-  hasher.add(seed_of(cell.case_index));
-  const ExperimentCase& one = experiment_.cases[cell.case_index];
-  hasher.add(one.is_simulated || !one.folder.empty() ? path_digest(case_folder(cell.case_index)).hex() : "");
-  for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
-  hasher.add(experiment_.initial_error);
-  return hasher.digest().hex();
-}
-
-std::optional<CellRow> CellRunner::finished(const CellIndex& cell) {
+std::optional<CellRow> CellRunner::finished(const CellIndex& cell, const std::string& key) const {
   try {
     CellRow row = row_from_json(read_text_file(folder_of(cell) / "cell.json", kMostSourceBytes), experiment_);
-    if (!row.failed.empty() || row.key != key_of(cell, pipeline_of(cell, case_folder(cell.case_index), Depth::figures))) return std::nullopt;
+    if (!row.failed.empty() || key.empty() || row.key != key) return std::nullopt;
     name_row(row, experiment_, cell);
     return row;
   } catch (const std::exception&) {  // not there, or no row: the cell runs, and says what is wrong
@@ -265,10 +246,11 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   CellRow row;
   try {
     const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::figures);
-    row.key = key_of(cell, pipeline);
+    const Watched before = watched(cell, pipeline);
+    row.key = before.key;
     const Done done = run_into(folder_of(cell), pipeline, cell, observer);
     fill(row, pipeline, done);
-    if (row.failed.empty() && row.key != key_of(cell, pipeline)) row.failed = "the case changed while the cell ran; run it again";
+    if (row.failed.empty() && watched(cell, pipeline) != before) row.failed = kChanged;
   } catch (const std::exception& error) {
     row.failed = error.what();
   }
@@ -302,11 +284,12 @@ fs::path CellRunner::pictures_of(const CellIndex& cell) const { return folder_ /
 bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   const fs::path folder = pictures_of(cell);
   const Pipeline pipeline = pipeline_of(cell, case_folder(cell.case_index), Depth::pictures);
-  const std::string key = key_of(cell, pipeline);
-  if (has_text(folder / "key.txt", key + "\n")) return false;
+  const Watched before = watched(cell, pipeline);
+  if (has_text(folder / "key.txt", before.key + "\n")) return false;
   const Done done = run_into(folder, pipeline, cell, observer);
   if (!done.fault.empty()) throw Error(done.fault);
-  write_text_file(folder / "key.txt", key + "\n");
+  if (watched(cell, pipeline) != before) throw Error(kChanged);
+  write_text_file(folder / "key.txt", before.key + "\n");
   return true;
 }
 
@@ -334,8 +317,9 @@ double CellRunner::time(const CellIndex& cell) {
   settings.remember = false;
   settings.made_anew = own_nodes(cell, pipeline);
   Hasher hasher;
+  const Watched before = watched(cell, pipeline);
   hasher.add(std::string("seconds"));
-  hasher.add(key_of(cell, pipeline));
+  hasher.add(before.key);
   hasher.add(std::int64_t(threads_));
   for (const std::string& id : settings.made_anew) hasher.add(id);  // another experiment's variants may share more or less
   const Digest key = hasher.digest();
@@ -343,6 +327,7 @@ double CellRunner::time(const CellIndex& cell) {
 
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error(reason_of(pipeline, result));
+  if (watched(cell, pipeline) != before) throw Error(kChanged);
   Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", result.seconds, "s"}}}));
   seconds.key = seconds.type.content->hash(seconds.data.get());
   if (store_) store_->save(key, {seconds}, {"time of " + cell_id(experiment_, cell), {}, {}, {}, false, 0, result.seconds, {}});

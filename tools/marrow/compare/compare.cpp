@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cstdio>
-#include <map>
 
 #include "commands.hpp"
 #include "compare/comparison.hpp"
@@ -31,21 +30,6 @@ bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment&
 
 fs::path folder_of(const CompareRequest& request, const Experiment& experiment) {
   return request.folder.empty() ? fs::path("runs") / "compare" / experiment.name : request.folder;
-}
-
-/// The files that say what is run, with what they hold.
-std::map<fs::path, std::string> sources_of(const Experiment& experiment) {
-  std::map<fs::path, std::string> sources{{experiment.file, experiment.text}};
-  for (const fs::path& file : {experiment.pipeline, experiment.simulation.pipeline})
-    if (!file.empty()) sources[file] = read_text_file(file, kMostSourceBytes);
-  return sources;
-}
-
-/// Each process of a comparison reads them for itself.
-void check_unchanged(const std::map<fs::path, std::string>& sources) {
-  for (const auto& [file, text] : sources)
-    if (read_text_file(file, kMostSourceBytes) != text)
-      throw Error(file.string() + " was changed while the comparison ran: its tables may mix the old with the new; give the same command again, which runs again what that concerns");
 }
 
 /// The part of a cell's name that is none of the experiment's, and what is near.
@@ -83,10 +67,7 @@ int compare_variants(const CompareRequest& asked) {
   const fs::path folder = folder_of(request, experiment);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
-  const auto sources = sources_of(experiment);
-  const int code = run_comparison(request, catalogue, experiment, folder);
-  check_unchanged(sources);
-  return code;
+  return run_comparison(request, catalogue, experiment, folder);
 }
 
 int run_cell(const CompareRequest& request, const std::string& id) {

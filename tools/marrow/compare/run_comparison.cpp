@@ -10,6 +10,7 @@
 
 #include "compare/comparison.hpp"
 #include "compare/pool.hpp"
+#include "compare/unchanged.hpp"
 #include "marrow/domain/error.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
@@ -62,7 +63,11 @@ class Comparison {
  public:
   Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder)
       : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)), rows_(cells_.size()),
-        runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {}
+        runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {
+    runner_.keep_dependencies();
+  }
+
+  const compare::Dependencies& dependencies() const { return runner_.dependencies(); }
 
   int run() {
     if (!make_cases() || !make_cells()) return stopped();
@@ -114,7 +119,7 @@ class Comparison {
       const CellIndex& cell = cells_[i];
       const auto fault = case_faults_.find(cell.case_index);
       if (fault != case_faults_.end()) rows_[i] = compare::failed_row(experiment_, cell, fault->second, 1);
-      else rows_[i] = runner_.finished(cell);
+      else rows_[i] = runner_.finished(cell, runner_.key_of(cell));
       found_ += rows_[i] && fault == case_faults_.end();
       if (!rows_[i])
         jobs.push_back(job_of("cell", cell, experiment_.cases[cell.case_index].name));
@@ -212,7 +217,11 @@ class Comparison {
 }  // namespace
 
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
-  return Comparison(request, catalogue, experiment, folder).run();
+  const Unchanged unchanged(experiment);
+  Comparison comparison(request, catalogue, experiment, folder);
+  const int code = comparison.run();
+  unchanged.check(comparison.dependencies());
+  return code;
 }
 
 }  // namespace marrow::cli

@@ -53,6 +53,14 @@ struct Dependence {
 };
 std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& experiment);
 
+/// What cells depend on beside the texts of the experiment and its pipelines, as it was when it was looked at.
+struct Dependencies {
+  std::map<std::string, std::string> contents;  ///< of what paths name, by path
+  std::map<std::string, Digest> builds;         ///< of the plugins, by node
+};
+/// The first path, or in words the first plugin, that is another one by now; empty where all are the same.
+std::string first_change(const Dependencies& before, const Catalogue& now);
+
 /// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record) and FOLDER/cells/ID/cell.json,
 /// which is written last and in one go; what there is to look at goes to FOLDER/pictures/ID/.
 class CellRunner {
@@ -66,8 +74,14 @@ class CellRunner {
   std::filesystem::path case_place(std::size_t case_index) const;
   /// The folder of a case; a simulated one is made where it is not in the store yet. Throws Error when that fails.
   std::filesystem::path case_folder(std::size_t case_index);
-  /// The row that is there already, where it is whole and of the same experiment, data and plugins.
-  std::optional<CellRow> finished(const CellIndex& cell);
+  /// From now on every path is looked at once: for a process that asks others to run cells, and must tell them all the same.
+  void keep_dependencies() { keeps_dependencies_ = true; }
+  /// What was looked at since.
+  const Dependencies& dependencies() const { return dependencies_; }
+  /// Of all that a run of the cell, and its row, depend on. Empty where that cannot be told; its run says why.
+  std::string key_of(const CellIndex& cell);
+  /// The row that is there already, where it is whole and has this key.
+  std::optional<CellRow> finished(const CellIndex& cell, const std::string& key) const;
   /// Never throws for what goes wrong in a node: that is the row's reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
   /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. False where
@@ -86,8 +100,18 @@ class CellRunner {
   Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
 
  private:
-  /// Of all that a run of the pipeline and the cell's row depend on; the case is looked at anew.
+  enum class Look { may_be_kept, anew };
+  std::string content_of(const std::string& path, Look look) const;
+  void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const std::filesystem::path& case_folder, Look look) const;
   std::string key_of(const CellIndex& cell, const Pipeline& pipeline);
+  /// What a run depends on, with the times of its files: another one where any was written to, even if it holds the same again.
+  struct Watched {
+    Digest states;
+    std::string key;
+    bool operator==(const Watched&) const = default;
+  };
+  Watched watched(const CellIndex& cell, const Pipeline& pipeline);
+  std::filesystem::path place_of_simulated(std::size_t case_index, Look look) const;
   struct Done {
     RunResult result;
     std::string fault;  ///< of the first node that failed, or of an output that could not be written
@@ -105,6 +129,9 @@ class CellRunner {
   std::filesystem::path folder_;
   int threads_;
   FileLimits file_limits_;
+  bool keeps_dependencies_ = false;
+  mutable Dependencies dependencies_;
+  mutable std::map<std::size_t, std::filesystem::path> places_;  ///< of simulated cases, where dependencies are kept
   struct FoundCase {
     std::filesystem::path outputs;
     std::shared_ptr<const void> use;  ///< while it lives, no tidying of the store removes the folder

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a kept cell, or a kept case, depends on: where any of it changes, nothing old passes for new."""
+import csv
+import os
+import shutil
+import subprocess
+
+from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
+
+PIPELINE = """marrow: 1
+inputs: {case: {type: path}}
+nodes:
+  s: {uses: test.work, with: {value: 0, path: $case}}
+  r: {uses: read.test_number, with: {path: other.txt}}
+outputs: {number: r, work: s}
+"""
+HEAD = """experiment: 1
+pipeline: p.yaml
+cases: {folders: [cases/*]}
+metrics: [number.value, work.value]
+timed_cells: 0
+"""
+
+
+class Changes(Case):
+    def setUp(self):
+        super().setUp()
+        self.write("p.yaml", PIPELINE)
+        self.write("other.txt", "one")
+        self.add_case("1")
+        self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}}\n")
+        self.environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
+
+    def add_case(self, name):
+        (self.scratch / "cases" / name).mkdir(parents=True)
+        self.write("cases/%s/data" % name, "case " + name)
+
+    def compare(self, out, *arguments, code=0):
+        result = marrow("compare", self.file, "--out", out, *arguments, plugins=[TEST_PLUGINS], cwd=self.scratch,
+                        extra_environment={"MARROW_CACHE": str(self.scratch / "cache")})
+        self.assertEqual(result.returncode, code, result.stdout + result.stderr)
+        return result
+
+    def figures(self, out, column="number.value"):
+        with open(self.scratch / out / "cells.csv", newline="") as stream:
+            return {row["cell"]: row[column] for row in csv.DictReader(stream)}
+
+    def changed_meanwhile(self, change, *arguments):
+        """What a comparison says when something changes once its first cell is there."""
+        process = subprocess.Popen([str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments], env=self.environment,
+                                   cwd=self.scratch, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.wait)
+        self.addCleanup(process.kill)  # where the test ends before
+        wait_until((self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").exists, "no cell came")
+        change()
+        said = process.communicate(timeout=240)[1]
+        self.assertEqual(process.returncode, 2, said)
+        return said
+
+    def test_a_file_that_an_option_names(self):
+        self.compare("out")
+        old = self.figures("out")
+        self.assertIn("2 were there already", self.compare("out").stdout)
+        self.write("other.txt", "two")
+        self.assertIn("0 were there already", self.compare("out").stdout)
+        self.compare("fresh", "--no-cache")
+        self.assertEqual(self.figures("out"), self.figures("fresh"))
+        self.assertNotEqual(self.figures("out"), old)
+
+    def test_a_path_that_is_not_there_or_cannot_be_read_costs_the_cells_that_need_it(self):
+        self.write("e.yaml", HEAD + "variants: {a: {}, b: {r.path: nothing.txt}}\n")
+        self.compare("out", "--no-cache")  # this reader takes it for an empty file
+        self.assertEqual(self.figures("out", "status"), {"a/1/0": "done", "b/1/0": "done"})
+        (self.scratch / "folder").mkdir()
+        (self.scratch / "folder" / "link").symlink_to(self.scratch / "other.txt")
+        self.write("e.yaml", HEAD + "variants: {a: {}, b: {r.path: folder}}\n")
+        result = self.compare("out", "--no-cache")
+        self.assertEqual(self.figures("out", "status"), {"a/1/0": "done", "b/1/0": "failed"})
+        self.assertRegex(result.stdout, r"b/1/0: .*folder/link: is a link to a place outside")
+
+    def test_a_file_that_a_case_is_simulated_from(self):
+        self.write("s.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
+                             "  sum: {uses: test.add, in: {a: s.both, b: r}}\noutputs: {case: sum}\n")
+        self.write("p.yaml", PIPELINE.replace("other.txt", "$case/a.json"))
+        self.write("e.yaml", HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: [1]}") + "variants: {a: {}}\n")
+        cases = {}
+        for content in ("old", "new", "old"):
+            self.write("bone", content)
+            self.compare("out")
+            kept = set((self.scratch / "cache" / "cases").glob("*/outputs/case/a.json"))
+            cases.setdefault(content, kept - set().union(*cases.values()))
+        self.assertEqual([len(found) for found in cases.values()], [1, 1])
+        old, new = (found.pop().read_text() for found in cases.values())
+        self.assertNotEqual(old, new)
+
+    def test_a_file_that_changes_meanwhile(self):
+        said = self.changed_meanwhile(lambda: self.write("other.txt", "two"))
+        self.assertIn("%s was changed while the comparison ran" % (self.scratch / "other.txt"), said)
+        self.compare("out")
+        self.compare("fresh", "--no-cache")
+        self.assertEqual(self.figures("out"), self.figures("fresh"))
+
+
+if __name__ == "__main__":
+    main()
