@@ -92,7 +92,10 @@ std::string CellRunner::key_of(const CellIndex& cell, const Pipeline& pipeline) 
   Hasher hasher;
   add_pipeline(hasher, pipeline, case_folder(cell.case_index), Look::may_be_kept);
   hasher.add(seed_of(cell.case_index));
-  for (const MetricChoice& metric : experiment_.metrics) hasher.add(metric.path);
+  for (const MetricChoice& metric : experiment_.metrics) {
+    hasher.add(metric.path);
+    hasher.add(metric.better == MetricChoice::Better::nearest_zero);  // then the row holds its magnitude
+  }
   hasher.add(experiment_.initial_error);
   return hasher.digest().hex();
 }

@@ -93,6 +93,16 @@ class Changes(Case):
         old, new = (found.pop().read_text() for found in cases.values())
         self.assertNotEqual(old, new)
 
+    def test_which_values_are_better(self):
+        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: -3, path: $case}}\noutputs: {number: m}\n")
+        head = HEAD.replace("metrics: [number.value, work.value]", "success: {number.value: 2}\nmetrics: [{figure: number.value, better: %s}]")
+        for better, figure, success in (("lower", "-3", "1"), ("nearest_zero", "3", "0"), ("lower", "-3", "1")):
+            self.write("e.yaml", head % better + "variants: {a: {}}\n")
+            self.compare("out")
+            self.assertEqual((self.figures("out"), self.figures("out", "success")), ({"a/1/0": figure}, {"a/1/0": success}), better)
+        self.write("e.yaml", head % "higher" + "variants: {a: {}}\n")
+        self.assertIn("1 were there already", self.compare("out").stdout)
+
     def test_a_file_that_changes_meanwhile(self):
         said = self.changed_meanwhile(lambda: self.write("other.txt", "two"))
         self.assertIn("%s was changed while the comparison ran" % (self.scratch / "other.txt"), said)
