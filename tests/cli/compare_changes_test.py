@@ -45,6 +45,12 @@ class Changes(Case):
         with open(self.scratch / out / "cells.csv", newline="") as stream:
             return {row["cell"]: row[column] for row in csv.DictReader(stream)}
 
+    def expect_fresh(self, out):
+        """Every figure is that of its own cell, as it is by now."""
+        self.compare("fresh", "--no-cache")
+        fresh = self.figures("fresh")
+        self.assertEqual({cell: figure for cell, figure in self.figures(out).items() if figure}, {cell: figure for cell, figure in fresh.items() if figure})
+
     def changed_meanwhile(self, change, *arguments):
         """What a comparison says when something changes once its first cell is there."""
         process = subprocess.Popen([str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments], env=self.environment,
@@ -107,8 +113,48 @@ class Changes(Case):
         said = self.changed_meanwhile(lambda: self.write("other.txt", "two"))
         self.assertIn("%s was changed while the comparison ran" % (self.scratch / "other.txt"), said)
         self.compare("out")
-        self.compare("fresh", "--no-cache")
-        self.assertEqual(self.figures("out"), self.figures("fresh"))
+        self.expect_fresh("out")
+
+    def test_a_case_that_changes_meanwhile(self):
+        self.write("p.yaml", PIPELINE.replace("other.txt", "$case/data"))
+        said = self.changed_meanwhile(lambda: self.write("cases/1/data", "another"))
+        self.assertIn("%s was changed while the comparison ran" % (self.scratch / "cases" / "1"), said)
+        self.compare("out")
+        self.expect_fresh("out")
+
+    def with_a_crash(self):
+        """After it another process goes on, which looks at everything for itself."""
+        self.add_case("2")
+        self.add_case("3")
+        self.write("p.yaml", PIPELINE.replace("other.txt", "$case/data").replace("outputs: {number: r, work: s}", "  m: {uses: test.misbehave, in: {a: s}}\noutputs: {number: r, work: m}"))
+        self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}, crash: {m.how: crash}}\n")
+
+    def test_a_case_that_comes_meanwhile(self):
+        self.with_a_crash()
+        said = self.changed_meanwhile(lambda: self.add_case("0"), "--no-cache")
+        self.assertIn("the list of cases ('0' is new) was changed while the comparison ran", said)
+        old = self.figures("out")
+        self.assertEqual([cell for cell, figure in old.items() if figure], ["a/1/0", "b/1/0", "a/2/0", "b/2/0", "a/3/0", "b/3/0"])
+        self.compare("out")
+        self.expect_fresh("out")
+        self.assertLessEqual(old.items(), self.figures("out").items(), "none was booked on another case")
+
+    def test_a_plugin_that_is_rebuilt_meanwhile(self):
+        self.with_a_crash()
+        shutil.copytree(TEST_PLUGINS, self.scratch / "plugins")
+        self.environment["MARROW_PLUGIN_PATH"] = str(self.scratch / "plugins")
+
+        def rebuild():
+            library = self.scratch / "plugins" / "marrow_test_readers.so"
+            content = library.read_bytes()
+            library.unlink()
+            library.write_bytes(content + b"\0")
+            library.with_suffix(".json").unlink()  # what it holds is asked anew
+
+        said = self.changed_meanwhile(rebuild)
+        self.assertIn("the plugin of read.test_number was changed while the comparison ran", said)
+        self.assertEqual({row for cell, row in self.figures("out", "status").items() if "/1/" not in cell}, {"failed"})
+        self.assertIn("depends on changed while the comparison ran; run it again", self.figures("out", "reason")["a/2/0"])
 
 
 if __name__ == "__main__":

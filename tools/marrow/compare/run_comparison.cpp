@@ -12,6 +12,7 @@
 #include "compare/pool.hpp"
 #include "compare/unchanged.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/runtime/worker.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/printable.hpp"
@@ -62,7 +63,7 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
 class Comparison {
  public:
   Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder)
-      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)), rows_(cells_.size()),
+      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)), rows_(cells_.size()), keys_(cells_.size()),
         runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {
     runner_.keep_dependencies();
   }
@@ -96,13 +97,15 @@ class Comparison {
   }
 
   Job job_of(const char* what, const CellIndex& cell, std::string group) const {
-    return {{{"do", what}, {"variant", cell.variant}, {"case", cell.case_index}, {"start", cell.start}}, std::move(group), number_of(cell)};
+    const std::size_t number = number_of(cell);
+    return {{{"do", what}, {"cell", compare::cell_id(experiment_, cell)}, {"key", keys_[number]}}, std::move(group), number};
   }
 
   bool make_cases() {
     std::vector<Job> jobs;
     for (std::size_t i = 0; i < experiment_.cases.size(); ++i)
-      if (experiment_.cases[i].is_simulated) jobs.push_back({{{"do", "case"}, {"case", i}}, experiment_.cases[i].name, i});
+      if (const compare::ExperimentCase& one = experiment_.cases[i]; one.is_simulated)
+        jobs.push_back({{{"do", "case"}, {"case", one.name}, {"place", json_of_bytes(runner_.case_place(i).string())}}, one.name, i});
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
@@ -119,7 +122,7 @@ class Comparison {
       const CellIndex& cell = cells_[i];
       const auto fault = case_faults_.find(cell.case_index);
       if (fault != case_faults_.end()) rows_[i] = compare::failed_row(experiment_, cell, fault->second, 1);
-      else rows_[i] = runner_.finished(cell, runner_.key_of(cell));
+      else rows_[i] = runner_.finished(cell, keys_[i] = runner_.key_of(cell));
       found_ += rows_[i] && fault == case_faults_.end();
       if (!rows_[i])
         jobs.push_back(job_of("cell", cell, experiment_.cases[cell.case_index].name));
@@ -176,10 +179,13 @@ class Comparison {
     if (!end.failed.empty()) return compare::failed_row(experiment_, cell, end.failed, end.tries);
     try {
       CellRow row = compare::row_from_json(end.answer.dump(), experiment_);
+      const std::string id = compare::cell_id(experiment_, cell);
+      if (end.answer.at("id") != id || (row.failed.empty() && row.key != keys_[number_of(cell)]))
+        throw Error("what it depends on changed while the comparison ran; run it again");
       compare::name_row(row, experiment_, cell);
       row.tries = end.tries;
       return row;
-    } catch (const Error& error) {
+    } catch (const std::exception& error) {
       return compare::failed_row(experiment_, cell, error.what(), end.tries);
     }
   }
@@ -209,6 +215,7 @@ class Comparison {
   Store store_;
   std::vector<CellIndex> cells_;
   std::vector<std::optional<CellRow>> rows_;
+  std::vector<std::string> keys_;  ///< of the cells, as they were when the comparison began
   std::map<std::size_t, std::string> case_faults_;
   std::size_t found_ = 0;
   CellRunner runner_;

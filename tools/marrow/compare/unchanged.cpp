@@ -14,6 +14,24 @@ namespace fs = std::filesystem;
                      "command again, which runs again what that concerns");
 }
 
+/// The folder, or the seed, of each case by its name.
+std::map<std::string, std::string> cases_of(const compare::Experiment& experiment) {
+  std::map<std::string, std::string> cases;
+  for (const compare::ExperimentCase& one : experiment.cases)
+    cases[one.name] = one.folder.string() + " " + std::to_string(one.seed);
+  return cases;
+}
+
+/// The first case that only one of them has.
+std::string difference(const compare::Experiment& before, const compare::Experiment& now) {
+  const auto old_cases = cases_of(before), new_cases = cases_of(now);
+  for (const auto& one : old_cases)
+    if (!new_cases.contains(one.first) || *new_cases.find(one.first) != one) return "'" + one.first + "' is another, or gone";
+  for (const auto& one : new_cases)
+    if (!old_cases.contains(one.first)) return "'" + one.first + "' is new";
+  return "";
+}
+
 }  // namespace
 
 Unchanged::Unchanged(const compare::Experiment& experiment)
@@ -28,6 +46,10 @@ void Unchanged::check(const compare::Dependencies& dependencies) const {
   const Catalogue catalogue;
   const std::string change = compare::first_change(dependencies, catalogue);
   if (!change.empty()) refuse(change);
+  Diagnostics diagnostics;
+  const compare::Experiment now = compare::read_experiment(experiment_.file, catalogue, diagnostics);
+  if (!diagnostics.empty()) refuse("what " + experiment_.file.string() + " names (" + diagnostics.text() + ")");
+  if (const std::string other = difference(experiment_, now); !other.empty()) refuse("the list of cases (" + other + ")");
 }
 
 }  // namespace marrow::cli

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker process of a comparison: makes cases and runs, times and draws cells, which it is asked for by their indices.
+// A worker process of a comparison: makes cases and runs, times and draws cells.
+#include <algorithm>
+
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/worker.hpp"
@@ -13,16 +15,27 @@ using compare::CellRunner;
 using compare::Experiment;
 using nlohmann::json;
 
-/// An index that must be below a count.
-std::size_t index_in(const json& request, const char* name, std::size_t count) {
-  const auto index = request.at(name).get<std::size_t>();
-  if (index >= count) throw Error(std::string("the experiment has no ") + name + " " + std::to_string(index) + " any more");
-  return index;
+[[noreturn]] void refuse(const std::string& what) {
+  throw Error(what + " changed while the comparison ran; run it again");
 }
 
-CellIndex cell_in(const Experiment& experiment, const json& request) {
-  return {index_in(request, "variant", experiment.variants.size()), index_in(request, "case", experiment.cases.size()),
-          index_in(request, "start", experiment.starts.size())};
+/// Between the asking process's look at the experiment and this one's, cases may have come and gone, and files have changed:
+/// the cell is asked for by its name and by the key of all that it depends on.
+CellIndex cell_in(CellRunner& runner, const json& asked) {
+  const std::string id = asked.at("cell");
+  const auto cell = compare::cell_of(runner.experiment(), id);
+  if (!cell || runner.key_of(*cell) != asked.at("key")) refuse("what cell " + id + " depends on");
+  return *cell;
+}
+
+void make_case(CellRunner& runner, const json& asked) {
+  const std::vector<compare::ExperimentCase>& cases = runner.experiment().cases;
+  const std::string name = asked.at("case");
+  const auto found = std::find_if(cases.begin(), cases.end(), [&](const auto& one) { return one.name == name; });
+  const std::size_t index = std::size_t(found - cases.begin());
+  if (found == cases.end() || runner.case_place(index).string() != bytes_of_json(asked.at("place")))
+    refuse("what case '" + name + "' is made from");
+  runner.case_folder(index);
 }
 
 /// Tells where a run is, and when it waits for another one.
@@ -49,18 +62,18 @@ int worker(const CompareRequest& request) {
   return serve_worker({
       {"case",
        [&](const json& asked, WorkerReports&) {
-         runner.case_folder(index_in(asked, "case", experiment.cases.size()));
+         make_case(runner, asked);
          return json(true);
        }},
       {"cell",
        [&](const json& asked, WorkerReports& reports) {
-         return json::parse(compare::to_json(runner.run(cell_in(experiment, asked), observer_of(reports))));
+         return json::parse(compare::to_json(runner.run(cell_in(runner, asked), observer_of(reports))));
        }},
       {"time",
-       [&](const json& asked, WorkerReports&) { return json(runner.time(cell_in(experiment, asked))); }},
+       [&](const json& asked, WorkerReports&) { return json(runner.time(cell_in(runner, asked))); }},
       {"draw",
        [&](const json& asked, WorkerReports& reports) {
-         const CellIndex cell = cell_in(experiment, asked);
+         const CellIndex cell = cell_in(runner, asked);
          if (runner.draw(cell, observer_of(reports))) ReportMaterial::prepare(runner.pictures_of(cell));
          return json(true);
        }},
