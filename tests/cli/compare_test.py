@@ -181,6 +181,11 @@ class Compare(Case):
         self.assertEqual(result.stderr.count("marrow: note: results are not kept: the folder %s holds other things" % (self.scratch / "cache")), 1, result.stderr)
         self.assertEqual(os.listdir(self.scratch / "cache"), ["mine"])
 
+    def test_limits_of_reading_come_to_the_workers_as_they_are(self):
+        result = self.compare(self.experiment({"a": "{}"}, cases=1), "--out", self.scratch / "out", "--file-seconds", "1e-7", "--file-memory", "1e30")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.rows("out")["a/0/0"]["reason"], "")
+
     def test_one_cell_by_itself(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
         environment = {"MARROW_CACHE": str(self.scratch / "cache")}

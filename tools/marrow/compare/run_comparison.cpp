@@ -2,6 +2,7 @@
 // A comparison from its start, or from where it was left, to its report.
 #include <unistd.h>
 
+#include <charconv>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -44,6 +45,12 @@ class Progress {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
 };
 
+/// The shortest text that is read back as this number.
+std::string exact_text(double value) {
+  char text[40];
+  return {text, std::to_chars(text, text + sizeof text, value).ptr};
+}
+
 PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int threads) {
   PoolSettings pool;
   pool.workers = request.jobs > 0 ? request.jobs : int(std::max(1u, std::thread::hardware_concurrency()));
@@ -56,7 +63,7 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
   for (const auto& [name, value] : {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
-    if (value > 0) pool.command.insert(pool.command.end(), {name, std::to_string(value)});
+    if (value > 0) pool.command.insert(pool.command.end(), {name, exact_text(value)});
   return pool;
 }
 
