@@ -12,6 +12,7 @@
 #include "marrow/runtime/types.hpp"
 #include "runtime/folder_use.hpp"
 #include "runtime/keys.hpp"
+#include "runtime/remove_tree.hpp"
 #include "runtime/store_folder.hpp"
 #include "runtime/text_file.hpp"
 
@@ -222,9 +223,7 @@ std::optional<CellRow> CellRunner::finished(const CellIndex& cell, const std::st
 
 CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pipeline, const CellIndex& cell,
                                       const std::function<void(const RunEvent&)>& observer) {
-  std::error_code error;
-  fs::remove_all(folder, error);
-  if (error) throw Error("the folder " + folder.string() + " cannot be emptied: " + error.message());
+  remove_tree(folder);
   RunFolder written(folder, pipeline);
   RunSettings settings;
   settings.threads = threads_;

@@ -156,6 +156,23 @@ class Changes(Case):
         self.assertEqual({row for cell, row in self.figures("out", "status").items() if "/1/" not in cell}, {"failed"})
         self.assertIn("depends on changed while the comparison ran; run it again", self.figures("out", "reason")["a/2/0"])
 
+    def test_nothing_is_removed_from_what_is_mounted_in_a_cell(self):
+        if subprocess.run(["unshare", "-m", "true"], stderr=subprocess.DEVNULL).returncode:
+            self.skipTest("nothing can be mounted here")
+        self.write("e.yaml", HEAD + "variants: {a: {}}\n")
+        self.compare("out")
+        (self.scratch / "mine").mkdir()
+        self.write("mine/file", "keep")
+        self.write("other.txt", "two")
+        mounted = "out/cells/a/1/0/outputs"
+        command = ["unshare", "-m", "sh", "-c", 'mount --bind mine "$0" && exec "$@"', mounted, str(MARROW), "compare", str(self.file), "--out", "out"]
+        result = subprocess.run(command, env=self.environment, cwd=self.scratch, capture_output=True, text=True)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("a/1/0: something is mounted at %s, where nothing is removed; unmount it" % mounted, result.stdout)
+        self.assertEqual((self.scratch / "mine" / "file").read_text(), "keep")
+        self.compare("out")
+        self.expect_fresh("out")
+
 
 if __name__ == "__main__":
     main()
