@@ -84,6 +84,19 @@ class Changes(Case):
         self.assertEqual(self.figures("out", "status"), {"a/1/0": "done", "b/1/0": "failed"})
         self.assertRegex(result.stdout, r"b/1/0: .*folder/link: is a link to a place outside")
 
+    def test_pictures_of_another_state_do_not_stay(self):
+        head = HEAD.replace("timed_cells: 0", "timed_cells: 1")
+        self.write("p.yaml", PIPELINE.replace("work: s}", "work: s, picture: r}"))
+        self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 1.5}}\n")
+        self.compare("out")
+        key = self.scratch / "out" / "pictures" / "a" / "1" / "0" / "key.txt"
+        self.assertTrue(key.exists())
+        (self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").unlink()
+        self.write("other.txt", "two")
+        said = self.changed_meanwhile(lambda: self.write("other.txt", "three"))  # while the time is measured
+        self.assertIn("no pictures of a/1/0: what cell a/1/0 depends on changed", said)
+        self.assertFalse(key.exists())
+
     def test_a_file_that_a_case_is_simulated_from(self):
         self.write("s.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
                              "  sum: {uses: test.add, in: {a: s.both, b: r}}\noutputs: {case: sum}\n")

@@ -17,6 +17,7 @@
 #include "process.hpp"
 #include "report/report.hpp"
 #include "runtime/printable.hpp"
+#include "runtime/remove_tree.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -173,8 +174,19 @@ class Comparison {
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string id = compare::cell_id(experiment_, cells_[job.number]);
       if (!end.failed.empty()) std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable(end.failed).c_str());
+      if (!end.failed.empty()) remove_old_pictures(cells_[job.number]);
       progress.done(++done, "pictures of " + id);
     });
+  }
+
+  /// Where there are none of the cell as it is, the report must not show those of another state of its files.
+  void remove_old_pictures(const CellIndex& cell) const {
+    try {
+      const fs::path folder = runner_.pictures_of(cell);
+      if (fs::exists(folder / "key.txt")) remove_tree(folder);
+    } catch (const std::exception& error) {
+      std::fprintf(stderr, "marrow: old pictures stay: %s\n", printable(error.what()).c_str());
+    }
   }
 
   std::size_t number_of(const CellIndex& cell) const {
