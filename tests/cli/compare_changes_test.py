@@ -51,7 +51,7 @@ class Changes(Case):
         fresh = self.figures("fresh")
         self.assertEqual({cell: figure for cell, figure in self.figures(out).items() if figure}, {cell: figure for cell, figure in fresh.items() if figure})
 
-    def changed_meanwhile(self, change, *arguments):
+    def changed_meanwhile(self, change, *arguments, code=2):
         """What a comparison says when something changes once its first cell is there."""
         process = subprocess.Popen([str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments], env=self.environment,
                                    cwd=self.scratch, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
@@ -60,7 +60,7 @@ class Changes(Case):
         wait_until((self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").exists, "no cell came")
         change()
         said = process.communicate(timeout=240)[1]
-        self.assertEqual(process.returncode, 2, said)
+        self.assertEqual(process.returncode, code, said)
         return said
 
     def test_a_file_that_an_option_names(self):
@@ -127,6 +127,14 @@ class Changes(Case):
         self.assertIn("%s was changed while the comparison ran" % (self.scratch / "other.txt"), said)
         self.compare("out")
         self.expect_fresh("out")
+
+    def test_a_file_that_changes_and_changes_back(self):
+        def change():
+            for content in ("two", "one"):
+                self.write("other.txt", content)
+
+        self.changed_meanwhile(change, code=0)
+        self.assertEqual(self.figures("out", "reason"), {"a/1/0": "", "b/1/0": "a file that the cell needs was changed while it ran; run it again"})
 
     def test_a_case_that_changes_meanwhile(self):
         self.write("p.yaml", PIPELINE.replace("other.txt", "$case/data"))
