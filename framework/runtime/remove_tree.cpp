@@ -12,11 +12,10 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Of a bind mount too, whose device is that of the folder around it.
-void refuse_mount(const fs::path& path) {
+bool is_mount(const fs::path& path) {
   struct statx status {};
-  if (statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW | AT_NO_AUTOMOUNT, STATX_TYPE, &status) != 0) return;
-  if (status.stx_attributes & status.stx_attributes_mask & STATX_ATTR_MOUNT_ROOT)
-    throw Error("something is mounted at " + path.string() + ", where nothing is removed; unmount it");
+  return statx(AT_FDCWD, path.c_str(), AT_SYMLINK_NOFOLLOW | AT_NO_AUTOMOUNT, STATX_TYPE, &status) == 0 &&
+         (status.stx_attributes & status.stx_attributes_mask & STATX_ATTR_MOUNT_ROOT);
 }
 
 [[noreturn]] void fail(const fs::path& path, const std::error_code& error) {
@@ -25,14 +24,19 @@ void refuse_mount(const fs::path& path) {
 
 }  // namespace
 
-void remove_tree(const fs::path& path) {
+std::optional<fs::path> mount_at_or_below(const fs::path& path) {
   std::error_code error;
-  refuse_mount(path);
-  if (fs::symlink_status(path, error).type() == fs::file_type::directory) {
-    fs::recursive_directory_iterator at(path, error);
-    for (const fs::recursive_directory_iterator end; !error && at != end; at.increment(error)) refuse_mount(at->path());
-    if (error) fail(path, error);
-  }
+  if (is_mount(path)) return path;
+  if (!fs::is_directory(fs::symlink_status(path, error))) return std::nullopt;
+  for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error))
+    if (is_mount(at->path())) return at->path();
+  return std::nullopt;
+}
+
+void remove_tree(const fs::path& path) {
+  if (const auto mount = mount_at_or_below(path))
+    throw Error("something is mounted at " + mount->string() + ", where nothing is removed; unmount it");
+  std::error_code error;
   fs::remove_all(path, error);
   if (error) fail(path, error);
 }

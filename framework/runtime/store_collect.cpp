@@ -1,16 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the store holds, and how it stays within its size.
-#include <fcntl.h>
 #include <signal.h>
-#include <sys/stat.h>
 
 #include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <cstdlib>
-#include <optional>
 
 #include "folder_use.hpp"
+#include "remove_tree.hpp"
 #include "store_entry.hpp"
 #include "store_folder.hpp"
 
@@ -22,30 +20,6 @@ using Kind = StoreItem::Kind;
 using Clock = fs::file_time_type::clock;
 
 constexpr auto kDay = std::chrono::hours(24);
-
-/// The mount that a file or folder lies in; nothing where the kernel does not tell.
-std::optional<std::uint64_t> mount_of(const fs::path& path) {
-#ifdef STATX_MNT_ID
-  struct statx status {};
-  constexpr int kThisOne = AT_SYMLINK_NOFOLLOW | AT_NO_AUTOMOUNT;
-  if (statx(AT_FDCWD, path.c_str(), kThisOne, STATX_MNT_ID, &status) == 0 && (status.stx_mask & STATX_MNT_ID))
-    return status.stx_mnt_id;
-#endif
-  return std::nullopt;
-}
-
-/// Whether another file system, or a folder from elsewhere, is mounted on a folder or below it: what that holds is not
-/// the store's. A file on which one is mounted the system does not remove.
-bool holds_mount(const fs::path& path) {
-  std::error_code error;
-  if (!fs::is_directory(fs::symlink_status(path, error))) return false;
-  const auto own = mount_of(path.parent_path());
-  if (!own) return false;
-  if (mount_of(path) != own) return true;
-  for (fs::recursive_directory_iterator at(path, error), end; !error && at != end; at.increment(error))
-    if (const auto mount = mount_of(at->path()); mount && mount != own) return true;
-  return false;
-}
 
 std::uint64_t bytes_of(const fs::path& path) {
   std::error_code error;
@@ -145,7 +119,7 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   std::uint64_t total = 0;
   std::vector<StoreItem> remembered;
   for (StoreItem& item : items_of_store(folder_, freed.fault)) {
-    if (holds_mount(item.path)) {
+    if (mount_at_or_below(item.path)) {
       freed.fault = item.path.string() + " is left, because something is mounted in it; unmount that first";
       continue;
     }
