@@ -66,12 +66,16 @@ Digest digest_once(const fs::path& file) {
 }
 
 /// Hashes the content and the name of a file, or of every file below a folder with its name from there. The name may decide
-/// what is made of the content: how it is read, or what an item is called.
+/// what is made of the content: how it is read, or what an item is called. The kind and the number keep a file apart from a
+/// folder that holds it alone, and what one path names from what the next one does.
 void add_path(Hasher& hasher, const std::string& text) {
   const std::vector<NamedFile> files = files_named_by(text);
-  if (files.empty()) hasher.add(std::string("absent"));  // the node itself says so
+  const bool is_itself = files.size() == 1 && files[0].name == ".";
+  std::error_code error;
+  hasher.add(std::string(is_itself ? "file" : fs::is_directory(text, error) ? "folder" : "absent"));  // the node itself says so
+  hasher.add(std::uint64_t(files.size()));
   for (const NamedFile& file : files) {
-    hasher.add(file.name == "." ? fs::path(text).filename().string() : file.name);
+    hasher.add(is_itself ? fs::path(text).filename().string() : file.name);
     hasher.add(file.is_there ? digest_once(file.file) : Digest{});
   }
 }
@@ -87,7 +91,9 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs) {
     if (info.type == OptionType::path) {
       add_path(hasher, std::get<std::string>(node.options[i]));
     } else if (info.type == OptionType::paths) {
-      for (const std::string& path : std::get<std::vector<std::string>>(node.options[i])) add_path(hasher, path);
+      const auto& paths = std::get<std::vector<std::string>>(node.options[i]);
+      hasher.add(std::uint64_t(paths.size()));
+      for (const std::string& path : paths) add_path(hasher, path);
     } else {
       std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
     }

@@ -154,6 +154,32 @@ TEST_F(Keys, FilesCountByTheirContentAndNames) {
   EXPECT_TRUE(seen.insert(recipe()).second) << "a file that is gone";
 }
 
+TEST_F(Keys, AFileIsNoneOfAFolderThatHoldsItAlone) {
+  std::set<Digest> seen;
+  option("folder") = write("alone/ct", "content");
+  seen.insert(recipe());
+  option("folder") = (folder_ / "alone").string();
+  EXPECT_TRUE(seen.insert(recipe()).second) << "the folder";
+  write("around/alone/ct", "content");
+  option("folder") = (folder_ / "around").string();
+  EXPECT_TRUE(seen.insert(recipe()).second) << "a folder around it";
+  fs::create_directory(folder_ / "empty");
+  option("folder") = (folder_ / "empty").string();
+  EXPECT_TRUE(seen.insert(recipe()).second) << "an empty folder";
+  option("folder") = (folder_ / "absent").string();
+  EXPECT_TRUE(seen.insert(recipe()).second) << "nothing";
+}
+
+TEST_F(Keys, FoldersOfAListKeepTheirFiles) {
+  for (const char* name : {"left/a", "left/b", "right/c", "one/a", "two/b", "two/c"}) write(name, "same");
+  const auto list = [&](const char* first, const char* second) {
+    option("files") = std::vector<std::string>{(folder_ / first).string(), (folder_ / second).string()};
+    return recipe();
+  };
+  EXPECT_NE(list("left", "right"), list("one", "two"));
+  EXPECT_NE(list("left", "right"), list("right", "left"));
+}
+
 TEST_F(Keys, FilesKnownFromBeforeAreReadAgainWhenTheirSizeOrTimeIsAnother) {
   const fs::path file = write("old", "one");
   const auto day = std::chrono::hours(24);
