@@ -151,10 +151,24 @@ void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string
   settings_.observer({kind, pipeline_.nodes[node].id, item, std::move(text), fraction, seconds});
 }
 
-Evaluation::Recipe Evaluation::recipe(std::size_t node, const Call& call) const {
+Evaluation::Recipe Evaluation::recipe(std::size_t node, const Call& call, Contents* contents) const {
   const NodeInfo& info = pipeline_.nodes[node].info;
-  const Digest recipe = recipe_of(pipeline_.nodes[node], call.inputs);
+  const Digest recipe = recipe_of(pipeline_.nodes[node], call.inputs, contents);
   return {recipe, result_key(recipe, catalogue_.library_of(info.name)->build_id, info.random, settings_.seed)};
+}
+
+/// The record of the run tells what its files held when they were read, whatever becomes of them later.
+Evaluation::Recipe Evaluation::noted_recipe(std::size_t node, const Call& call) {
+  const auto note = [&](const Contents& contents) {
+    const std::scoped_lock lock(mutex_);
+    if (!contents.empty() || records_[node].files.empty()) records_[node].files = contents_of_options(pipeline_.nodes[node], contents);
+  };
+  Contents contents;
+  note(contents);
+  const Recipe key = recipe(node, call, &contents);
+  files_read_.note(contents);
+  note(contents);
+  return key;
 }
 
 bool Evaluation::makes_functions(std::size_t node) const {
@@ -165,7 +179,7 @@ bool Evaluation::makes_functions(std::size_t node) const {
 void Evaluation::evaluate(std::size_t node, Call& call) {
   Recipe key;
   try {
-    key = recipe(node, call);
+    key = noted_recipe(node, call);
     remember(node, call, key);
   } catch (const std::exception& error) {  // a file that its options name cannot be read
     call.result = {Status::failed, error.what(), {}};
@@ -395,7 +409,9 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
   Provenance result;
   result.node = node.info.name;
   result.build_id = catalogue_.library_of(node.info.name)->build_id;
-  for (std::size_t i = 0; i < node.options.size(); ++i) result.options[node.info.options[i].name] = text_of(node.options[i], node.info.options[i].type);
+  const Contents read = files_read_.of(node);
+  for (std::size_t i = 0; i < node.options.size(); ++i)
+    result.options[node.info.options[i].name] = text_of(node.options[i], node.info.options[i].type, read);
   for (std::size_t i = 0; i < inputs.size(); ++i) result.inputs[node.info.inputs[i].name] = key_of(inputs[i]);
   result.random = node.info.random;
   result.seed = settings_.seed;

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "files_read.hpp"
 #include "marrow/runtime/executor.hpp"
 
 namespace marrow {
@@ -58,7 +59,8 @@ class Evaluation {
     Digest recipe, key;
   };
 
-  Recipe recipe(std::size_t node, const Call& call) const;
+  Recipe recipe(std::size_t node, const Call& call, Contents* contents = nullptr) const;
+  Recipe noted_recipe(std::size_t node, const Call& call);
   Provenance provenance(std::size_t node, const std::vector<Value>& inputs) const;
   std::string place(std::size_t node, const std::string& item) const;
   void remember(std::size_t node, const Call& call, const Recipe& recipe);
@@ -82,6 +84,7 @@ class Evaluation {
   std::mutex& mutex_;
   std::function<void(std::size_t, Call&)> finished_;
   std::map<Digest, std::unique_ptr<Memo>> memos_;
+  FilesRead files_read_;
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;
 };

@@ -65,35 +65,44 @@ Digest digest_once(const fs::path& file) {
   return digest;
 }
 
-/// Hashes the content and the name of a file, or of every file below a folder with its name from there. The name may decide
-/// what is made of the content: how it is read, or what an item is called. The kind and the number keep a file apart from a
-/// folder that holds it alone, and what one path names from what the next one does.
-void add_path(Hasher& hasher, const std::string& text) {
-  const std::vector<NamedFile> files = files_named_by(text);
-  const bool is_itself = files.size() == 1 && files[0].name == ".";
-  std::error_code error;
-  hasher.add(std::string(is_itself ? "file" : fs::is_directory(text, error) ? "folder" : "absent"));  // the node itself says so
-  hasher.add(std::uint64_t(files.size()));
-  for (const NamedFile& file : files) {
-    hasher.add(is_itself ? fs::path(text).filename().string() : file.name);
-    hasher.add(file.is_there ? digest_once(file.file) : Digest{});
-  }
-}
-
 }  // namespace
 
-Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs) {
+PathContent content_of(const std::string& path) {
+  PathContent content;
+  Hasher hasher;
+  const std::vector<NamedFile> files = files_named_by(path);
+  const bool is_itself = files.size() == 1 && files[0].name == ".";
+  std::error_code error;
+  const bool is_folder = !is_itself && fs::is_directory(path, error);
+  content.is_there = is_itself || is_folder;
+  // The kind and the number keep a file apart from a folder that holds it alone, and what one path names from what the next does.
+  hasher.add(std::string(is_itself ? "file" : is_folder ? "folder" : "absent"));
+  hasher.add(std::uint64_t(files.size()));
+  for (const NamedFile& file : files) {
+    // The name may decide what is made of the content: how it is read, or what an item is called.
+    hasher.add(is_itself ? fs::path(path).filename().string() : file.name);
+    const Digest digest = file.is_there ? digest_once(file.file) : Digest{};
+    hasher.add(digest);
+    content.files[fs::weakly_canonical(file.file, error)] = digest;
+  }
+  content.digest = hasher.digest();
+  return content;
+}
+
+Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Contents* contents) {
   Hasher hasher;
   hasher.add(node.info.name);
   for (std::size_t i = 0; i < node.options.size(); ++i) {
     const OptionInfo& info = node.info.options[i];
     hasher.add(info.name);
-    if (info.type == OptionType::path) {
-      add_path(hasher, std::get<std::string>(node.options[i]));
-    } else if (info.type == OptionType::paths) {
-      const auto& paths = std::get<std::vector<std::string>>(node.options[i]);
+    if (info.type == OptionType::path || info.type == OptionType::paths) {
+      const std::vector<std::string> paths = paths_of(node, i);
       hasher.add(std::uint64_t(paths.size()));
-      for (const std::string& path : paths) add_path(hasher, path);
+      for (const std::string& path : paths) {
+        PathContent content = content_of(path);
+        hasher.add(content.digest);
+        if (contents && !path.empty()) contents->insert_or_assign(path, std::move(content));
+      }
     } else {
       std::visit([&](const auto& value) { hasher.add(value); }, node.options[i]);
     }
@@ -133,9 +142,7 @@ Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std
 }
 
 Digest path_digest(const fs::path& path) {
-  Hasher hasher;
-  add_path(hasher, path.string());
-  return hasher.digest();
+  return content_of(path.string()).digest;
 }
 
 Digest function_key(const Digest& result, std::size_t output) {
@@ -145,13 +152,13 @@ Digest function_key(const Digest& result, std::size_t output) {
   return hasher.digest();
 }
 
-std::string text_of(const OptionValue& value, OptionType type) {
+std::string text_of(const OptionValue& value, OptionType type, const Contents& contents) {
   std::ostringstream out;
   out.precision(17);
   const auto add_file = [&](const std::string& path) {
-    Hasher hasher;
-    add_path(hasher, path);
-    out << path << " (content " << hasher.digest().hex().substr(0, 8) << ")";
+    const auto known = contents.find(path);
+    const Digest digest = known == contents.end() ? path_digest(path) : known->second.digest;
+    out << path << " (content " << digest.hex().substr(0, 8) << ")";
   };
   std::visit([&](const auto& one) {
     using T = std::decay_t<decltype(one)>;

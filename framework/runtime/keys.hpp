@@ -2,6 +2,7 @@
 #pragma once
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <vector>
 
 #include "marrow/runtime/pipeline.hpp"
@@ -9,15 +10,27 @@
 
 namespace marrow {
 
+/// What a path named when it was hashed.
+struct PathContent {
+  bool is_there = false;
+  Digest digest;                                  ///< of its name and content, or of all files below it with their names
+  std::map<std::filesystem::path, Digest> files;  ///< the content of each, by its real path
+};
+using Contents = std::map<std::string, PathContent>;  ///< by the path as an option has it
+
+/// Files are read once in a process, and again when they may have changed. Throws Error where a file cannot be read, and as
+/// files_named_by() does.
+PathContent content_of(const std::string& path);
+
 /// The recipe of one call of a node: its name, the options that affect its result (a path by the names and content of all
 /// that it names) and the keys of its inputs. Without the build id, so that a rebuilt plugin draws the same random numbers.
-Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs);
+/// `contents` is given what its paths named; also of those before one that throws Error.
+Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Contents* contents = nullptr);
 
 /// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
 
-/// Of the name and content of a file, or of all files below a folder with their names. Files are read once in a process, and again
-/// when they may have changed. Throws Error where a file cannot be read, and as files_named_by() does.
+/// The digest of content_of().
 Digest path_digest(const std::filesystem::path& path);
 
 /// Of the sizes and times of all files that the node's options name: another one where any was written to in the meantime, even
@@ -27,8 +40,8 @@ Digest states_of_files(const PipelineNode& node);
 /// The key of a function that a call returns.
 Digest function_key(const Digest& result, std::size_t output);
 
-/// An option's value in words; of a path, with the hash of all that it names.
-std::string text_of(const OptionValue& value, OptionType type);
+/// An option's value in words; of a path, with the hash of all that it names: from `contents`, or as it is now.
+std::string text_of(const OptionValue& value, OptionType type, const Contents& contents = {});
 
 /// What makes two results differ: "option 'high' is 80, was 75; input 'field' changed". Empty where nothing does.
 std::string difference(const Provenance& before, const Provenance& now);

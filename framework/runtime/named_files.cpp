@@ -62,15 +62,20 @@ std::vector<NamedFile> files_named_by(const fs::path& path) {
   return files;
 }
 
-std::vector<std::string> paths_of(const PipelineNode& node) {
+std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option) {
   std::vector<std::string> paths;
-  for (std::size_t i = 0; i < node.options.size(); ++i) {
-    if (node.info.options[i].type == OptionType::path) paths.push_back(std::get<std::string>(node.options[i]));
-    if (node.info.options[i].type == OptionType::paths)
-      for (const std::string& path : std::get<std::vector<std::string>>(node.options[i])) paths.push_back(path);
-  }
-  std::erase(paths, "");
+  const OptionType type = node.info.options[option].type;
+  if (type == OptionType::path) paths = {std::get<std::string>(node.options[option])};
+  if (type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[option]);
   return paths;
+}
+
+std::vector<std::string> paths_of(const PipelineNode& node) {
+  std::vector<std::string> all;
+  for (std::size_t i = 0; i < node.options.size(); ++i)
+    for (std::string& path : paths_of(node, i))
+      if (!path.empty()) all.push_back(std::move(path));
+  return all;
 }
 
 }  // namespace marrow

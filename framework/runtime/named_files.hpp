@@ -20,6 +20,8 @@ struct NamedFile {
 /// links inside a folder that lead out of it or to another folder.
 std::vector<NamedFile> files_named_by(const std::filesystem::path& path);
 
+/// The texts of one of a node's options; none where it is not of type path.
+std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option);
 /// The texts of a node's options of type path that name something.
 std::vector<std::string> paths_of(const PipelineNode& node);
 

@@ -106,24 +106,10 @@ json inputs_of(const PipelineNode& node, const RunResult& result) {
   return inputs;
 }
 
-/// The contents that the node's options of type path named; null for what is not there.
-json files_of(const PipelineNode& node) {
+/// The contents that the node's options of type path named when it read them; null for what was not there or not to be read.
+json files_of(const NodeRecord& record) {
   json files = json::object();
-  for (std::size_t i = 0; i < node.options.size(); ++i) {
-    std::vector<std::string> paths;
-    if (node.info.options[i].type == OptionType::path) paths = {std::get<std::string>(node.options[i])};
-    if (node.info.options[i].type == OptionType::paths) paths = std::get<std::vector<std::string>>(node.options[i]);
-    std::erase(paths, "");
-    if (paths.empty()) continue;
-    Hasher hasher;
-    bool all_there = true;
-    for (const std::string& path : paths) {
-      std::error_code error;
-      all_there = all_there && fs::exists(path, error);
-      hasher.add(path_digest(path));
-    }
-    files[node.info.options[i].name] = all_there ? json(hasher.digest().hex()) : json();
-  }
+  for (const auto& [option, content] : record.files) files[option] = content == Digest{} ? json() : json(content.hex());
   return files;
 }
 
@@ -155,7 +141,7 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
             {"items", json::object()},
             {"functions", json::array()},
             {"random", node.info.random},
-            {"files", files_of(node)}};
+            {"files", files_of(record)}};
   if (!record.reason.empty()) j["reason"] = record.reason;
   if (const LibraryInfo* library = catalogue.library_of(node.info.name)) {
     j["library"] = library->file.filename().string();

@@ -141,6 +141,35 @@ TEST_F(ApartTest, FileThatIsAsBeforeWhenItHasBeenReadMayHaveBeenAnotherOne) {
   EXPECT_EQ(std::filesystem::file_size(file), std::string("change_back").size());
 }
 
+TEST_F(ApartTest, NodesOfOneRunDoNotMixContents) {
+  const auto run_with_edit = [&](const char* first, const char* second, const std::function<void()>& edit) {
+    std::filesystem::create_directory(scratch.path / "folder");
+    file = scratch.write("folder/file.txt", "one");
+    marrow::Diagnostics diagnostics;
+    const auto path = scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: ") + first +
+                                                  "}}\n  r: {uses: read.test_number, in: {added: c}, with: {path: " + second +
+                                                  "}}\noutputs: {r: r, c: c}\n");
+    pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    settings.threads = 2;
+    settings.observer = [&](const RunEvent& event) {
+      if (event.kind == RunEvent::Kind::finished && event.node == "c") edit();
+    };
+    const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);
+    EXPECT_EQ(result.nodes[0].status, NodeRecord::Status::done);
+    return result.nodes[1].reason;
+  };
+  const auto rewrite = [&] { std::ofstream(file) << "two"; };
+  const std::string changed = " was changed while the run went on: another node read something else there; run it again when nothing writes to it";
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [] {}), "");
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", rewrite), file.string() + changed);
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [&] { std::filesystem::remove(file); }), file.string() + changed);
+  EXPECT_EQ(run_with_edit("folder", "folder/file.txt", rewrite), file.string() + changed);
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder", rewrite), file.parent_path().string() + changed);
+  EXPECT_EQ(run_with_edit("folder", "folder", [&] { scratch.write("folder/another", "x"); }), file.parent_path().string() + changed);
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [] {}), "") << "another run";
+}
+
 TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
   std::filesystem::create_directory(scratch.path / "case");
   std::filesystem::create_directory(scratch.path / "elsewhere");

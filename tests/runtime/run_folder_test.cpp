@@ -189,6 +189,38 @@ TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
   EXPECT_EQ(places.size(), 10u) << items;
 }
 
+TEST_F(RunFolderTest, RecordHoldsTheFilesAsTheyWereRead) {
+  const fs::path file = scratch.write("file.txt", "one"), inside = scratch.path / "folder";
+  fs::create_directory(inside);
+  scratch.write("folder/a", "1");
+  const marrow::Pipeline pipeline = pipeline_of(
+      "  c: {uses: test.constant, with: {path: file.txt}}\n  f: {uses: test.constant, with: {path: folder, value: 2}}\n"
+      "  n: {uses: test.constant, with: {path: nothing, value: 3}}\n  w: {uses: test.constant, with: {path: /proc/self/mem}}\n"
+      "  d: {uses: test.work, in: {after: w}, with: {path: file.txt, value: 0}}\n",
+      "c: c, f: f, n: n, w: w, d: d");
+  const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
+  EXPECT_EQ(result.nodes[0].status, marrow::NodeRecord::Status::done);
+  EXPECT_EQ(result.nodes[3].status, marrow::NodeRecord::Status::failed) << "it cannot be hashed";
+  const auto files_recorded = [&](const std::string& name) {
+    RunFolder folder(scratch.path / name, pipeline);
+    folder.write_record(pipeline, result, {}, writing_catalogue(), {}, {});
+    nlohmann::json files;
+    const nlohmann::json record = nlohmann::json::parse(text_of(folder.path() / "run.json"));
+    for (const nlohmann::json& node : record["nodes"])
+      files[std::string(node["id"])] = node["files"];
+    return files;
+  };
+  const nlohmann::json before = files_recorded("before");
+  EXPECT_TRUE(before["c"]["path"].is_string());
+  EXPECT_TRUE(before["f"]["path"].is_string());
+  EXPECT_EQ(before["n"], nlohmann::json({{"path", nullptr}}));
+  EXPECT_EQ(before["w"], nlohmann::json({{"path", nullptr}}));
+  EXPECT_FALSE(before["d"].contains("path")) << "it did not come to read it";
+  std::ofstream(file) << "two";
+  fs::create_symlink("/tmp", inside / "link");  // now the folder cannot be hashed
+  EXPECT_EQ(files_recorded("after"), before);
+}
+
 TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {
   const marrow::Pipeline pipeline =
       pipeline_of("  c: {uses: test.constant}\n  s: {uses: test.sides}\n", "x: c, x.json: s.both");

@@ -58,6 +58,7 @@ struct NodeRecord {
   double cached_seconds = 0;   ///< that those calls took when they were made
   double peak_memory_mb = 0;   ///< most memory of the whole process while it ran
   std::vector<Value> outputs;  ///< in the order of the node's outputs
+  std::map<std::string, Digest> files;  ///< content of what its options named when it was read; zero: not there or not to be read
 };
 const char* status_name(NodeRecord::Status status);
 
