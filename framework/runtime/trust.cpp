@@ -5,6 +5,7 @@
 #include <grp.h>
 #include <pwd.h>
 #include <sys/stat.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -71,6 +72,11 @@ std::string mode_text(mode_t mode) {
   return text;
 }
 
+/// An access list lets other users write as far as the mode lets the group; the group itself may have nothing to do with it.
+bool has_access_list(const fs::path& path) {
+  return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0;
+}
+
 /// What lets others change a file or the entries of a folder. Of a folder further above, a sticky bit keeps them from
 /// replacing what is not theirs.
 std::string fault_of(const fs::path& path, bool is_above) {
@@ -81,10 +87,11 @@ std::string fault_of(const fs::path& path, bool is_above) {
     return "is not trusted, because " + quoted + " belongs to " + name_of(status.st_uid) + " (mode " +
            mode_text(status.st_mode) + "), who is neither you nor root; copy it into a folder of your own";
   if (is_above && (status.st_mode & S_ISVTX)) return "";
-  const bool group = (status.st_mode & S_IWGRP) && !is_private(status.st_gid, status.st_uid);
+  const bool has_list = (status.st_mode & S_IWGRP) && has_access_list(path);
+  const bool group = has_list || ((status.st_mode & S_IWGRP) && !is_private(status.st_gid, status.st_uid));
   if (!group && !(status.st_mode & S_IWOTH)) return "";
   return "is not trusted, because others may write to " + quoted + " (owner " + name_of(status.st_uid) + ", mode " +
-         mode_text(status.st_mode) + "); chmod go-w " + quoted;
+         mode_text(status.st_mode) + (has_list ? " and an access list" : "") + "); chmod go-w " + quoted;
 }
 
 /// Whoever can write here can replace marrow itself, so that trusting no plugin below would gain nothing.

@@ -5,6 +5,7 @@
 #include <sys/socket.h>
 #include <sys/stat.h>
 #include <sys/un.h>
+#include <sys/xattr.h>
 #include <unistd.h>
 
 #include <atomic>
@@ -134,6 +135,25 @@ TEST_F(UntrustedLibraryTest, ThePrivateGroupOfTheUserMayWrite) {
   EXPECT_EQ(marrow::library_info(file, framework).note, "");
   ASSERT_EQ(chown(folder.c_str(), 0, kSomebody), 0);
   expect_untrusted(file, others_may_write(folder, "0775"));
+}
+TEST_F(UntrustedLibraryTest, AnAccessListIsNoPrivateGroup) {
+  // With a list, the mode shows as the group's what the list gives anyone at most.
+  const fs::path file = copy_good(true);
+  struct Entry {
+    std::uint16_t tag, permissions;
+    std::uint32_t id;
+  };
+  struct {
+    std::uint32_t version = 2;
+    Entry entries[5] = {{1, 7, ~0u}, {2, 7, kSomebody}, {4, 5, ~0u}, {16, 7, ~0u}, {32, 5, ~0u}};
+  } list;
+  expect_trusted(file);
+  if (setxattr(folder.c_str(), "system.posix_acl_access", &list, sizeof list, 0) != 0) GTEST_SKIP() << "no access lists here";
+  ASSERT_EQ(fs::status(folder).permissions(), fs::perms(0775));
+  expect_untrusted(file, "others may write to '" + folder.string() + "' (owner ");
+  expect_untrusted(file, "mode 0775 and an access list); chmod go-w '" + folder.string() + "'");
+  fs::permissions(folder, fs::perms(0755));  // as advised: the list no longer lets anyone write
+  expect_trusted(file);
 }
 TEST_F(UntrustedLibraryTest, WhatBelongsToSomebodyElse) {
   if (geteuid() != 0) GTEST_SKIP() << "only root can give files away";
