@@ -212,12 +212,12 @@ fs::path framework_file() {
 std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
   const fs::path& file = described.file;
   try {
-    expect_trusted(file);
-    check_elf(RegularFile(file));
-    void* handle = open_library(file, RTLD_NOW);
+    const fs::path real = trusted_path(file);
+    check_elf(RegularFile(real));
+    void* handle = open_library(real, RTLD_NOW);
     auto plugin = std::make_unique<Plugin>();
     run_registration(*plugin, checked_entry(handle));
-    if (digest_of(RegularFile(file)) != described.digest) throw Error("was changed since this program began; start it again");
+    if (digest_of(RegularFile(real)) != described.digest) throw Error("was changed since this program began; start it again");
     expect_described(described, registered(*plugin, handle));
     return plugin;
   } catch (const Error& error) {
@@ -233,12 +233,12 @@ LibraryInfo describe_library(const fs::path& file) {
   LibraryInfo info;
   Digest digest;
   try {
-    expect_trusted(file);
-    const RegularFile library(file);
+    const fs::path real = trusted_path(file);
+    const RegularFile library(real);
     check_elf(library);
     const Digest before = digest_of(library);
-    info = describe_apart(file);
-    if (digest_of(RegularFile(file)) != before) throw Error("cannot be described: it was changed meanwhile; try again");
+    info = describe_apart(real);
+    if (digest_of(RegularFile(real)) != before) throw Error("cannot be described: it was changed meanwhile; try again");
     digest = before;
   } catch (const Error& error) {
     info = LibraryInfo{};

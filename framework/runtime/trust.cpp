@@ -111,11 +111,10 @@ std::string fault_of_chain(const fs::path& real) {
   return fault;
 }
 
-}  // namespace
-
-std::string changeable_by_others(const fs::path& file) {
+/// Of a path that may lead over links; `real` is the one without.
+std::string fault_of_both_ends(const fs::path& file, fs::path& real) {
   std::error_code error;
-  const fs::path real = fs::canonical(file, error);
+  real = fs::canonical(file, error);
   if (error) return "cannot be read: " + error.message();
   const fs::path folder = fs::canonical(fs::absolute(file).parent_path(), error);
   if (error) return "cannot be read: " + error.message();
@@ -124,12 +123,21 @@ std::string changeable_by_others(const fs::path& file) {
   return fault;
 }
 
-void expect_trusted(const fs::path& library) {
+}  // namespace
+
+std::string changeable_by_others(const fs::path& file) {
+  fs::path real;
+  return fault_of_both_ends(file, real);
+}
+
+fs::path trusted_path(const fs::path& library) {
   const char* all = std::getenv(kTrustAll);
-  if (all && std::strcmp(all, "1") == 0) return;
-  const std::string fault = changeable_by_others(library);
+  fs::path real;
+  const std::string fault = fault_of_both_ends(library, real);
+  if (all && std::strcmp(all, "1") == 0) return real.empty() ? library : real;
   if (!fault.empty())
     throw Error(fault + (fault.starts_with("is not") ? std::string(", or set ") + kTrustAll + "=1" : ""));
+  return real;
 }
 
 }  // namespace marrow

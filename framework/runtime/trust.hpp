@@ -11,7 +11,8 @@ namespace marrow {
 /// write where it is the owner's private one.
 std::string changeable_by_others(const std::filesystem::path& file);
 
-/// Throws Error for a library that others could change, unless MARROW_TRUST_ALL_PLUGINS is 1.
-void expect_trusted(const std::filesystem::path& library);
+/// The path of a library without links. Only this one may be opened: a link on the way of the given one may lie where others can
+/// turn it to another place. Throws Error for a library that others could change, unless MARROW_TRUST_ALL_PLUGINS is 1.
+std::filesystem::path trusted_path(const std::filesystem::path& library);
 
 }  // namespace marrow

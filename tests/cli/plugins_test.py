@@ -115,6 +115,18 @@ class Plugins(Case):
         folder.chmod(0o755)
         self.assertIn("test.add", marrow("doctor", plugins=[folder], extra_environment=self.own()).stdout, "the verdict is not kept")
 
+    def test_what_was_checked_is_loaded_wherever_a_link_leads_by_then(self):
+        # Others may turn a link in an open folder between the check and the load: the link is not used twice.
+        folder, opened = self.unknown_library(), self.scratch / "open"
+        opened.mkdir()
+        opened.chmod(0o777)
+        (opened / "link").symlink_to(folder)
+        pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {number: c}\n")
+        for command in (["describe", opened / "link" / "marrow_test_numbers.so"], ["run", pipeline, "--out", self.scratch / "out"]):
+            result = marrow(*command, plugins=[opened / "link"], extra_environment=self.own(LD_DEBUG="files"), timeout=240)
+            loads = [line.split("calling init: ")[1] for line in result.stderr.splitlines() if "calling init: " in line and "marrow_test" in line]
+            self.assertEqual(set(loads), {str(folder / "marrow_test_numbers.so")}, command)
+
     def test_manifests_are_written_whole(self):
         folder = self.unknown_library()
         library, manifest = folder / "marrow_test_numbers.so", folder / "marrow_test_numbers.json"
