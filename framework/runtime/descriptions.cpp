@@ -9,7 +9,7 @@
 #include <cstdlib>
 
 #include "json_text.hpp"
-#include "keys.hpp"
+#include "linked_libraries.hpp"
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "regular_file.hpp"
@@ -64,12 +64,8 @@ fs::path cached_file(const Digest& library, const Digest& framework, bool make) 
   Hasher name;
   name.add(library);
   name.add(framework);
+  name.add(search_digest());
   return folder / (name.digest().hex() + ".json");
-}
-
-/// Packages come with another size when they change. What people build themselves may have the same size and do something else.
-bool is_of_the_system(const std::string& library) {
-  return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
 }
 
 /// That the description belongs to this very library and to the libraries that are here now; else why not.
@@ -99,7 +95,9 @@ std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& 
   try {
     LibraryInfo info = manifest_from_text(manifest_text_of(manifest));
     if (!info.refused.empty()) throw Error("it is of a library that was refused");
-    const std::string reason = stale(info, digest);
+    std::string reason = stale(info, digest);
+    for (const LinkedLibrary& linked : info.linked)
+      if (reason.empty() && !found_before(linked).empty()) reason = "LD_LIBRARY_PATH leads to " + found_before(linked);
     if (reason.empty()) return info;
     note = "its manifest is stale (" + reason + "), so it was described anew";
   } catch (const Error& fault) {
@@ -163,11 +161,8 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   Hasher build_id;
   build_id.add(digest);
   build_id.add(framework);
-  for (const LinkedLibrary& library : info.linked) {
-    build_id.add(fs::path(library.path).filename().string());
-    build_id.add(library.size);
-    if (!is_of_the_system(library.path)) build_id.add(path_digest(library.path));
-  }
+  for (const std::vector<LinkedLibrary>* libraries : {&framework_libraries(), &std::as_const(info.linked)})
+    for (const LinkedLibrary& library : *libraries) build_id.add(identity_of(library));
   info.build_id = build_id.digest();
   return info;
 }

@@ -4,17 +4,18 @@
 
 #include <dlfcn.h>
 #include <fcntl.h>
-#include <link.h>
 #include <unistd.h>
 
 #include <chrono>
 #include <csignal>
 #include <cstring>
 #include <set>
+#include <tuple>
 
 #include "apart.hpp"
 #include "descriptions.hpp"
 #include "elf_file.hpp"
+#include "linked_libraries.hpp"
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
@@ -88,29 +89,6 @@ void* open_library(const fs::path& file, int mode) {
   throw Error("cannot be loaded: " + reason);
 }
 
-/// The libraries that a loaded library links directly, with the files they were found in.
-std::vector<LinkedLibrary> linked_libraries(void* handle) {
-  std::vector<LinkedLibrary> result;
-  link_map* self = nullptr;
-  if (dlinfo(handle, RTLD_DI_LINKMAP, &self) != 0) return result;
-  const char* names = nullptr;
-  for (const ElfW(Dyn)* d = self->l_ld; d->d_tag != DT_NULL; ++d)
-    if (d->d_tag == DT_STRTAB) names = reinterpret_cast<const char*>(d->d_un.d_ptr);
-  std::set<std::string> needed;
-  for (const ElfW(Dyn)* d = self->l_ld; d->d_tag != DT_NULL; ++d)
-    if (d->d_tag == DT_NEEDED) needed.insert(names + d->d_un.d_val);
-  const link_map* first = self;
-  while (first->l_prev) first = first->l_prev;
-  for (const link_map* l = first; l; l = l->l_next) {
-    const fs::path path(l->l_name);
-    if (!needed.count(path.filename().string()) || path.filename().string().starts_with("libmarrow.so")) continue;
-    std::error_code error;
-    const fs::path real = fs::canonical(path, error);
-    if (!error) result.push_back({real.string(), fs::file_size(real)});
-  }
-  return result;
-}
-
 void run_registration(Plugin& plugin, const PluginEntry& entry) {
   entry.register_nodes(plugin);
   std::string faults;
@@ -180,10 +158,12 @@ LibraryInfo registered(const Plugin& plugin, void* handle) {
   return info;
 }
 
-/// By name and size.
-std::set<std::pair<std::string, std::uint64_t>> versions_of(const std::vector<LinkedLibrary>& libraries) {
-  std::set<std::pair<std::string, std::uint64_t>> result;
-  for (const LinkedLibrary& library : libraries) result.insert({fs::path(library.path).filename().string(), library.size});
+/// By name, size and what is in them.
+using Versions = std::set<std::tuple<std::string, std::uint64_t, Digest>>;
+
+Versions versions_of(const std::vector<LinkedLibrary>& libraries) {
+  Versions result;
+  for (const LinkedLibrary& library : libraries) result.insert({fs::path(library.path).filename().string(), library.size, identity_of(library)});
   return result;
 }
 
@@ -191,11 +171,13 @@ std::set<std::pair<std::string, std::uint64_t>> versions_of(const std::vector<Li
 /// library registers, nothing of the library may be called.
 void expect_described(const LibraryInfo& described, const LibraryInfo& registered) {
   std::string found = difference(described, registered);
-  const auto before = versions_of(described.linked), now = versions_of(registered.linked);
+  const Versions before = versions_of(described.linked), now = versions_of(registered.linked);
   for (const auto& library : now)
-    if (found.empty() && !before.count(library)) found = "it loads another " + library.first + " (" + std::to_string(library.second) + " bytes)";
+    if (const auto& [name, size, content] = library; found.empty() && !before.count(library))
+      found = "it loads another " + name + " (" + std::to_string(size) + " bytes)";
   for (const auto& library : before)
-    if (found.empty() && !now.count(library)) found = "it does not load " + library.first + " of " + std::to_string(library.second) + " bytes";
+    if (const auto& [name, size, content] = library; found.empty() && !now.count(library))
+      found = "it does not load " + name + " of " + std::to_string(size) + " bytes";
   if (found.empty()) return;
   forget_description(described);
   throw Error("is not what its description says: " + found + "; " + cure_of_description(described.file));

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Libraries that must be refused, each with one sentence that says why, and manifests that do not belong.
+#include <dlfcn.h>
 #include <elf.h>
+
+#include <set>
 
 #include "runtime/library_fixture.hpp"
 
@@ -188,6 +191,72 @@ TEST_F(LibraryTest, LinkedLibraryOfTheSameSizeThatIsAnotherOneChangesTheBuildId)
   scratch.write("libmarrow_helper.so", "other");
   EXPECT_NE(marrow::library_info(file, framework).build_id, first);
   EXPECT_EQ(marrow::library_info(file, framework).note, "");
+}
+/// The plugin that links others, in the scratch folder with the first version of both.
+class LinkedLibraryTest : public LibraryTest {
+ protected:
+  LinkedLibraryTest() {
+    fs::create_directories(scratch.path / "plugins" / "libs");
+    fs::copy_file(kLinked / "linked.so", file);
+    put(1, "libtest_base.so", scratch.path / "plugins" / "libs");
+    put(1, "libtest_deep.so", scratch.path / "plugins" / "libs");
+  }
+  ~LinkedLibraryTest() override { unsetenv("LD_LIBRARY_PATH"); }
+  void put(int version, const std::string& name, const fs::path& folder) {
+    fs::create_directories(folder);
+    fs::remove(folder / name);  // another file, as a linker makes it
+    fs::copy_file(kLinked / ("libs" + std::to_string(version)) / name, folder / name);
+  }
+  marrow::Digest build_id() {
+    const marrow::LibraryInfo info = marrow::library_info(file, framework);
+    EXPECT_EQ(info.refused, "");
+    return info.build_id;
+  }
+  const fs::path kLinked = fs::path(MARROW_BINARY_DIR) / "tests" / "linked_plugins";
+  const fs::path file = scratch.path / "plugins" / "linked.so";
+};
+
+TEST_F(LinkedLibraryTest, WhatALinkedLibraryNeedsCountsToo) {
+  const marrow::Digest first = build_id();
+  EXPECT_EQ(build_id(), first);
+  std::set<std::string> names;
+  for (const marrow::LinkedLibrary& linked : marrow::library_info(file, framework).linked) names.insert(fs::path(linked.path).filename());
+  EXPECT_TRUE(names.contains("libtest_base.so"));
+  EXPECT_TRUE(names.contains("libtest_deep.so")) << "only another library needs it";
+  ASSERT_EQ(fs::file_size(kLinked / "libs1" / "libtest_deep.so"), fs::file_size(kLinked / "libs2" / "libtest_deep.so"));
+  put(2, "libtest_deep.so", scratch.path / "plugins" / "libs");
+  EXPECT_NE(build_id(), first);
+  put(1, "libtest_deep.so", scratch.path / "plugins" / "libs");
+  EXPECT_EQ(build_id(), first);
+}
+TEST_F(LinkedLibraryTest, LibrariesThatTheLoaderFindsElsewhereCount) {
+  marrow::write_manifest(marrow::library_info(file, framework));
+  const marrow::Digest first = build_id();
+  const fs::path elsewhere = scratch.path / "elsewhere";
+  fs::create_directories(elsewhere);
+  setenv("LD_LIBRARY_PATH", elsewhere.c_str(), 1);
+  EXPECT_EQ(build_id(), first) << "nothing lies there";
+  put(2, "libtest_base.so", elsewhere), put(1, "libtest_deep.so", elsewhere);
+  setenv("LD_LIBRARY_PATH", (elsewhere.string() + ":").c_str(), 1);
+  const marrow::LibraryInfo other = marrow::library_info(file, framework);
+  EXPECT_NE(other.build_id, first);
+  EXPECT_TRUE(other.note.starts_with("its manifest is stale (LD_LIBRARY_PATH leads to " + elsewhere.string())) << other.note;
+  EXPECT_EQ(build_id(), other.build_id) << "from the cache";
+  unsetenv("LD_LIBRARY_PATH");
+  EXPECT_EQ(build_id(), first);
+}
+TEST_F(LinkedLibraryTest, AnotherLibraryThanTheDescribedOneIsFoundOut) {
+  marrow::write_manifest(marrow::library_info(file, framework));
+  const marrow::Catalogue catalogue({scratch.path / "plugins"});
+  put(2, "libtest_deep.so", scratch.path / "elsewhere");
+  // Loaded before under the same name, it is what the plugin gets.
+  ASSERT_NE(dlopen((scratch.path / "elsewhere" / "libtest_deep.so").c_str(), RTLD_NOW), nullptr);
+  try {
+    catalogue.load("test.linked");
+    ADD_FAILURE();
+  } catch (const marrow::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("it loads another libtest_deep.so ("), std::string::npos) << error.what();
+  }
 }
 TEST_F(LibraryTest, LinkedLibraryThatIsNoFileMakesTheManifestStale) {
   for (const std::string path : {"/dev/zero", "/", "/nonexistent/lib.so"}) {

@@ -1,0 +1,233 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "linked_libraries.hpp"
+
+#include <dlfcn.h>
+#include <link.h>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <mutex>
+#include <set>
+#include <sstream>
+
+#include "keys.hpp"
+#include "marrow/domain/error.hpp"
+#include "regular_file.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+constexpr std::size_t kMostNote_bytes = 1 << 16;
+
+/// What the loader knows of a library: its own name, and the names of those that it links.
+struct Names {
+  std::string own;
+  std::vector<std::string> needed;
+};
+
+Names names_of(const link_map* library) {
+  Names names;
+  const char* texts = nullptr;
+  for (const ElfW(Dyn)* d = library->l_ld; d && d->d_tag != DT_NULL; ++d)
+    if (d->d_tag == DT_STRTAB) texts = reinterpret_cast<const char*>(d->d_un.d_ptr);
+  // The kernel's own library has a place from its beginning there, not an address.
+  if (!texts || reinterpret_cast<std::uintptr_t>(texts) < library->l_addr) return names;
+  for (const ElfW(Dyn)* d = library->l_ld; d->d_tag != DT_NULL; ++d) {
+    if (d->d_tag == DT_SONAME) names.own = texts + d->d_un.d_val;
+    if (d->d_tag == DT_NEEDED) names.needed.push_back(texts + d->d_un.d_val);
+  }
+  return names;
+}
+
+/// All libraries that are loaded, by the names under which others may need them, in the order of loading.
+class Loaded {
+ public:
+  explicit Loaded(const link_map* any) {
+    while (any->l_prev) any = any->l_prev;
+    for (const link_map* library = any; library; library = library->l_next) {
+      if (!library->l_name || !*library->l_name) continue;  // the program
+      order_.push_back(library);
+      const Names names = names_of(library);
+      for (const std::string& name : {fs::path(library->l_name).filename().string(), names.own})
+        if (!name.empty()) by_name_.try_emplace(name, library);
+    }
+  }
+  std::set<const link_map*> needed_by(const link_map* library) const {
+    std::set<const link_map*> needed;
+    for (const std::string& name : names_of(library).needed)
+      if (const auto found = by_name_.find(name); found != by_name_.end()) needed.insert(found->second);
+    return needed;
+  }
+  /// Of a library and all that it needs; what is in `known` already is not followed.
+  void add_all(const link_map* library, std::set<const link_map*>& known) const {
+    for (const link_map* one : needed_by(library))
+      if (known.insert(one).second) add_all(one, known);
+  }
+  std::vector<LinkedLibrary> files_of(const std::set<const link_map*>& wanted) const {
+    std::vector<LinkedLibrary> files;
+    for (const link_map* library : order_) {
+      std::error_code error;
+      const fs::path real = wanted.contains(library) ? fs::canonical(library->l_name, error) : fs::path();
+      if (!real.empty() && !error) files.push_back({real.string(), fs::file_size(real)});
+    }
+    return files;
+  }
+
+ private:
+  std::vector<const link_map*> order_;
+  std::map<std::string, const link_map*> by_name_;
+};
+
+const link_map* map_of_framework() {
+  Dl_info info{};
+  link_map* map = nullptr;
+  dladdr1(reinterpret_cast<const void*>(&framework_file), &info, reinterpret_cast<void**>(&map), RTLD_DL_LINKMAP);
+  return map;
+}
+
+bool is_of_the_system(const std::string& library) {
+  return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
+}
+
+/// The note that the linker leaves in each build, or an empty text.
+std::string build_note(const RegularFile& file) {
+  Elf64_Ehdr header{};
+  if (file.read(&header, sizeof header, 0) < sizeof header || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
+      header.e_phentsize != sizeof(Elf64_Phdr))
+    return "";
+  std::vector<Elf64_Phdr> segments(header.e_phnum);
+  file.read(segments.data(), segments.size() * sizeof(Elf64_Phdr), header.e_phoff);
+  for (const Elf64_Phdr& segment : segments) {
+    if (segment.p_type != PT_NOTE || segment.p_filesz > kMostNote_bytes) continue;
+    std::string text(segment.p_filesz, '\0');
+    text.resize(file.read(text.data(), text.size(), segment.p_offset));
+    const auto padded = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };
+    for (std::size_t at = 0; at + sizeof(Elf64_Nhdr) <= text.size();) {
+      Elf64_Nhdr note;
+      std::memcpy(&note, text.data() + at, sizeof note);
+      const std::size_t name = at + sizeof note, content = name + padded(note.n_namesz);
+      at = content + padded(note.n_descsz);
+      if (at > text.size() || note.n_namesz > text.size() || note.n_descsz > text.size()) break;
+      if (note.n_type == NT_GNU_BUILD_ID && text.compare(name, 4, "GNU", 4) == 0) return text.substr(content, note.n_descsz);
+    }
+  }
+  return "";
+}
+
+Digest identity_of_package(const std::string& path, const struct stat& status) try {
+  Hasher hasher;
+  hasher.add(fs::path(path).filename().string());
+  const std::string note = build_note(RegularFile(path));
+  hasher.add(note);
+  hasher.add(std::int64_t(status.st_size));
+  if (note.empty()) hasher.add(std::int64_t(status.st_mtim.tv_sec)), hasher.add(std::int64_t(status.st_mtim.tv_nsec));
+  return hasher.digest();
+} catch (const Error& error) {
+  throw Error(path + " " + error.what());
+}
+
+std::string variable(const char* name) {
+  const char* text = std::getenv(name);
+  return text ? text : "";
+}
+
+std::string without_version(const std::string& name) { return name.substr(0, name.find(".so") + 3); }
+
+std::vector<fs::path> folders_of(const std::string& search_path) {
+  std::vector<fs::path> folders;
+  std::istringstream stream(search_path);
+  for (std::string folder; std::getline(stream, folder, ':');) folders.emplace_back(folder.empty() ? "." : folder);
+  return folders;
+}
+
+std::vector<fs::path> libraries_in(const fs::path& folder) {
+  std::vector<fs::path> files;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
+    if (at->path().filename().string().find(".so") != std::string::npos) files.push_back(at->path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+}  // namespace
+
+const std::vector<LinkedLibrary>& framework_libraries() {
+  static const std::vector<LinkedLibrary> libraries = [] {
+    const link_map* framework = map_of_framework();
+    if (!framework) return std::vector<LinkedLibrary>();
+    const Loaded loaded(framework);
+    std::set<const link_map*> needed;
+    loaded.add_all(framework, needed);
+    return loaded.files_of(needed);
+  }();
+  return libraries;
+}
+
+std::vector<LinkedLibrary> linked_libraries(void* handle) {
+  link_map* self = nullptr;
+  if (dlinfo(handle, RTLD_DI_LINKMAP, &self) != 0) return {};
+  const Loaded loaded(self);
+  const link_map* framework = map_of_framework();
+  std::set<const link_map*> all, of_framework, wanted = loaded.needed_by(self);
+  if (framework) all.insert(framework), of_framework.insert(framework), loaded.add_all(framework, of_framework);
+  loaded.add_all(self, all);
+  for (const link_map* library : all)
+    if (!of_framework.contains(library)) wanted.insert(library);
+  wanted.erase(framework);
+  wanted.erase(self);
+  return loaded.files_of(wanted);
+}
+
+Digest identity_of(const LinkedLibrary& library) {
+  if (!is_of_the_system(library.path)) return path_digest(library.path);
+  struct stat status {};
+  if (stat(library.path.c_str(), &status) != 0) throw Error(library.path + " cannot be read: " + std::strerror(errno));
+  struct Known {
+    struct stat status;
+    Digest identity;
+  };
+  static std::mutex mutex;
+  static std::map<std::string, Known> known;
+  const std::scoped_lock lock(mutex);
+  const auto found = known.find(library.path);
+  if (found != known.end() && found->second.status.st_ino == status.st_ino && found->second.status.st_size == status.st_size &&
+      std::memcmp(&found->second.status.st_ctim, &status.st_ctim, sizeof status.st_ctim) == 0)
+    return found->second.identity;
+  const Digest identity = identity_of_package(library.path, status);
+  known[library.path] = {status, identity};
+  return identity;
+}
+
+std::string found_before(const LinkedLibrary& library) {
+  struct Found {
+    std::string search_path;
+    std::multimap<std::string, fs::path> files;
+  };
+  static std::mutex mutex;
+  static Found found;
+  const std::string search_path = variable("LD_LIBRARY_PATH");
+  const std::scoped_lock lock(mutex);
+  if (found.search_path != search_path) {
+    found = {search_path, {}};
+    for (const fs::path& folder : folders_of(search_path))
+      for (const fs::path& file : libraries_in(folder)) found.files.emplace(without_version(file.filename()), file);
+  }
+  const auto [begin, end] = found.files.equal_range(without_version(fs::path(library.path).filename()));
+  for (auto at = begin; at != end; ++at) {
+    std::error_code error;
+    if (fs::canonical(at->second, error) != library.path && !error) return at->second.string();
+  }
+  return "";
+}
+
+Digest search_digest() {
+  Hasher hasher;
+  for (const char* name : {"LD_LIBRARY_PATH", "LD_PRELOAD"}) hasher.add(variable(name));
+  for (const fs::path& folder : folders_of(variable("LD_LIBRARY_PATH")))
+    for (const fs::path& file : libraries_in(folder)) hasher.add(file.string());
+  return hasher.digest();
+}
+
+}  // namespace marrow
