@@ -6,6 +6,7 @@
 
 #include "marrow/compare/cell.hpp"
 #include "runtime/keys.hpp"
+#include "runtime/machine.hpp"
 #include "runtime/named_files.hpp"
 
 namespace marrow::compare {
@@ -70,6 +71,7 @@ void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs
       for (const std::string& path : paths_of(node)) paths.insert(path);
   }
   for (const Digest& id : build_ids) hasher.add(id);
+  hasher.add(machine_digest());
   for (const std::string& path : paths) hasher.add(content_of(path, look));
 }
 

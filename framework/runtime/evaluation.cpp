@@ -450,7 +450,7 @@ std::string Evaluation::change_since_last(std::size_t node, const Call& call) co
   const auto last = settings_.store ? settings_.store->last(place(node, call.item)) : std::nullopt;
   if (!last) return "it has not run before";
   const std::string changes = difference(last->provenance, provenance(node, call.inputs));
-  return changes.empty() ? "its result is no longer in the store" : changes;
+  return changes.empty() ? "the store has no result of it: it failed, was stopped or removed, or the processor is another" : changes;
 }
 
 }  // namespace marrow

@@ -10,6 +10,7 @@
 #include <optional>
 #include <sstream>
 
+#include "machine.hpp"
 #include "mapping.hpp"
 #include "named_files.hpp"
 
@@ -137,6 +138,7 @@ Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std
   Hasher hasher;
   hasher.add(recipe);
   hasher.add(build_id);
+  hasher.add(machine_digest());
   if (random) hasher.add(seed);
   return hasher.digest();
 }

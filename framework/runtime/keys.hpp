@@ -27,7 +27,7 @@ PathContent content_of(const std::string& path);
 /// `contents` is given what its paths named; also of those before one that throws Error.
 Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Contents* contents = nullptr);
 
-/// The key of its result: the recipe, the build id and, where the node is random, the run's seed.
+/// The key of its result: the recipe, the build id, the machine (machine_digest()) and, where the node is random, the run's seed.
 Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std::uint64_t seed);
 
 /// The digest of content_of().

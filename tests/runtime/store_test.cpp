@@ -405,7 +405,7 @@ TEST_F(StoreTest, PlanSaysWhatRunsAndWhy) {
 
   store.collect(1);
   planned = plan(kChain, "n: n");
-  EXPECT_EQ(planned[0].why, "its result is no longer in the store");
+  EXPECT_EQ(planned[0].why, "the store has no result of it: it failed, was stopped or removed, or the processor is another");
 }
 
 TEST_F(StoreTest, WarningsAreRepeated) {

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "machine.hpp"
+
+#include <unistd.h>
+
+#include <set>
+#include <string>
+#include <string_view>
+
+#include "marrow/runtime/run_folder.hpp"
+
+namespace marrow {
+namespace {
+
+/// What OpenCV and the C library choose their code by.
+std::string processor_features() {
+  std::string features = cpu_level();
+#if defined(__x86_64__)
+  __builtin_cpu_init();
+  const auto add = [&](bool has, const char* name) { features += has ? std::string(" ") + name : ""; };
+  add(__builtin_cpu_supports("sse3"), "sse3");
+  add(__builtin_cpu_supports("ssse3"), "ssse3");
+  add(__builtin_cpu_supports("sse4.1"), "sse4.1");
+  add(__builtin_cpu_supports("sse4.2"), "sse4.2");
+  add(__builtin_cpu_supports("popcnt"), "popcnt");
+  add(__builtin_cpu_supports("avx"), "avx");
+  add(__builtin_cpu_supports("fma"), "fma");
+  add(__builtin_cpu_supports("fma4"), "fma4");
+  add(__builtin_cpu_supports("avx2"), "avx2");
+  add(__builtin_cpu_supports("avx512f"), "avx512f");
+  add(__builtin_cpu_supports("avx512cd"), "avx512cd");
+  add(__builtin_cpu_supports("avx512bw"), "avx512bw");
+  add(__builtin_cpu_supports("avx512dq"), "avx512dq");
+  add(__builtin_cpu_supports("avx512vl"), "avx512vl");
+  add(__builtin_cpu_supports("avx512vnni"), "avx512vnni");
+#endif
+  return features;
+}
+
+/// OpenCV's and the C library's switches for the processor's features, the choice of code of two libraries of linear algebra that
+/// OpenCV may call, and libraries that are put before all others.
+bool counts(std::string_view variable) {
+  if (variable.starts_with("OPENCV_LOG")) return false;
+  for (const char* beginning : {"OPENCV_", "GLIBC_TUNABLES=", "OPENBLAS_CORETYPE=", "MKL_CBWR=", "LD_PRELOAD="})
+    if (variable.starts_with(beginning)) return true;
+  return false;
+}
+
+}  // namespace
+
+Digest machine_digest() {
+  static const std::string features = processor_features();
+  std::set<std::string> variables;
+  for (char** variable = environ; variable && *variable; ++variable)
+    if (counts(*variable)) variables.insert(*variable);
+  Hasher hasher;
+  hasher.add(features);
+  hasher.add(std::uint64_t(variables.size()));
+  for (const std::string& variable : variables) hasher.add(variable);
+  return hasher.digest();
+}
+
+}  // namespace marrow
