@@ -288,6 +288,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   try {
     if (settings_.cancelled && settings_.cancelled->load()) throw Cancelled();
     const Digest before = states_of_files(pipeline_.nodes[node]);
+    write_back_files(pipeline_.nodes[node]);
     // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
     check_unchanged(node, inputs, recipe, before);

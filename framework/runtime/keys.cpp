@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "keys.hpp"
 
+#include <fcntl.h>
+#include <linux/magic.h>
 #include <sys/stat.h>
+#include <sys/vfs.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <map>
@@ -19,7 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What tells one state of a file from another: any write changes the time of its last change, which nobody can set.
+/// What tells one state of a file from another: a write changes the time of its last change, which nobody can set. Where the file
+/// is mapped into memory, only the first write after write_back() does.
 struct FileState {
   dev_t device = 0;
   ino_t number = 0;
@@ -38,8 +43,21 @@ std::optional<FileState> state_of(const fs::path& file) {
   return FileState{status.st_dev, status.st_ino, status.st_size, status.st_mtim, status.st_ctim};
 }
 
-/// A file that was changed just now may change again within the resolution of its time.
-bool is_settled(const FileState& state) {
+/// Brings what was written through memory to the file, so that the next such write changes the file's time.
+void write_back(const fs::path& file) {
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
+  const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
+  if (descriptor < 0) return;  // who reads it says why
+  sync_file_range(descriptor, 0, 0, SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
+  close(descriptor);
+}
+
+/// A file that was changed just now may change again within the resolution of its time; one that lies in memory alone may change
+/// without any other time.
+bool is_settled(const fs::path& file, const FileState& state) {
+  struct statfs system {};
+  if (statfs(file.c_str(), &system) != 0 || system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC) return false;
   timespec now{};
   clock_gettime(CLOCK_REALTIME, &now);
   return now.tv_sec - state.changed.tv_sec > 2;
@@ -58,8 +76,9 @@ Digest digest_once(const fs::path& file) {
     const auto found = known.find(file);
     if (found != known.end() && found->second.state == *state) return found->second.digest;
   }
+  write_back(file);
   const Digest digest = file_digest(file);
-  if (state && is_settled(*state) && state_of(file) == state) {
+  if (state && is_settled(file, *state) && state_of(file) == state) {
     const std::scoped_lock lock(mutex);
     known[file] = {*state, digest};
   }
@@ -113,6 +132,12 @@ Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Con
     hasher.add(key_of(inputs[i]));
   }
   return hasher.digest();
+}
+
+void write_back_files(const PipelineNode& node) {
+  for (const std::string& path : paths_of(node))
+    for (const NamedFile& file : files_named_by(path))
+      if (file.is_there) write_back(file.file);
 }
 
 Digest states_of_files(const PipelineNode& node) {

@@ -37,6 +37,10 @@ Digest path_digest(const std::filesystem::path& path);
 /// if it holds the same again. Throws Error as files_named_by() does.
 Digest states_of_files(const PipelineNode& node);
 
+/// Brings what programs wrote through memory to the files that the node's options name: from then on, each first write through
+/// memory gives them another state too. Not where files lie in memory alone (tmpfs). Throws Error as files_named_by() does.
+void write_back_files(const PipelineNode& node);
+
 /// The key of a function that a call returns.
 Digest function_key(const Digest& result, std::size_t output);
 

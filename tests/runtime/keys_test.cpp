@@ -2,12 +2,18 @@
 // Each thing that may change a result changes its key, on its own; nothing else does.
 #include "framework/runtime/keys.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <linux/magic.h>
+#include <sys/mman.h>
+#include <sys/vfs.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <set>
+#include <thread>
 
 #include "framework/runtime/mapping.hpp"
 
@@ -195,6 +201,31 @@ TEST_F(Keys, FilesKnownFromBeforeAreReadAgainWhenTheirSizeOrTimeIsAnother) {
   EXPECT_NE(marrow::path_digest(file), two) << "another size";
   write("old", "two");
   EXPECT_EQ(marrow::path_digest(file), two);
+}
+
+TEST_F(Keys, WritesThroughMemoryDoNotPass) {
+  const std::string file = write("file", std::string(10000, 'x'));
+  struct statfs system {};
+  ASSERT_EQ(statfs(file.c_str(), &system), 0);
+  const int descriptor = open(file.c_str(), O_RDWR | O_CLOEXEC);
+  auto* text = static_cast<char*>(mmap(nullptr, 10000, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0));
+  close(descriptor);
+  ASSERT_NE(static_cast<void*>(text), MAP_FAILED);
+  const auto write_later = [&](char c) {  // by more than the resolution of the file's time
+    std::this_thread::sleep_for(std::chrono::milliseconds(30));
+    text[5000] = c;
+  };
+  write_later('a');
+  const Digest state = states_of_files(node_);
+  write_back_files(node_);
+  EXPECT_EQ(states_of_files(node_), state);
+  write_later('b');
+  EXPECT_TRUE(system.f_type == TMPFS_MAGIC || states_of_files(node_) != state) << "a node may be reading it";
+  std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // from then on a digest is kept
+  const Digest before = marrow::path_digest(file);
+  write_later('c');
+  EXPECT_NE(marrow::path_digest(file), before);
+  munmap(text, 10000);
 }
 
 TEST_F(Keys, OfResults) {
