@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <set>
+#include <sstream>
 #include <string>
 #include <string_view>
 
@@ -37,13 +38,20 @@ std::string processor_features() {
   return features;
 }
 
-/// OpenCV's and the C library's switches for the processor's features, the choice of code of two libraries of linear algebra that
-/// OpenCV may call, and libraries that are put before all others.
+/// OpenCV's switches for the processor's features, the choice of code of two libraries of linear algebra that OpenCV may call, and
+/// libraries that are put before all others.
 bool counts(std::string_view variable) {
   if (variable.starts_with("OPENCV_LOG")) return false;
-  for (const char* beginning : {"OPENCV_", "GLIBC_TUNABLES=", "OPENBLAS_CORETYPE=", "MKL_CBWR=", "LD_PRELOAD="})
+  for (const char* beginning : {"OPENCV_", "OPENBLAS_CORETYPE=", "MKL_CBWR=", "LD_PRELOAD="})
     if (variable.starts_with(beginning)) return true;
   return false;
+}
+
+/// The C library's switches for the processor's features, among others that change no result: worker processes set one of those.
+void add_switches(std::string_view tunables, std::set<std::string>& variables) {
+  std::istringstream stream{std::string(tunables)};
+  for (std::string one; std::getline(stream, one, ':');)
+    if (one.starts_with("glibc.cpu.")) variables.insert(one);
 }
 
 }  // namespace
@@ -51,8 +59,12 @@ bool counts(std::string_view variable) {
 Digest machine_digest() {
   static const std::string features = processor_features();
   std::set<std::string> variables;
-  for (char** variable = environ; variable && *variable; ++variable)
-    if (counts(*variable)) variables.insert(*variable);
+  constexpr std::string_view kTunables = "GLIBC_TUNABLES=";
+  for (char** one = environ; one && *one; ++one) {
+    const std::string_view variable(*one);
+    if (counts(variable)) variables.insert(*one);
+    else if (variable.starts_with(kTunables)) add_switches(variable.substr(kTunables.size()), variables);
+  }
   Hasher hasher;
   hasher.add(features);
   hasher.add(std::uint64_t(variables.size()));
