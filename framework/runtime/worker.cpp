@@ -6,6 +6,7 @@
 #include <poll.h>
 #include <signal.h>
 #include <spawn.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -31,8 +32,14 @@ constexpr std::size_t kLongestLine = std::size_t(64) << 20;
 /// Time between two looks counts as no more than this: where it was longer, this process was suspended itself.
 constexpr double kLongestLook_s = 1;
 constexpr int kFirstFreeDescriptor = 64;  // above those that the worker is given
+constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
 
 [[noreturn]] void cannot_start(int code) {
+  rlimit files{};
+  getrlimit(RLIMIT_NOFILE, &files);
+  if (code == EMFILE || (code == EINVAL && files.rlim_cur <= kMostFiles))
+    throw Error("cannot start a process: no more than " + std::to_string(files.rlim_cur) +
+                " files may be open at once; raise the limit (ulimit -n " + std::to_string(kEnoughFiles) + ")");
   throw Error(std::string("cannot start a process: ") + std::strerror(code) +
               (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
 }

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -143,6 +144,21 @@ TEST(Worker, ProgramThatIsNotThereIsSaid) {
   } catch (const marrow::Error& error) {
     EXPECT_STREQ(error.what(), "cannot start /nowhere/marrow-worker: No such file or directory; install marrow again");
   }
+}
+
+TEST(Worker, ALowLimitOfFilesIsSaid) {
+  rlimit before{};
+  getrlimit(RLIMIT_NOFILE, &before);
+  const rlimit low{50, before.rlim_max};
+  setrlimit(RLIMIT_NOFILE, &low);
+  std::string said;
+  try {
+    const Worker worker({{MARROW_TEST_WORKER}});
+  } catch (const std::exception& error) {
+    said = error.what();
+  }
+  setrlimit(RLIMIT_NOFILE, &before);
+  EXPECT_EQ(said, "cannot start a process: no more than 50 files may be open at once; raise the limit (ulimit -n 1024)");
 }
 
 TEST(Worker, BytesThatAreNoTextTravelToo) {
