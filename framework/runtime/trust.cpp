@@ -90,8 +90,11 @@ std::string fault_of(const fs::path& path, bool is_above) {
   const bool has_list = (status.st_mode & S_IWGRP) && has_access_list(path);
   const bool group = has_list || ((status.st_mode & S_IWGRP) && !is_private(status.st_gid, status.st_uid));
   if (!group && !(status.st_mode & S_IWOTH)) return "";
+  // A sticky folder is there for all, as /tmp is.
+  const bool is_for_all = S_ISDIR(status.st_mode) && (status.st_mode & S_ISVTX);
   return "is not trusted, because others may write to " + quoted + " (owner " + name_of(status.st_uid) + ", mode " +
-         mode_text(status.st_mode) + (has_list ? " and an access list" : "") + "); chmod go-w " + quoted;
+         mode_text(status.st_mode) + (has_list ? " and an access list" : "") + "); " +
+         (is_for_all ? "move the library into a folder of your own" : "chmod go-w " + quoted);
 }
 
 /// Whoever can write here can replace marrow itself, so that trusting no plugin below would gain nothing.

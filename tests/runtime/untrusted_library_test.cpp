@@ -34,8 +34,9 @@ class UntrustedLibraryTest : public library_test::LibraryTest {
   void expect_trusted(const fs::path& file) { EXPECT_EQ(marrow::describe_library(file).refused, ""); }
   static std::string others_may_write(const fs::path& path, const std::string& mode) {
     return "is not trusted, because others may write to '" + path.string() + "' (owner " +
-           getpwuid(geteuid())->pw_name + ", mode " + mode + "); chmod go-w '" + path.string() +
-           "', or set MARROW_TRUST_ALL_PLUGINS=1";
+           getpwuid(geteuid())->pw_name + ", mode " + mode + "); " +
+           (mode[0] == '1' ? "move the library into a folder of your own" : "chmod go-w '" + path.string() + "'") +
+           ", or set MARROW_TRUST_ALL_PLUGINS=1";
   }
   const fs::path folder = scratch.path / "plugins";
 };
