@@ -256,7 +256,7 @@ bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
       if (value.source) value.source = std::make_shared<DeferredSource>(deferred, leaf, value.source);
       ++leaf;
     });
-  for (const std::string& warning : stored->provenance.warnings) report(RunEvent::Kind::warning, node, call.item, warning);
+  for (const std::string& warning : stored->provenance.warnings) report(RunEvent::Kind::warning, node, call.item, warning_now(warning, pipeline_.nodes[node], stored->provenance));
   report(RunEvent::Kind::cached, node, call.item, "", 1, stored->provenance.seconds);
   call.result = {Status::done, "", std::move(stored->outputs), false, true};
   const std::scoped_lock lock(mutex_);

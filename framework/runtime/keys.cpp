@@ -233,6 +233,18 @@ std::string difference(const Provenance& before, const Provenance& now) {
   return text;
 }
 
+std::string warning_now(std::string warning, const PipelineNode& node, const Provenance& kept) {
+  for (std::size_t i = 0; i < node.options.size(); ++i) {
+    const auto option = kept.options.find(node.info.options[i].name);
+    if (node.info.options[i].type != OptionType::path || option == kept.options.end()) continue;
+    const std::string before = option->second.substr(0, option->second.rfind(" (content "));
+    const std::string& now = std::get<std::string>(node.options[i]);
+    if (!before.starts_with('/') || before == now) continue;
+    for (std::size_t at = 0; (at = warning.find(before, at)) != std::string::npos; at += now.size()) warning.replace(at, before.size(), now);
+  }
+  return warning;
+}
+
 std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed) {
   Hasher hasher;
   hasher.add(recipe);

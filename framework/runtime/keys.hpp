@@ -50,6 +50,9 @@ std::string text_of(const OptionValue& value, OptionType type, const Contents& c
 /// What makes two results differ: "option 'high' is 80, was 75; input 'field' changed". Empty where nothing does.
 std::string difference(const Provenance& before, const Provenance& now);
 
+/// A warning that was kept with a result, with the paths that the node has now: the same content may lie elsewhere by now.
+std::string warning_now(std::string warning, const PipelineNode& node, const Provenance& kept);
+
 /// The seed that a call draws from.
 std::uint64_t seed_of(const Digest& recipe, std::uint64_t run_seed);
 

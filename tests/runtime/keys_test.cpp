@@ -266,6 +266,17 @@ TEST_F(Keys, OptionsInWords) {
   EXPECT_EQ(marrow::text_of(std::vector<std::string>{file, file}, OptionType::paths), "[" + file + content + ", " + file + content + "]");
 }
 
+TEST_F(Keys, KeptWarningsNameTheFileThatIsReadNow) {
+  Provenance kept;
+  for (std::size_t i = 0; i < node_.options.size(); ++i)
+    kept.options[node_.info.options[i].name] = marrow::text_of(node_.options[i], node_.info.options[i].type);
+  const std::string before = std::get<std::string>(option("file")), now = write("elsewhere/file", "content");
+  option("file") = now;
+  EXPECT_EQ(marrow::warning_now(before + ": it has holes; " + before, node_, kept), now + ": it has holes; " + now);
+  EXPECT_EQ(marrow::warning_now("holes", node_, kept), "holes");
+  EXPECT_EQ(marrow::warning_now(before + ": it has holes", node_, {}), before + ": it has holes") << "nothing is known of it";
+}
+
 TEST_F(Keys, WhatMadeADifference) {
   Provenance before;
   before.node = "edges.canny";
