@@ -179,7 +179,8 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   const RunResult result = run_pipeline(pipeline, catalogue_, settings);
   if (result.failed()) throw Error("case '" + one.name + "' cannot be simulated: " + reason_of(pipeline, result));
   if (states_of_files(pipeline) != states || case_folder_of(place_of_simulated(index, Look::anew)) != folder)
-    throw Error("case '" + one.name + "' cannot be simulated: what it is made from was changed meanwhile; run it again");
+    throw Error("case '" + one.name +
+                "' cannot be simulated: what it is made from was changed meanwhile; run it again");
   const TemporaryFolder temporary(folder);
   RunFolder written(temporary.path, pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))

@@ -79,7 +79,8 @@ fs::path CellRunner::place_of_simulated(std::size_t index, Look look) const {
   Hasher hasher;
   add_pipeline(hasher, simulation_of(index), {}, look);
   hasher.add(experiment_.cases[index].seed);
-  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" / experiment_.simulation.output;
+  return (store_ ? store_->cases() : folder_ / "cases") / hasher.digest().hex() / "outputs" /
+         experiment_.simulation.output;
 }
 
 fs::path CellRunner::case_place(std::size_t index) const {

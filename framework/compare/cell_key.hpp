@@ -5,7 +5,8 @@
 
 namespace marrow::compare {
 
-/// Of the states of all files that the pipeline's needed nodes name: another one where any was written to in the meantime.
+/// Of the states of all files that the pipeline's needed nodes name: another one where any was written to in the
+/// meantime.
 Digest states_of_files(const Pipeline& pipeline);
 
 }  // namespace marrow::compare

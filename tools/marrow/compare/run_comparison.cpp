@@ -71,7 +71,8 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
 class Comparison {
  public:
   Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder)
-      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)), rows_(cells_.size()), keys_(cells_.size()),
+      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)),
+        rows_(cells_.size()), keys_(cells_.size()),
         runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {
     runner_.keep_dependencies();
   }
@@ -113,7 +114,9 @@ class Comparison {
     std::vector<Job> jobs;
     for (std::size_t i = 0; i < experiment_.cases.size(); ++i)
       if (const compare::ExperimentCase& one = experiment_.cases[i]; one.is_simulated)
-        jobs.push_back({{{"do", "case"}, {"case", one.name}, {"place", json_of_bytes(runner_.case_place(i).string())}}, one.name, i});
+        jobs.push_back({{{"do", "case"}, {"case", one.name}, {"place", json_of_bytes(runner_.case_place(i).string())}},
+                        one.name,
+                        i});
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {

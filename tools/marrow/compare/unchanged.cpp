@@ -10,8 +10,9 @@ namespace {
 namespace fs = std::filesystem;
 
 [[noreturn]] void refuse(const std::string& what) {
-  throw Error(what + " was changed while the comparison ran: its tables may mix the old with the new; give the same "
-                     "command again, which runs again what that concerns");
+  throw Error(what +
+              " was changed while the comparison ran: its tables may mix the old with the new; give the same "
+              "command again, which runs again what that concerns");
 }
 
 /// The folder, or the seed, of each case by its name.
@@ -26,7 +27,8 @@ std::map<std::string, std::string> cases_of(const compare::Experiment& experimen
 std::string difference(const compare::Experiment& before, const compare::Experiment& now) {
   const auto old_cases = cases_of(before), new_cases = cases_of(now);
   for (const auto& one : old_cases)
-    if (!new_cases.contains(one.first) || *new_cases.find(one.first) != one) return "'" + one.first + "' is another, or gone";
+    if (!new_cases.contains(one.first) || *new_cases.find(one.first) != one)
+      return "'" + one.first + "' is another, or gone";
   for (const auto& one : new_cases)
     if (!old_cases.contains(one.first)) return "'" + one.first + "' is new";
   return "";
@@ -49,7 +51,8 @@ void Unchanged::check(const compare::Dependencies& dependencies) const {
   Diagnostics diagnostics;
   const compare::Experiment now = compare::read_experiment(experiment_.file, catalogue, diagnostics);
   if (!diagnostics.empty()) refuse("what " + experiment_.file.string() + " names (" + diagnostics.text() + ")");
-  if (const std::string other = difference(experiment_, now); !other.empty()) refuse("the list of cases (" + other + ")");
+  if (const std::string other = difference(experiment_, now); !other.empty())
+    refuse("the list of cases (" + other + ")");
 }
 
 }  // namespace marrow::cli

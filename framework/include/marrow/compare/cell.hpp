@@ -74,7 +74,8 @@ class CellRunner {
   std::filesystem::path case_place(std::size_t case_index) const;
   /// The folder of a case; a simulated one is made where it is not in the store yet. Throws Error when that fails.
   std::filesystem::path case_folder(std::size_t case_index);
-  /// From now on every path is looked at once: for a process that asks others to run cells, and must tell them all the same.
+  /// From now on every path is looked at once: for a process that asks others to run cells, and must tell them all
+  /// the same.
   void keep_dependencies() { keeps_dependencies_ = true; }
   /// What was looked at since.
   const Dependencies& dependencies() const { return dependencies_; }
@@ -102,9 +103,11 @@ class CellRunner {
  private:
   enum class Look { may_be_kept, anew };
   std::string content_of(const std::string& path, Look look) const;
-  void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const std::filesystem::path& case_folder, Look look) const;
+  void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const std::filesystem::path& case_folder,
+                    Look look) const;
   std::string key_of(const CellIndex& cell, const Pipeline& pipeline);
-  /// What a run depends on, with the times of its files: another one where any was written to, even if it holds the same again.
+  /// What a run depends on, with the times of its files: another one where any was written to, even if it holds the
+  /// same again.
   struct Watched {
     Digest states;
     std::string key;
