@@ -61,8 +61,7 @@ class BadData(Case):
         (self.scratch / "ct.tif").write_bytes(tiff(16, 12, [[number * 100] * 192 for number in range(6)]))
         (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), [1.5] * 64))
         for name in ("series", "ct.tif, voxel_size_mm: [1, 1, 1]", "ct.mha"):
-            result = marrow("run", self.write("p.yaml", READ_VOLUME % name), "--out", self.scratch / name.split(",")[0].replace(".", "-out-"
-                            if "." in name else ".") / "out", "--quiet")
+            result = marrow("run", self.write("p.yaml", READ_VOLUME % name), "--out", self.scratch / ("out-" + name.split(",")[0]), "--quiet")
             self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_dicom_slice_cut_off(self):
