@@ -3,6 +3,8 @@
 
 #include <charconv>
 
+#include "amount_bounds.hpp"
+
 namespace marrow::cli {
 namespace {
 

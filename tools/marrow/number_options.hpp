@@ -22,9 +22,7 @@ CLI::Option* add_whole_number(CLI::App* command, const std::string& option, T& t
   return command->add_option_function<std::string>(option, take, help)->type_name("WHOLE NUMBER");
 }
 
-/// Of megabytes and seconds: more than nothing, and less than what a clock or a counter cannot hold.
-inline constexpr double kLeastAmount = 0.001, kMostAmount = 1e9;
-
+/// Of megabytes or seconds, within the bounds of amounts.
 CLI::Option* add_amount(CLI::App* command, const std::string& option, double& target, const std::string& unit,
                         const std::string& help);
 

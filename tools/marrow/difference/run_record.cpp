@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <set>
 
+#include "amount_bounds.hpp"
 #include "marrow/domain/error.hpp"
-#include "number_options.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/printable.hpp"
