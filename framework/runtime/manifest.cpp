@@ -16,7 +16,7 @@ namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 1;
+constexpr int kManifestVersion = 2;  // 2: with the libraries that others of the plugin need
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
 constexpr std::size_t kMostLinked = 1000;

@@ -182,7 +182,7 @@ class Compare(Case):
         self.assertEqual(os.listdir(self.scratch / "cache"), ["mine"])
 
     def test_limits_of_reading_come_to_the_workers_as_they_are(self):
-        result = self.compare(self.experiment({"a": "{}"}, cases=1), "--out", self.scratch / "out", "--file-seconds", "1e-7", "--file-memory", "1e30")
+        result = self.compare(self.experiment({"a": "{}"}, cases=1), "--out", self.scratch / "out", "--file-seconds", "0.001", "--file-memory", "1e9")
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(self.rows("out")["a/0/0"]["reason"], "")
 

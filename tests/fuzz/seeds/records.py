@@ -85,7 +85,7 @@ def manifest_seeds():
                for name, value in defaults.items()]
     options[2].update(minimum=0, maximum=9.5)
     node = {"name": "test.add", "summary": "Adds", "random": True, "inputs": [port], "outputs": [dict(port, axis="side")], "options": options}
-    manifest = {"marrow_manifest": 1, "library": "0123456789abcdef0123456789abcdef", "refused": "", "linked": [{"path": "/usr/lib/a.so", "size": 5}], "nodes": [node],
+    manifest = {"marrow_manifest": 2, "library": "0123456789abcdef0123456789abcdef", "refused": "", "linked": [{"path": "/usr/lib/a.so", "size": 5}], "nodes": [node],
                 "writers": [{"type": kind, "extension": "json", "help": "h"}], "checksum": "0" * 32}
     files = {"c_all": manifest, "c_refused": dict(manifest, nodes=[], refused="is no plugin"), "r_all": manifest, "c_digest": dict(manifest, library="x" * 32),
              "c_invented": dict(manifest, nodes=[dict(node, options=[dict(options[0], type="invented")])])}
