@@ -15,8 +15,10 @@ fs::path plain_path(const fs::path& path) {
     if (part.empty() || part == "." || (is_up && is_root)) continue;  // above the root is the root
     std::error_code error;
     const bool goes_with_it = is_up && plain.filename() != ".." && fs::is_directory(fs::symlink_status(plain, error));
-    if (goes_with_it) plain = plain.parent_path();
-    else plain /= part;
+    if (goes_with_it)
+      plain = plain.parent_path();
+    else
+      plain /= part;
   }
   const fs::path shortest = path.lexically_normal();
   if (plain.empty()) return shortest.empty() ? plain : ".";

@@ -37,7 +37,8 @@ class XmalabText {
     while (stream_)
       if (const std::string line = next_line(); !line.empty())
         fail("expected the end of the file after the translation, got '" + line.substr(0, 40) + "', which is not read" +
-             (line.rfind("undistortion", 0) == 0 ? ": give images that are already undistorted, and take the block out" : ""));
+             (line.rfind("undistortion", 0) == 0 ? ": give images that are already undistorted, and take the block out"
+                                                 : ""));
   }
 
   std::vector<double> numbers(std::size_t count) {

@@ -106,7 +106,8 @@ bool is_straight(const Affine& affine) {
   if (!is_finite(affine)) return false;
   for (std::size_t a = 0; a < 3; ++a)
     for (std::size_t b = a; b < 3; ++b) {
-      if (a == b ? !(dot(a, a) > 0) : std::abs(dot(a, b)) > kRoundedDirection * std::sqrt(dot(a, a) * dot(b, b))) return false;
+      if (a == b ? !(dot(a, a) > 0) : std::abs(dot(a, b)) > kRoundedDirection * std::sqrt(dot(a, a) * dot(b, b)))
+        return false;
     }
   return true;
 }

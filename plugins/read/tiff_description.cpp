@@ -3,6 +3,8 @@
 
 #include <cstdlib>
 
+#include "header_lines.hpp"
+
 namespace marrow::read {
 namespace {
 
@@ -38,7 +40,7 @@ std::string of_tifffile(const std::string& text) {
     if (const long length = std::strtol(at, &stop, 10); length > 1) ++dimensions;
     at = stop == at ? at + 1 : stop;
   }
-  if (dimensions > 3) return "an array of " + std::to_string(dimensions) + " dimensions, " + shape;
+  if (dimensions > 3) return "an array of " + std::to_string(dimensions) + " dimensions, " + shown(shape);
   const std::size_t key = text.find("\"axes\": \"");
   const std::string axes = key == std::string::npos ? "" : text.substr(key + 9, text.find('"', key + 9) - (key + 9));
   if (dimensions == 3 && axes.size() == 3 && (axes[0] == 'T' || axes[0] == 'C'))

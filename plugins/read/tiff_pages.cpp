@@ -96,7 +96,8 @@ class Walk {
       if (std::uint64_t* const place = place_of(page, tag)) {
         const auto numbers = numbers_of(entry);
         if (numbers.empty())
-          throw Error(what() + ": its field " + std::to_string(tag) + " has no number of a kind that is read; it is "
+          throw Error(what() + ": its field " + std::to_string(tag) +
+                      " has no number of a kind that is read; it is "
                       "damaged, or save it anew as a plain TIFF");
         *place = numbers[0];
         // Samples of a pixel may each have a width and a format of their own.
@@ -116,7 +117,8 @@ class Walk {
     count_bytes(length);
     const TiffDescription description = read_tiff_description(window_.text(at, length));
     if (description.is_truncated)
-      throw Error(what() + ": its first page stands for several, of which the others have no directory (tifffile's "
+      throw Error(what() +
+                  ": its first page stands for several, of which the others have no directory (tifffile's "
                   "'truncated'); save it without");
     if (tiff_.other_pages.empty()) tiff_.other_pages = description.other_pages;
   }

@@ -15,7 +15,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-
 std::string lower_extension(const fs::path& path) {
   return in_small_letters(path.extension().string());
 }
@@ -33,7 +32,8 @@ VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
   if (is_tiff(extension)) {
     VolumeSamples volume{read_tiff(path), {}};
     if (volume.geometry.components != 1)
-      throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) + " values per voxel; a CT has one");
+      throw Error(path.string() + ": has " + std::to_string(volume.geometry.components) +
+                  " values per voxel; a CT has one");
     if (!volume.geometry.other_pages.empty())
       throw Error(path.string() + ": is " + volume.geometry.other_pages +
                   ", whose pages are not slices of one volume; save one of them alone, or, where they are slices, save "
@@ -70,7 +70,8 @@ Grid grid_of(const Samples& samples) {
   grid.origin_mm = Eigen::Map<const Eigen::Vector3d>(samples.origin_mm.data());
   grid.direction = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(samples.direction.data());
   const Eigen::Matrix3d defect = grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity();
-  if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection && defect.cwiseAbs().maxCoeff() > 1e-12) {
+  if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection &&
+      defect.cwiseAbs().maxCoeff() > 1e-12) {
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(grid.direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
     grid.direction = svd.matrixU() * svd.matrixV().transpose();
   }

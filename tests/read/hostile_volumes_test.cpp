@@ -209,7 +209,9 @@ TEST_F(Hostile, NrrdThatDoesNotSayHowLargeVoxelsAre) {
 
 TEST_F(Hostile, NrrdThatSaysTwiceHowLargeVoxelsAre) {
   const std::string bytes = good("a.nrrd");  // of voxels of 1 mm
-  const auto spaced = [&](const std::string& value) { return with(bytes, "\nendian", "\nspacings: " + value + "\nendian"); };
+  const auto spaced = [&](const std::string& value) {
+    return with(bytes, "\nendian", "\nspacings: " + value + "\nendian");
+  };
   for (const char* value : {"1 1 2", "1 x 1", "1 1 1 1", "1 1 0"})
     expect("b.nrrd", spaced(value), "expected the lengths of the 'space directions' (or take 'spacings' out)");
   for (const char* value : {"1 1 1", "nan NaN nan", "1.0005 1 1"}) {
@@ -265,7 +267,8 @@ TEST_F(Hostile, RoundedDirectionsAreMadeExact) {
   std::string nifti = replaced(good("a.nii"), 252, number<std::int16_t>(0));
   for (int row = 0; row < 3; ++row)
     for (int axis = 0; axis < 3; ++axis)
-      nifti = replaced(nifti, 280 + 16 * std::size_t(row) + 4 * std::size_t(axis), number(float(row < 2 ? -rounded(row, axis) : rounded(row, axis))));
+      nifti = replaced(nifti, 280 + 16 * std::size_t(row) + 4 * std::size_t(axis),
+                       number(float(row < 2 ? -rounded(row, axis) : rounded(row, axis))));
   put(folder / "b.nii", nifti);
   for (const char* name : {"b.mha", "b.nii"}) {
     const marrow::Grid grid = volume_at(folder / name).grid;
@@ -276,10 +279,13 @@ TEST_F(Hostile, RoundedDirectionsAreMadeExact) {
 
 TEST_F(Hostile, VoxelsOfImpossibleSizes) {
   const std::string bytes = good("a.mha");
-  for (const auto& [length, said] : {std::pair{"1e-300", "voxel spacing 1e-300 mm; expected 0.001 to 100 mm: is it in another unit?"},
-                                     {"0.0005", "voxel spacing 0.0005 mm; expected"}, {"1e308", "voxel spacing 1e+308 mm; expected"}})
+  for (const auto& [length, said] :
+       {std::pair{"1e-300", "voxel spacing 1e-300 mm; expected 0.001 to 100 mm: is it in another unit?"},
+        {"0.0005", "voxel spacing 0.0005 mm; expected"},
+        {"1e308", "voxel spacing 1e+308 mm; expected"}})
     expect("b.mha", with(bytes, "ElementSpacing = 1 1 1", "ElementSpacing = 1 1 " + std::string(length)), said);
-  expect("b.mha", with(bytes, "Offset = 0 0 0", "Offset = 0 0 1e308"), "the volume begins 1e+308 mm from the origin; expected at most 1 km");
+  expect("b.mha", with(bytes, "Offset = 0 0 0", "Offset = 0 0 1e308"),
+         "the volume begins 1e+308 mm from the origin; expected at most 1 km");
 }
 
 TEST_F(Hostile, NiftiThatSaysTwiceHowLargeVoxelsAre) {
@@ -424,8 +430,9 @@ TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
   expect("a.tif", stack("{\"axes\": \"TZYX\", \"shape\": [2, 2, 2, 2]}"), "is an array of 4 dimensions, [2, 2, 2, 2]");
   expect("a.tif", stack("{\"shape\": [2, 2, 2], \"axes\": \"TYX\"}"), "is a stack of times");
   expect("a.tif", stack("{\"shape\": [2, 2, 2], \"truncated\": true}"), "its first page stands for several");
-  for (const char* slices : {"{\"shape\": [2, 2, 2]}", "{\"shape\": [1, 2, 2, 2], \"axes\": \"TZYX\"}",
-                             "{\"shape\": [2, 2, 2], \"axes\": \"ZYX\"}", "<OME><Pixels SizeC=\"1\" SizeT=\"1\"/></OME>"}) {
+  for (const char* slices :
+       {"{\"shape\": [2, 2, 2]}", "{\"shape\": [1, 2, 2, 2], \"axes\": \"TZYX\"}",
+        "{\"shape\": [2, 2, 2], \"axes\": \"ZYX\"}", "<OME><Pixels SizeC=\"1\" SizeT=\"1\"/></OME>"}) {
     put(folder / "a.tif", stack(slices));
     EXPECT_EQ(volume_at(folder / "a.tif").grid.size, (std::array<int, 3>{2, 2, 2})) << slices;
   }
@@ -434,7 +441,8 @@ TEST_F(Hostile, TiffOfImageJWhosePagesAreNoSlices) {
 TEST_F(Hostile, TiffFieldsOfKindsThatAreNotRead) {
   std::string bytes = "II" + number<std::uint16_t>(42) + number<std::uint32_t>(8) + tiff_directory(0);
   const std::size_t at = bytes.find(tiff_entry(278, 4, 1, 2));
-  expect("a.tif", bytes.replace(at, 12, tiff_entry(339, 8, 1, 2)), "its field 339 has no number of a kind that is read");
+  expect("a.tif", bytes.replace(at, 12, tiff_entry(339, 8, 1, 2)),
+         "its field 339 has no number of a kind that is read");
 }
 
 TEST_F(Hostile, TiffWhosePagesRunInACircle) {
