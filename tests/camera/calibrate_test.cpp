@@ -158,6 +158,41 @@ TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
   EXPECT_NEAR(ratio.root_mean_square(), 1, 0.15);
 }
 
+TEST(Calibrate, SquarePixelsHaveOneFocalLengthAndOneDeviation) {
+  const camera::Board board = camera::read_board_file(test::kBoardFile);
+  const auto views = test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 4), 0.2, 1);
+  const auto fit = camera::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
+  EXPECT_DOUBLE_EQ(fit.calibration.intrinsics(0, 0), fit.calibration.intrinsics(1, 1));
+  EXPECT_GT(fit.calibration.focal_deviation_px[0], 0);
+  EXPECT_EQ(fit.calibration.focal_deviation_px[1], fit.calibration.focal_deviation_px[0]);
+}
+
+// f x = u z and f y = v z, for a point at (x, y, z) in the camera's frame: the best f has no derivative left.
+TEST(Calibrate, ClosedFormSolvesItsEquationsWhateverIsSeen) {
+  std::mt19937_64 random(7);
+  std::uniform_real_distribution<double> place_mm(-100, 100), pixel(0, 1023);
+  int found = 0;
+  for (int trial = 0; trial < 200; ++trial) {
+    camera::ViewPoints view{"view", {}, {}, {}};
+    for (int i = 0; i < 12; ++i) {
+      view.board_mm.emplace_back(place_mm(random), place_mm(random), place_mm(random));
+      view.pixels.emplace_back(pixel(random), pixel(random));
+    }
+    const auto start = camera::closed_form_camera(view, {511.5, 511.5});
+    if (!start || start->is_mirrored) continue;
+    ++found;
+    double derivative = 0, squares = 0;
+    for (std::size_t i = 0; i < view.board_mm.size(); ++i) {
+      const Eigen::Vector3d x = start->camera_from_world * view.board_mm[i];
+      const Eigen::Vector2d seen = view.pixels[i] - Eigen::Vector2d(511.5, 511.5);
+      derivative += x.head<2>().dot(start->focal_px * x.head<2>() - seen * x.z());
+      squares += x.head<2>().squaredNorm() * start->focal_px;
+    }
+    EXPECT_LT(std::abs(derivative), 1e-6 * squares) << "trial " << trial;
+  }
+  EXPECT_GT(found, 10);
+}
+
 TEST(Calibrate, RefusesWithoutEnoughBeads) {
   const camera::Board board = camera::read_board_file(test::kBoardFile);
   auto views = test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 3), 0, 1);

@@ -112,6 +112,25 @@ TEST(GradientProjection, AnEvenImageIsTheWorst) {
   EXPECT_EQ(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1);
 }
 
+TEST(GradientProjection, ImagesThatAreTurnedBy180DegreesGiveTheSame) {
+  marrow::View view = view_of(0), turned = view;
+  cv::rotate(view.image.pixels, turned.image.pixels, cv::ROTATE_180);
+  const Eigen::Matrix3d about_axis = Eigen::Vector3d(-1, -1, 1).asDiagonal();
+  turned.camera.camera_from_world.rotation = about_axis * view.camera.camera_from_world.rotation;
+  turned.camera.camera_from_world.translation_mm = about_axis * view.camera.camera_from_world.translation_mm;
+  for (int i : {0, 1}) turned.camera.intrinsics(i, 2) = 255 - view.camera.intrinsics(i, 2);
+  const auto cost_of = [](const marrow::View& seen) {
+    marrow::List<marrow::View> views;
+    views.add("frontal", seen);
+    shipped::Inputs in = inputs();
+    in["views"] = shipped::list(views, "view");
+    return shipped::call("similarity.gradient_projection", in).at("cost");
+  };
+  const marrow::Value straight = cost_of(view), other = cost_of(turned);
+  for (const double x : {0.0, 1.3, 4.1})
+    EXPECT_NEAR(straight.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)), other.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)), 1e-5);
+}
+
 TEST(GradientProjection, SaysWhatIsWrong) {
   shipped::Inputs in = inputs();
   marrow::Volume even = ball();
