@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whether a run, computed again from its folder, gives the same."""
 import json
+import struct
 
 from diff_test import CHAIN, Runs
 from marrow_cli import CACHE, IS_SANITIZED, TEST_PLUGINS, main
@@ -70,8 +71,13 @@ class Rerun(Runs):
 
     def test_with_the_limits_of_the_run(self):
         text = "marrow: 1\nnodes:\n  r: {uses: read.mesh, with: {path: a.ply}}\noutputs: {r: r}\n"
-        self.write("a.ply", "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\nelement face 4\n"
-                   "property list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")
+        count = 200_000  # more than a process has left over before its first limit
+        header = ("ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty double x\nproperty double y\nproperty double z\nelement face 4\n"
+                  "property list uchar int vertex_indices\nend_header\n" % count)
+        corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)] + [(i % 100, i // 100, 0) for i in range(4, count)]
+        faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+        (self.scratch / "a.ply").write_bytes(header.encode() + b"".join(struct.pack("<3d", *corner) for corner in corners) +
+                                             b"".join(struct.pack("<B3i", 3, *face) for face in faces))
         self.run_into("plain", text)
         self.run_into("a", text, "--file-memory", 900, "--file-seconds", "7.5")
         limits = lambda name: [json.loads((self.scratch / name / "run.json").read_text()).get(limit) for limit in ("file_memory_mb", "file_seconds")]
