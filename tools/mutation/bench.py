@@ -80,6 +80,7 @@ class Bench:
 
     def run(self, test, limit_s):
         """None where the test passes, else what failed."""
+        self.last = test
         scratch = self.own / "scratch"
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir()
@@ -126,15 +127,20 @@ class Bench:
             test.seconds = times[test.name][1]
 
     def try_change(self, path, text, tests):
-        """What catches the file with another text; None where nothing does. Everything is put back."""
+        """What catches the file with another text; None where nothing does. Everything is put back. A test that then fails as well tells nothing."""
         source = self.root / path
         made = self.graph.made_from(source)
         self.save([str(source), *made])
+        self.last = None
         try:
             source.write_text(text)
-            return self.first_failure(sorted(tests, key=lambda test: (test.command[0] not in made, test.seconds)), made)
+            caught = self.first_failure(sorted(tests, key=lambda test: (test.command[0] not in made, test.seconds)), made)
         finally:
             self.put_back()
+        without = self.run(self.last, self.last.limit_s()) if caught and self.last else None
+        if without:
+            raise SystemExit("fails also where nothing is changed: " + without)
+        return caught
 
     def first_failure(self, tests, made):
         """Builds for each test what it needs, the tests that hold the changed code themselves first."""
