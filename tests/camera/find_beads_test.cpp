@@ -78,6 +78,19 @@ TEST(FindBeads, NotWhatTouchesTheBorder) {
   }
 }
 
+TEST(FindBeads, AllFourBordersAreAlike) {
+  std::size_t first = 0, last = 0;
+  for (double away = 5; away < 10; away += 0.2) {
+    const std::size_t left = count({{away, 120, 12, 12}});
+    EXPECT_EQ(count({{150, away, 12, 12}}), left) << away;
+    EXPECT_EQ(count({{299 - away, 120, 12, 12}}), left) << away;
+    EXPECT_EQ(count({{150, 259 - away, 12, 12}}), left) << away;
+    (away < 5.1 ? first : last) = left;
+  }
+  EXPECT_EQ(first, 0u);
+  EXPECT_EQ(last, 1u);
+}
+
 TEST(FindBeads, CentresOnSlopesAndBesideOthers) {
   // Largest first. The neighbour's darkness would pull a centre by tenths of a pixel.
   const std::vector<Ellipse> beads{{60.3, 70.8, 16, 16}, {84.1, 70.2, 12, 12}, {150.5, 120.25, 9, 9, 250}, {166.2, 131.7, 8.6, 8.6, 300}, {240.4, 200.6, 14, 14, 350}};

@@ -159,6 +159,34 @@ TEST(ContourDistance, SaysWhatIsWrong) {
             "view 'lateral': no edge lies inside the mask; widen the mask");
 }
 
+TEST(NearestOutline, IsThatOfASearchThroughAll) {
+  std::vector<marrow::OutlinePoint> points;
+  for (int i = 0; i < 300; ++i) {
+    const double angle = 0.7 * i;
+    points.push_back({float((i * 37) % 131) - 5, float((i * 53) % 101) - 5, float(std::cos(angle)), float(std::sin(angle)), Eigen::Vector3f::Zero()});
+  }
+  for (const double reach_px : {0.5, 4.0, 9.0}) {
+    const NearestOutline nearest(points, 120, 90, reach_px);
+    int within = 0;
+    for (float v = -2; v < 94; v += 1.7f)
+      for (float u = -2; u < 124; u += 1.9f) {
+        const marrow::EdgePixel edge{u, v, 0.6f, 0.8f, 1};
+        double best = reach_px;
+        int expected = -1;
+        for (std::size_t i = 0; i < points.size(); ++i) {
+          const double away = std::hypot(double(points[i].u_px) - u, double(points[i].v_px) - v);
+          if (away < best - 1e-6 && 0.6 * double(points[i].normal_u) + 0.8 * double(points[i].normal_v) >= 0.5) best = away, expected = int(i);
+        }
+        const int found = nearest.find(edge, reach_px, 0.5f);
+        ASSERT_EQ(found < 0, expected < 0) << u << " " << v << " " << reach_px;
+        if (found < 0) continue;
+        ++within;
+        EXPECT_NEAR(std::hypot(double(points[std::size_t(found)].u_px) - u, double(points[std::size_t(found)].v_px) - v), best, 1e-4);
+      }
+    EXPECT_GT(within, 5);
+  }
+}
+
 TEST(NearestEdges, AgreesWithASearchThroughAll) {
   // Single edges far apart, so that no smoothing moves them.
   marrow::EdgeMap map{120, 90, {}};

@@ -68,6 +68,20 @@ TEST(GradientProjection, IsBestAtTheTruth) {
   EXPECT_NEAR(value(0, -900, 0), 1, 0.2) << "behind one of two sources";
 }
 
+TEST(GradientProjection, WhatLiesBehindTheSourceIsNotSeen) {
+  shipped::Inputs in = inputs();
+  marrow::List<marrow::View> views;
+  marrow::View view = view_of(0);
+  view.image.pixels = 60000 - view.image.pixels;
+  views.add("frontal", view);
+  in["views"] = shipped::list(views, "view");
+  const marrow::Value made = shipped::call("similarity.gradient_projection", in).at("cost");
+  // Through the source the ball would be seen where it is now, upside down, with gradients that then fit a bright ball.
+  const Eigen::Vector3d behind_mm = 2 * marrow::source_position_mm(views[0].camera);
+  for (const double off_mm : {-3.0, 0.0, 4.0})
+    EXPECT_EQ(made.as<marrow::Cost>().value(shifted(behind_mm.x() + off_mm, behind_mm.y(), behind_mm.z() - off_mm)), 1) << off_mm;
+}
+
 TEST(GradientProjection, DirectionsCount) {
   // A bright ball: all gradients point the other way.
   shipped::Inputs in = inputs();
