@@ -27,6 +27,27 @@ class WallProjector : public Projector {
   }
 };
 
+/// A square whose region ends with it, or further out.
+class SquareProjector : public Projector {
+ public:
+  explicit SquareProjector(int around_px) : around_px_(around_px) {}
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&, const marrow::PixelGrid& grid) const override {
+    std::vector<float> values;
+    for (int row = 0; row < grid.rows; ++row)
+      for (int column = 0; column < grid.columns; ++column) {
+        const Eigen::Vector2d p = grid.pixel(column, row);
+        values.push_back(p.x() >= 80 && p.x() < 120 && p.y() >= 60 && p.y() < 100 ? 10.0f : 0.0f);
+      }
+    return values;
+  }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
+    return {80.0 - around_px_, 60.0 - around_px_, 1, 40 + 2 * around_px_, 40 + 2 * around_px_};
+  }
+
+ private:
+  const int around_px_;
+};
+
 /// Edges at u, facing left as the wall's do: left of it the image is brighter.
 shipped::Inputs inputs(double u, float direction = -1) {
   marrow::EdgeMap map{200, 170, {}};
@@ -56,6 +77,16 @@ TEST(DrrEdges, WhatDoesNotMatchIsTheWorst) {
   EXPECT_NEAR(value(inputs(130), at(0, 0)), loss(10), 1e-9) << "beyond the reach";
   EXPECT_NEAR(value(inputs(100, 1), at(0, 0)), loss(10), 1e-9) << "edges of the other direction";
   EXPECT_NEAR(value(inputs(100), at(80, 0)), loss(10), 1e-9) << "out of view";
+}
+
+TEST(DrrEdges, BlurReachesBeyondTheRegion) {
+  const auto value_with = [](int around_px, double blur_px) {
+    shipped::Inputs in = inputs(81);
+    in["projector"] = marrow::Value::of<Projector>(std::make_shared<const SquareProjector>(around_px));
+    const marrow::Value cost = shipped::call("similarity.drr_edges", in, {{"blur_px", blur_px}, {"reach_px", 10.0}}).at("cost");
+    return cost.as<marrow::Cost>().value(at(0, 0));
+  };
+  for (const double blur_px : {1.5, 4.0}) EXPECT_NEAR(value_with(0, blur_px), value_with(30, blur_px), 1e-3) << blur_px;
 }
 
 TEST(DrrEdges, Levels) {
