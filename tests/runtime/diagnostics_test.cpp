@@ -81,6 +81,8 @@ TEST(Diagnostics, LongMessagesAreCut) {
 TEST(Suggestion, NearNamesAlone) {
   EXPECT_EQ(marrow::suggestion("vlaue", {"count", "value", "flag"}), "did you mean 'value'?")
       << "two neighbours swapped";
+  for (const std::vector<std::string>& known : {std::vector<std::string>{"read", "eradxy"}, {"eradxy", "read"}})
+    EXPECT_EQ(marrow::nearest_name("erad", known), "read") << "the first two are swapped";
   EXPECT_EQ(marrow::nearest_name("kitten", {"sitting", "kitchen"}), "kitchen");
   EXPECT_EQ(marrow::nearest_name("abcdef", {"uvwxyz"}), "");
   EXPECT_EQ(marrow::suggestion("abcdef", {}), "there are none");
