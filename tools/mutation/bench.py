@@ -17,7 +17,7 @@ from graph import Graph
 NEAR = {
     "framework/domain": ["domain_", "fracture_", "evaluate_targets", "evaluate_pose_error", "evaluate_shapes", "register_", "camera_", "mesh_", "read_camera", "read_pose",
                          "initial_axis", "runtime_"],
-    "framework/runtime": ["runtime_", "domain_hash", "compare_experiment", "cli_"],
+    "framework/runtime": ["runtime_", "domain_hash", "compare_experiment", "cli_bad", "cli_ca", "cli_co", "cli_d", "cli_mu", "cli_na", "cli_nu", "cli_pl", "cli_r", "cli_sc", "cli_w"],
     "framework/compare": ["compare_", "cli_compare", "cli_commands"],
     "plugins/camera": ["camera_", "conformance_camera", "cli_schema"],
     "plugins/evaluate": ["evaluate_", "cli_schema"],
