@@ -291,6 +291,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     write_back_files(pipeline_.nodes[node]);
     // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
+    if (const std::string elsewhere = working_folder_.go_back(); !elsewhere.empty())
+      throw Error("the working folder was changed to " + elsewhere + " while it ran; a plugin must leave it as it is");
     check_unchanged(node, inputs, recipe, before);
     seconds = seconds_since(start);
     for (std::size_t i = 0; i < result.outputs.size(); ++i) finish_value(result.outputs[i], recipe.key, i, inputs);
@@ -308,6 +310,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     result.status = Status::failed;
     result.reason = error.what();
   }
+  working_folder_.go_back();  // also where it failed
   if (result.status == Status::failed) report(RunEvent::Kind::failed, node, item, failure_text(node, item, result.reason));
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);

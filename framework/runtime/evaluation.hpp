@@ -10,6 +10,7 @@
 
 #include "files_read.hpp"
 #include "marrow/runtime/executor.hpp"
+#include "working_folder.hpp"
 
 namespace marrow {
 
@@ -85,6 +86,7 @@ class Evaluation {
   std::function<void(std::size_t, Call&)> finished_;
   std::map<Digest, std::unique_ptr<Memo>> memos_;
   FilesRead files_read_;
+  WorkingFolder working_folder_;
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;
 };

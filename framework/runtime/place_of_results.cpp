@@ -24,16 +24,24 @@ bool is_in(const fs::path& folder, const fs::path& place) {
 
 }  // namespace
 
+std::optional<fs::path> folder_that_holds(const std::vector<fs::path>& folders, const fs::path& place) {
+  const fs::path real_place = real_path(place);
+  for (const fs::path& folder : folders) {
+    const fs::path real = real_path(folder);
+    if (!real.empty() && is_in(real, real_place)) return folder;
+  }
+  return std::nullopt;
+}
+
 void expect_nothing_reads(const Pipeline& pipeline, const fs::path& place, const std::string& what,
                           const std::string& advice) {
-  const fs::path real_place = real_path(place);
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     if (!needed[i]) continue;
     for (const std::string& path : paths_of(pipeline.nodes[i])) {
       std::error_code error;
       const fs::path folder = real_path(path);
-      if (folder.empty() || !fs::is_directory(folder, error) || !is_in(folder, real_place)) continue;
+      if (!fs::is_directory(folder, error) || !folder_that_holds({folder}, place)) continue;
       throw Error(what + " " + place.string() + " lies in " + folder.string() + ", a folder that node '" +
                   pipeline.nodes[i].id + "' reads, which would change while it is read; " + advice);
     }

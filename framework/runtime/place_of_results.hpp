@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "marrow/runtime/pipeline.hpp"
 
@@ -11,5 +13,8 @@ namespace marrow {
 /// they would never be the same before and after. `what` and `advice` are for the sentence. Throws Error.
 void expect_nothing_reads(const Pipeline& pipeline, const std::filesystem::path& place, const std::string& what,
                           const std::string& advice);
+
+/// The first of the folders in which `place` lies, with all links followed; nothing where it lies in none.
+std::optional<std::filesystem::path> folder_that_holds(const std::vector<std::filesystem::path>& folders, const std::filesystem::path& place);
 
 }  // namespace marrow

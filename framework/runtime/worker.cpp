@@ -255,6 +255,11 @@ std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
     end.is_late = true;
     return end;
   }
+  if (limits.seconds < WorkerLimits().seconds && suspended_seconds_ > limits.suspended_seconds) {
+    WorkerEnd end = ended(number_text("was suspended for more than %g s", limits.suspended_seconds));
+    end.is_late = true;
+    return end;
+  }
   if (memory_mb() > limits.memory_mb) {
     WorkerEnd end = ended(number_text("used more than %g MB of memory", limits.memory_mb));
     end.is_out_of_memory = true;
@@ -288,7 +293,10 @@ double Worker::seconds() {
   const auto now = Clock::now();
   const double passed = std::chrono::duration<double>(now - looked_).count();
   looked_ = now;
-  if (is_busy_ && !is_waiting_ && !is_suspended()) seconds_ += std::min(passed, kLongestLook_s);
+  const double counted = std::min(passed, kLongestLook_s);
+  const bool suspended = is_suspended();
+  suspended_seconds_ = suspended ? suspended_seconds_ + counted : 0;
+  if (is_busy_ && !is_waiting_ && !suspended) seconds_ += counted;
   return seconds_;
 }
 

@@ -57,6 +57,26 @@ class Comparison(Case):
 
 
 class Folder(Comparison):
+    def test_nothing_is_written_into_a_case(self):
+        before = sorted(self.scratch.rglob("*"))
+        sentence = "lies in the case %s, which would change while its cells run; " % (self.scratch / "cases" / "1")
+        self.refused("the output folder cases/1/out " + sentence + "choose another with --out", "compare", "e.yaml", "--out", "cases/1/out")
+        self.refused("the output folder cases/1/out " + sentence, "cell", "e.yaml", "a/1/0", "--out", "cases/1/out")
+        store = self.scratch / "cases" / "1" / "store"
+        result = marrow("compare", "e.yaml", "--out", "out", plugins=[TEST_PLUGINS], extra_environment={"MARROW_CACHE": str(store)}, cwd=self.scratch)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn("the store of results %s %sset MARROW_CACHE to another folder, or give --no-cache" % (store, sentence), result.stderr)
+        self.assertEqual(sorted(self.scratch.rglob("*")), before)
+
+    def test_a_plugin_that_goes_elsewhere_takes_no_result_along(self):
+        self.experiment("e", "{a: {}, elsewhere: {m.how: elsewhere}, error: {m.how: error}}")
+        self.marrow(0, "compare", "e.yaml", "--out", "out", "--jobs", 1)
+        cells = json.loads((self.scratch / "out" / "cells" / "elsewhere" / "0" / "0" / "cell.json").read_text())
+        self.assertEqual(cells["reason"], "node 'm' (test.misbehave) failed: the working folder was changed to / while it ran; a plugin must leave it as it is")
+        self.assertEqual(len(list((self.scratch / "out" / "cells").glob("*/*/0/run.json"))), 6)
+        self.marrow(1, "run", "p.yaml", "case=cases/0", "--set", "m.how=elsewhere", "--out", "one")
+        self.assertTrue((self.scratch / "one" / "run.json").exists())
+
     def test_a_folder_with_an_experiment_file_is_not_ours_for_that(self):
         (self.scratch / "mine").mkdir()
         self.write("mine/experiment.yaml", "my own notes")

@@ -112,6 +112,17 @@ TEST(Worker, TimeWhileItIsSuspendedIsNotItsTime) {
   later.join();
 }
 
+TEST(Worker, WhatStaysSuspendedIsEnded) {
+  Worker worker({{MARROW_TEST_WORKER}});
+  wait_for_start(worker);
+  kill(only_child(), SIGSTOP);
+  worker.ask({{"do", "echo"}, {"text", 1}});
+  const WorkerEnd end = worker.wait({120, 1000, 1.5}, nullptr, nullptr);
+  EXPECT_TRUE(end.is_late);
+  EXPECT_EQ(end.failed, "its process was suspended for more than 1.5 s");
+  EXPECT_TRUE(worker.is_dead());
+}
+
 TEST(Worker, CancelEndsIt) {
   const std::atomic<bool> cancelled{true};
   Worker worker({{MARROW_TEST_WORKER}});

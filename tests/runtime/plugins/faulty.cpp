@@ -2,6 +2,7 @@
 // A node that fails in every way that a plugin can fail a comparison.
 #include <chrono>
 #include <csignal>
+#include <filesystem>
 #include <limits>
 #include <thread>
 
@@ -13,13 +14,15 @@ using marrow::Metrics;
 struct Options {
   std::string how = "none";
   double value = 1;
+  std::string text = "it will not do";
 };
 
 Metrics misbehave(const Metrics& a, const Options& options) {
   double value = a.items.at(0).value + options.value;
   if (options.how == "crash") std::raise(SIGSEGV);
   if (options.how == "exit") std::_Exit(3);
-  if (options.how == "error") throw marrow::Error("it will not do");
+  if (options.how == "error") throw marrow::Error(options.text);
+  if (options.how == "elsewhere") std::filesystem::current_path("/");
   if (options.how == "nan") value = std::numeric_limits<double>::quiet_NaN();
   if (options.how == "hang")
     for (;;) std::this_thread::sleep_for(std::chrono::seconds(1));
@@ -34,6 +37,7 @@ Metrics misbehave(const Metrics& a, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("test.misbehave", misbehave).summary("Fails as it is told").in("a", "number").out("number", "a + value")
-      .option("how", &Options::how, "what goes wrong", marrow::one_of({"none", "crash", "exit", "error", "nan", "hang", "memory"}))
-      .option("value", &Options::value, "added");
+      .option("how", &Options::how, "what goes wrong", marrow::one_of({"none", "crash", "exit", "error", "nan", "hang", "memory", "elsewhere"}))
+      .option("value", &Options::value, "added")
+      .option("text", &Options::text, "of the error");
 }

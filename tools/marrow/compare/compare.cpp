@@ -7,6 +7,7 @@
 #include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
 #include "process.hpp"
+#include "runtime/place_of_results.hpp"
 #include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
@@ -30,6 +31,20 @@ bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment&
 
 fs::path folder_of(const CompareRequest& request, const Experiment& experiment) {
   return request.folder.empty() ? fs::path("runs") / "compare" / experiment.name : request.folder;
+}
+
+/// A case counts with all of its files: what is written into it would change it while its cells run.
+void expect_outside_cases(const Experiment& experiment, const fs::path& folder, bool no_cache) {
+  std::vector<fs::path> cases;
+  for (const compare::ExperimentCase& one : experiment.cases)
+    if (!one.folder.empty()) cases.push_back(one.folder);
+  const auto expect = [&](const std::string& what, const fs::path& place, const std::string& advice) {
+    if (const auto holder = folder_that_holds(cases, place))
+      throw Error(what + " " + place.string() + " lies in the case " + holder->string() + ", which would change while its cells run; " + advice);
+  };
+  expect("the output folder", folder, "choose another with --out");
+  const Store store;
+  if (!no_cache && store.fault().empty()) expect("the store of results", store.folder(), "set MARROW_CACHE to another folder, or give --no-cache");
 }
 
 /// The part of a cell's name that is none of the experiment's, and what is near.
@@ -65,6 +80,7 @@ int compare_variants(const CompareRequest& asked) {
     return 0;
   }
   const fs::path folder = folder_of(request, experiment);
+  expect_outside_cases(experiment, folder, request.no_cache);
   const ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::alone);
   request.no_cache = request.no_cache || !can_keep_results(Store().prepare(), request.quiet);
   return run_comparison(request, catalogue, experiment, folder);
@@ -80,6 +96,7 @@ int run_cell(const CompareRequest& request, const std::string& id) {
     return 2;
   }
   const fs::path folder = folder_of(request, experiment);
+  expect_outside_cases(experiment, folder, request.no_cache);
   ComparisonFolder kept(folder, experiment, ComparisonFolder::Use::with_others);
   kept.take_cell(id);
   const Store store;

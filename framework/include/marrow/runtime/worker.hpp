@@ -34,6 +34,7 @@ struct WorkerSettings {
 struct WorkerLimits {
   double seconds = 1e9;  ///< as Worker::seconds() counts
   double memory_mb = 1e9;
+  double suspended_seconds = 60;  ///< in a row; counts only where `seconds` is set
 };
 
 /// How a job ended.
@@ -90,7 +91,7 @@ class Worker {
   bool is_busy_ = false, is_waiting_ = false;
   std::string text_, at_;
   std::chrono::steady_clock::time_point looked_;
-  double seconds_ = 0;
+  double seconds_ = 0, suspended_seconds_ = 0;
 };
 
 /// What a worker tells while it is at a job. Safe to use from several threads.
