@@ -44,6 +44,13 @@ bool is_abandoned(const StoreItem& item) {
   return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && Clock::now() - changed > kDay);
 }
 
+/// Whether something is mounted on what holds it, on it or below it: that is another's.
+bool is_mounted(const StoreItem& item) {
+  std::error_code error;
+  const fs::path parent = fs::canonical(item.path.parent_path(), error);
+  return mount_at_or_below(parent) == parent || mount_at_or_below(item.path);
+}
+
 /// Returns false with the reason where something of it is left. A folder gets another name first, so that no one takes
 /// half of it for the whole; one in use is left.
 bool remove_item(const StoreItem& item, std::error_code& error) {
@@ -119,8 +126,8 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   std::uint64_t total = 0;
   std::vector<StoreItem> remembered;
   for (StoreItem& item : items_of_store(folder_, freed.fault)) {
-    if (mount_at_or_below(item.path)) {
-      freed.fault = item.path.string() + " is left, because something is mounted in it; unmount that first";
+    if (is_mounted(item)) {
+      freed.fault = item.path.string() + " is left, because something is mounted there; unmount that first";
       continue;
     }
     if (item.kind == Kind::temporary) {

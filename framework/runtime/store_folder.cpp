@@ -195,7 +195,8 @@ std::vector<StoreItem> items_of_store(const fs::path& folder, std::string& fault
       add_temporary(name, path, [](const std::string& final) { return final == kStoreMarker || final == "tidied"; });
     } else if (name == "cases") {
       for_each_in(path, fault, [&](const std::string& inner, const fs::path& at, bool is_case) {
-        if (const auto key = key_of_name(inner); key && is_case)
+        std::error_code error;
+        if (const auto key = key_of_name(inner); key && is_case && fs::is_regular_file(at / "content.txt", error))
           items.push_back({Kind::simulated_case, at, *key, 0});
         else if (is_case)
           add_temporary(inner, at, is_key);

@@ -67,11 +67,17 @@ class Cache(Case):
         self.assertEqual((told.returncode, told.stdout), (2, ""))
         self.assertEqual(told.stderr, "marrow: error: %d keys begin with '%s'; give more digits of one of them:\n" % (len(several), digit)
                          + "".join("  %s\n" % key for key in several[:5]) + ("  ...\n" if len(several) > 5 else ""))
+        damaged = next(self.cache.rglob(entries[0]))
+        damaged.write_bytes(damaged.read_bytes()[:-1])
+        told = self.marrow("cache", "why", entries[0])
+        self.assertEqual((told.returncode, told.stdout), (2, ""))
+        self.assertEqual(told.stderr, "marrow: error: the result %s is damaged or of another version; it is made anew when it is needed\n" % entries[0])
 
     def test_what_is_mounted_in_the_store_is_left(self):
         self.assertEqual(self.run_pipeline().returncode, 0)
         inner = self.cache / "cases" / ("0" * 32) / "outputs"
         inner.mkdir(parents=True)
+        (inner.parent / "content.txt").write_text("made by marrow\n")
         (self.scratch / "precious").mkdir()
         self.write("precious/data", "mine")
         script = 'mount --bind "$1" "$2" && "$3" cache gc --keep-gb 0'
@@ -80,7 +86,7 @@ class Cache(Case):
             self.skipTest("only root can mount")
         result = subprocess.run(list(map(str, command)), capture_output=True, text=True, env={**os.environ, "MARROW_CACHE": str(self.cache)})
         self.assertEqual(result.returncode, 2, result.stderr)
-        self.assertIn("%s is left, because something is mounted in it; unmount that first" % inner.parent, result.stderr)
+        self.assertIn("%s is left, because something is mounted there; unmount that first" % inner.parent, result.stderr)
         self.assertEqual((self.scratch / "precious" / "data").read_text(), "mine")
         self.assertTrue(inner.is_dir())
         self.assertIn("1 results removed", result.stdout, "all else is")

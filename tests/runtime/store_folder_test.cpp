@@ -120,6 +120,7 @@ TEST_F(StoreFolderTest, ACaseInUseIsLeft) {
   ASSERT_EQ(save(store), "");
   const fs::path one = folder / "cases" / kHex;
   put(one / "outputs" / "ct.mha");
+  put(one / "content.txt");
   std::shared_ptr<const void> first = marrow::use_folder(one), second = marrow::use_folder(one);
   ASSERT_TRUE(first && second);
   Store::Freed freed = store.collect(0);
@@ -142,6 +143,7 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   const std::string dead = ".tmp-4194304-0";  // no process has that number
   put(scratch.path / "elsewhere" / "ab0123456789abcdef0123456789abcd");
   for (const char* own : {"cases/0123456789abcdef0123456789abcdef/outputs/case/a",
+                          "cases/0123456789abcdef0123456789abcdef/content.txt",
                           "cases/0123456789abcdef0123456789abcdef.tmp-4194304-7/x"})
     put(folder / own);
   put(folder / two / (key + dead));
@@ -152,6 +154,7 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
         "ff/" + std::string(kHex), two + "/" + two + std::string(30, 'A'),
         two + "/" + two + std::string(30, '0') + "/x", two + "/notes.txt", two + "/" + key + ".tmp-1x-0",
         two + "/" + key + ".tmp--0", two + "/" + key + ".tmp-0-0", "cases/" + std::string(31, '1') + "/x",
+        "cases/" + std::string(32, '4') + "/mine.txt",
         "cases/2222222222222222" + std::string(16, '2'), std::string("last/mine.tmp-4194304-0")})
     put(folder / foreign);
   fs::create_directory_symlink(scratch.path / "elsewhere", folder / "ab");

@@ -86,8 +86,12 @@ int cache_why(const std::string& key) {
   }
   if (keys.empty()) return code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
   if (keys.size() > 1) return code_after(several(key, keys));
-  for (const Store::Entry& entry : meant) print(entry);
-  return 0;
+  int code = 0;
+  for (const Store::Entry& entry : meant) {
+    if (!entry.provenance.node.empty()) print(entry);
+    else code = code_after("the result " + entry.key.hex() + " is damaged or of another version; it is made anew when it is needed");
+  }
+  return code;
 }
 
 int cache_collect(double keep_gb) {
