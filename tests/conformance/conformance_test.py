@@ -3,6 +3,7 @@
 import os
 import pathlib
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -145,6 +146,17 @@ class Conformance(unittest.TestCase):
     def test_a_library_means_its_nodes(self):
         result, nodes = conformance("marrow_wrong_edges.so")
         self.assertEqual(sorted(nodes), ["edges.changing", "edges.crashing", "edges.plain", "edges.shifted", "edges.turned", "edges.unsorted"])
+
+    def test_a_library_of_any_folder(self):
+        with tempfile.TemporaryDirectory() as folder:
+            library = pathlib.Path(folder) / "marrow_alone.so"
+            shutil.copy(BUILD / "tests" / "conformance_plugins" / "marrow_wrong_cameras.so", library)
+            result, nodes = conformance(str(library), seconds=60, MARROW_PLUGIN_PATH="")
+            self.assertIn("camera.plain", nodes, result.stderr)
+            library.write_bytes(library.read_bytes()[:1000])
+            result, _ = conformance(str(library), MARROW_PLUGIN_PATH="")
+            self.assertEqual(result.returncode, 2)
+            self.assertIn("the library %s is not used: " % library, result.stderr)
 
 
 if __name__ == "__main__":

@@ -119,6 +119,11 @@ std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string&
     if (name == what || name.substr(0, name.find('.')) == what || library->file.filename() == what || std::filesystem::equivalent(library->file, what, error))
       names.push_back(name);
   }
+  for (const LibraryInfo& library : catalogue.libraries()) {
+    std::error_code error;
+    if (!library.refused.empty() && (library.file.filename() == what || std::filesystem::equivalent(library.file, what, error)))
+      throw Error("the library " + library.file.string() + " is not used: " + library.refused);
+  }
   if (names.empty()) throw Error("there is no node, kind or library '" + what + "'; " + suggestion(what, catalogue.node_names()) + "; marrow doctor shows the folders searched");
   return names;
 }
@@ -147,7 +152,20 @@ int check_worker(const std::filesystem::path& files_folder) {
                         }}});
 }
 
+/// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is searched as well.
+void search_folders_of(const std::vector<std::string>& subjects) {
+  for (const std::string& subject : subjects) {
+    std::error_code error;
+    const std::filesystem::path file(subject);
+    if (file.extension() != ".so" || !std::filesystem::exists(file, error)) continue;
+    const char* searched = std::getenv("MARROW_PLUGIN_PATH");
+    const std::string folder = std::filesystem::absolute(file).parent_path().string();
+    setenv("MARROW_PLUGIN_PATH", (searched && *searched ? folder + ":" + searched : folder).c_str(), 1);
+  }
+}
+
 int run_conformance(const std::vector<std::string>& subjects) try {
+  search_folders_of(subjects);
   const Catalogue catalogue;
   const std::atomic<bool>& stopped = stop_on_signals();
   const FilesFolder files;
