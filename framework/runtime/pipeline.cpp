@@ -25,6 +25,7 @@ std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream stream(text);
   for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
+  if (parts.empty()) parts.emplace_back();
   return parts;
 }
 

@@ -141,6 +141,7 @@ class Reader {
     node.uses_place = entry.place;
     if (entry.key.find('.') != std::string::npos)
       yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a dot", "dots are for outputs, as in case.views");
+    if (entry.key.empty()) yaml_.fault(entry.place, "a node has no name", "write it as  name: {uses: kind.name}");
     bool has_uses = false;
     for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys)) {
       if (part.key == "uses") {

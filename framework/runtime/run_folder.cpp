@@ -31,6 +31,8 @@ using nlohmann::json;
 constexpr const char* kAdvice = "; choose another with --out";
 
 [[noreturn]] void refuse(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) throw Error("the output folder " + folder.string() + " is a file" + kAdvice);
   throw Error("the output folder " + folder.string() + " is already there and not empty" + kAdvice + ", or remove it");
 }
 

@@ -65,7 +65,7 @@ void scene(const marrow::Scene& scene, const std::string& path) {
       if (scene.models[i].name == placement.model)
         json["poses"].push_back({{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
   for (const auto& view : scene.views) json["views"].push_back(json_of(view));
-  marrow::write::write_text(path, json.dump() + "\n");
+  marrow::write::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 void landscape(const marrow::Landscape& landscape, const std::string& path) {
@@ -76,7 +76,7 @@ void landscape(const marrow::Landscape& landscape, const std::string& path) {
     if (profile.truth) one["truth"] = *profile.truth;
     json["profiles"].push_back(one);
   }
-  marrow::write::write_text(path, json.dump() + "\n");
+  marrow::write::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace

@@ -34,7 +34,7 @@ void metrics(const marrow::Metrics& metrics, const std::string& path) {
   nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};
   for (const marrow::Metric& metric : metrics.items)
     json["metrics"].push_back({{"name", metric.name}, {"value", metric.value}, {"unit", metric.unit}});
-  write_text(path, json.dump(2) + "\n");
+  write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace

@@ -46,6 +46,13 @@ class Tables(Case):
         self.assertEqual({row[rows[0].index("m.value")] for row in rows[1:]}, {"", "-5"})
         self.assertEqual({len(row) for row in rows}, {len(rows[0])})
 
+    def test_no_terminal_obeys_a_field(self):
+        file = self.experiment("e.yaml", ["a"], "variants: {a: {}, b: {k.how: error, k.text: \"\\e[31mred\\nnext line\"}}\n")
+        self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)
+        text = (self.scratch / "out" / "cells.csv").read_text()
+        self.assertNotIn("\x1b", text)
+        self.assertIn("\\x1b[31mred\nnext line", text)
+
     def report_data(self, page):
         return json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page.read_text(), re.S).group(1))
 

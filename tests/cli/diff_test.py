@@ -332,11 +332,15 @@ class Diff(Runs):
         for node in record["nodes"]:
             del node["items"]
         self.write("old/run.json", json.dumps(record))
+        shutil.copytree(self.scratch / "a", self.scratch / "linked")
+        (self.scratch / "linked" / "pipeline.yaml").rename(self.scratch / "elsewhere.yaml")
+        (self.scratch / "linked" / "pipeline.yaml").symlink_to(self.scratch / "elsewhere.yaml")
         for name, text in (("nothing", "nothing is not a folder" + advice),
                            ("empty", "empty is not the folder of a run: it has no run.json" + advice),
                            ("bare", "bare is not the whole folder of a run: it has a run.json, but no pipeline.yaml" + advice),
                            ("killed", "the run in killed did not come to its end: it has a pipeline.yaml, but no run.json; run it again\n"),
                            ("damaged", "damaged/run.json is not what 'marrow run' wrote: "),
+                           ("linked", "linked/pipeline.yaml is a link to a file outside of the folder, of which nothing is shown; copy it there\n"),
                            ("old", "old/run.json was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed 1\n")):
             for command in (["diff", name, "a"], ["diff", "a", name], ["rerun", name]):
                 result = self.marrow(*command)

@@ -186,6 +186,8 @@ class Records(Commands):
         for values in ({"nodes": 1}, {"outputs": [1]}, {"pipeline": []}, {"seconds": "x"}):
             self.change(**values)
             self.assertIn("a/run.json is not what 'marrow run' wrote: ", self.expect(2, "show", "a").stderr)
+        self.write("a/run.json", "{}")
+        self.assertIn("a/run.json is not what 'marrow run' wrote: what it should say is missing in it", self.expect(2, "show", "a").stderr)
         self.assertFalse((self.scratch / "b").exists())
 
     def test_wrong_pipelines_are_refused(self):

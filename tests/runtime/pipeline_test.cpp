@@ -152,6 +152,9 @@ TEST_F(PipelineTest, MergeKey) {
   expect_fault("marrow: 1\nnodes:\n  c: {uses: test.constant, <<: {with: {}}}\noutputs: {o: c}\n", 3, 28, "merge keys (<<) are not supported");
 }
 TEST_F(PipelineTest, UnknownNode) { expect_node_fault("{uses: test.constnat}", 13, "unknown node 'test.constnat'", "did you mean 'test.constant'?"); }
+TEST_F(PipelineTest, NodeWithoutName) {
+  expect_fault("marrow: 1\nnodes:\n  \"\": {uses: test.constant}\noutputs: {o: \"\"}\n", 3, 3, "a node has no name", "write it as  name: {uses: kind.name}");
+}
 TEST_F(PipelineTest, MissingUses) { expect_node_fault("{with: {value: 1}}", 3, "node 'n' does not say what it uses"); }
 TEST_F(PipelineTest, DotInName) {
   expect_fault("marrow: 1\nnodes:\n  a.b: {uses: test.constant}\n  c: {uses: test.constant}\noutputs: {o: c}\n", 3, 3, "has a dot");

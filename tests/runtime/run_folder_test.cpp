@@ -127,6 +127,15 @@ TEST_F(RunFolderTest, WhatIsThereStays) {
   }
 }
 
+TEST_F(RunFolderTest, AFileIsNoFolder) {
+  const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n", "o: c");
+  std::ofstream(scratch.path / "file") << "";
+  EXPECT_NE(fault_of([&] {
+              RunFolder{scratch.path / "file", pipeline};
+            }).find("/file is a file; choose another with --out"),
+            std::string::npos);
+}
+
 TEST_F(RunFolderTest, AfterAFullDiskASecondTrySucceeds) {
   const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n", "o: c");
   const fs::path folder = scratch.path / "out";

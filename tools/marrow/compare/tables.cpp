@@ -5,6 +5,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
+#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {
@@ -22,8 +23,13 @@ bool is_number(const std::string& text) {
 }
 
 /// RFC 4180: quoted where it has to be. A text that a spreadsheet would compute, as a reason that begins with "=", is marked
-/// as a text.
-std::string field(std::string text) {
+/// as a text. Control characters, which a terminal would obey, are written out; lines stay.
+std::string field(const std::string& raw) {
+  std::string text;
+  for (std::size_t begin = 0, end = 0; begin <= raw.size(); begin = end + 1) {
+    end = std::min(raw.find('\n', begin), raw.size());
+    text += (begin ? "\n" : "") + printable(raw.substr(begin, end - begin));
+  }
   if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !is_number(text)) text = "'" + text;
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";

@@ -111,6 +111,7 @@ int show(const fs::path& folder, fs::path file) {
   if (!fs::exists(folder / "run.json", error))
     throw Error(folder.string() + " is not the folder of a run: it has no run.json; give the folder that marrow run wrote");
   const json record = read_record(folder);
+  if (!record.contains("nodes") || !record.contains("status")) refuse_record(folder, "what it should say is missing in it, or of another type");
   const Kinds kinds = file.empty() ? Kinds::files : Kinds::files_and_pipes;
   if (file.empty()) file = folder / "report.html";
   ReportMaterial material;
