@@ -71,7 +71,7 @@ WRONG = {  # node: checks of which at least one must fail; the others of the sui
 
 def conformance(*subjects, seconds=10, **variables):
     """Exit code, and {node: {check: (passed, text)}}."""
-    environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), MARROW_CHECK_SECONDS=str(seconds), **variables)
+    environment = {**os.environ, "MARROW_PLUGIN_PATH": str(BUILD / "tests" / "conformance_plugins"), "MARROW_CHECK_SECONDS": str(seconds), **variables}
     result = subprocess.run([str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment)
     nodes, checks = {}, {}
     for line in result.stdout.splitlines():
