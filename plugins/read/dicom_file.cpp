@@ -42,6 +42,24 @@ constexpr KnownSyntax kSyntaxes[] = {{"1.2.840.10008.1.2", "implicit little endi
                                      {"1.2.840.10008.1.2.4.100", "MPEG-2", false},
                                      {"1.2.840.10008.1.2.4.102", "MPEG-4", false}};
 
+constexpr std::uint32_t kGroupsOfValues[] = {
+    0x52009229,  // SharedFunctionalGroupsSequence
+    0x52009230,  // PerFrameFunctionalGroupsSequence
+    0x00189401,  // ProjectionPixelCalibrationSequence
+    0x00189405,  // PositionerPositionSequence
+    0x00189412,  // XAXRFFrameCharacteristicsSequence
+    0x00189432,  // FieldOfViewSequence
+    0x00189451,  // FrameDetectorParametersSequence
+    0x00189462,  // IsocenterReferenceSystemSequence
+    0x00189476,  // XRayGeometrySequence
+    0x00209113,  // PlanePositionSequence
+    0x00209116,  // PlaneOrientationSequence
+    0x00209450,  // PatientOrientationInFrameSequence
+    0x00289110,  // PixelMeasuresSequence
+    0x00289145,  // PixelValueTransformationSequence
+    0x00289443,  // FramePixelDataPropertiesSequence
+};
+
 bool is_long(const std::string& kind) {
   static const std::string kLong = "OB OD OF OL OV OW SQ SV UC UN UR UT UV";
   const std::size_t at = kLong.find(kind);
@@ -154,7 +172,7 @@ class DicomWalk {
       const Next element = next(syntax);
       if (element.tag == kItemEnd && delimited) return;
       if (element.tag >> 16 == 0xFFFE) damaged("an item's end stands where an element should");
-      into.push_back({element.tag, {at_, 0}, {}});
+      into.push_back({element.tag, {at_, 0}, syntax.big_endian, {}});
       const bool are_pixels = element.tag == kPixels && depth == 0;
       if (are_pixels && into_.has_pixels_) damaged("it has its pixels twice");
       into_.has_pixels_ = into_.has_pixels_ || are_pixels;
@@ -162,18 +180,27 @@ class DicomWalk {
       if (element.length == kUndefined && are_pixels) {
         fragments(syntax, end);
       } else if (element.length == kUndefined) {
-        items(element.kind == "UN" ? Syntax{false, false} : syntax, end, true, depth, into.back());
+        items(inside(element, syntax), end, true, depth, into.back());
       } else {
         check_fits(element, end);
         into.back().value.bytes = element.length;
         if (are_pixels) into_.pixel_parts_.push_back(into.back().value);
-        if (element.kind == "SQ")
-          items(syntax, at_ + element.length, false, depth, into.back());
+        if (is_sequence(element))
+          items(inside(element, syntax), at_ + element.length, false, depth, into.back());
         else
           at_ += element.length;
       }
     }
     if (delimited) damaged("an item has no end");
+  }
+
+  /// Of those without a kind (implicit) or of an unknown one (UN) only the tag tells that they are sequences.
+  static bool is_sequence(const Next& element) {
+    return element.kind == "SQ" || ((element.kind.empty() || element.kind == "UN") && is_group_of_values(element.tag));
+  }
+  /// What is of an unknown kind (UN) is written in implicit little endian, whatever the file is in.
+  static Syntax inside(const Next& element, const Syntax& syntax) {
+    return element.kind == "UN" ? Syntax{false, false} : syntax;
   }
 
   /// Whether nothing but zeros follows.
@@ -226,6 +253,10 @@ class DicomWalk {
 
 DicomFile::DicomFile(const std::filesystem::path& path) : file_(path) {
   DicomWalk(*this).all();
+}
+
+bool is_group_of_values(std::uint32_t tag) {
+  return std::find(std::begin(kGroupsOfValues), std::end(kGroupsOfValues), tag) != std::end(kGroupsOfValues);
 }
 
 const DicomElement* find_element(const std::filesystem::path& path, const DicomElements& elements, std::uint32_t tag) {

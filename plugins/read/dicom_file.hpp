@@ -15,9 +15,14 @@ struct DicomSpan {
 struct DicomElement {
   std::uint32_t tag = 0;
   DicomSpan value;
+  bool big_endian = false;
   std::vector<std::vector<DicomElement>> items;  ///< of a sequence
 };
 using DicomElements = std::vector<DicomElement>;
+
+/// Whether the tag is that of a sequence in which values that are read may stand: the functional groups of an enhanced
+/// file, and the sequences in them. Implicit files do not say which of their elements are sequences.
+bool is_group_of_values(std::uint32_t tag);
 
 /// The element of that tag, or nullptr. Throws Error where there are two.
 const DicomElement* find_element(const std::filesystem::path& path, const DicomElements& elements, std::uint32_t tag);

@@ -10,7 +10,6 @@
 namespace marrow::read {
 namespace {
 
-constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 constexpr std::uint64_t kLongestText = 4096;
 
 }  // namespace
@@ -21,26 +20,27 @@ std::string DicomTag::text() const {
   return name + std::string(numbers);
 }
 
-/// The element among those of a data set, or of the sequences in it, the outermost first.
+/// The element among those of a functional group, or of the sequences in it, the outermost first.
 const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std::uint32_t tag) const {
   if (const auto* element = find_element(path(), elements, tag); element && element->value.bytes > 0) return element;
-  for (const DicomElement& element : elements)
+  for (const DicomElement& element : elements) {
+    if (!is_group_of_values(element.tag)) continue;
     for (const DicomElements& item : element.items)
       if (const auto* found = find_inside(item, tag)) return found;
+  }
   return nullptr;
 }
 
-/// In the data set itself, then in the frame's own functional group, then in the shared one.
+/// In the frame's own functional group, then in the shared one, then in the data set itself.
 const DicomElement* DicomHeader::find(const DicomTag& tag) const {
-  if (const auto* element = find_element(path(), file_.elements(), tag.code());
-      element && (element->value.bytes > 0 || !element->items.empty()))
-    return element;
   for (const std::uint32_t groups : {kFrameGroups, kSharedGroups}) {
     const auto* sequence = find_element(path(), file_.elements(), groups);
     const std::size_t item = groups == kFrameGroups ? std::size_t(frame_ - 1) : 0;
     if (!sequence || item >= sequence->items.size()) continue;
     if (const auto* element = find_inside(sequence->items[item], tag.code())) return element;
   }
+  const auto* element = find_element(path(), file_.elements(), tag.code());
+  if (element && (element->value.bytes > 0 || !element->items.empty())) return element;
   return nullptr;
 }
 
@@ -55,8 +55,8 @@ std::optional<std::string> DicomHeader::text(const DicomTag& tag) const {
     if (value.size() != 2)
       throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(value.size()) +
                   " bytes; expected 2: it is damaged");
-    const int low = std::uint8_t(value[file_.is_big_endian() ? 1 : 0]),
-              high = std::uint8_t(value[file_.is_big_endian() ? 0 : 1]);
+    const int low = std::uint8_t(value[element->big_endian ? 1 : 0]),
+              high = std::uint8_t(value[element->big_endian ? 0 : 1]);
     const int number = high << 8 | low;
     return std::to_string(tag.kind == DicomTag::Kind::ss && number > 0x7FFF ? number - 0x10000 : number);
   }

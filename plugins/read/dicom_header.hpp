@@ -10,6 +10,9 @@
 
 namespace marrow::read {
 
+/// Sequences of what an enhanced file says of all frames, and of each.
+constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
+
 /// A data element as the standard lists it.
 struct DicomTag {
   std::uint16_t group, element;
@@ -27,8 +30,8 @@ class DicomHeader {
   DicomHeader(const DicomFile& file, int frame) : file_(file), frame_(frame) {}
 
   const std::filesystem::path& path() const { return file_.path(); }
-  /// The value as text without padding; none where the element is missing or empty. Elements in the functional groups
-  /// of an enhanced file are found like those of a plain one.
+  /// The value as text without padding; none where the element is missing or empty. What the functional groups of an
+  /// enhanced file say of the frame comes before what stands outside of them.
   std::optional<std::string> text(const DicomTag& tag) const;
   /// The values as numbers. Throws Error where they are none, or where there are not `count`.
   std::optional<std::vector<double>> numbers(const DicomTag& tag, std::size_t count) const;

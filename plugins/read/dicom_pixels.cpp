@@ -49,6 +49,15 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   if (header.text(kPhotometric).value_or("").rfind("PALETTE", 0) == 0) pixels.channels = 3;
 }
 
+/// Each frame has its item among the groups of values, or another frame's would be taken.
+void check_groups(const DicomFile& file, const DicomPixels& pixels) {
+  const DicomElement* groups = find_element(pixels.path, file.elements(), kFrameGroups);
+  if (groups && groups->items.size() != std::size_t(pixels.frames))
+    damaged(pixels.path, "it has " + std::to_string(pixels.frames) + (pixels.frames == 1 ? " frame" : " frames") +
+                             ", but values for " + std::to_string(groups->items.size()) +
+                             " (PerFrameFunctionalGroupsSequence)");
+}
+
 void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   pixels.bits_allocated = whole(header, kAllocated, 16);
   pixels.bits_stored = whole(header, kStored, pixels.bits_allocated);
@@ -213,6 +222,7 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
     throw Error(pixels.path.string() + ": holds a dose of radiotherapy; expected a CT slice or an X-ray image");
   if (!file.has_pixels()) damaged(pixels.path, "it has no pixels");
   read_size(header, pixels);
+  check_groups(file, pixels);
   if (pixels.channels == 1) read_bits(header, pixels);
   const bool should_be_compressed =
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";

@@ -13,8 +13,11 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 using marrow::test::dicom_file;
 using marrow::test::dicom_item;
+using marrow::test::dicom_items;
 using marrow::test::Elements;
 using marrow::test::fluoroscopy;
+using marrow::test::implicit_elements;
+using marrow::test::implicit_file;
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 
@@ -191,6 +194,24 @@ TEST(DicomCamera, EnhancedFile) {
   EXPECT_NEAR(camera.intrinsics(0, 0), 1200 / 0.3, 1e-9);
   EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 780, 1e-9);
   EXPECT_TRUE(towards_detector(camera).isApprox(Vector3d::UnitX()));
+}
+
+// Implicit files do not say that these are sequences.
+TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
+  Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});
+  std::vector<std::string> frames;
+  for (const char* angle : {"DS:0", "DS:90"})
+    frames.push_back(implicit_elements({{0x00189405, dicom_items({implicit_elements({{kPrimary, angle}, {kSecondary, "DS:0"}})})}}));
+  header[0x00280008] = "IS:2";
+  header[0x7FE00010] += header[0x7FE00010].substr(3);
+  header[0x52009230] = dicom_items(frames);
+  const TemporaryFolder folder;
+  put(folder / "x.dcm", implicit_file(header));
+  Options options;
+  options.paths = {folder / "x.dcm"};
+  options.frame = 2;
+  marrow::Context context;
+  EXPECT_TRUE(towards_detector(dicom(options, context)[0]).isApprox(Vector3d::UnitX()));
 }
 
 TEST(DicomCamera, OneCameraPerFileByName) {

@@ -114,31 +114,9 @@ TEST(ReadDicom, SlicesInAFolderBelowAreRefused) {
   EXPECT_SAYS(read(folder.path()), "('part/slice6.dcm'), and only one folder is read");
 }
 
-/// A CT slice of 4 x 3 pixels, element by element.
-marrow::test::Elements ct_slice(int z) {
-  std::string pixels;
-  for (int i = 0; i < 12; ++i) pixels += marrow::test::little(std::uint32_t(i), 2);
-  return {{0x00080060, "CS:CT"},
-          {0x0020000E, "UI:1.2.9"},
-          {0x00200032, "DS:0\\0\\" + std::to_string(z)},
-          {0x00200037, "DS:1\\0\\0\\0\\1\\0"},
-          {0x00280002, "US:1"},
-          {0x00280004, "CS:MONOCHROME2"},
-          {0x00280010, "US:3"},
-          {0x00280011, "US:4"},
-          {0x00280030, "DS:1\\1"},
-          {0x00280100, "US:16"},
-          {0x00280101, "US:16"},
-          {0x00280102, "US:15"},
-          {0x00280103, "US:0"},
-          {0x00281052, "DS:-1024"},
-          {0x00281053, "DS:1"},
-          {0x7FE00010, "OW:" + pixels}};
-}
-
 void put_slices(const TemporaryFolder& folder, const marrow::test::Elements& changed) {
   for (int z = 0; z < 3; ++z) {
-    auto elements = ct_slice(z);
+    auto elements = marrow::test::ct_slice(z);
     for (const auto& [tag, value] : changed) elements[tag] = value;
     marrow::test::put(folder / ("s" + std::to_string(z) + ".dcm"), marrow::test::dicom_file(elements));
   }
@@ -172,7 +150,7 @@ TEST(ReadDicom, ScalingOfOnlySomeSlicesIsRefused) {
   const TemporaryFolder folder;
   for (const std::uint32_t tag : {0x00281052u, 0x00281053u}) {
     put_slices(folder, {});
-    auto elements = ct_slice(1);
+    auto elements = marrow::test::ct_slice(1);
     elements.erase(tag);
     marrow::test::put(folder / "s1.dcm", marrow::test::dicom_file(elements));
     const std::string name = tag == 0x00281052u ? "RescaleIntercept" : "RescaleSlope";
