@@ -6,6 +6,7 @@
 #include <cstring>
 
 #include "codecs.hpp"
+#include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
 #include "packbits.hpp"
 
@@ -31,8 +32,12 @@ constexpr DicomTag kTable{0x0028, 0x3000, "ModalityLUTSequence"};
   throw Error(path.string() + ": is cut off or damaged: " + fault + "; copy or export it again");
 }
 
-int whole(const DicomHeader& header, const DicomTag& tag, int missing) {
-  const double value = header.number(tag).value_or(missing);
+int whole(const DicomHeader& header, const DicomTag& tag, std::optional<int> missing = {}) {
+  const auto given = header.number(tag);
+  if (!given && !missing)
+    throw Error(header.path().string() + ": its header has no " + tag.text() +
+                ", without which its pixels cannot be understood; copy or export it again");
+  const double value = given ? *given : *missing;
   if (value != std::floor(value) || std::abs(value) > 1e9)
     damaged(header.path(), tag.text() + " is " + std::to_string(value) + "; expected a whole number");
   return int(value);
@@ -43,10 +48,15 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
   pixels.columns = whole(header, kColumns, 0);
   if (pixels.rows < 1 || pixels.columns < 1) damaged(pixels.path, "its header does not say how large the image is");
   pixels.frames = std::max(1, whole(header, kFrames, 1));
-  pixels.channels = whole(header, kSamples, 1);
+  pixels.channels = whole(header, kSamples);
   if (pixels.channels < 1 || pixels.channels > 4)
     damaged(pixels.path, "its header tells of " + std::to_string(pixels.channels) + " values per pixel");
-  if (header.text(kPhotometric).value_or("").rfind("PALETTE", 0) == 0) pixels.channels = 3;
+  const std::string photometric = header.text(kPhotometric).value_or("");
+  if (photometric.rfind("PALETTE", 0) == 0) pixels.channels = 3;
+  if (pixels.channels == 1 && photometric != "MONOCHROME1" && photometric != "MONOCHROME2")
+    throw Error(pixels.path.string() + ": " + kPhotometric.text() +
+                (photometric.empty() ? " is missing" : " is '" + shown(photometric) + "'") +
+                "; expected MONOCHROME1 or MONOCHROME2, as grey pixels have: copy or export it again");
 }
 
 /// Each frame has its item among the groups of values, or another frame's would be taken.
@@ -59,10 +69,10 @@ void check_groups(const DicomFile& file, const DicomPixels& pixels) {
 }
 
 void read_bits(const DicomHeader& header, DicomPixels& pixels) {
-  pixels.bits_allocated = whole(header, kAllocated, 16);
-  pixels.bits_stored = whole(header, kStored, pixels.bits_allocated);
-  const int allocated = pixels.bits_allocated, stored = pixels.bits_stored, high = whole(header, kHighBit, stored - 1);
-  const int representation = whole(header, kRepresentation, 0);
+  pixels.bits_allocated = whole(header, kAllocated);
+  pixels.bits_stored = whole(header, kStored);
+  const int allocated = pixels.bits_allocated, stored = pixels.bits_stored, high = whole(header, kHighBit);
+  const int representation = whole(header, kRepresentation);
   if ((allocated != 8 && allocated != 16 && allocated != 32) || stored < 1 || stored > allocated || high != stored - 1)
     throw Error(pixels.path.string() + ": its pixels have " + std::to_string(stored) + " of " +
                 std::to_string(allocated) + " bits, the highest being " + std::to_string(high) +

@@ -197,6 +197,16 @@ void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
   }
 }
 
+/// A slice that lost what its pixels are, or was replaced, may still read as good numbers.
+void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
+  if (slice.is_signed == first.is_signed && slice.bits_stored == first.bits_stored) return;
+  const auto kind = [](const DicomPixels& pixels) {
+    return std::to_string(pixels.bits_stored) + " bits " + (pixels.is_signed ? "with" : "without") + " a sign";
+  };
+  throw Error(slice.path.string() + ": its pixels have " + kind(slice) + ", those of " + first.path.string() + " " +
+              kind(first) + "; slices of one series have the same: export the series again");
+}
+
 /// The distance between slices of the volume that is made of them.
 double spacing_of(const std::vector<Slice>& slices) {
   return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
@@ -241,6 +251,7 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
       throw Error(slice.path().string() +
                   ": its values go through a table (ModalityLUTSequence), which is not read; export it as HU");
     check_same_scaling(slice.pixels, first.pixels);
+    check_same_pixels(slice.pixels, first.pixels);
     bool same = slice.samples.size == first.samples.size;
     for (int i = 0; i < 9; ++i) same = same && std::abs(slice.samples.direction[i] - first.samples.direction[i]) < 1e-4;
     for (int i = 0; i < 2; ++i)
@@ -248,6 +259,10 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
     if (!same)
       throw Error(slice.path().string() + ": has another size, spacing or direction than " + first.path().string());
   }
+  if (!first.pixels.gives_slope || !first.pixels.gives_intercept)
+    throw Error(first.path().string() + ": its header has no " +
+                (first.pixels.gives_slope ? "RescaleIntercept (0028,1052)" : "RescaleSlope (0028,1053)") +
+                ", nor has any other slice's, so which values are Hounsfield units is not known; export the series again");
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
   std::vector<double> sorted = gaps;

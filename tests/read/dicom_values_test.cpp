@@ -15,11 +15,23 @@ Elements with(Elements elements, const Elements& changed) {
   return elements;
 }
 
+Elements without(Elements elements, std::uint32_t tag) {
+  elements.erase(tag);
+  return elements;
+}
+
 class DicomValues : public testing::Test {
  protected:
   marrow::Image image(const std::string& bytes, int frame = 0) {
     put(folder / "x.dcm", bytes);
     return marrow::read::read_image_file(folder / "x.dcm", frame);
+  }
+  /// Three slices, the second one as given.
+  marrow::Volume series(const Elements& second, const Elements& others = {}) {
+    std::filesystem::create_directories(folder / "ct");
+    for (int z = 0; z < 3; ++z) put(folder / ("ct/s" + std::to_string(z)), dicom_file(with(ct_slice(z), others)));
+    put(folder / "ct/s1", dicom_file(second));
+    return marrow::read::read_volume_file(folder / "ct", {});
   }
   TemporaryFolder folder;
 };
@@ -57,6 +69,42 @@ TEST_F(DicomValues, OfEachFrameInEveryWayOfWritingThem) {
 TEST_F(DicomValues, OfAFrameComeBeforeThoseOfTheFile) {
   const Elements both = with(three_frames(), {{0x00281052, "DS:0"}, {0x00281053, "DS:1"}, {0x52009230, slopes(dicom_elements)}});
   EXPECT_EQ(image(dicom_file(both), 3).pixels.at<float>(3, 1), 7 * 301 + 2);
+}
+
+// With a value that is only likely in its place, bone is read as air, or a negative value as a high one.
+TEST_F(DicomValues, WithoutWhatThePixelsAreAreRefused) {
+  for (const auto& [tag, name] : {std::pair{0x00280002u, "SamplesPerPixel (0028,0002)"},
+                                  {0x00280100u, "BitsAllocated (0028,0100)"},
+                                  {0x00280101u, "BitsStored (0028,0101)"},
+                                  {0x00280102u, "HighBit (0028,0102)"},
+                                  {0x00280103u, "PixelRepresentation (0028,0103)"}}) {
+    EXPECT_SAYS(image(dicom_file(without(fluoroscopy(), tag))), std::string("x.dcm: its header has no ") + name);
+    EXPECT_SAYS(series(without(ct_slice(1), tag)), std::string("s1: its header has no ") + name);
+  }
+}
+
+TEST_F(DicomValues, OfAnUnknownPhotometryAreRefused) {
+  EXPECT_SAYS(image(dicom_file(without(fluoroscopy(), 0x00280004))), "PhotometricInterpretation (0028,0004) is missing");
+  for (const char* other : {"MONOCHROME3", "RGB"})
+    EXPECT_SAYS(image(dicom_file(with(fluoroscopy(), {{0x00280004, std::string("CS:") + other}}))),
+                std::string("(0028,0004) is '") + other + "'; expected MONOCHROME1 or MONOCHROME2");
+}
+
+TEST_F(DicomValues, OfSlicesWithOtherPixelsAreRefused) {
+  EXPECT_SAYS(series(with(ct_slice(1), {{0x00280103, "US:1"}})),
+              "s1: its pixels have 16 bits with a sign, those of");
+  EXPECT_SAYS(series(with(ct_slice(1), {{0x00280101, "US:12"}, {0x00280102, "US:11"}})),
+              "s1: its pixels have 12 bits without a sign, those of");
+}
+
+// Raw stored values look like Hounsfield units that are 1024 too high.
+TEST_F(DicomValues, OfACtThatDoesNotScaleThemAreRefused) {
+  for (const auto& [tag, name] : {std::pair{0x00281052u, "RescaleIntercept (0028,1052)"}, {0x00281053u, "RescaleSlope (0028,1053)"}}) {
+    series(ct_slice(1));
+    for (int z = 0; z < 3; ++z) put(folder / ("ct/s" + std::to_string(z)), dicom_file(without(ct_slice(z), tag)));
+    EXPECT_SAYS(marrow::read::read_volume_file(folder / "ct", {}), std::string("s0: its header has no ") + name + ", nor has any other slice's");
+  }
+  EXPECT_EQ(image(dicom_file(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301) << "an X-ray image needs no scale";
 }
 
 TEST_F(DicomValues, OfOtherThanEveryFrameAreRefused) {
