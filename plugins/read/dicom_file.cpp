@@ -172,7 +172,8 @@ class DicomWalk {
       const Next element = next(syntax);
       if (element.tag == kItemEnd && delimited) return;
       if (element.tag >> 16 == 0xFFFE) damaged("an item's end stands where an element should");
-      into.push_back({element.tag, {at_, 0}, syntax.big_endian, {}});
+      into.push_back({element.tag, {at_, 0}, syntax.big_endian, {}, {}});
+      if (element.kind.size() == 2) into.back().kind = {element.kind[0], element.kind[1]};
       const bool are_pixels = element.tag == kPixels && depth == 0;
       if (are_pixels && into_.has_pixels_) damaged("it has its pixels twice");
       into_.has_pixels_ = into_.has_pixels_ || are_pixels;

@@ -2,6 +2,7 @@
 #pragma once
 // The elements of a DICOM file, each held against what is left of the file. GDCM reserves as much memory as a damaged
 // length claims, and stops the program at some contradictions, so it is given nothing but compressed pixels.
+#include <array>
 #include <memory>
 
 #include "input_file.hpp"
@@ -16,6 +17,7 @@ struct DicomElement {
   std::uint32_t tag = 0;
   DicomSpan value;
   bool big_endian = false;
+  std::array<char, 2> kind{};  ///< its value representation; zeros where the file does not say (implicit)
   std::vector<std::vector<DicomElement>> items;  ///< of a sequence
 };
 using DicomElements = std::vector<DicomElement>;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "dicom_header.hpp"
 
+#include <bit>
 #include <charconv>
 #include <cmath>
 
@@ -10,7 +11,59 @@
 namespace marrow::read {
 namespace {
 
-constexpr std::uint64_t kLongestText = 4096;
+constexpr std::uint64_t kLongestText = 65536;  // angles of each of some thousands of frames
+
+/// Most files say themselves how a number is written, and some choose another way than the standard.
+DicomTag::Kind kind_of(const DicomElement& element, const DicomTag& tag) {
+  const std::string_view kind(element.kind.data(), element.kind.size());
+  if (kind == "FL") return DicomTag::Kind::fl;
+  if (kind == "FD") return DicomTag::Kind::fd;
+  if (kind == "DS" || kind == "IS") return DicomTag::Kind::text;
+  return tag.kind;
+}
+
+std::string without_padding(std::string value) {
+  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
+  while (!value.empty() && is_padding(value.back())) value.pop_back();
+  value.erase(0, std::min(value.find_first_not_of(std::string(" \0", 2)), value.size()));
+  return value;
+}
+
+/// Numbers with backslashes between them; none where anything else stands there.
+std::optional<std::vector<double>> numbers_in_text(const std::string& value) {
+  std::vector<double> numbers;
+  const char *at = value.data(), *end = at + value.size();
+  while (true) {
+    while (at != end && (*at == ' ' || *at == '+')) ++at;
+    double number = 0;
+    const auto [stop, failure] = std::from_chars(at, end, number);
+    if (failure != std::errc() || !std::isfinite(number)) return std::nullopt;
+    numbers.push_back(number);
+    at = stop;
+    while (at != end && *at == ' ') ++at;
+    if (at == end) return numbers;
+    if (*at++ != '\\') return std::nullopt;
+  }
+}
+
+std::optional<std::vector<double>> binary_numbers(const std::string& bytes, DicomTag::Kind kind, bool big_endian) {
+  using Kind = DicomTag::Kind;
+  const std::size_t width = kind == Kind::fd ? 8 : kind == Kind::fl ? 4 : 2;
+  if (bytes.empty() || bytes.size() % width != 0) return std::nullopt;
+  std::vector<double> numbers;
+  for (std::size_t at = 0; at < bytes.size(); at += width) {
+    std::uint64_t value = 0;
+    for (std::size_t k = 0; k < width; ++k)
+      value = value << 8 | std::uint8_t(bytes[at + (big_endian ? k : width - 1 - k)]);
+    const double number = kind == Kind::fd   ? std::bit_cast<double>(value)
+                          : kind == Kind::fl ? double(std::bit_cast<float>(std::uint32_t(value)))
+                          : kind == Kind::ss ? double(std::int16_t(value))
+                                             : double(value);
+    if (!std::isfinite(number)) return std::nullopt;
+    numbers.push_back(number);
+  }
+  return numbers;
+}
 
 }  // namespace
 
@@ -44,49 +97,35 @@ const DicomElement* DicomHeader::find(const DicomTag& tag) const {
   return nullptr;
 }
 
+std::string DicomHeader::bytes_of(const DicomElement& element, const DicomTag& tag) const {
+  if (element.value.bytes > kLongestText)
+    throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(element.value.bytes) +
+                " bytes; it is damaged");
+  return file_.file().text(element.value.begin, std::size_t(element.value.bytes));
+}
+
 std::optional<std::string> DicomHeader::text(const DicomTag& tag) const {
   const DicomElement* element = find(tag);
   if (!element || element->value.bytes == 0) return std::nullopt;
-  if (element->value.bytes > kLongestText)
-    throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(element->value.bytes) +
-                " bytes; it is damaged");
-  std::string value = file_.file().text(element->value.begin, std::size_t(element->value.bytes));
-  if (tag.kind != DicomTag::Kind::text) {
-    if (value.size() != 2)
-      throw Error(path().string() + ": " + tag.text() + " has " + std::to_string(value.size()) +
-                  " bytes; expected 2: it is damaged");
-    const int low = std::uint8_t(value[element->big_endian ? 1 : 0]),
-              high = std::uint8_t(value[element->big_endian ? 0 : 1]);
-    const int number = high << 8 | low;
-    return std::to_string(tag.kind == DicomTag::Kind::ss && number > 0x7FFF ? number - 0x10000 : number);
-  }
-  const auto is_padding = [](char c) { return c == ' ' || c == '\0'; };
-  while (!value.empty() && is_padding(value.back())) value.pop_back();
-  value.erase(0, std::min(value.find_first_not_of(std::string(" \0", 2)), value.size()));
+  const std::string value = without_padding(bytes_of(*element, tag));
   if (value.empty()) return std::nullopt;
   return value;
 }
 
 std::optional<std::vector<double>> DicomHeader::numbers(const DicomTag& tag, std::size_t count) const {
-  const auto value = text(tag);
-  if (!value) return std::nullopt;
-  std::vector<double> numbers;
-  const char *at = value->data(), *end = at + value->size();
-  bool good = true;
-  while (good) {
-    while (at != end && (*at == ' ' || *at == '+')) ++at;
-    double number = 0;
-    const auto [stop, failure] = std::from_chars(at, end, number);
-    good = failure == std::errc() && std::isfinite(number);
-    if (good) numbers.push_back(number);
-    at = stop;
-    while (at != end && *at == ' ') ++at;
-    if (at == end || *at != '\\') break;
-    ++at;
+  const DicomElement* element = find(tag);
+  if (!element || element->value.bytes == 0) return std::nullopt;
+  const DicomTag::Kind kind = kind_of(*element, tag);
+  const std::string bytes = bytes_of(*element, tag), value = kind == DicomTag::Kind::text ? without_padding(bytes) : "";
+  if (kind == DicomTag::Kind::text && value.empty()) return std::nullopt;
+  const auto numbers = kind == DicomTag::Kind::text ? numbers_in_text(value) : binary_numbers(bytes, kind, element->big_endian);
+  if (!numbers || (count > 0 && numbers->size() != count)) {
+    const std::string expected = count == 0 ? "numbers" : std::to_string(count) + (count == 1 ? " number" : " numbers");
+    throw Error(path().string() + ": " + tag.text() + ": expected " + expected + ", got " +
+                (kind == DicomTag::Kind::text ? "'" + shown(value) + "'"
+                                              : std::to_string(bytes.size()) + " bytes of such numbers or a value that is none") +
+                "; it is damaged");
   }
-  if (!good || at != end || numbers.size() != count)
-    throw Error(path().string() + ": " + tag.text() + ": expected " + std::to_string(count) +
-                (count == 1 ? " number" : " numbers") + ", got '" + shown(*value) + "'");
   return numbers;
 }
 

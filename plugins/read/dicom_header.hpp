@@ -17,8 +17,8 @@ constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 struct DicomTag {
   std::uint16_t group, element;
   const char* name;
-  /// How its value is written: as text, or as a number of 2 bytes without or with a sign.
-  enum class Kind { text, us, ss } kind = Kind::text;
+  /// How its values are written: as text, as numbers of 2 bytes without or with a sign, or as floating numbers of 4 or 8.
+  enum class Kind { text, us, ss, fl, fd } kind = Kind::text;
   std::uint32_t code() const { return std::uint32_t(group) << 16 | element; }
   /// "PixelSpacing (0028,0030)"
   std::string text() const;
@@ -33,7 +33,7 @@ class DicomHeader {
   /// The value as text without padding; none where the element is missing or empty. What the functional groups of an
   /// enhanced file say of the frame comes before what stands outside of them.
   std::optional<std::string> text(const DicomTag& tag) const;
-  /// The values as numbers. Throws Error where they are none, or where there are not `count`.
+  /// The values as numbers. Throws Error where they are none, or where there are not `count` (0: any).
   std::optional<std::vector<double>> numbers(const DicomTag& tag, std::size_t count) const;
   std::optional<double> number(const DicomTag& tag) const;
   /// Whether the file has the element, in whatever form.
@@ -41,6 +41,7 @@ class DicomHeader {
 
  private:
   const DicomElement* find(const DicomTag& tag) const;
+  std::string bytes_of(const DicomElement& element, const DicomTag& tag) const;
   const DicomElement* find_inside(const DicomElements& elements, std::uint32_t tag) const;
   const DicomFile& file_;
   int frame_;

@@ -14,7 +14,7 @@ namespace {
 constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kDistanceSourceToDetector{0x0018, 0x1110, "DistanceSourceToDetector"};
 constexpr DicomTag kDistanceSourceToPatient{0x0018, 0x1111, "DistanceSourceToPatient"};
-constexpr DicomTag kDistanceSourceToIsocenter{0x0018, 0x9402, "DistanceSourceToIsocenter"};
+constexpr DicomTag kDistanceSourceToIsocenter{0x0018, 0x9402, "DistanceSourceToIsocenter", DicomTag::Kind::fl};
 constexpr DicomTag kMagnification{0x0018, 0x1114, "EstimatedRadiographicMagnificationFactor"};
 constexpr DicomTag kImagerPixelSpacing{0x0018, 0x1164, "ImagerPixelSpacing"};
 constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};

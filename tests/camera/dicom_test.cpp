@@ -196,6 +196,19 @@ TEST(DicomCamera, EnhancedFile) {
   EXPECT_TRUE(towards_detector(camera).isApprox(Vector3d::UnitX()));
 }
 
+// Enhanced files have it as a binary number of 4 bytes.
+TEST(DicomCamera, IsocentreDistanceAsABinaryNumber) {
+  const Elements header = with(without(fluoroscopy(), {0x00181111}), 0x00189402, "FL:785.5");
+  EXPECT_NEAR((read(header).camera.camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
+  const TemporaryFolder folder;
+  put(folder / "x.dcm", implicit_file(header));
+  Options options;
+  options.paths = {folder / "x.dcm"};
+  marrow::Context context;
+  EXPECT_NEAR((dicom(options, context)[0].camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
+  EXPECT_SAYS(read(with(header, 0x00189402, "FL:nan")), "DistanceSourceToIsocenter (0018,9402): expected 1 number, got 4 bytes");
+}
+
 // Implicit files do not say that these are sequences.
 TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
   Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // X-ray files as a C-arm writes them, made element by element, so that each may be left out or wrong.
+#include <bit>
 #include <cstdint>
 #include <map>
 #include <string>
@@ -28,7 +29,9 @@ inline std::string dicom_elements(const Elements& elements) {
   std::string bytes;
   for (const auto& [tag, text] : elements) {
     const std::string kind = text.substr(0, 2), value = text.substr(3);
-    bytes += dicom_element(tag, kind, kind == "US" || kind == "SS" ? little(std::uint32_t(std::stoi(value)), 2) : value);
+    bytes += dicom_element(tag, kind, kind == "US" || kind == "SS" ? little(std::uint32_t(std::stoi(value)), 2)
+                                      : kind == "FL" ? little(std::bit_cast<std::uint32_t>(std::stof(value)), 4)
+                                                     : value);
   }
   return bytes;
 }
