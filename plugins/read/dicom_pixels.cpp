@@ -89,6 +89,40 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   if (pixels.slope == 0) damaged(pixels.path, kSlope.text() + " is 0");
 }
 
+/// What a value of 16 bits stands for where only `bits_stored` of them count; none where it needs more.
+std::optional<double> value_of_stored_bits(const DicomPixels& pixels, double value) {
+  const int bits = pixels.bits_stored, word = std::uint16_t(int(value));
+  if (bits >= 16) return value;
+  if (word >> bits == 0) return pixels.is_signed && word >> (bits - 1) == 1 ? word - (1 << bits) : word;
+  if (pixels.is_signed && value >= -double(1 << (bits - 1)) && value < 0) return value;
+  return std::nullopt;
+}
+
+void read_padding(const DicomHeader& header, DicomPixels& pixels) {
+  const Kind kind = pixels.is_signed ? Kind::ss : Kind::us;
+  const auto value = header.number({0x0028, 0x0120, "PixelPaddingValue", kind});
+  if (!value) return;
+  const double limit = header.number({0x0028, 0x0121, "PixelPaddingRangeLimit", kind}).value_or(*value);
+  const auto from = value_of_stored_bits(pixels, *value), to = value_of_stored_bits(pixels, limit);
+  if (from && to)
+    pixels.padding = {std::min(*from, *to), std::max(*from, *to)};
+  else
+    pixels.padding_beyond_bits = std::uint16_t(int(*value));
+}
+
+/// Without the bits that do not count, such padding would become another value, maybe that of bone.
+void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& bytes) {
+  if (!pixels.padding_beyond_bits || pixels.bits_allocated != 16) return;
+  for (std::size_t at = 0; at < bytes.size(); at += 2) {
+    std::uint16_t word;
+    std::memcpy(&word, bytes.data() + at, 2);
+    if (word == *pixels.padding_beyond_bits)
+      throw Error(pixels.path.string() + ": has pixels of the value " + std::to_string(word) +
+                  " (PixelPaddingValue), which the " + std::to_string(pixels.bits_stored) +
+                  " bits that its pixels have cannot hold; export it again");
+  }
+}
+
 /// Where each part begins, by the table of offsets, which counts from the first part's item.
 std::vector<std::size_t> parts_by_table(const DicomFile& file, const DicomPixels& pixels) {
   const DicomSpan& table = file.offset_table();
@@ -233,7 +267,10 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   if (!file.has_pixels()) damaged(pixels.path, "it has no pixels");
   read_size(header, pixels);
   check_groups(file, pixels);
-  if (pixels.channels == 1) read_bits(header, pixels);
+  if (pixels.channels == 1) {
+    read_bits(header, pixels);
+    read_padding(header, pixels);
+  }
   const bool should_be_compressed =
       pixels.transfer_syntax.rfind("1.2.840.10008.1.2.4", 0) == 0 || pixels.transfer_syntax == "1.2.840.10008.1.2.5";
   if (file.is_compressed() != should_be_compressed)
@@ -268,10 +305,20 @@ Samples read_dicom_frame(const DicomPixels& pixels, int frame) {
   else
     samples.bytes = decoded(pixels, coded_frame(pixels, file, frame));
   if (pixels.bits_stored == pixels.bits_allocated) return samples;
+  check_padding(pixels, samples.bytes);
   if (pixels.bits_allocated == 8) keep_stored<std::uint8_t>(pixels, samples.bytes);
   if (pixels.bits_allocated == 16) keep_stored<std::uint16_t>(pixels, samples.bytes);
   if (pixels.bits_allocated == 32) keep_stored<std::uint32_t>(pixels, samples.bytes);
   return samples;
+}
+
+void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count) {
+  constexpr float kAir_hu = -1000;
+  if (!pixels.padding) return;
+  const auto scaled = [&](double stored) { return float(pixels.slope * stored + pixels.intercept); };
+  const auto [lowest, highest] = std::minmax({scaled((*pixels.padding)[0]), scaled((*pixels.padding)[1])});
+  for (std::size_t i = 0; i < count; ++i)
+    if (values[i] >= lowest && values[i] <= highest) values[i] = std::min(values[i], kAir_hu);
 }
 
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values) {

@@ -302,6 +302,7 @@ VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::
     const Samples slice = read_dicom_frame(slices[k].pixels, 1);
     if (series.values.empty()) series.values.resize(pixels * slices.size());
     scaled_values(slices[k].pixels, slice, series.values.data() + k * pixels);
+    make_padding_air(slices[k].pixels, series.values.data() + k * pixels, pixels);
   }
   return series;
 }

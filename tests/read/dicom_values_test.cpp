@@ -107,6 +107,38 @@ TEST_F(DicomValues, OfACtThatDoesNotScaleThemAreRefused) {
   EXPECT_EQ(image(dicom_file(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301) << "an X-ray image needs no scale";
 }
 
+// Outside of what a scanner sees it writes a value of its choice, here one above that of any bone.
+TEST_F(DicomValues, OfPaddingAreAir) {
+  const auto with_pixel = [](Elements slice, std::uint32_t value) {
+    slice[0x7FE00010].replace(3, 2, little(value, 2));
+    return slice;
+  };
+  const Elements padded = with_pixel(with(ct_slice(1), {{0x00280120, "US:63536"}}), 63536);
+  marrow::Volume volume = series(padded);
+  EXPECT_EQ(volume.at(0, 0, 1), -1000);
+  EXPECT_EQ(volume.at(1, 0, 1), 1 - 1024);
+  volume = series(with_pixel(with(padded, {{0x00280121, "US:65000"}}), 64000));
+  EXPECT_EQ(volume.at(0, 0, 1), -1000) << "a range of values";
+  volume = series(with_pixel(padded, 63537));
+  EXPECT_EQ(volume.at(0, 0, 1), 63537 - 1024) << "only the padding itself";
+  volume = series(with(ct_slice(1), {{0x00280120, "US:3"}}));
+  EXPECT_EQ(volume.at(3, 0, 1), 3 - 1024) << "below air already";
+  // Of pixels with a sign it has one too, and may be written as if it had none.
+  const Elements with_sign{{0x00280103, "US:1"}, {0x00281052, "DS:0"}, {0x00281053, "DS:-1"}};
+  for (const char* value : {"SS:-2000", "US:63536"}) {
+    volume = series(with_pixel(with(with(ct_slice(1), with_sign), {{0x00280120, value}}), 63536), with_sign);
+    EXPECT_EQ(volume.at(0, 0, 1), -1000) << value;
+  }
+}
+
+TEST_F(DicomValues, OfPaddingThatTheirBitsCannotHoldAreRefused) {
+  const Elements bits{{0x00280101, "US:12"}, {0x00280102, "US:11"}};
+  Elements slice = with(with(ct_slice(1), bits), {{0x00280120, "US:63536"}});
+  EXPECT_EQ(series(slice, bits).at(0, 0, 1), -1024) << "none is there";
+  slice[0x7FE00010].replace(3, 2, little(63536, 2));
+  EXPECT_SAYS(series(slice, bits), "s1: has pixels of the value 63536 (PixelPaddingValue), which the 12 bits");
+}
+
 TEST_F(DicomValues, OfOtherThanEveryFrameAreRefused) {
   const Elements two = with(three_frames(), {{0x52009230, slopes(dicom_elements, 2)}});
   EXPECT_SAYS(image(dicom_file(two), 3), "it has 3 frames, but values for 2 (PerFrameFunctionalGroupsSequence)");
