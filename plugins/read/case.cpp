@@ -97,6 +97,21 @@ std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& m
   return read_or_fault(map, key, [&] { return marrow::read::read_image_file(*file); });
 }
 
+/// The mask is drawn on the image as it is stored: where that is mirrored as it is read, so is the mask.
+std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, bool has_image) {
+  const auto mask = read_image(folder, map, "mask");
+  if (!mask) return std::nullopt;
+  if (mask->pixels.type() != CV_8U)
+    map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
+  const auto is_mirrored = [&](const std::string& key) {
+    return marrow::read::is_mirrored_as_read(file_in(folder, map, key).value());
+  };
+  if (!has_image || is_mirrored("image") == is_mirrored("mask")) return mask->pixels;
+  cv::Mat mirrored(mask->pixels.size(), mask->pixels.type());
+  for (int u = 0; u < mirrored.cols; ++u) mask->pixels.col(mirrored.cols - 1 - u).copyTo(mirrored.col(u));
+  return mirrored;
+}
+
 void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
   const auto name = map.text("name");
   if (name)
@@ -106,11 +121,9 @@ void read_view(const fs::path& folder, const YamlMap& map, marrow::Case& result)
   const auto camera = read_camera(folder, map);
   marrow::View view;
   if (map.has("mask")) {
-    const auto mask = read_image(folder, map, "mask");
+    const auto mask = read_mask(folder, map, image.has_value());
     if (!mask) return;
-    view.mask = mask->pixels;
-    if (view.mask.type() != CV_8U)
-      map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
+    view.mask = *mask;
   }
   if (!name || !image || !camera) return;
   if (result.views.find(*name)) return map.fault("name", "name: two views are named '" + *name + "'");

@@ -79,11 +79,20 @@ Image as_its_camera_sees(Image image, const fs::path& path, int frame) {
   return image;
 }
 
+bool is_dicom(const fs::path& path) {
+  const std::string extension = in_small_letters(path.extension().string());
+  return extension == ".dcm" || extension == ".dicom";
+}
+
 }  // namespace
+
+bool is_mirrored_as_read(const fs::path& path, int frame) {
+  return is_dicom(path) && read_xray_pixels(path, std::max(1, frame)).mirrored;
+}
 
 Image read_image_file(const fs::path& path, int frame) {
   const std::string extension = in_small_letters(path.extension().string());
-  if (extension == ".dcm" || extension == ".dicom") return as_its_camera_sees(read_dicom_image(path, frame), path, frame);
+  if (is_dicom(path)) return as_its_camera_sees(read_dicom_image(path, frame), path, frame);
   if (extension != ".tif" && extension != ".tiff" && extension != ".png")
     throw Error(path.string() + ": not an image that can be read; known are .png, .tif and .dcm");
   const Samples samples = extension == ".png" ? read_png(path) : read_tiff(path);

@@ -32,7 +32,7 @@ marrow::List<marrow::Image> images(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.images", images)
       .summary("Grey images whose cameras are not known yet, as a calibration takes them")
-      .out("images", "the grey values as stored", marrow::over("view"))
+      .out("images", "grey values, as read.image gives them", marrow::over("view"))
       .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
       .option("names", &Options::names, "one name per image; without names, the files' names without extension")
       .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));

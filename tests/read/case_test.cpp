@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
 
@@ -159,6 +160,25 @@ TEST_F(ReadCase, NothingOutsideTheFolderIsOpened) {
   put(elsewhere / "ct.mha", marrow::test::bytes_of(folder / "ct.mha"));
   std::filesystem::create_symlink(elsewhere / "ct.mha", folder / "link.mha");
   expect_said("ct: ct.mha", "ct: link.mha", "is a link to a place outside the case's folder");
+}
+
+// The wrong side would be masked.
+TEST_F(ReadCase, TheMaskIsMirroredWithItsImage) {
+  ItkGrid<std::uint8_t> mask{.size = {6, 4}, .samples = std::vector<std::uint8_t>(24, 255)};
+  mask.samples[0] = 0;
+  write_itk(folder / "mask.png", mask);
+  put(folder / "case.yaml", with(kCase, "image: lateral.png", "image: lateral.dcm"));
+  auto elements = marrow::test::fluoroscopy();
+  for (const bool mirrored : {false, true}) {
+    elements[0x00200020] = mirrored ? "CS:L\\F" : "CS:R\\F";
+    put(folder / "lateral.dcm", marrow::test::dicom_file(elements));
+    marrow::Case value;
+    ASSERT_EQ(message_of([&] { value = read_case({folder.path()}); }), "");
+    const marrow::View& view = value.views[1];
+    EXPECT_EQ(view.image.pixels.at<std::uint16_t>(0, mirrored ? 5 : 0), 0);
+    EXPECT_EQ(view.mask.at<std::uint8_t>(0, mirrored ? 5 : 0), 0);
+    EXPECT_EQ(view.mask.at<std::uint8_t>(0, mirrored ? 0 : 5), 255);
+  }
 }
 
 TEST_F(ReadCase, SizesOfImageAndCameraThatDisagree) {
