@@ -24,6 +24,9 @@ constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
 constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
+constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
+constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
+constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
 constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign", DicomTag::Kind::ss};
 constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
 constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
@@ -164,6 +167,24 @@ void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
                 " mm is no detector's; give pixel_mm");
 }
 
+/// Whether higher values, as scaled, stand for less radiation. The sign is that of stored values, which a negative slope
+/// turns round. Without it the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
+bool is_inverted(const DicomHeader& header) {
+  const auto sign = header.number(kIntensitySign);
+  if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
+  if (*sign != 1 && *sign != -1)
+    throw Error(header.path().string() + ": " + kIntensitySign.text() + " is " + std::to_string(int(*sign)) + ", expected 1 or -1");
+  return (*sign < 0) != (header.number(kSlope).value_or(1) < 0);
+}
+
+/// Values must be linear in the radiation: their logarithm is taken later.
+void check_linear(const DicomHeader& header) {
+  if (header.text(kIntensity).value_or("") == "LOG")
+    throw Error(header.path().string() + ": its values are logarithms (" + kIntensity.text() +
+                " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), or, where only "
+                "contours are looked for, save it as PNG or TIFF with bright air");
+}
+
 }  // namespace
 
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
@@ -209,8 +230,8 @@ XrayPixels read_xray_pixels(const std::filesystem::path& path, int frame) {
   const DicomFile file(path);
   const DicomHeader header(file, frame);
   XrayPixels pixels;
-  const auto sign = header.number(kIntensitySign);
-  pixels.inverted = sign && *sign < 0;
+  check_linear(header);
+  pixels.inverted = is_inverted(header);
   const auto primary = header.number(kPrimaryAngle), secondary = header.number(kSecondaryAngle);
   if (primary && secondary)
     if (const auto stored = stored_axes(header, carm_axes(*secondary, *primary))) pixels.mirrored = stored->mirrored;

@@ -139,6 +139,31 @@ TEST_F(DicomValues, OfPaddingThatTheirBitsCannotHoldAreRefused) {
   EXPECT_SAYS(series(slice, bits), "s1: has pixels of the value 63536 (PixelPaddingValue), which the 12 bits");
 }
 
+// Air must come out bright. The fluoroscopy holds 0 at its first pixel and 305 at its last.
+TEST_F(DicomValues, AreInvertedByWhatTheSignSaysOfStoredOnes) {
+  const auto rises = [&](const Elements& changed) {
+    cv::Mat pixels;
+    image(dicom_file(with(fluoroscopy(), changed))).pixels.convertTo(pixels, CV_32F);
+    return pixels.at<float>(0, 0) < pixels.at<float>(3, 5);
+  };
+  const std::pair<std::uint32_t, std::string> less{0x00281041, "SS:-1"}, more{0x00281041, "SS:1"}, slope{0x00281053, "DS:-1"},
+      intercept{0x00281052, "DS:4095"}, white{0x00280004, "CS:MONOCHROME1"};
+  EXPECT_TRUE(rises({}));
+  EXPECT_TRUE(rises({more}));
+  EXPECT_FALSE(rises({less}));
+  EXPECT_FALSE(rises({less, slope, intercept})) << "the slope has turned them round already";
+  EXPECT_TRUE(rises({more, slope, intercept}));
+  EXPECT_FALSE(rises({white})) << "without a sign, as a viewer shows it";
+  EXPECT_TRUE(rises({white, more})) << "the sign says what a viewer's white does not";
+  EXPECT_SAYS(image(dicom_file(with(fluoroscopy(), {{0x00281041, "SS:0"}}))), "(0028,1041) is 0, expected 1 or -1");
+}
+
+TEST_F(DicomValues, ThatAreLogarithmsAreRefused) {
+  EXPECT_SAYS(image(dicom_file(with(fluoroscopy(), {{0x00281040, "CS:LOG"}}))),
+              "x.dcm: its values are logarithms (PixelIntensityRelationship (0028,1040) is LOG)");
+  EXPECT_EQ(image(dicom_file(with(fluoroscopy(), {{0x00281040, "CS:LIN"}}))).pixels.at<std::uint16_t>(3, 1), 301);
+}
+
 TEST_F(DicomValues, OfOtherThanEveryFrameAreRefused) {
   const Elements two = with(three_frames(), {{0x52009230, slopes(dicom_elements, 2)}});
   EXPECT_SAYS(image(dicom_file(two), 3), "it has 3 frames, but values for 2 (PerFrameFunctionalGroupsSequence)");
