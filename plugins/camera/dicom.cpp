@@ -10,7 +10,7 @@ namespace {
 struct Options {
   std::vector<std::filesystem::path> paths;
   std::vector<std::string> names;
-  int frame = 1;
+  int frame = 0;
   double source_to_detector_mm = 0;
   double source_to_isocentre_mm = 0;
   double pixel_mm = 0;
@@ -42,7 +42,8 @@ MARROW_PLUGIN(plugin) {
       .out("camera", "geometry of each view; the isocentre is the world's origin, its axes are the patient's", marrow::over("view"))
       .option("paths", &Options::paths, "DICOM files, the same that read.views takes as images", marrow::required())
       .option("names", &Options::names, "one name per view; without names, the files' names without extension")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1", marrow::at_least(1))
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1, the one that read.views takes; 0 = there is only one, or all were taken alike",
+              marrow::at_least(0))
       .option("source_to_detector_mm", &Options::source_to_detector_mm, "instead of DistanceSourceToDetector; 0 = as the header says",
               marrow::at_least(0))
       .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm,

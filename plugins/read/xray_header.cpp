@@ -21,6 +21,8 @@ constexpr DicomTag kPixelSpacing{0x0028, 0x0030, "PixelSpacing"};
 constexpr DicomTag kSpacingCalibration{0x0028, 0x0a02, "PixelSpacingCalibrationType"};
 constexpr DicomTag kPrimaryAngle{0x0018, 0x1510, "PositionerPrimaryAngle"};
 constexpr DicomTag kSecondaryAngle{0x0018, 0x1511, "PositionerSecondaryAngle"};
+constexpr DicomTag kPrimaryIncrement{0x0018, 0x1520, "PositionerPrimaryAngleIncrement"};
+constexpr DicomTag kSecondaryIncrement{0x0018, 0x1521, "PositionerSecondaryAngleIncrement"};
 constexpr DicomTag kPositionerMotion{0x0018, 0x1500, "PositionerMotion"};
 constexpr DicomTag kPatientPosition{0x0018, 0x5100, "PatientPosition"};
 constexpr DicomTag kPatientOrientation{0x0020, 0x0020, "PatientOrientation"};
@@ -141,10 +143,27 @@ Eigen::Matrix3d carm_axes(double secondary_deg, double primary_deg) {
   return camera::world_from_camera_rotation(radians(secondary_deg), radians(primary_deg));
 }
 
-void check_motion(const DicomHeader& header, int frame) {
-  if (frame > 1 && header.text(kPositionerMotion).value_or("") == "DYNAMIC")
-    throw Error(header.path().string() + ": the arm moves during this run, and its angles are those of the first frame; use frame 1, or "
-                "camera.carm with the angles of frame " + std::to_string(frame));
+/// Increments of the angles are none of theirs where they are all 0.
+bool arm_moves(const DicomHeader& header) {
+  if (header.text(kPositionerMotion).value_or("") == "DYNAMIC") return true;
+  for (const DicomTag& tag : {kPrimaryIncrement, kSecondaryIncrement})
+    for (const double increment : header.numbers(tag, 0).value_or(std::vector<double>{}))
+      if (increment != 0) return true;
+  return false;
+}
+
+void check_motion(const DicomHeader& header, int frame, int frames) {
+  if (frame == 1 || (frame == 0 && frames == 1) || !arm_moves(header)) return;
+  throw Error(header.path().string() + ": the arm moves during this run" +
+              (frame == 0 ? " of " + std::to_string(frames) + " frames" : "") +
+              ", and its angles are those of the first frame; use frame 1, or camera.carm with the angles of " +
+              (frame == 0 ? "another" : "frame " + std::to_string(frame)));
+}
+
+void check_frame(const DicomHeader& header, int frame, int frames) {
+  if (frame <= frames) return;
+  throw Error(header.path().string() + ": has " + std::to_string(frames) + (frames == 1 ? " frame" : " frames") +
+              "; there is no frame " + std::to_string(frame));
 }
 
 void check_angles(const DicomHeader& header, double primary_deg, double secondary_deg) {
@@ -173,7 +192,8 @@ bool is_inverted(const DicomHeader& header) {
   const auto sign = header.number(kIntensitySign);
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
   if (*sign != 1 && *sign != -1)
-    throw Error(header.path().string() + ": " + kIntensitySign.text() + " is " + std::to_string(int(*sign)) + ", expected 1 or -1");
+    throw Error(header.path().string() + ": " + kIntensitySign.text() + " is " + std::to_string(int(*sign)) +
+                ", expected 1 or -1");
   return (*sign < 0) != (header.number(kSlope).value_or(1) < 0);
 }
 
@@ -181,18 +201,12 @@ bool is_inverted(const DicomHeader& header) {
 void check_linear(const DicomHeader& header) {
   if (header.text(kIntensity).value_or("") == "LOG")
     throw Error(header.path().string() + ": its values are logarithms (" + kIntensity.text() +
-                " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), or, where only "
-                "contours are looked for, save it as PNG or TIFF with bright air");
+                " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), "
+                "or, where only contours are looked for, save it as PNG or TIFF with bright air");
 }
 
-}  // namespace
-
-XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
-  const DicomFile file(path);
-  read_dicom_pixels(file, frame);  // whether the header agrees with itself and the file
+XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverrides& overrides) {
   const DicomHeader header(file, frame);
-  check_modality(header);
-  check_motion(header, frame);
   XrayGeometry geometry;
   Wanted wanted(header);
   const double primary_deg = wanted.number(kPrimaryAngle, "or use camera.carm");
@@ -214,15 +228,56 @@ XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, co
     axes.col(0) = stored->mirrored ? Eigen::Vector3d(-stored->right) : stored->right;
     axes.col(1) = stored->down;
   } else {
-    geometry.warnings.push_back(path.string() + ": " + kPatientOrientation.text() +
+    geometry.warnings.push_back(file.path().string() + ": " + kPatientOrientation.text() +
                                 " is missing, so the image is taken to have the head up and to be seen from the source (in the frontal view the "
                                 "patient's left is on the left); if it is not, mirror or turn it first");
   }
   if (const auto position = header.text(kPatientPosition); position && *position != "HFS")
-    geometry.warnings.push_back(path.string() + ": " + kPatientPosition.text() + " is " + *position +
+    geometry.warnings.push_back(file.path().string() + ": " + kPatientPosition.text() + " is " + *position +
                                 "; angles are taken relative to the patient, as the standard has it, but not every C-arm writes them so");
   geometry.camera = camera::carm_camera(arm, axes);
-  check_camera(geometry.camera, path.string());
+  check_camera(geometry.camera, file.path().string());
+  return geometry;
+}
+
+/// Whether two frames were taken by the same camera.
+bool are_same(const Camera& a, const Camera& b) {
+  return a.intrinsics.isApprox(b.intrinsics, 1e-9) &&
+         a.camera_from_world.rotation.isApprox(b.camera_from_world.rotation, 1e-9) &&
+         a.camera_from_world.translation_mm.isApprox(b.camera_from_world.translation_mm, 1e-9);
+}
+
+/// Without a frame's number there is an answer only where all frames have the same.
+void check_all_same(const DicomFile& file, int frames, const XrayGeometry& first, const XrayOverrides& overrides) {
+  constexpr int kMostCompared = 1000, kMostShown = 8;
+  if (frames == 1 || !find_element(file.path(), file.elements(), kFrameGroups)) return;
+  bool same = frames <= kMostCompared;
+  std::string shown;
+  for (int frame = 1; frame <= std::min(frames, kMostCompared); ++frame) {
+    same = same && are_same(geometry_of_frame(file, frame, overrides).camera, first.camera);
+    if (frame > kMostShown) continue;
+    const DicomHeader header(file, frame);
+    char text[96];
+    std::snprintf(text, sizeof text, "%sframe %d at %g, %g degrees", frame == 1 ? "" : "; ", frame,
+                  header.number(kPrimaryAngle).value_or(0), header.number(kSecondaryAngle).value_or(0));
+    shown += text;
+  }
+  if (same) return;
+  throw Error(file.path().string() + ": has " + std::to_string(frames) + " frames with a geometry each (" + shown +
+              (frames > kMostShown ? "; ..." : "") + "); name the one that the image is of with frame (from 1)");
+}
+
+}  // namespace
+
+XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
+  const DicomFile file(path);
+  const int frames = read_dicom_pixels(file, std::max(1, frame)).frames;  // also whether the header agrees with itself
+  const DicomHeader header(file, std::max(1, frame));
+  check_modality(header);
+  check_motion(header, frame, frames);
+  check_frame(header, frame, frames);
+  const XrayGeometry geometry = geometry_of_frame(file, std::max(1, frame), overrides);
+  if (frame == 0) check_all_same(file, frames, geometry, overrides);
   return geometry;
 }
 

@@ -11,6 +11,7 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
+using marrow::test::dicom_elements;
 using marrow::test::dicom_file;
 using marrow::test::dicom_item;
 using marrow::test::dicom_items;
@@ -225,6 +226,52 @@ TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
   options.frame = 2;
   marrow::Context context;
   EXPECT_TRUE(towards_detector(dicom(options, context)[0]).isApprox(Vector3d::UnitX()));
+}
+
+/// Three frames, at these angles.
+Elements frames_at(const std::vector<std::string>& angles) {
+  Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});
+  std::vector<std::string> frames;
+  const std::string pixels = header[0x7FE00010].substr(3);
+  header[0x7FE00010] = "OW:";
+  for (const std::string& angle : angles) {
+    frames.push_back(dicom_elements({{0x00189405, dicom_item({{kPrimary, "DS:" + angle}, {kSecondary, "DS:0"}})}}));
+    header[0x7FE00010] += pixels;
+  }
+  header[0x00280008] = "IS:" + std::to_string(angles.size());
+  header[0x52009230] = dicom_items(frames);
+  return header;
+}
+
+// The image may be of any of them: read.views takes the frame that it is told.
+TEST(DicomCamera, FramesWithAGeometryEachMustBeNamed) {
+  const Elements turning = frames_at({"0", "30", "60"});
+  EXPECT_SAYS(read(turning), "x.dcm: has 3 frames with a geometry each (frame 1 at 0, 0 degrees; frame 2 at 30, 0 degrees; frame 3 at 60, 0 "
+                             "degrees); name the one that the image is of with frame (from 1)");
+  Options options;
+  options.frame = 3;
+  const Eigen::Matrix3d third = read(turning, options).camera.camera_from_world.rotation;
+  EXPECT_TRUE(third.isApprox(at("60", "0").camera_from_world.rotation));
+  EXPECT_TRUE(read(frames_at({"60", "60", "60"})).camera.camera_from_world.rotation.isApprox(third)) << "all alike";
+  options.frame = 4;
+  EXPECT_SAYS(read(turning, options), "x.dcm: has 3 frames; there is no frame 4");
+}
+
+TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
+  Elements header = with(fluoroscopy(), 0x00280008, "IS:3");
+  const std::string pixels = header[0x7FE00010].substr(3);
+  header[0x7FE00010] += pixels + pixels;
+  const Elements still = with(with(header, 0x00181520, "DS:0\\0\\0"), 0x00181500, "CS:STATIC");
+  EXPECT_EQ(read(still).camera.width_px, 6);
+  for (const std::uint32_t tag : {0x00181520u, 0x00181521u}) {
+    const Elements moving = with(still, tag, "DS:0\\30\\60");
+    EXPECT_SAYS(read(moving), "the arm moves during this run of 3 frames");
+    Options options;
+    options.frame = 3;
+    EXPECT_SAYS(read(moving, options), "use frame 1, or camera.carm with the angles of frame 3");
+    options.frame = 1;
+    EXPECT_TRUE(read(moving, options).camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));
+  }
 }
 
 TEST(DicomCamera, OneCameraPerFileByName) {

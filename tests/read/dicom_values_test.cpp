@@ -146,8 +146,8 @@ TEST_F(DicomValues, AreInvertedByWhatTheSignSaysOfStoredOnes) {
     image(dicom_file(with(fluoroscopy(), changed))).pixels.convertTo(pixels, CV_32F);
     return pixels.at<float>(0, 0) < pixels.at<float>(3, 5);
   };
-  const std::pair<std::uint32_t, std::string> less{0x00281041, "SS:-1"}, more{0x00281041, "SS:1"}, slope{0x00281053, "DS:-1"},
-      intercept{0x00281052, "DS:4095"}, white{0x00280004, "CS:MONOCHROME1"};
+  const std::pair<std::uint32_t, std::string> less{0x00281041, "SS:-1"}, more{0x00281041, "SS:1"},
+      slope{0x00281053, "DS:-1"}, intercept{0x00281052, "DS:4095"}, white{0x00280004, "CS:MONOCHROME1"};
   EXPECT_TRUE(rises({}));
   EXPECT_TRUE(rises({more}));
   EXPECT_FALSE(rises({less}));
