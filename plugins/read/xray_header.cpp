@@ -30,6 +30,8 @@ constexpr DicomTag kPhotometric{0x0028, 0x0004, "PhotometricInterpretation"};
 constexpr DicomTag kSlope{0x0028, 0x1053, "RescaleSlope"};
 constexpr DicomTag kIntensity{0x0028, 0x1040, "PixelIntensityRelationship"};
 constexpr DicomTag kIntensitySign{0x0028, 0x1041, "PixelIntensityRelationshipSign", DicomTag::Kind::ss};
+constexpr DicomTag kFieldOfViewOrigin{0x0018, 0x7030, "FieldOfViewOrigin"};
+constexpr DicomTag kIsocentreProjection{0x0018, 0x9430, "PositionOfIsocenterProjection", DicomTag::Kind::fl};
 constexpr DicomTag kRows{0x0028, 0x0010, "Rows", DicomTag::Kind::us};
 constexpr DicomTag kColumns{0x0028, 0x0011, "Columns", DicomTag::Kind::us};
 
@@ -235,6 +237,11 @@ XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverr
   if (const auto position = header.text(kPatientPosition); position && *position != "HFS")
     geometry.warnings.push_back(file.path().string() + ": " + kPatientPosition.text() + " is " + *position +
                                 "; angles are taken relative to the patient, as the standard has it, but not every C-arm writes them so");
+  for (const DicomTag& tag : {kFieldOfViewOrigin, kIsocentreProjection})
+    if (header.has(tag))
+      geometry.warnings.push_back(file.path().string() + ": " + tag.text() +
+                                  " is not made use of: the ray through the isocentre is taken to meet the image's centre, which "
+                                  "it does not where the image is a part of the detector; check the result with camera.check");
   geometry.camera = camera::carm_camera(arm, axes);
   check_camera(geometry.camera, file.path().string());
   return geometry;

@@ -173,6 +173,16 @@ TEST(DicomCamera, WarnsWhereTheHeaderIsSilent) {
   EXPECT_NE(prone.warnings[0].find("PatientPosition (0018,5100) is HFP"), std::string::npos);
 }
 
+TEST(DicomCamera, WarnsWhereTheCentreMayLieElsewhere) {
+  for (const auto& [tag, value, name] : {std::tuple{0x00187030u, "DS:500\\0", "FieldOfViewOrigin (0018,7030)"},
+                                         {0x00189430u, "FL:510", "PositionOfIsocenterProjection (0018,9430)"}}) {
+    const Read warned = read(with(fluoroscopy(), tag, value));
+    ASSERT_EQ(warned.warnings.size(), 1u) << name;
+    EXPECT_NE(warned.warnings[0].find(std::string(name) + " is not made use of: the ray through the isocentre is taken to meet"),
+              std::string::npos) << warned.warnings[0];
+  }
+}
+
 TEST(DicomCamera, RefusesWhatCannotBe) {
   EXPECT_SAYS(read(with(fluoroscopy(), 0x00080060, "CS:CT")), "is of modality 'CT'; expected XA or RF");
   EXPECT_SAYS(read(with(fluoroscopy(), 0x00181110, "DS:500")), "the isocentre (600.000000 mm from the source) lies behind the detector");
