@@ -17,6 +17,9 @@ using Vector = std::array<double, 3>;
 constexpr double kFarthestOff_mm = 0.1;  // of a slice from its place in an even, straight grid
 
 constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
+constexpr DicomTag kPatient{0x0010, 0x0020, "PatientID"};
+constexpr DicomTag kStudy{0x0020, 0x000D, "StudyInstanceUID"};
+constexpr DicomTag kFrameOfReference{0x0020, 0x0052, "FrameOfReferenceUID"};
 constexpr DicomTag kDescription{0x0008, 0x103E, "SeriesDescription"};
 constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
 constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
@@ -37,6 +40,7 @@ Vector normalized(const Vector& a) {
 
 struct Slice {
   std::string series, description, modality;
+  std::string patient, study, frame_of_reference;
   std::string unit;  ///< of its values: HU, US (unspecified), or empty where the header does not say
   DicomPixels pixels;
   Samples samples;         ///< without bytes
@@ -121,6 +125,9 @@ Slice read_slice(const std::filesystem::path& path) {
   slice.series = header.text(kSeries).value_or("");
   slice.description = header.text(kDescription).value_or("");
   slice.modality = header.text(kModality).value_or("");
+  slice.patient = header.text(kPatient).value_or("");
+  slice.study = header.text(kStudy).value_or("");
+  slice.frame_of_reference = header.text(kFrameOfReference).value_or("");
   slice.unit = header.text(kRescaleType).value_or("");
   if (slice.pixels.frames != 1)
     throw Error(path.string() + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
@@ -207,6 +214,18 @@ void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
               kind(first) + "; slices of one series have the same: export the series again");
 }
 
+/// Slices of two patients, or of two places of one, lie in no common grid, whatever their positions say.
+void check_same_patient(const Slice& slice, const Slice& first) {
+  const std::tuple<const DicomTag&, const std::string&, const std::string&> all[] = {
+      {kPatient, slice.patient, first.patient},
+      {kStudy, slice.study, first.study},
+      {kFrameOfReference, slice.frame_of_reference, first.frame_of_reference}};
+  for (const auto& [tag, value, first_value] : all)
+    if (value != first_value)
+      throw Error(slice.path().string() + ": " + tag.text() + " is '" + shown(value) + "', but '" + shown(first_value) + "' in " +
+                  first.path().string() + "; slices of one series have the same: export the series again");
+}
+
 /// The distance between slices of the volume that is made of them.
 double spacing_of(const std::vector<Slice>& slices) {
   return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
@@ -250,6 +269,7 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
     if (slice.pixels.has_table)
       throw Error(slice.path().string() +
                   ": its values go through a table (ModalityLUTSequence), which is not read; export it as HU");
+    check_same_patient(slice, first);
     check_same_scaling(slice.pixels, first.pixels);
     check_same_pixels(slice.pixels, first.pixels);
     bool same = slice.samples.size == first.samples.size;

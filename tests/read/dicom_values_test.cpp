@@ -97,6 +97,16 @@ TEST_F(DicomValues, OfSlicesWithOtherPixelsAreRefused) {
               "s1: its pixels have 12 bits without a sign, those of");
 }
 
+// By their SeriesInstanceUID and positions they would go together.
+TEST_F(DicomValues, OfTwoPatientsOrPlacesAreNotJoined) {
+  const Elements all{{0x00100020, "LO:x"}, {0x0020000D, "UI:1.2.1"}, {0x00200052, "UI:1.2.2"}};
+  EXPECT_EQ(series(with(ct_slice(1), all), all).grid.size[2], 3);
+  for (const auto& [tag, value, name] : {std::tuple{0x00100020u, "LO:other", "PatientID (0010,0020) is 'other', but 'x' in "},
+                                         {0x0020000Du, "UI:1.2.9", "StudyInstanceUID (0020,000d) is '1.2.9', but '1.2.1' in "},
+                                         {0x00200052u, "UI:1.2.9", "FrameOfReferenceUID (0020,0052) is '1.2.9', but '1.2.2' in "}})
+    EXPECT_SAYS(series(with(with(ct_slice(1), all), {{tag, value}}), all), std::string("s1: ") + name);
+}
+
 // Raw stored values look like Hounsfield units that are 1024 too high.
 TEST_F(DicomValues, OfACtThatDoesNotScaleThemAreRefused) {
   for (const auto& [tag, name] : {std::pair{0x00281052u, "RescaleIntercept (0028,1052)"}, {0x00281053u, "RescaleSlope (0028,1053)"}}) {
