@@ -39,15 +39,19 @@ marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& cont
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.dicom", dicom)
       .summary("Cameras of X-ray images (XA, RF) from the angles and distances in their DICOM headers")
-      .out("camera", "geometry of each view; the isocentre is the world's origin, its axes are the patient's", marrow::over("view"))
+      .out("camera", "geometry of each view; the isocentre is the world's origin, its axes are the patient's",
+           marrow::over("view"))
       .option("paths", &Options::paths, "DICOM files, the same that read.views takes as images", marrow::required())
       .option("names", &Options::names, "one name per view; without names, the files' names without extension")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1, the one that read.views takes; 0 = there is only one, or all were taken alike",
+      .option("frame", &Options::frame,
+              "frame of a multi-frame file, from 1, the one that read.views takes; 0 = there is only one, or all were "
+              "taken alike",
               marrow::at_least(0))
-      .option("source_to_detector_mm", &Options::source_to_detector_mm, "instead of DistanceSourceToDetector; 0 = as the header says",
-              marrow::at_least(0))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm,
+              "instead of DistanceSourceToDetector; 0 = as the header says", marrow::at_least(0))
       .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm,
               "instead of DistanceSourceToPatient; 0 = as the header says", marrow::at_least(0))
-      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, instead of ImagerPixelSpacing; 0 = as the header says",
+      .option("pixel_mm", &Options::pixel_mm,
+              "size of a pixel on the detector, instead of ImagerPixelSpacing; 0 = as the header says",
               marrow::at_least(0));
 }

@@ -17,7 +17,8 @@ constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 struct DicomTag {
   std::uint16_t group, element;
   const char* name;
-  /// How its values are written: as text, as numbers of 2 bytes without or with a sign, or as floating numbers of 4 or 8.
+  /// How its values are written: as text, as numbers of 2 bytes without or with a sign, or as floating numbers of 4
+  /// or 8.
   enum class Kind { text, us, ss, fl, fd } kind = Kind::text;
   std::uint32_t code() const { return std::uint32_t(group) << 16 | element; }
   /// "PixelSpacing (0028,0030)"

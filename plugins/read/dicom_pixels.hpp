@@ -34,7 +34,8 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame);
 /// One frame (from 1) as unsigned or signed integers, of which only the bits that count are kept. Throws Error.
 Samples read_dicom_frame(const DicomPixels& pixels, int frame);
 
-/// Values of pixels that were not measured are made air's, unless they are that already. `values` come from scaled_values().
+/// Values of pixels that were not measured are made air's, unless they are that already. `values` come from
+/// scaled_values().
 void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count);
 
 /// The values that stored ones stand for (RescaleSlope, RescaleIntercept).

@@ -222,8 +222,8 @@ void check_same_patient(const Slice& slice, const Slice& first) {
       {kFrameOfReference, slice.frame_of_reference, first.frame_of_reference}};
   for (const auto& [tag, value, first_value] : all)
     if (value != first_value)
-      throw Error(slice.path().string() + ": " + tag.text() + " is '" + shown(value) + "', but '" + shown(first_value) + "' in " +
-                  first.path().string() + "; slices of one series have the same: export the series again");
+      throw Error(slice.path().string() + ": has another " + tag.text() + " than " + first.path().string() +
+                  "; slices of one series have the same: export the series again");
 }
 
 /// The distance between slices of the volume that is made of them.
@@ -280,9 +280,10 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
       throw Error(slice.path().string() + ": has another size, spacing or direction than " + first.path().string());
   }
   if (!first.pixels.gives_slope || !first.pixels.gives_intercept)
-    throw Error(first.path().string() + ": its header has no " +
-                (first.pixels.gives_slope ? "RescaleIntercept (0028,1052)" : "RescaleSlope (0028,1053)") +
-                ", nor has any other slice's, so which values are Hounsfield units is not known; export the series again");
+    throw Error(
+        first.path().string() + ": its header has no " +
+        (first.pixels.gives_slope ? "RescaleIntercept (0028,1052)" : "RescaleSlope (0028,1053)") +
+        ", nor has any other slice's, so which values are Hounsfield units is not known; export the series again");
   std::vector<double> gaps;
   for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
   std::vector<double> sorted = gaps;

@@ -19,8 +19,10 @@ marrow::Image image(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.image", image)
       .summary("Grey image from PNG or TIFF (8 or 16 bit, or float) or DICOM")
-      .out("image", "grey values; of DICOM scaled as its header says, and of X-ray images mirrored and inverted to what "
-                    "the camera of their header sees, bright = air")
+      .out("image",
+           "grey values; of DICOM scaled as its header says, and of X-ray images mirrored and inverted to what "
+           "the camera of their header sees, bright = air")
       .option("path", &Options::path, "image file", marrow::required())
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              marrow::at_least(0));
 }

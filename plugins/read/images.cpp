@@ -35,5 +35,6 @@ MARROW_PLUGIN(plugin) {
       .out("images", "grey values, as read.image gives them", marrow::over("view"))
       .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
       .option("names", &Options::names, "one name per image; without names, the files' names without extension")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              marrow::at_least(0));
 }

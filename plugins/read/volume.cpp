@@ -23,8 +23,9 @@ marrow::Volume volume(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.volume", volume)
       .summary("CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its data)")
-      .out("volume", "CT in Hounsfield units; patient axes are LPS; what a DICOM series marks as padding (PixelPaddingValue) "
-                     "is air, at most -1000 HU")
+      .out("volume",
+           "CT in Hounsfield units; patient axes are LPS; what a DICOM series marks as padding (PixelPaddingValue) "
+           "is air, at most -1000 HU")
       .option("path", &Options::path, "file, or folder of one series", marrow::required())
       .option("voxel_size_mm", &Options::voxel_size_mm,
               "size of a voxel [x, y, z]; needed for TIFF, replaces the file's own")

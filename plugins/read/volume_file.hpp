@@ -26,7 +26,8 @@ Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& 
 /// 1; 0 = there must be only one. Throws Error.
 Image read_image_file(const std::filesystem::path& path, int frame = 0);
 
-/// Whether read_image_file() mirrors this image, so that what was drawn on the file as it is stored must be mirrored along.
+/// Whether read_image_file() mirrors this image, so that what was drawn on the file as it is stored must be mirrored
+/// along.
 bool is_mirrored_as_read(const std::filesystem::path& path, int frame = 0);
 
 }  // namespace marrow::read

@@ -188,8 +188,8 @@ void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
                 " mm is no detector's; give pixel_mm");
 }
 
-/// Whether higher values, as scaled, stand for less radiation. The sign is that of stored values, which a negative slope
-/// turns round. Without it the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
+/// Whether higher values, as scaled, stand for less radiation. The sign is that of stored values, which a negative
+/// slope turns round. Without it the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
 bool is_inverted(const DicomHeader& header) {
   const auto sign = header.number(kIntensitySign);
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
@@ -202,9 +202,10 @@ bool is_inverted(const DicomHeader& header) {
 /// Values must be linear in the radiation: their logarithm is taken later.
 void check_linear(const DicomHeader& header) {
   if (header.text(kIntensity).value_or("") == "LOG")
-    throw Error(header.path().string() + ": its values are logarithms (" + kIntensity.text() +
-                " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), "
-                "or, where only contours are looked for, save it as PNG or TIFF with bright air");
+    throw Error(
+        header.path().string() + ": its values are logarithms (" + kIntensity.text() +
+        " is LOG), but those of an X-ray image must rise linearly with the radiation; export it as linear (LIN), "
+        "or, where only contours are looked for, save it as PNG or TIFF with bright air");
 }
 
 XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverrides& overrides) {
@@ -231,17 +232,22 @@ XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverr
     axes.col(1) = stored->down;
   } else {
     geometry.warnings.push_back(file.path().string() + ": " + kPatientOrientation.text() +
-                                " is missing, so the image is taken to have the head up and to be seen from the source (in the frontal view the "
+                                " is missing, so the image is taken to have the head up and to be seen from the source "
+                                "(in the frontal view the "
                                 "patient's left is on the left); if it is not, mirror or turn it first");
   }
   if (const auto position = header.text(kPatientPosition); position && *position != "HFS")
-    geometry.warnings.push_back(file.path().string() + ": " + kPatientPosition.text() + " is " + *position +
-                                "; angles are taken relative to the patient, as the standard has it, but not every C-arm writes them so");
-  for (const DicomTag& tag : {kFieldOfViewOrigin, kIsocentreProjection})
-    if (header.has(tag))
-      geometry.warnings.push_back(file.path().string() + ": " + tag.text() +
-                                  " is not made use of: the ray through the isocentre is taken to meet the image's centre, which "
-                                  "it does not where the image is a part of the detector; check the result with camera.check");
+    geometry.warnings.push_back(
+        file.path().string() + ": " + kPatientPosition.text() + " is " + *position +
+        "; angles are taken relative to the patient, as the standard has it, but not every C-arm writes them so");
+  for (const DicomTag& tag : {kFieldOfViewOrigin, kIsocentreProjection}) {
+    if (!header.has(tag)) continue;
+    geometry.warnings.push_back(file.path().string() + ": " + tag.text() +
+                                " is not made use of: the ray through the isocentre is taken to meet the image's "
+                                "centre, which it does not where the image is a part of the detector; check the "
+                                "result with camera.check");
+    break;  // once is enough
+  }
   geometry.camera = camera::carm_camera(arm, axes);
   check_camera(geometry.camera, file.path().string());
   return geometry;

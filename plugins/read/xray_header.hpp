@@ -19,9 +19,9 @@ struct XrayGeometry {
   std::vector<std::string> warnings;
 };
 
-/// The camera of the image as read_image_file() reads it: one that is stored mirrored (as one facing the patient sees it) is
-/// mirrored back. The world's origin is the isocentre, its axes are the patient's (LPS). `frame` counts from 1; 0 = there is only
-/// one, or all were taken alike. Throws Error that names all that is missing.
+/// The camera of the image as read_image_file() reads it: one that is stored mirrored (as one facing the patient sees
+/// it) is mirrored back. The world's origin is the isocentre, its axes are the patient's (LPS). `frame` counts from 1;
+/// 0 = there is only one, or all were taken alike. Throws Error that names all that is missing.
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides);
 
 /// What the pixels of a frame (from 1) need to become the image that the camera sees, bright = air.

@@ -178,9 +178,15 @@ TEST(DicomCamera, WarnsWhereTheCentreMayLieElsewhere) {
                                          {0x00189430u, "FL:510", "PositionOfIsocenterProjection (0018,9430)"}}) {
     const Read warned = read(with(fluoroscopy(), tag, value));
     ASSERT_EQ(warned.warnings.size(), 1u) << name;
-    EXPECT_NE(warned.warnings[0].find(std::string(name) + " is not made use of: the ray through the isocentre is taken to meet"),
-              std::string::npos) << warned.warnings[0];
+    EXPECT_NE(warned.warnings[0].find(std::string(name) +
+                                      " is not made use of: the ray through the isocentre is taken to meet"),
+              std::string::npos)
+        << warned.warnings[0];
   }
+}
+
+TEST(DicomCamera, WarnsOfTheCentreOnce) {
+  EXPECT_EQ(read(with(with(fluoroscopy(), 0x00187030, "DS:500\\0"), 0x00189430, "FL:510")).warnings.size(), 1u);
 }
 
 TEST(DicomCamera, RefusesWhatCannotBe) {
@@ -217,7 +223,8 @@ TEST(DicomCamera, IsocentreDistanceAsABinaryNumber) {
   options.paths = {folder / "x.dcm"};
   marrow::Context context;
   EXPECT_NEAR((dicom(options, context)[0].camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
-  EXPECT_SAYS(read(with(header, 0x00189402, "FL:nan")), "DistanceSourceToIsocenter (0018,9402): expected 1 number, got 4 bytes");
+  EXPECT_SAYS(read(with(header, 0x00189402, "FL:nan")),
+              "DistanceSourceToIsocenter (0018,9402): expected 1 number, got 4 bytes");
 }
 
 // Implicit files do not say that these are sequences.
@@ -225,7 +232,8 @@ TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
   Elements header = without(fluoroscopy(), {kPrimary, kSecondary, kOrientation});
   std::vector<std::string> frames;
   for (const char* angle : {"DS:0", "DS:90"})
-    frames.push_back(implicit_elements({{0x00189405, dicom_items({implicit_elements({{kPrimary, angle}, {kSecondary, "DS:0"}})})}}));
+    frames.push_back(
+        implicit_elements({{0x00189405, dicom_items({implicit_elements({{kPrimary, angle}, {kSecondary, "DS:0"}})})}}));
   header[0x00280008] = "IS:2";
   header[0x7FE00010] += header[0x7FE00010].substr(3);
   header[0x52009230] = dicom_items(frames);
@@ -256,8 +264,10 @@ Elements frames_at(const std::vector<std::string>& angles) {
 // The image may be of any of them: read.views takes the frame that it is told.
 TEST(DicomCamera, FramesWithAGeometryEachMustBeNamed) {
   const Elements turning = frames_at({"0", "30", "60"});
-  EXPECT_SAYS(read(turning), "x.dcm: has 3 frames with a geometry each (frame 1 at 0, 0 degrees; frame 2 at 30, 0 degrees; frame 3 at 60, 0 "
-                             "degrees); name the one that the image is of with frame (from 1)");
+  EXPECT_SAYS(
+      read(turning),
+      "x.dcm: has 3 frames with a geometry each (frame 1 at 0, 0 degrees; frame 2 at 30, 0 degrees; frame 3 at 60, 0 "
+      "degrees); name the one that the image is of with frame (from 1)");
   Options options;
   options.frame = 3;
   const Eigen::Matrix3d third = read(turning, options).camera.camera_from_world.rotation;
@@ -280,7 +290,8 @@ TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
     options.frame = 3;
     EXPECT_SAYS(read(moving, options), "use frame 1, or camera.carm with the angles of frame 3");
     options.frame = 1;
-    EXPECT_TRUE(read(moving, options).camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));
+    EXPECT_TRUE(read(moving, options)
+                    .camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));
   }
 }
 

@@ -29,9 +29,10 @@ inline std::string dicom_elements(const Elements& elements) {
   std::string bytes;
   for (const auto& [tag, text] : elements) {
     const std::string kind = text.substr(0, 2), value = text.substr(3);
-    bytes += dicom_element(tag, kind, kind == "US" || kind == "SS" ? little(std::uint32_t(std::stoi(value)), 2)
-                                      : kind == "FL" ? little(std::bit_cast<std::uint32_t>(std::stof(value)), 4)
-                                                     : value);
+    bytes += dicom_element(tag, kind,
+                           kind == "US" || kind == "SS" ? little(std::uint32_t(std::stoi(value)), 2)
+                           : kind == "FL"               ? little(std::bit_cast<std::uint32_t>(std::stof(value)), 4)
+                                                        : value);
   }
   return bytes;
 }
@@ -47,7 +48,8 @@ inline std::string implicit_elements(const Elements& elements) {
   return bytes;
 }
 
-/// A sequence, as the value of an element: "SQ:" before it. Each item is what dicom_elements() or implicit_elements() gave.
+/// A sequence, as the value of an element: "SQ:" before it. Each item is what dicom_elements() or implicit_elements()
+/// gave.
 inline std::string dicom_items(const std::vector<std::string>& items) {
   std::string bytes = "SQ:";
   for (const std::string& item : items) bytes += little(0xE000FFFEu, 4) + little(std::uint32_t(item.size()), 4) + item;
@@ -61,8 +63,10 @@ inline std::string dicom_item(const Elements& elements) {
 }
 
 inline std::string dicom_start(const std::string& transfer_syntax) {
-  const std::string meta = dicom_element(0x00020001, "OB", std::string("\0\1", 2)) + dicom_element(0x00020010, "UI", transfer_syntax);
-  return std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta;
+  const std::string meta =
+      dicom_element(0x00020001, "OB", std::string("\0\1", 2)) + dicom_element(0x00020010, "UI", transfer_syntax);
+  return std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) +
+         meta;
 }
 
 inline std::string dicom_file(const Elements& elements) {

@@ -156,7 +156,8 @@ TEST_F(HostileDicom, BytesInWordsOfTheOtherOrder) {
   };
   const auto file = [&](const std::string& kind) {
     const std::string meta = dicom_element(0x00020010, "UI", "1.2.840.10008.1.2.2");
-    std::string bytes = std::string(128, '\0') + "DICM" + dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta +
+    std::string bytes = std::string(128, '\0') + "DICM" +
+                        dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta +
                         big(0x00080060, "CS", "XA") + big(0x00280004, "CS", "MONOCHROME2");
     for (const auto& [tag, value] : {std::pair{0x00280002u, "1"}, {0x00280010u, "2"}, {0x00280011u, "2"}, {0x00280100u, "8"},
                                      {0x00280101u, "8"}, {0x00280102u, "7"}, {0x00280103u, "0"}})
