@@ -58,6 +58,17 @@ TEST_F(StoreEntryTest, AnEntryUnderAnothersNameIsNotAccepted) {
   EXPECT_EQ(store.find(key)->outputs[0].as<Metrics>().items[0].value, 1);
 }
 
+TEST_F(StoreEntryTest, WhatWasNotMadeIsNotKept) {
+  struct Never : marrow::Source {
+    std::shared_ptr<const void> data(const marrow::TypeInfo&) override { return nullptr; }
+  };
+  Value missing = number(1);
+  missing.data.reset();
+  missing.source = std::make_shared<Never>();
+  EXPECT_NE(store.save(key, {missing}, {}).find("a result that was not made is not kept"), std::string::npos);
+  EXPECT_FALSE(fs::exists(file_of(key)));
+}
+
 TEST_F(StoreEntryTest, WhatAnotherPlaceCameToIsNotAccepted) {
   Store::Last last;
   last.key = key;

@@ -96,6 +96,22 @@ TEST(GradientProjection, DirectionsCount) {
   EXPECT_NEAR(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1, 1e-6);
 }
 
+TEST(GradientProjection, WhatIsMaskedDoesNotCount) {
+  const auto value = [](double grey) {
+    marrow::View view = view_of(0);
+    view.mask = cv::Mat(256, 256, CV_8U, cv::Scalar(0));
+    view.mask(cv::Rect(30, 30, 105, 190)).setTo(1);
+    view.image.pixels.setTo(grey, view.mask == 0);
+    marrow::List<marrow::View> views;
+    views.add("frontal", view);
+    shipped::Inputs in = inputs();
+    in["views"] = shipped::list(views, "view");
+    return shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().value(shifted(0.3, 0, 0.6));
+  };
+  EXPECT_LT(value(20000), 0.9) << "some of the outline is left";
+  EXPECT_NEAR(value(5), value(60000), 1e-6) << "line integrals are relative to the brightest pixel";
+}
+
 TEST(GradientProjection, AnotherFragmentsShadowDoesNotCount) {
   const auto own = std::make_shared<const other_fragment::SquareOutline>();
   const other_fragment::Fragments fragments{own, std::make_shared<const other_fragment::SquareProjector>()};

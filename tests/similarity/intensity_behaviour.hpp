@@ -109,6 +109,9 @@ inline void nothing_is_the_worst(const Make& make, double worst) {
   View masked = view;
   masked.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(0));
   EXPECT_TRUE(std::isfinite(make(projector, views_of(masked))->value(at(0, 0))));
+  View few = masked;
+  few.mask(cv::Rect(89, 79, 3, 3)).setTo(1);
+  EXPECT_EQ(make(projector, views_of(few))->value(at(0, 0)), make(projector, views_of(masked))->value(at(0, 0))) << "nine pixels say no more than none";
   View black = view;
   black.image.pixels = cv::Mat(170, 200, CV_16U, cv::Scalar(0));
   EXPECT_TRUE(std::isfinite(make(projector, views_of(black))->value(at(0, 0))));
