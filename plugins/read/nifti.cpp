@@ -96,19 +96,22 @@ bool is_finite(const Affine& affine) {
   return true;
 }
 
+double dot(const Affine& affine, std::size_t a, std::size_t b) {
+  double sum = 0;
+  for (const auto& row : affine) sum += double(row[a]) * double(row[b]);
+  return sum;
+}
+
+/// Whether it consists of numbers, and no column is zero.
+bool has_lengths(const Affine& affine) {
+  return is_finite(affine) && dot(affine, 0, 0) > 0 && dot(affine, 1, 1) > 0 && dot(affine, 2, 2) > 0;
+}
+
 /// Whether its columns are at right angles and none is zero.
 bool is_straight(const Affine& affine) {
-  const auto dot = [&](std::size_t a, std::size_t b) {
-    double sum = 0;
-    for (const auto& row : affine) sum += double(row[a]) * double(row[b]);
-    return sum;
-  };
-  if (!is_finite(affine)) return false;
-  for (std::size_t a = 0; a < 3; ++a)
-    for (std::size_t b = a; b < 3; ++b) {
-      if (a == b ? !(dot(a, a) > 0) : std::abs(dot(a, b)) > kRoundedDirection * std::sqrt(dot(a, a) * dot(b, b)))
-        return false;
-    }
+  if (!has_lengths(affine)) return false;
+  for (const auto& [a, b] : {std::pair<std::size_t, std::size_t>{0, 1}, {0, 2}, {1, 2}})
+    if (std::abs(dot(affine, a, b)) > kRoundedDirection * std::sqrt(dot(affine, a, a) * dot(affine, b, b))) return false;
   return true;
 }
 
@@ -142,15 +145,29 @@ Affine qform(const Header& header) {
   return affine;
 }
 
-bool are_near(const Affine& one, const Affine& other, double unit_mm) {
-  for (std::size_t row = 0; row < 3; ++row)
-    for (std::size_t k = 0; k < 4; ++k)
-      if (!(std::abs(one[row][k] - other[row][k]) * unit_mm < 1e-4)) return false;
+/// Whether both put every voxel of the volume to the same place, but for the rounding of either.
+bool are_near(const Affine& one, const Affine& other, const Header& header) {
+  for (std::size_t row = 0; row < 3; ++row) {
+    double apart = std::abs(double(one[row][3]) - double(other[row][3]));
+    for (std::size_t k = 0; k < 3; ++k)
+      apart += std::abs(double(one[row][k]) - double(other[row][k])) * std::max(0, header.dim(int(k) + 1) - 1);
+    if (!(apart * header.unit_mm() < 0.02)) return false;  // not where one is no number, too
+  }
   return true;
 }
 
-/// The sform says it more exactly where it is one of the scanner, or agrees with the qform; of others, the qform stands
-/// for the scanner.
+[[noreturn]] void refuse_two_places(const Header& header, const Affine& s, int scode, int qcode) {
+  const std::string codes = "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
+  if (!is_straight(s))
+    throw Error(header.what() + ": its " + codes +
+                " do not agree: the sform is a matrix that is sheared (as of a CT with a tilted gantry) or damaged, which "
+                "no qform can say; resample it to axes at right angles, or export it again");
+  throw Error(header.what() + ": its " + codes +
+              " put the same voxels to different places; set the code of the wrong one to 0, or export it again");
+}
+
+/// Where both are given they must agree, or the sform must be the scanner's own. An sform that leads to another scan is
+/// none of this one, so then the qform stands for the scanner.
 Affine affine_of(const Header& header) {
   const int qcode = header.at<std::int16_t>(252), scode = header.at<std::int16_t>(254);
   if (qcode <= 0 && scode <= 0)  // programs differ in what they take then, and one of them mirrors the bone
@@ -158,8 +175,9 @@ Affine affine_of(const Header& header) {
                 ": its header does not say which axis is left or right, front or back, up or down (qform_code and "
                 "sform_code are 0); export it again with one of them, or as MHA");
   const Affine q = qform(header), s = sform(header);
-  if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q, header.unit_mm()))) return s;
-  if (qcode > 0 && is_straight(q)) return q;
+  if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q, header))) return s;
+  if (qcode > 0 && is_straight(q) && (scode <= 0 || (scode == 2 && qcode == 1 && has_lengths(s)))) return q;
+  if (qcode > 0 && scode > 0 && is_straight(q)) refuse_two_places(header, s, scode, qcode);
   throw Error(header.what() +
               ": its header does not say where it lies, or by a matrix that is sheared or damaged; resample or export "
               "it again");
