@@ -50,11 +50,6 @@ struct Slice {
   const std::filesystem::path& path() const { return pixels.path; }
 };
 
-bool looks_like_dicom(const std::filesystem::path& path) {
-  const InputFile file(path, true);
-  return file.size() >= 132 && file.text(128, 4) == "DICM";
-}
-
 /// Whether a file that is not DICOM is by its name no slice either: a licence, a note, a picture. Of any other, such as
 /// "IM5", it may be what is left of a slice.
 bool is_no_slice_by_name(const std::filesystem::path& path) {
@@ -307,6 +302,11 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
 }
 
 }  // namespace
+
+bool looks_like_dicom(const std::filesystem::path& path) {
+  const InputFile file(path, true);
+  return file.size() >= 132 && file.text(128, 4) == "DICM";
+}
 
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
   std::vector<Slice> slices = choose_series(folder, series_uid);

@@ -22,6 +22,7 @@ struct Samples {
   std::string spacing_field;  ///< where the file does not say how large voxels are: what its header would have to say
   std::string other_pages;    ///< of a TIFF whose pages are not the slices of one volume: what they are
   enum class Type { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 } type = Type::u8;
+  double slope = 1, intercept = 0;  ///< value = slope * sample + intercept
   std::vector<std::byte> bytes;  ///< x runs fastest, then y, then z
 
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
@@ -45,6 +46,8 @@ VolumeSamples read_nifti(const std::filesystem::path& path);
 /// A CT series: all slices of one series in a folder, sorted by position and checked for gaps, as HU. `series_uid`
 /// picks one where the folder holds several; empty = there must be just one. Throws Error.
 VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid);
+/// Whether a file begins as those of DICOM do.
+bool looks_like_dicom(const std::filesystem::path& path);
 
 /// All pages of a TIFF. Where it has colours, `components` says so and there are no bytes.
 Samples read_tiff(const std::filesystem::path& path);
@@ -68,7 +71,7 @@ struct StoredSamples {
 /// Throws Error unless all of them are there, and nothing behind them.
 std::vector<float> read_floats(const InputFile& file, const StoredSamples& stored);
 
-/// The samples as float.
+/// The values of the samples as float.
 std::vector<float> to_float(const Samples& samples);
 
 }  // namespace marrow::read

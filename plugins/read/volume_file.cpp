@@ -47,14 +47,22 @@ VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
               "folder of DICOM slices (name the folder)");
 }
 
+/// The header of MHA or NRRD that stands for the folder. Throws Error where slices of DICOM lie beside it: which of the two
+/// is the CT, and which are its labels, no name says.
 fs::path detached_header_in(const fs::path& folder) {
-  std::vector<fs::path> headers;
-  std::error_code failure;
+  std::vector<fs::path> headers, others;
+  std::error_code failure, none;
   for (fs::directory_iterator entry(folder, failure), end; entry != end && !failure; entry.increment(failure)) {
     const std::string extension = lower_extension(entry->path());
-    if (extension == ".mhd" || extension == ".nhdr") headers.push_back(entry->path());
+    const bool is_header = extension == ".mhd" || extension == ".nhdr";
+    if (is_header || entry->is_regular_file(none)) (is_header ? headers : others).push_back(entry->path());
   }
   if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
+  if (!headers.empty())
+    for (const fs::path& other : others)
+      if (looks_like_dicom(other))
+        throw Error(folder.string() + ": holds both a DICOM file ('" + other.filename().string() + "') and '" +
+                    headers[0].filename().string() + "', which may be another volume; keep one volume per folder");
   if (headers.size() > 1)
     throw Error(folder.string() + ": holds " + std::to_string(headers.size()) +
                 " .mhd or .nhdr files; keep one per folder");

@@ -103,6 +103,17 @@ TEST(ReadDicom, FilesThatAreNoSliceByNameArePassedOver) {
   EXPECT_EQ(read(folder.path()).grid.size[2], 4);
 }
 
+// Labels beside the CT would be handed on in its place.
+TEST(ReadDicom, AVolumeOfAnotherKindBesideTheSlicesIsRefused) {
+  for (const char* name : {"labels.mhd", "labels.nhdr"}) {
+    const marrow::test::TemporaryFolder folder;
+    write_series(folder);
+    marrow::test::put(folder / name, "header");
+    EXPECT_SAYS(read(folder.path()), "holds both a DICOM file ('slice");
+    EXPECT_SAYS(read(folder.path()), std::string("and '") + name + "', which may be another volume; keep one volume per folder");
+  }
+}
+
 TEST(ReadDicom, SlicesInAFolderBelowAreRefused) {
   const TemporaryFolder folder;
   write_series(folder);
