@@ -166,6 +166,21 @@ void check_units(const HeaderFields& fields, const std::string& key) {
       fields.refuse(key, "mm");
 }
 
+/// Of each axis, whether its ends are those of the first and last voxel's centres (node) instead of their borders (cell, or
+/// not said).
+std::array<bool, 3> nodes_of(const HeaderFields& fields) {
+  std::array<bool, 3> are_nodes{};
+  if (!fields.has("centers")) return are_nodes;
+  const std::vector<std::string> words = words_of(in_small_letters(fields.text("centers")));
+  if (words.size() != 3) fields.refuse("centers", "one of cell, node and none for each of the axes");
+  for (std::size_t k = 0; k < 3; ++k) {
+    if (words[k] != "node" && words[k] != "cell" && words[k] != "none" && words[k] != "???")
+      fields.refuse("centers", "one of cell, node and none for each of the axes");
+    are_nodes[k] = words[k] == "node";
+  }
+  return are_nodes;
+}
+
 /// By the fields of single axes, which are those of the patient then.
 void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
   for (const char* key : {"space", "space dimension", "space origin"})
@@ -185,14 +200,13 @@ void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
   const auto spacings = fields.numbers("spacings", 3);
   std::copy(spacings.begin(), spacings.end(), samples.spacing_mm.begin());
   if (!has_ends) return;
-  // Of the first voxel's border, unless its field `centers` says nodes.
   const auto least = fields.numbers("axis mins", 3);
-  const bool are_nodes = in_small_letters(fields.text_or("centers", "")).find("node") != std::string::npos;
-  for (std::size_t k = 0; k < 3; ++k) samples.origin_mm[k] = least[k] + (are_nodes ? 0 : spacings[k] / 2);
+  const auto are_nodes = nodes_of(fields);
+  for (std::size_t k = 0; k < 3; ++k) samples.origin_mm[k] = least[k] + (are_nodes[k] ? 0 : spacings[k] / 2);
   if (!fields.has("axis maxs")) return;
   const auto greatest = fields.numbers("axis maxs", 3);
   for (std::size_t k = 0; k < 3; ++k)
-    if (const double length = spacings[k] * (samples.size[k] - (are_nodes ? 1 : 0));
+    if (const double length = spacings[k] * (samples.size[k] - (are_nodes[k] ? 1 : 0));
         std::abs(greatest[k] - least[k] - length) > 1e-3 * std::abs(length))
       fields.refuse("axis maxs", "'axis mins' and as many 'spacings' as there are voxels (" +
                                      std::to_string(least[k] + length) + ")");
