@@ -42,6 +42,14 @@ Image image_of(const Samples& samples, int frame, const fs::path& path) {
                                                         : -1;
   if (type < 0) throw Error(path.string() + ": expected 8 or 16 bit grey levels without sign, or float");
   const std::size_t page_bytes = std::size_t(samples.size[0]) * std::size_t(samples.size[1]) * bytes_each(samples.type);
+  if (samples.slope != 1 || samples.intercept != 0) {
+    const std::vector<float> values = to_float(samples);
+    const std::size_t page_pixels = values.size() / std::size_t(samples.size[2]);
+    Image image{cv::Mat(samples.size[1], samples.size[0], CV_32F)};
+    std::copy_n(values.begin() + std::ptrdiff_t(std::size_t(frame - 1) * page_pixels), page_pixels,
+                image.pixels.ptr<float>());
+    return image;
+  }
   Image image{cv::Mat(samples.size[1], samples.size[0], type)};
   std::memcpy(image.pixels.data, samples.bytes.data() + std::size_t(frame - 1) * page_bytes, page_bytes);
   check_finite(image, path);

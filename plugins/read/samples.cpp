@@ -59,10 +59,14 @@ void convert(Samples::Type type, const std::byte* bytes, std::size_t count, bool
   }
 }
 
+void scale(float* values, std::size_t count, double slope, double intercept) {
+  if (slope == 1 && intercept == 0) return;
+  for (std::size_t i = 0; i < count; ++i) values[i] = float(double(values[i]) * slope + intercept);
+}
+
 void convert(const StoredSamples& stored, const std::byte* bytes, std::size_t count, float* values) {
   convert(stored.type, bytes, count, stored.big_endian, values);
-  if (stored.slope != 1 || stored.intercept != 0)
-    for (std::size_t i = 0; i < count; ++i) values[i] = float(double(values[i]) * stored.slope + stored.intercept);
+  scale(values, count, stored.slope, stored.intercept);
 }
 
 constexpr std::size_t kPart = 1 << 17;  // samples that are converted at once
@@ -136,6 +140,7 @@ std::vector<float> read_floats(const InputFile& file, const StoredSamples& store
 std::vector<float> to_float(const Samples& samples) {
   std::vector<float> values(samples.count());
   convert(samples.type, samples.bytes.data(), values.size(), false, values.data());
+  scale(values.data(), values.size(), samples.slope, samples.intercept);
   return values;
 }
 

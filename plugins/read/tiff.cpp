@@ -67,6 +67,16 @@ void invert(const std::string& what, Samples& samples) {
               "and 16 bits without sign only: save it with zero as black");
 }
 
+/// ImageJ calibrates whole numbers without sign; what it means for others, or for those that are inverted, it does not say.
+void check_calibration(const std::string& what, const Samples& samples, const TiffPage& page) {
+  if (samples.slope == 1 && samples.intercept == 0) return;
+  const bool is_plain = samples.type == Samples::Type::u8 || samples.type == Samples::Type::u16;
+  if (!is_plain || page.photometric == 0)
+    throw Error(what + ": its values are calibrated by ImageJ (c0, c1), and " +
+                (is_plain ? "its zero is white" : "its pixels are not whole numbers of 8 or 16 bits without sign") +
+                "; save it uncalibrated (in ImageJ: Analyze, Calibrate), or as float");
+}
+
 }  // namespace
 
 Samples read_tiff(const std::filesystem::path& path) {
@@ -77,12 +87,15 @@ Samples read_tiff(const std::filesystem::path& path) {
   Samples samples;
   samples.dimensions = tiff.pages.size() > 1 ? 3 : 2;
   samples.other_pages = tiff.other_pages;
+  samples.slope = tiff.slope;
+  samples.intercept = tiff.intercept;
   samples.size = {int(first.width), int(first.height), int(tiff.pages.size())};
   samples.components = int(std::min<std::uint64_t>(first.samples, 1000));
   if (first.photometric > 1) samples.components = std::max(samples.components, 3);  // a palette
   if (samples.components != 1) return samples;
   for (const TiffPage& page : tiff.pages) check_kind(what, page);
   samples.type = type_of(what, first);
+  check_calibration(what, samples, first);
   check_size(what, {samples.size[0], samples.size[1], samples.size[2]}, file.size());
   const std::size_t page_bytes = std::size_t(first.width) * std::size_t(first.height) * bytes_each(samples.type);
   samples.bytes.resize(page_bytes * tiff.pages.size());

@@ -15,7 +15,7 @@ namespace marrow::read {
 namespace {
 
 constexpr std::size_t kMostPages = 100000;
-constexpr std::uint64_t kLongestDescription = 65536;
+constexpr std::uint64_t kLongestDescription = 1 << 20;
 
 /// The widths of places and entries: BigTIFF (43) has 8-byte places and 20-byte entries, TIFF (42) 4 and 12.
 struct Layout {
@@ -38,6 +38,7 @@ class Walk {
                   " pages are whole; copy or export it again");
     }
     if (tiff_.pages.empty()) throw Error(what() + ": has no page");
+    check_pages_told();
     return std::move(tiff_);
   }
 
@@ -87,10 +88,11 @@ class Walk {
     if (!window_.holds(first_entry, entries * layout_.entry_bytes)) throw std::out_of_range("entries");
     TiffPage page;
     std::vector<std::uint64_t> places, lengths;
+    TiffDescription description;
     for (std::uint64_t i = 0; i < entries; ++i) {
       const std::uint64_t entry = first_entry + i * layout_.entry_bytes, tag = number(entry, 2);
       if (tag == 273) places = numbers_of(entry);
-      if (tag == 270) check_description(entry);
+      if (tag == 270) description = check_description(entry);
       if (tag == 279) lengths = numbers_of(entry);
       if (tag == 322 || tag == 324) page.is_tiled = true;
       if (std::uint64_t* const place = place_of(page, tag)) {
@@ -105,22 +107,62 @@ class Walk {
       }
     }
     check_strips(places, lengths, page);
+    page.told = description.pages;
+    if (description.samples == 0 || page.is_tiled || page.samples < 1 || page.samples > 1000) return page;
+    const std::uint64_t each = page.width * page.height * page.samples;
+    if (description.samples % each == 0) page.told = description.samples / each;
     return page;
   }
 
-  void check_description(std::uint64_t entry) {
+  TiffDescription check_description(std::uint64_t entry) {
     const std::uint64_t type = number(entry + 2, 2), count = number(entry + 4, layout_.width);
-    if (type != 2 || count <= std::uint64_t(layout_.width)) return;
+    if (type != 2 || count <= std::uint64_t(layout_.width)) return {};
     const std::uint64_t at = number(entry + 4 + std::uint64_t(layout_.width), layout_.width);
+    if (!window_.holds(at, count)) throw std::out_of_range("description");
     const std::uint64_t length = std::min(count, kLongestDescription);
-    if (!window_.holds(at, length)) throw std::out_of_range("description");
     count_bytes(length);
-    const TiffDescription description = read_tiff_description(window_.text(at, length));
+    const std::string text = window_.text(at, length);
+    if (length < count && text.find('<') != std::string::npos)  // what it says of the pages may come behind
+      throw Error(what() + ": its description has " + std::to_string(count) + " bytes, more than the " +
+                  std::to_string(kLongestDescription) + " that are read; save it without");
+    TiffDescription description = read_tiff_description(text);
     if (description.is_truncated)
       throw Error(what() +
                   ": its first page stands for several, of which the others have no directory (tifffile's "
                   "'truncated'); save it without");
     if (tiff_.other_pages.empty()) tiff_.other_pages = description.other_pages;
+    take_calibration(description);
+    return description;
+  }
+
+  /// All pages go by that of the first.
+  void take_calibration(const TiffDescription& description) {
+    if (!description.calibration.empty())
+      throw Error(what() + ": " + description.calibration + "; save it uncalibrated (in ImageJ: Analyze, Calibrate)");
+    const bool is_other = description.slope != tiff_.slope || description.intercept != tiff_.intercept;
+    if (is_other && !tiff_.pages.empty() && (description.slope != 1 || description.intercept != 0))
+      throw Error(what() + ": page " + std::to_string(tiff_.pages.size() + 1) +
+                  " is calibrated otherwise than page 1; save it uncalibrated");
+    if (tiff_.pages.empty()) tiff_.slope = description.slope, tiff_.intercept = description.intercept;
+  }
+
+  /// Descriptions count the pages of a stack. Others than those mean that some are missed, or that they are two stacks.
+  void check_pages_told() {
+    std::uint64_t most = 0, different = 0, single = 0;
+    for (const TiffPage& page : tiff_.pages) {
+      most = std::max(most, page.told);
+      if (page.told == 1) ++single;
+      if (page.told != 0 && page.told != tiff_.pages.size()) ++different;
+    }
+    if (most > tiff_.pages.size())
+      throw Error(what() + ": " + (tiff_.other_pages.empty() ? "" : "is " + tiff_.other_pages + "; ") +
+                  "its description tells of " + std::to_string(most) + " pages, but it has " +
+                  std::to_string(tiff_.pages.size()) +
+                  ": the others have no directory, or are in other files; save it with a directory for each page");
+    if (different > 0 && single != tiff_.pages.size() && tiff_.other_pages.empty())  // else written page by page
+      tiff_.other_pages = "a file of several stacks (its first page tells of " +
+                          std::to_string(std::max<std::uint64_t>(1, tiff_.pages[0].told)) + " of the " +
+                          std::to_string(tiff_.pages.size()) + " pages)";
   }
 
   static std::uint64_t* place_of(TiffPage& page, std::uint64_t tag) {

@@ -16,6 +16,7 @@ struct TiffPage {
   std::uint64_t width = 0, height = 0, bits = 1, samples = 1, compression = 1, photometric = 1, fill_order = 1,
                 orientation = 1, rows_per_strip = 0xFFFFFFFF, predictor = 1, format = 1, subfile = 0;
   bool is_tiled = false;
+  std::uint64_t told = 0;  ///< pages that belong together by its description, of which it is the first; 0 = not said
   std::vector<TiffStrip> strips;
 
   /// Whether both are pages of one stack.
@@ -29,6 +30,7 @@ struct TiffPages {
   bool big_endian = false;
   std::vector<TiffPage> pages;
   std::string other_pages;  ///< where pages are not the slices of one volume: what they are
+  double slope = 1, intercept = 0;  ///< what makes values of the samples
 };
 
 /// Throws Error when pages are missing at the file's end, differ in size, or claim more than the file holds.
