@@ -4,8 +4,12 @@
 #include <signal.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <condition_variable>
 #include <cstring>
+#include <memory>
+#include <mutex>
 #include <thread>
 
 #include "manifest.hpp"
@@ -14,6 +18,7 @@
 #include "marrow/runtime/kinds.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "named_files.hpp"
+#include "no_process.hpp"
 #include "packed_values.hpp"
 
 namespace marrow {
@@ -123,6 +128,70 @@ std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& n
   }
 }
 
+/// The processes that read files for this one. Where the system grants no further one, another of them must end first. One
+/// that has just ended, or a thread, may still be counted for a moment.
+class Readers {
+ public:
+  std::unique_ptr<Worker> start(const WorkerSettings& settings, const std::atomic<bool>* cancelled) {
+    std::unique_lock lock(mutex_);
+    for (int alone = 0;;) {
+      const long ended = ended_;
+      ++running_;
+      lock.unlock();
+      try {
+        return std::make_unique<Worker>(settings);
+      } catch (const NoProcess&) {
+        lock.lock();
+        --running_;
+        const bool is_alone = running_ == 0 && ended_ == ended;
+        if (is_alone && ++alone == kMostTries) {
+          note_call_without_process();
+          throw;
+        }
+        one_ended_.notify_all();
+      } catch (...) {
+        end(nullptr);
+        throw;
+      }
+      if (running_ == 0) one_ended_.wait_for(lock, std::chrono::milliseconds(20));
+      while (running_ > 0 && ended_ == ended) {
+        if (cancelled && cancelled->load()) throw Cancelled();
+        one_ended_.wait_for(lock, std::chrono::milliseconds(50));
+      }
+    }
+  }
+  void end(std::unique_ptr<Worker> worker) {
+    worker.reset();
+    const std::scoped_lock lock(mutex_);
+    --running_;
+    ++ended_;
+    one_ended_.notify_all();
+  }
+
+ private:
+  static constexpr int kMostTries = 25;
+  std::mutex mutex_;
+  std::condition_variable one_ended_;
+  int running_ = 0;  ///< or about to start
+  long ended_ = 0;
+};
+
+class Reader {
+ public:
+  Reader(const WorkerSettings& settings, const std::atomic<bool>* cancelled) : worker_(all().start(settings, cancelled)) {}
+  ~Reader() { all().end(std::move(worker_)); }
+  Reader(const Reader&) = delete;
+  Reader& operator=(const Reader&) = delete;
+  Worker& worker() { return *worker_; }
+
+ private:
+  static Readers& all() {
+    static Readers readers;
+    return readers;
+  }
+  std::unique_ptr<Worker> worker_;
+};
+
 }  // namespace
 
 bool runs_apart(const PipelineNode& node) {
@@ -156,7 +225,8 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   const SharedMemory given, made;
   write_values(given.descriptor(), inputs, false);
   const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
-  Worker worker({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true, true});
+  Reader reader({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true, true}, hooks.cancelled);
+  Worker& worker = reader.worker();
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
                                     [&](const json& report) { pass_on(report, hooks); });

@@ -9,33 +9,21 @@
 #include <chrono>
 #include <condition_variable>
 #include <exception>
+#include <memory>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <thread>
 
 #include "evaluation.hpp"
 #include "mapping.hpp"
+#include "no_process.hpp"
+#include "thread_supply.hpp"
 
 namespace marrow {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 using Status = NodeRecord::Status;
-
-/// Of `wanted` threads, those that can be had beside this one: at a limit of the system, TBB would end the program.
-int threads_to_be_had(int wanted) {
-  std::vector<std::thread> threads;
-  std::atomic<bool> may_end{false};
-  try {
-    while (int(threads.size()) < wanted) threads.emplace_back([&] { may_end.wait(false); });
-  } catch (const std::exception&) {  // a limit of threads, or of memory
-  }
-  may_end = true;
-  may_end.notify_all();
-  for (std::thread& thread : threads) thread.join();
-  const int had = int(threads.size());
-  return had < wanted && had > 1 ? had - 1 : had;  // at the limit, one is left for the process that reads files
-}
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
@@ -59,7 +47,10 @@ class Executor {
     cv::setNumThreads(1);
     const int wanted = settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
     const int threads = threads_to_be_had(wanted);
-    if (threads == 0) throw Error("cannot start a thread; the limit of processes is reached (ulimit -u)");
+    if (threads == 0) {
+      note_call_without_process();
+      throw NoProcess("cannot start a thread; the limit of processes is reached (ulimit -u)");
+    }
     tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads) + 1);
     tbb::task_arena arena(threads, 0);
     arena_ = &arena;
@@ -159,9 +150,11 @@ class Executor {
   /// Gives the pool some work. What a node throws is its own failure; anything else that goes wrong ends the run.
   template <class Work>
   void enqueue(Work work) {
+    const auto is_taken = std::make_shared<std::atomic<bool>>(false);
     ++at_work_;
     try {
-      arena_->enqueue([this, work] {
+      arena_->enqueue([this, work, is_taken] {
+        if (is_taken->exchange(true)) return;
         try {
           if (!is_broken_) work();
         } catch (...) {
@@ -170,10 +163,18 @@ class Executor {
         const std::scoped_lock lock(mutex_);
         if (--at_work_ == 0) all_done_.notify_all();
       });
-    } catch (...) {  // no memory for it: nobody will be at it
-      --at_work_;
+    } catch (const std::bad_alloc&) {  // no memory for it: nobody will be at it
+      withdraw(*is_taken);
       throw;
+    } catch (const std::exception& error) {  // no thread for it: in this process TBB waits for that thread from now on
+      withdraw(*is_taken);
+      note_call_without_process();
+      throw NoProcess(std::string("cannot start a thread (") + error.what() + "); the limit of processes is reached (ulimit -u)");
     }
+  }
+
+  void withdraw(std::atomic<bool>& is_taken) {
+    if (!is_taken.exchange(true)) --at_work_;
   }
 
   void set_fault() {

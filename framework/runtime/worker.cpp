@@ -21,6 +21,7 @@
 #include "json_text.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/library.hpp"
+#include "no_process.hpp"
 
 namespace marrow {
 namespace {
@@ -38,9 +39,9 @@ constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
   rlimit files{};
   getrlimit(RLIMIT_NOFILE, &files);
   if (code == EMFILE || (code == EINVAL && files.rlim_cur <= kMostFiles))
-    throw Error("cannot start a process: no more than " + std::to_string(files.rlim_cur) +
+    throw NoProcess("cannot start a process: no more than " + std::to_string(files.rlim_cur) +
                 " files may be open at once; raise the limit (ulimit -n " + std::to_string(kEnoughFiles) + ")");
-  throw Error(std::string("cannot start a process: ") + std::strerror(code) +
+  throw NoProcess(std::string("cannot start a process: ") + std::strerror(code) +
               (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
 }
 

@@ -7,6 +7,7 @@
 #include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
 #include "process.hpp"
+#include "runtime/no_process.hpp"
 #include "runtime/place_of_results.hpp"
 #include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
@@ -102,7 +103,9 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   const Store store;
   const bool is_kept = !request.no_cache && can_keep_results(store.prepare(), false);
   CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads, request.file_limits);
+  const long without_process = calls_without_process();
   CellRow row = runner.run(*cell);
+  if (!row.failed.empty() && calls_without_process() != without_process) throw Error(row.failed);  // no failure of the cell's
   runner.write(*cell, row);
   std::printf("%s\n", compare::to_json(row).c_str());
   if (!row.failed.empty()) return 1;

@@ -12,28 +12,34 @@
 #include <utility>
 
 #include "marrow/runtime/worker.hpp"
+#include "runtime/no_process.hpp"
 
 namespace marrow::cli {
 namespace {
 
+constexpr int kMostRefused = 3;  // times: another program may be about to end
+
 /// A worker and the job that it is at.
 struct Member {
   explicit Member(const std::vector<std::string>& command) : worker({command}) {}
-  void start(Job next) {
+  void start(Job next, bool no_other) {
     job = std::move(next);
+    is_alone = no_other;
     ++job->tries;
     worker.ask(job->request);
   }
 
   Worker worker;
   std::optional<Job> job;
+  bool is_alone = false;  ///< no other worker was there while it was at its job
 };
 
 /// What is still to do, by groups, and who is at it.
 class Pool {
  public:
   Pool(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended)
-      : waiting_(std::make_move_iterator(jobs.begin()), std::make_move_iterator(jobs.end())), settings_(settings), ended_(ended) {}
+      : waiting_(std::make_move_iterator(jobs.begin()), std::make_move_iterator(jobs.end())), settings_(settings), ended_(ended),
+        most_(std::size_t(std::max(1, settings.workers))) {}
 
   bool run() {
     while (!waiting_.empty() || !again_.empty() || is_busy()) {
@@ -60,7 +66,8 @@ class Pool {
     const bool alone = waiting_.empty();
     if (alone && is_busy()) return;
     std::deque<Job>& source = alone ? again_ : waiting_;
-    const std::size_t most = alone ? 1 : std::size_t(std::max(1, settings_.workers));
+    if (alone && members_.size() > 1) members_.resize(1);  // those that do nothing have memory and threads, too
+    const std::size_t most = alone ? 1 : most_;
     while (!source.empty()) {
       Member* free = nullptr;
       for (const auto& member : members_)
@@ -68,12 +75,35 @@ class Pool {
       if (alone && is_busy()) return;
       if (!free) {
         if (members_.size() >= most) return;
-        free = members_.emplace_back(std::make_unique<Member>(settings_.command)).get();
+        free = new_member();
+        if (!free) return;
       }
       std::optional<Job> next = next_for(*free, source);
       if (!next) return;
-      free->start(std::move(*next));
+      free->start(std::move(*next), members_.size() == 1);
     }
+  }
+
+  /// None where the system grants no further process; then those that there are do all.
+  Member* new_member() {
+    try {
+      members_.push_back(std::make_unique<Member>(settings_.command));
+      for (const auto& member : members_) member->is_alone = members_.size() == 1;
+      return members_.back().get();
+    } catch (const NoProcess&) {
+      if (members_.empty()) throw;
+      most_ = members_.size();
+      return nullptr;
+    }
+  }
+
+  /// The job is done again, by fewer workers.
+  void lacks_process(Member& member, Job job, const std::string& why) {
+    if (member.is_alone && ++job.refused == kMostRefused) throw NoProcess(why);
+    most_ = std::max<std::size_t>(1, members_.size() - 1);
+    member.worker.close();
+    --job.tries;
+    waiting_.push_front(std::move(job));
   }
 
   /// A job of the group that the worker was at; else of one that no other worker is at; else of one whose first job is done:
@@ -102,6 +132,8 @@ class Pool {
     if (!end) end = member.worker.check({settings_.time_limit_s, settings_.memory_limit_mb});
     if (!end || !member.job) return;
     Job job = std::move(*std::exchange(member.job, std::nullopt));
+    if (end->answer.is_object() && end->answer.contains(kNoProcess))
+      return lacks_process(member, std::move(job), end->answer[kNoProcess].get<std::string>());
     begun_.insert(job.group);
     if (end->died && job.tries < 2) again_.push_back(std::move(job));
     else ended_(job, {std::move(end->answer), end->failed, job.tries});
@@ -112,6 +144,7 @@ class Pool {
   const std::function<void(const Job&, const JobEnd&)>& ended_;
   std::vector<std::unique_ptr<Member>> members_;
   std::map<const Member*, std::string> groups_;
+  std::size_t most_;  ///< workers at once
   std::set<std::string> begun_;  ///< groups of which a job has ended
 };
 

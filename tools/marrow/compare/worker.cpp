@@ -3,9 +3,11 @@
 #include <algorithm>
 
 #include "compare/comparison.hpp"
+#include "compare/pool.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "report/report.hpp"
+#include "runtime/no_process.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -50,6 +52,24 @@ std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
   };
 }
 
+/// What a task makes, or why the system granted no process for it, which is no failure of what is compared.
+json with_processes(const std::function<json()>& task) {
+  const long before = calls_without_process();
+  try {
+    return task();
+  } catch (const Error& error) {
+    if (calls_without_process() == before) throw;
+    return {{kNoProcess, error.what()}};
+  }
+}
+
+json run_cell(CellRunner& runner, const json& asked, WorkerReports& reports) {
+  const long before = calls_without_process();
+  const compare::CellRow row = runner.run(cell_in(runner, asked), observer_of(reports));
+  if (!row.failed.empty() && calls_without_process() != before) throw Error(row.failed);
+  return json::parse(compare::to_json(row));
+}
+
 }  // namespace
 
 int worker(const CompareRequest& request) {
@@ -62,20 +82,26 @@ int worker(const CompareRequest& request) {
   return serve_worker({
       {"case",
        [&](const json& asked, WorkerReports&) {
-         make_case(runner, asked);
-         return json(true);
+         return with_processes([&] {
+           make_case(runner, asked);
+           return json(true);
+         });
        }},
       {"cell",
        [&](const json& asked, WorkerReports& reports) {
-         return json::parse(compare::to_json(runner.run(cell_in(runner, asked), observer_of(reports))));
+         return with_processes([&] { return run_cell(runner, asked, reports); });
        }},
       {"time",
-       [&](const json& asked, WorkerReports&) { return json(runner.time(cell_in(runner, asked))); }},
+       [&](const json& asked, WorkerReports&) {
+         return with_processes([&] { return json(runner.time(cell_in(runner, asked))); });
+       }},
       {"draw",
        [&](const json& asked, WorkerReports& reports) {
-         const CellIndex cell = cell_in(runner, asked);
-         if (runner.draw(cell, observer_of(reports))) ReportMaterial::prepare(runner.pictures_of(cell));
-         return json(true);
+         return with_processes([&] {
+           const CellIndex cell = cell_in(runner, asked);
+           if (runner.draw(cell, observer_of(reports))) ReportMaterial::prepare(runner.pictures_of(cell));
+           return json(true);
+         });
        }},
   });
 }
