@@ -9,7 +9,7 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostBytes = 16'000'000;  // a long value that is named often would fill the memory
+constexpr std::size_t kMostBytes = 256'000;  // a long value that is named often would fill memory, terminal and records
 
 }  // namespace
 
@@ -28,7 +28,7 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
     const std::string* value = value_of(text.substr(i + 1, end - i - 1), place);
     if (value && (bytes_ += value->size()) > kMostBytes) {
       diagnostics_.add(
-          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostBytes / 1'000'000) + " MB",
+          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostBytes / 1000) + " kB",
           "give shorter values, or name them less often");
       return std::nullopt;
     }
