@@ -128,6 +128,13 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   return process;
 }
 
+/// With what it has started itself, which is in its group unless it has left it. To be called before the process is waited for:
+/// until then the group's number is no other's.
+void kill_group(pid_t process) {
+  kill(process, SIGKILL);
+  kill(-process, SIGKILL);
+}
+
 std::string number_text(const char* form, double value) {
   char text[80];
   std::snprintf(text, sizeof text, form, value);
@@ -152,7 +159,7 @@ Worker::~Worker() {
 
 void Worker::close() {
   if (process_ <= 0) return;
-  kill(process_, SIGKILL);
+  kill_group(process_);
   waitpid(process_, nullptr, 0);
   process_ = -1;
   is_busy_ = false;
@@ -220,13 +227,12 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
 
 WorkerEnd Worker::died() {
   int status = 0;
-  pid_t gone = 0;
+  siginfo_t gone{};
   // Its answers have ended; where the process itself has not, it is of no use.
-  for (int i = 0; i < 100 && (gone = waitpid(process_, &status, WNOHANG)) == 0; ++i) usleep(10'000);
-  if (gone == 0) {
-    kill(process_, SIGKILL);
-    waitpid(process_, &status, 0);
-  }
+  for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0; ++i)
+    usleep(10'000);
+  kill_group(process_);
+  waitpid(process_, &status, 0);
   process_ = -1;
   is_busy_ = false;
   WorkerEnd end;

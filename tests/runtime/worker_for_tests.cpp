@@ -42,6 +42,14 @@ int main() {
          std::this_thread::sleep_for(std::chrono::seconds(60));
          return json(text.size());
        }},
+      {"fork", [](const json& request, marrow::WorkerReports& reports) {
+         const pid_t child = fork();
+         if (child == 0) std::this_thread::sleep_for(std::chrono::seconds(600)), std::_Exit(0);
+         reports.at(std::to_string(child));
+         if (request.at("then") == "crash") std::raise(SIGSEGV);
+         if (request.at("then") == "sleep") std::this_thread::sleep_for(std::chrono::seconds(600));
+         return json(child);
+       }},
       {"parent", [](const json&, marrow::WorkerReports&) { return json(getppid()); }},
   });
 }

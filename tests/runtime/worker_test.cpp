@@ -148,6 +148,20 @@ TEST(Worker, DoesNotOutliveWhoMadeIt) {
   EXPECT_TRUE(comes_to(worker, std::string("ZX\0", 3))) << "it would sleep for a minute";
 }
 
+TEST(Worker, WhatItHasStartedEndsWithIt) {
+  for (const char* then : {"answer", "crash", "sleep"}) {
+    pid_t child = 0;
+    {
+      Worker worker({{MARROW_TEST_WORKER}, {}, true});
+      wait_for_start(worker);
+      ask(worker, {{"do", "fork"}, {"then", then}}, 2);
+      child = pid_t(std::stol(worker.at()));
+    }
+    ASSERT_GT(child, 0);
+    EXPECT_TRUE(comes_to(child, std::string("ZX\0", 3))) << then;
+  }
+}
+
 TEST(Worker, ProgramThatIsNotThereIsSaid) {
   try {
     Worker worker({{"/nowhere/marrow-worker"}});
