@@ -88,28 +88,6 @@ std::string file_of(const PipelineNode& node, const Worker& worker) {
   return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
 }
 
-std::string number_text(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.3g", value);
-  return text;
-}
-
-std::string failure_of(const PipelineNode& node, const Worker& worker, const WorkerEnd& end, const CallLimits& limits) {
-  const std::string file = file_of(node, worker);
-  if (end.is_out_of_memory)
-    return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
-           " MB of memory, which is more than a file of its size should; where the file is good, raise the limit with "
-           "--file-memory";
-  if (end.signal == SIGXCPU)
-    return file + ": to read it takes more than " + number_text(limits.processor_s) +
-           " s, which is more than a file of its size should; where the file is good, raise the limit with --file-seconds";
-  if (end.signal)
-    return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
-           "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
-  if (end.died) return file + ": could not be read: the process that was started for it " + end.failed;
-  return end.failed;
-}
-
 /// What the worker made. Large pieces are read from its memory, or where that is not allowed, from memory that both share.
 std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker, const SharedMemory& made) {
   const auto content_of = [&](const TypeInfo& type) -> const Content* {
@@ -192,7 +170,40 @@ class Reader {
   std::unique_ptr<Worker> worker_;
 };
 
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// How a process ended, without where it was, which the sentence has said.
+std::string without_place(std::string end, const std::string& place) {
+  const std::string where = " in " + place, subject = "its process";
+  if (const std::size_t found = end.find(where); found != end.npos) end.erase(found, where.size());
+  if (end.starts_with(subject + " ")) end.erase(0, subject.size() + 1);
+  return end;
+}
+
 }  // namespace
+
+std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits) {
+  if (end.is_out_of_memory)
+    return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
+           " MB of memory, which is more than a file of its size should; where the file is good, raise the limit with "
+           "--file-memory";
+  if (end.signal == SIGXCPU)
+    return file + ": to read it takes more than " + number_text(limits.processor_s) +
+           " s, which is more than a file of its size should; where the file is good, raise the limit with --file-seconds";
+  if (end.signal)
+    return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
+           "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
+  if (end.is_late)
+    return file + ": to read it takes more than " + number_text(limits.seconds) +
+           " s by the clock, which is more than a file of its size should; where the machine has much other work, try again, or "
+           "raise the limit with --file-seconds";
+  if (end.died) return file + ": could not be read: the process that was started for it " + without_place(end.failed, file);
+  return end.failed;
+}
 
 bool runs_apart(const PipelineNode& node) {
   return apart_of(node) != Kind::Apart::no && !paths_of(node).empty() && !has_function(node.info.inputs) &&
@@ -230,7 +241,7 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
                                     [&](const json& report) { pass_on(report, hooks); });
-  if (!end.failed.empty()) throw Error(failure_of(node, worker, end, limits));
+  if (!end.failed.empty()) throw Error(failure_of(file_of(node, worker), end, limits));
   std::vector<Value> outputs = handed_over(catalogue, node, worker, made);
   if (outputs.size() != node.info.outputs.size())
     throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) + " values, expected " +

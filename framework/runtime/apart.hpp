@@ -10,6 +10,7 @@
 namespace marrow {
 
 class WorkerReports;
+struct WorkerEnd;
 
 /// Whether calls of the node run apart: its kind says so, an option of it names a file, and no function goes in or comes out.
 bool runs_apart(const PipelineNode& node);
@@ -29,6 +30,9 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
 /// std::bad_alloc as the node itself would; an Error that names the file where the process crashed or went beyond its limits.
 std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& node, const std::vector<Value>& inputs,
                               const Context::Hooks& hooks, const RunSettings& settings);
+
+/// Why the file could not be read by the process that ended so, as a sentence.
+std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits);
 
 /// The worker's side: {"do": "call", "library": ..., "node": ..., "options": ..., ...}. Inputs come by descriptor 3, outputs go
 /// to descriptor 4.

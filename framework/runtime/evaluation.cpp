@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <opencv2/core.hpp>
 #include <optional>
 
 #include "apart.hpp"
@@ -306,6 +307,9 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   } catch (const std::bad_alloc&) {
     result.status = Status::failed;
     result.reason = "out of memory";
+  } catch (const cv::Exception& error) {
+    result.status = Status::failed;
+    result.reason = error.code == cv::Error::StsNoMem ? "out of memory" : error.what();
   } catch (const std::exception& error) {
     result.status = Status::failed;
     result.reason = error.what();

@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <mutex>
 #include <new>
+#include <opencv2/core.hpp>
 
 #include "json_text.hpp"
 #include "marrow/domain/error.hpp"
@@ -70,13 +71,19 @@ bool is_left_behind() {
 
 json failure(const std::string& why) { return {{"failed", why.empty() ? "it gave no reason" : why}}; }
 
+json out_of_memory() {
+  json failed = failure("out of memory");
+  failed["out_of_memory"] = true;
+  return failed;
+}
+
 json result_of(const WorkerTask& task, const json& request, Answers& answers) {
   try {
     return {{"end", task(request, answers)}};
   } catch (const std::bad_alloc&) {
-    json failed = failure("out of memory");
-    failed["out_of_memory"] = true;
-    return failed;
+    return out_of_memory();
+  } catch (const cv::Exception& error) {
+    return error.code == cv::Error::StsNoMem ? out_of_memory() : failure(error.what());
   } catch (const json::exception& error) {
     return failure(std::string("the request cannot be understood: ") + error.what());
   } catch (const std::exception& error) {

@@ -8,6 +8,7 @@
 #include <chrono>
 #include <thread>
 
+#include "marrow/runtime/worker.hpp"
 #include "runtime/fixture.hpp"
 
 namespace {
@@ -79,6 +80,21 @@ TEST_F(ApartTest, CrashIsOneNodesErrorThatNamesTheFile) {
 
 TEST_F(ApartTest, EndedProcessIsOneNodesError) {
   EXPECT_EQ(failure("exit"), ": could not be read: the process that was started for it ended with exit code 3");
+  EXPECT_EQ(failure("inside"), "/inner: could not be read: the process that was started for it ended with exit code 0");
+}
+
+TEST_F(ApartTest, WhatEndedAProcessIsASentence) {
+  marrow::CallLimits limits;
+  limits.seconds = 45.0004;
+  marrow::WorkerEnd end;
+  end.died = true;
+  end.failed = "its process in a.ply sent a line without end";
+  EXPECT_EQ(marrow::failure_of("a.ply", end, limits),
+            "a.ply: could not be read: the process that was started for it sent a line without end");
+  end.is_late = true;
+  EXPECT_EQ(marrow::failure_of("a.ply", end, limits),
+            "a.ply: to read it takes more than 45 s by the clock, which is more than a file of its size should; where the machine has "
+            "much other work, try again, or raise the limit with --file-seconds");
 }
 
 TEST_F(ApartTest, WhatANodeRefusesIsItsOwnError) { EXPECT_EQ(failure("refuse"), ": is refused"); }
@@ -87,6 +103,7 @@ TEST_F(ApartTest, MemoryIsLimitedByTheFilesSize) {
   if (marrow::abi_stamp().sanitizers) GTEST_SKIP() << "a sanitizer itself ends a process that is out of memory";
   EXPECT_EQ(failure("memory"), ": to read it takes more than 192 MB of memory, which is more than a file of its size should; "
                                                "where the file is good, raise the limit with --file-memory");
+  EXPECT_EQ(failure("opencv"), failure("memory"));  // it has an exception of its own for that
 }
 
 TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {

@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <opencv2/core.hpp>
 #include <thread>
 
 #include <marrow/plugin.hpp>
@@ -27,6 +28,8 @@ Metrics number(const Options& options, const Metrics* added, marrow::Context& co
   if (word == "exit") std::_Exit(3);
   if (word == "refuse") throw marrow::Error(options.path.string() + ": is refused");
   if (word == "memory") return {{{"value", double(std::vector<double>(std::size_t(1) << 33, 1.0).back()), ""}}};
+  if (word == "opencv") cv::Mat(1 << 17, 1 << 17, CV_8U).setTo(1);
+  if (word == "inside") marrow::now_reading(options.path / "inner"), std::_Exit(0);
   if (word == "spin")
     for (std::atomic<int> i{0};; ++i) {
     }
