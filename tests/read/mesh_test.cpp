@@ -173,6 +173,49 @@ TEST(ReadMesh, MoreThanTheHeaderClaimsIsRefused) {
   EXPECT_SAYS(read(folder / "a.ply"), "bytes of numbers, but the file has ");
 }
 
+/// A prism of height 1 on this outline.
+std::string prism(const std::vector<std::pair<double, double>>& outline) {
+  const int count = int(outline.size());
+  std::string vertices, below, above, sides;
+  for (const char* z : {" 0\n", " 1\n"})
+    for (const auto& [x, y] : outline) vertices += std::to_string(x) + " " + std::to_string(y) + z;
+  for (int k = 0; k < count; ++k) {
+    const int next = (k + 1) % count;
+    below += " " + std::to_string(count - 1 - k);
+    above += " " + std::to_string(count + k);
+    sides += "4 " + std::to_string(k) + " " + std::to_string(next) + " " + std::to_string(count + next) + " " +
+             std::to_string(count + k) + "\n";
+  }
+  return "ply\nformat ascii 1.0\nelement vertex " + std::to_string(2 * count) +
+         "\nproperty double x\nproperty double y\nproperty double z\nelement face " + std::to_string(count + 2) +
+         "\nproperty list uchar int vertex_indices\nend_header\n" + vertices + std::to_string(count) + below + "\n" +
+         std::to_string(count) + above + "\n" + sides;
+}
+
+/// Of all triangles' areas; where two lie over each other, more than that of the surface.
+double area_of(const marrow::Mesh& mesh) {
+  double area = 0;
+  for (const auto& [a, b, c] : mesh.triangles)
+    area += (mesh.vertices_mm[b] - mesh.vertices_mm[a]).cross(mesh.vertices_mm[c] - mesh.vertices_mm[a]).norm() / 2;
+  return area;
+}
+
+TEST(ReadMesh, FacesOfManyCornersAreCoveredOnce) {
+  const TemporaryFolder folder;
+  const auto area_of_prism = [&](const std::vector<std::pair<double, double>>& outline) {
+    put(folder / "a.ply", prism(outline));
+    return area_of(read(folder / "a.ply", 1));
+  };
+  const std::vector<std::pair<double, double>> notch{{0, 0}, {4, 0}, {4, 4}, {2, 1}, {0, 4}};  // seen whole from its reflex corner
+  EXPECT_NEAR(area_of_prism(notch), 2 * 10 + 12 + 2 * std::hypot(2, 3), 1e-9);
+  EXPECT_NEAR(area_of_prism({{0, 0}, {2, 0}, {4, 0}, {4, 2}, {0, 2}}), 2 * 8 + 12, 1e-9);  // a straight corner
+  const std::string uncertain = "corners is far from convex or flat, or crosses itself";
+  EXPECT_SAYS(area_of_prism({{0, 0}, {1, 1}, {0, 1}, {1, 0}}), "a face of 4 " + uncertain);
+  EXPECT_SAYS(area_of_prism({{10, 0}, {-8, 6}, {3, -9.5}, {3, 9.5}, {-8, -6}}), "a face of 5 " + uncertain);  // a star, twice round
+  EXPECT_SAYS(area_of_prism({{0, 0}, {9, 0}, {9, 5}, {8, 5}, {8, 1}, {5, 1}, {5, 5}, {4, 5}, {4, 1}, {1, 1}, {1, 5}, {0, 5}}),
+              "a face of 12 " + uncertain);  // a comb
+}
+
 TEST(ReadMesh, AFileOfSeveralSolidsMustBeWhole) {
   const TemporaryFolder folder;
   const std::string two = stl_text() + stl_text();
