@@ -5,6 +5,7 @@
 #include <csetjmp>
 #include <cstring>
 #include <new>
+#include <string_view>
 
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
@@ -74,6 +75,41 @@ bool read_rows(Reader& reader, png_bytepp rows) {
   return true;
 }
 
+/// The whole number of `width` bytes; 0 behind the end.
+std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t width, bool big_endian) {
+  std::uint32_t number = 0;
+  for (std::size_t i = 0; at <= bytes.size() && width <= bytes.size() - at && i < width; ++i)
+    number = number << 8 | static_cast<unsigned char>(bytes[at + (big_endian ? i : width - 1 - i)]);
+  return number;
+}
+
+/// How an image is to be turned, as the first directory of Exif data says it (1 to 8); 1, not at all, where it does not.
+std::uint32_t orientation_of(std::string_view exif) {
+  const bool big_endian = exif.substr(0, 2) == "MM";
+  if (!big_endian && exif.substr(0, 2) != "II") return 1;
+  const std::size_t directory = number_at(exif, 4, 4, big_endian), entries = number_at(exif, directory, 2, big_endian);
+  for (std::size_t i = 0; i < entries && directory + 14 + 12 * i <= exif.size(); ++i) {
+    const std::size_t entry = directory + 2 + 12 * i;
+    if (number_at(exif, entry, 2, big_endian) != 274) continue;
+    const bool is_long = number_at(exif, entry + 2, 2, big_endian) == 4;
+    return number_at(exif, entry + 8, is_long ? 4 : 2, big_endian);
+  }
+  return 1;
+}
+
+/// Programs that show the image would show it turned; the reader does not turn it.
+void check_orientation(const std::string& what, std::string_view bytes) {
+  for (std::size_t at = 8; at + 12 <= bytes.size();) {
+    const std::size_t length = number_at(bytes, at, 4, true);
+    if (length > bytes.size() - at - 12) return;  // cut off, which libpng has found or does not need
+    if (bytes.substr(at + 4, 4) == "eXIf")
+      if (const auto orientation = orientation_of(bytes.substr(at + 8, length)); orientation >= 2 && orientation <= 8)
+        throw Error(what + ": is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation) +
+                    "), but its pixels are not; save it turned, without Orientation");
+    at += 12 + length;
+  }
+}
+
 }  // namespace
 
 Samples read_png(const std::filesystem::path& path) {
@@ -82,6 +118,7 @@ Samples read_png(const std::filesystem::path& path) {
   source.bytes = read_bytes(path, kLargestFile);
   if (source.bytes.size() < 8 || png_sig_cmp(reinterpret_cast<png_const_bytep>(source.bytes.data()), 0, 8))
     throw Error(what + ": is not a PNG file, or is damaged at its start");
+  check_orientation(what, source.bytes);
   const auto fail = [&] {
     throw Error(what + ": cannot be read as PNG, it may be cut off or damaged (" + source.fault +
                 "); copy or export it again");

@@ -2,6 +2,7 @@
 #include "plugins/read/image.cpp"
 
 #include <gtest/gtest.h>
+#include <zlib.h>
 
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
@@ -83,6 +84,32 @@ TEST(ReadImage, DamagedFilesAreDiagnosed) {
                                              folder / ("damaged" + std::string(extension)),
                                              [](const auto& path) { read(path); });
   }
+}
+
+// Programs show such an image turned; an X-ray that is read unturned would be registered against the wrong side.
+TEST(ReadImage, PngThatIsToBeTurnedIsRefused) {
+  const TemporaryFolder folder;
+  write_itk(folder / "a.png", ramp<std::uint8_t>(7, 5, 3));
+  const std::string bytes = marrow::test::bytes_of(folder / "a.png");
+  const auto with_exif = [&](const std::string& exif) {
+    const std::string chunk = "eXIf" + exif;
+    const auto crc = std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(chunk.data()), unsigned(chunk.size())));
+    const auto big = [](std::uint32_t value) {
+      return std::string{char(value >> 24), char(value >> 16), char(value >> 8), char(value)};
+    };
+    marrow::test::put(folder / "b.png", bytes.substr(0, 33) + big(std::uint32_t(exif.size())) + chunk + big(crc) + bytes.substr(33));
+    return folder / "b.png";
+  };
+  using namespace std::string_literals;
+  const auto little = [](char orientation) {
+    return "II*\0\x08\0\0\0\x01\0\x12\x01\x03\0\x01\0\0\0"s + orientation + "\0\0\0\0\0\0\0"s;
+  };
+  for (char orientation = 2; orientation <= 8; ++orientation)
+    EXPECT_SAYS(read(with_exif(little(orientation))),
+                "is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation));
+  EXPECT_SAYS(read(with_exif("MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"s)), "Exif Orientation 6");
+  for (const std::string& exif : {little(1), little(0), "II*\0"s, "II*\0\xff\xff\xff\xff"s, "junk"s, little(6).substr(0, 12)})
+    EXPECT_EQ(read(with_exif(exif)).pixels.size(), cv::Size(7, 5));
 }
 
 TEST(ReadImage, DamagedRealTiffIsDiagnosed) {
