@@ -176,7 +176,8 @@ Affine affine_of(const Header& header) {
                 "sform_code are 0); export it again with one of them, or as MHA");
   const Affine q = qform(header), s = sform(header);
   if (scode > 0 && is_straight(s) && (qcode <= 0 || scode == 1 || are_near(s, q, header))) return s;
-  if (qcode > 0 && is_straight(q) && (scode <= 0 || (scode == 2 && qcode == 1 && has_lengths(s)))) return q;
+  const bool is_of_other_scan = scode == 2 && qcode == 1 && has_lengths(s);
+  if (qcode > 0 && is_straight(q) && (scode <= 0 || is_of_other_scan || are_near(s, q, header))) return q;
   if (qcode > 0 && scode > 0 && is_straight(q)) refuse_two_places(header, s, scode, qcode);
   throw Error(header.what() +
               ": its header does not say where it lies, or by a matrix that is sheared or damaged; resample or export "

@@ -53,6 +53,8 @@ TEST_F(TwoPlaces, ShearedSformIsNotThrownAway) {
   for (const auto& [sform, qform] : {std::pair{1, 1}, {1, 2}, {2, 2}, {3, 1}})
     expect_refused(replaced(replaced(with_codes(sform, qform), place(1, 2), number(0.26f)), place(2, 2), number(z)),
                    "do not agree: the sform is a matrix that is sheared");
+  const std::string rounded = replaced(with_codes(1, 1), place(0, 2), number(0.0006f));  // 0.017 mm at the last slice
+  EXPECT_TRUE(grid_of(rounded).direction.isIdentity(1e-6));
   const std::string other_scan = replaced(with_codes(2, 1), place(1, 2), number(0.26f));
   EXPECT_TRUE(grid_of(other_scan).direction.isIdentity(1e-6));  // decided: then the qform is this scan's
 }
