@@ -10,7 +10,8 @@ class NoProcess : public Error {
   using Error::Error;
 };
 
-/// How often a call of a node, or a whole run, failed by that in this process. A comparison must not hold it against a method.
+/// How often a call of a node, or a whole run, failed by that in this process. A comparison must not hold it against a
+/// method.
 long calls_without_process();
 void note_call_without_process();
 

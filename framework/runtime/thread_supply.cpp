@@ -15,7 +15,8 @@ namespace {
 int threads_here() {
   std::error_code none;
   int count = 0;
-  for (std::filesystem::directory_iterator task("/proc/self/task", none), end; !none && task != end; task.increment(none))
+  for (std::filesystem::directory_iterator task("/proc/self/task", none), end; !none && task != end;
+       task.increment(none))
     ++count;
   return count;
 }

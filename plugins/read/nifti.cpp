@@ -111,7 +111,8 @@ bool has_lengths(const Affine& affine) {
 bool is_straight(const Affine& affine) {
   if (!has_lengths(affine)) return false;
   for (const auto& [a, b] : {std::pair<std::size_t, std::size_t>{0, 1}, {0, 2}, {1, 2}})
-    if (std::abs(dot(affine, a, b)) > kRoundedDirection * std::sqrt(dot(affine, a, a) * dot(affine, b, b))) return false;
+    if (std::abs(dot(affine, a, b)) > kRoundedDirection * std::sqrt(dot(affine, a, a) * dot(affine, b, b)))
+      return false;
   return true;
 }
 
@@ -157,11 +158,13 @@ bool are_near(const Affine& one, const Affine& other, const Header& header) {
 }
 
 [[noreturn]] void refuse_two_places(const Header& header, const Affine& s, int scode, int qcode) {
-  const std::string codes = "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
+  const std::string codes =
+      "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
   if (!is_straight(s))
-    throw Error(header.what() + ": its " + codes +
-                " do not agree: the sform is a matrix that is sheared (as of a CT with a tilted gantry) or damaged, which "
-                "no qform can say; resample it to axes at right angles, or export it again");
+    throw Error(
+        header.what() + ": its " + codes +
+        " do not agree: the sform is a matrix that is sheared (as of a CT with a tilted gantry) or damaged, which "
+        "no qform can say; resample it to axes at right angles, or export it again");
   throw Error(header.what() + ": its " + codes +
               " put the same voxels to different places; set the code of the wrong one to 0, or export it again");
 }

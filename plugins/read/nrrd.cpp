@@ -166,8 +166,8 @@ void check_units(const HeaderFields& fields, const std::string& key) {
       fields.refuse(key, "mm");
 }
 
-/// Of each axis, whether its ends are those of the first and last voxel's centres (node) instead of their borders (cell, or
-/// not said).
+/// Of each axis, whether its ends are those of the first and last voxel's centres (node) instead of their borders
+/// (cell, or not said).
 std::array<bool, 3> nodes_of(const HeaderFields& fields) {
   std::array<bool, 3> are_nodes{};
   if (!fields.has("centers")) return are_nodes;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The description of OME-TIFF, an XML text: https://docs.openmicroscopy.org/ome-model. Of all that it may say, one plain stack
-// of slices is understood; anything else is told as what the pages are instead.
+// The description of OME-TIFF, an XML text: https://docs.openmicroscopy.org/ome-model. Of all that it may say, one
+// plain stack of slices is understood; anything else is told as what the pages are instead.
 #include <cctype>
 #include <cstdint>
 #include <map>
@@ -125,7 +125,8 @@ TiffDescription read_ome_description(const std::string& text) {
   else if (!several.empty())
     description.other_pages = several;
   else if (pixels != 1 || !in_order || !tags.is_understood())
-    description.other_pages = "an OME file whose description is not that of one stack of slices in the order of its pages";
+    description.other_pages =
+        "an OME file whose description is not that of one stack of slices in the order of its pages";
   return description;
 }
 

@@ -238,8 +238,8 @@ std::vector<std::uint32_t> read_vertices(const Element& element, Body& body, Mes
 
 constexpr std::size_t kMostStarts = 64;  // of a fan: no modeller makes faces of more corners that are not convex
 
-/// Whether the triangles from one corner to all edges cover the face, each once: all look to the same side, and they go round
-/// that corner less than once.
+/// Whether the triangles from one corner to all edges cover the face, each once: all look to the same side, and they go
+/// round that corner less than once.
 bool is_covered_from(std::size_t start, const std::vector<Eigen::Vector3d>& corners) {
   const std::size_t count = corners.size();
   Eigen::Vector3d all = Eigen::Vector3d::Zero();
@@ -260,16 +260,18 @@ bool is_covered_from(std::size_t start, const std::vector<Eigen::Vector3d>& corn
 }
 
 /// The corner from which a face of more than three corners is cut into triangles. Throws Error where none will do.
-std::size_t start_of_fan(const std::vector<std::uint32_t>& polygon, const MeshBuilder& builder, const std::string& what) {
+std::size_t start_of_fan(const std::vector<std::uint32_t>& polygon, const MeshBuilder& builder,
+                         const std::string& what) {
   std::vector<Eigen::Vector3d> corners;
   for (const std::uint32_t vertex : polygon) corners.push_back(builder.mesh.vertices_mm[vertex]);
   for (std::size_t start = 0; start < std::min(polygon.size(), kMostStarts); ++start) {
     if (is_covered_from(start, corners)) return start;
     if (polygon.size() > kMostStarts) break;
   }
-  throw Error(what + ": a face of " + std::to_string(polygon.size()) +
-              " corners is far from convex or flat, or crosses itself, so its triangles are not certain; save the surface as "
-              "triangles");
+  throw Error(
+      what + ": a face of " + std::to_string(polygon.size()) +
+      " corners is far from convex or flat, or crosses itself, so its triangles are not certain; save the surface as "
+      "triangles");
 }
 
 void read_polygon(const Property& property, Body& body, MeshBuilder& builder, const std::vector<std::uint32_t>& index,

@@ -44,7 +44,8 @@ struct Reader {
       throw std::bad_alloc();
     }
     png_set_read_fn(png, &source, take);
-    // What is no pixels is passed over: libpng takes the memory that a comment claims, and only warns where that is much.
+    // What is no pixels is passed over: libpng takes the memory that a comment claims, and only warns where that is
+    // much.
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
     // Notes and colour profiles, which are unpacked too, are of no use here: not many, and none that is large.
     png_set_chunk_malloc_max(png, 4 << 20);
@@ -83,7 +84,8 @@ std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t widt
   return number;
 }
 
-/// How an image is to be turned, as the first directory of Exif data says it (1 to 8); 1, not at all, where it does not.
+/// How an image is to be turned, as the first directory of Exif data says it (1 to 8); 1, not at all, where it does
+/// not.
 std::uint32_t orientation_of(std::string_view exif) {
   const bool big_endian = exif.substr(0, 2) == "MM";
   if (!big_endian && exif.substr(0, 2) != "II") return 1;

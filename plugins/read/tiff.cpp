@@ -63,11 +63,13 @@ void invert_as(std::vector<std::byte>& bytes) {
 void invert(const std::string& what, Samples& samples) {
   if (samples.type == Samples::Type::u8) return invert_as<std::uint8_t>(samples.bytes);
   if (samples.type == Samples::Type::u16) return invert_as<std::uint16_t>(samples.bytes);
-  throw Error(what + ": its zero is white (PhotometricInterpretation WhiteIsZero); that is read for whole numbers of 8 "
+  throw Error(what +
+              ": its zero is white (PhotometricInterpretation WhiteIsZero); that is read for whole numbers of 8 "
               "and 16 bits without sign only: save it with zero as black");
 }
 
-/// ImageJ calibrates whole numbers without sign; what it means for others, or for those that are inverted, it does not say.
+/// ImageJ calibrates whole numbers without sign; what it means for others, or for those that are inverted, it does not
+/// say.
 void check_calibration(const std::string& what, const Samples& samples, const TiffPage& page) {
   if (samples.slope == 1 && samples.intercept == 0) return;
   const bool is_plain = samples.type == Samples::Type::u8 || samples.type == Samples::Type::u16;

@@ -7,11 +7,11 @@
 namespace marrow::read {
 
 struct TiffDescription {
-  std::string other_pages;    ///< where pages are not the slices of one volume: what they are; else empty
-  bool is_truncated = false;  ///< the pages are more than the directories tell of
-  std::uint64_t pages = 0;    ///< that belong together, of which this is the first; 0 = it does not say
-  std::uint64_t samples = 0;  ///< the same in samples, where it tells of those
-  std::string calibration;    ///< why values cannot be had from the samples; else empty
+  std::string other_pages;          ///< where pages are not the slices of one volume: what they are; else empty
+  bool is_truncated = false;        ///< the pages are more than the directories tell of
+  std::uint64_t pages = 0;          ///< that belong together, of which this is the first; 0 = it does not say
+  std::uint64_t samples = 0;        ///< the same in samples, where it tells of those
+  std::string calibration;          ///< why values cannot be had from the samples; else empty
   double slope = 1, intercept = 0;  ///< what makes values of the samples
 };
 

@@ -29,7 +29,7 @@ struct TiffPage {
 struct TiffPages {
   bool big_endian = false;
   std::vector<TiffPage> pages;
-  std::string other_pages;  ///< where pages are not the slices of one volume: what they are
+  std::string other_pages;          ///< where pages are not the slices of one volume: what they are
   double slope = 1, intercept = 0;  ///< what makes values of the samples
 };
 

@@ -47,8 +47,8 @@ VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
               "folder of DICOM slices (name the folder)");
 }
 
-/// The header of MHA or NRRD that stands for the folder. Throws Error where slices of DICOM lie beside it: which of the two
-/// is the CT, and which are its labels, no name says.
+/// The header of MHA or NRRD that stands for the folder. Throws Error where slices of DICOM lie beside it: which of the
+/// two is the CT, and which are its labels, no name says.
 fs::path detached_header_in(const fs::path& folder) {
   std::vector<fs::path> headers, others;
   std::error_code failure, none;

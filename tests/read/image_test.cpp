@@ -97,7 +97,8 @@ TEST(ReadImage, PngThatIsToBeTurnedIsRefused) {
     const auto big = [](std::uint32_t value) {
       return std::string{char(value >> 24), char(value >> 16), char(value >> 8), char(value)};
     };
-    marrow::test::put(folder / "b.png", bytes.substr(0, 33) + big(std::uint32_t(exif.size())) + chunk + big(crc) + bytes.substr(33));
+    marrow::test::put(folder / "b.png",
+                      bytes.substr(0, 33) + big(std::uint32_t(exif.size())) + chunk + big(crc) + bytes.substr(33));
     return folder / "b.png";
   };
   using namespace std::string_literals;
@@ -107,8 +108,10 @@ TEST(ReadImage, PngThatIsToBeTurnedIsRefused) {
   for (char orientation = 2; orientation <= 8; ++orientation)
     EXPECT_SAYS(read(with_exif(little(orientation))),
                 "is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation));
-  EXPECT_SAYS(read(with_exif("MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"s)), "Exif Orientation 6");
-  for (const std::string& exif : {little(1), little(0), "II*\0"s, "II*\0\xff\xff\xff\xff"s, "junk"s, little(6).substr(0, 12)})
+  EXPECT_SAYS(read(with_exif("MM\0*\0\0\0\x08\0\x01\x01\x12\0\x03\0\0\0\x01\0\x06\0\0\0\0\0\0"s)),
+              "Exif Orientation 6");
+  for (const std::string& exif :
+       {little(1), little(0), "II*\0"s, "II*\0\xff\xff\xff\xff"s, "junk"s, little(6).substr(0, 12)})
     EXPECT_EQ(read(with_exif(exif)).pixels.size(), cv::Size(7, 5));
 }
 
@@ -139,7 +142,9 @@ TEST(ReadImage, DicomAsItsCameraSeesIt) {
   using marrow::test::dicom_file;
   using marrow::test::fluoroscopy;
   const TemporaryFolder folder;
-  const auto put = [&](const marrow::test::Elements& elements) { marrow::test::put(folder / "x.dcm", dicom_file(elements)); };
+  const auto put = [&](const marrow::test::Elements& elements) {
+    marrow::test::put(folder / "x.dcm", dicom_file(elements));
+  };
   auto elements = fluoroscopy();
   put(elements);
   cv::Mat pixels = read(folder / "x.dcm").pixels;

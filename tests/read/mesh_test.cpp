@@ -206,14 +206,17 @@ TEST(ReadMesh, FacesOfManyCornersAreCoveredOnce) {
     put(folder / "a.ply", prism(outline));
     return area_of(read(folder / "a.ply", 1));
   };
-  const std::vector<std::pair<double, double>> notch{{0, 0}, {4, 0}, {4, 4}, {2, 1}, {0, 4}};  // seen whole from its reflex corner
+  const std::vector<std::pair<double, double>> notch{
+      {0, 0}, {4, 0}, {4, 4}, {2, 1}, {0, 4}};  // seen whole from its reflex corner
   EXPECT_NEAR(area_of_prism(notch), 2 * 10 + 12 + 2 * std::hypot(2, 3), 1e-9);
   EXPECT_NEAR(area_of_prism({{0, 0}, {2, 0}, {4, 0}, {4, 2}, {0, 2}}), 2 * 8 + 12, 1e-9);  // a straight corner
   const std::string uncertain = "corners is far from convex or flat, or crosses itself";
   EXPECT_SAYS(area_of_prism({{0, 0}, {1, 1}, {0, 1}, {1, 0}}), "a face of 4 " + uncertain);
-  EXPECT_SAYS(area_of_prism({{10, 0}, {-8, 6}, {3, -9.5}, {3, 9.5}, {-8, -6}}), "a face of 5 " + uncertain);  // a star, twice round
-  EXPECT_SAYS(area_of_prism({{0, 0}, {9, 0}, {9, 5}, {8, 5}, {8, 1}, {5, 1}, {5, 5}, {4, 5}, {4, 1}, {1, 1}, {1, 5}, {0, 5}}),
-              "a face of 12 " + uncertain);  // a comb
+  EXPECT_SAYS(area_of_prism({{10, 0}, {-8, 6}, {3, -9.5}, {3, 9.5}, {-8, -6}}),
+              "a face of 5 " + uncertain);  // a star, twice round
+  EXPECT_SAYS(
+      area_of_prism({{0, 0}, {9, 0}, {9, 5}, {8, 5}, {8, 1}, {5, 1}, {5, 5}, {4, 5}, {4, 1}, {1, 1}, {1, 5}, {0, 5}}),
+      "a face of 12 " + uncertain);  // a comb
 }
 
 TEST(ReadMesh, AFileOfSeveralSolidsMustBeWhole) {
@@ -221,7 +224,8 @@ TEST(ReadMesh, AFileOfSeveralSolidsMustBeWhole) {
   const std::string two = stl_text() + stl_text();
   put(folder / "two.stl", two);
   EXPECT_EQ(read(folder / "two.stl").triangles.size(), 8u);
-  for (const std::size_t end : {two.size() - 10, two.rfind(" endfacet"), two.rfind("   vertex"), two.rfind("solid t") + 3}) {
+  for (const std::size_t end :
+       {two.size() - 10, two.rfind(" endfacet"), two.rfind("   vertex"), two.rfind("solid t") + 3}) {
     put(folder / "cut.stl", two.substr(0, end));
     EXPECT_SAYS(read(folder / "cut.stl"), "cut off");
   }

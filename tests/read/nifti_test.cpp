@@ -62,7 +62,8 @@ TEST_F(TwoPlaces, ShearedSformIsNotThrownAway) {
 TEST_F(TwoPlaces, DamagedSformIsNotThrownAway) {
   for (const int sform : {1, 2}) {
     const std::string bytes = with_codes(sform, 1);
-    expect_refused(replaced(bytes, place(0, 1), number(std::nanf(""))), "sheared (as of a CT with a tilted gantry) or damaged");
+    expect_refused(replaced(bytes, place(0, 1), number(std::nanf(""))),
+                   "sheared (as of a CT with a tilted gantry) or damaged");
     expect_refused(replaced(bytes, place(0, 3), number(HUGE_VALF)), "or damaged");
     expect_refused(replaced(bytes, place(2, 2), number(0.f)), "or damaged");
   }

@@ -50,8 +50,10 @@ std::vector<Page> pages_of(std::size_t count, const std::string& description_of_
 }
 
 std::string ome(const std::string& sizes, const std::string& data = "<TiffData/>") {
-  return "<?xml version=\"1.0\"?><OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><Image ID=\"Image:0\">"
-         "<Pixels " + sizes + ">" + data + "</Pixels></Image></OME>";
+  return "<?xml version=\"1.0\"?><OME xmlns=\"http://www.openmicroscopy.org/Schemas/OME/2016-06\"><Image "
+         "ID=\"Image:0\">"
+         "<Pixels " +
+         sizes + ">" + data + "</Pixels></Image></OME>";
 }
 
 class Tiff : public testing::Test {
@@ -86,7 +88,8 @@ TEST_F(Tiff, ImageJsCalibrationIsApplied) {
 TEST_F(Tiff, OtherCalibrationsOfImageJAreRefused) {
   const std::string start = "ImageJ=1.53t\nimages=2\nslices=2\n", line = start + "cf=0\nc0=1\nc1=2\n";
   for (const char* function : {"1", "20", "21", "x"})
-    expect_no_volume(pages_of(2, start + "cf=" + function + "\nc0=1\nc1=2\n"), std::string("ImageJ's function ") + function);
+    expect_no_volume(pages_of(2, start + "cf=" + function + "\nc0=1\nc1=2\n"),
+                     std::string("ImageJ's function ") + function);
   expect_no_volume(pages_of(2, start + "c0=1\nc1=2\n"), "ImageJ's function (none)");
   for (const char* numbers : {"c0=nan\nc1=1\n", "c0=1\n", "c0=1\nc1=0\n", "c0=1\nc1=inf\n", "c0=1e\nc1=1\n"})
     expect_no_volume(pages_of(2, start + "cf=0\n" + numbers), "two numbers expected, the second not 0");
@@ -98,7 +101,8 @@ TEST_F(Tiff, OtherCalibrationsOfImageJAreRefused) {
 TEST_F(Tiff, ImagesWithoutADirectoryAreMissed) {
   const std::string four = "ImageJ=1.53t\nimages=4\nslices=4\n";
   for (const std::size_t count : {1u, 2u}) {
-    EXPECT_SAYS(image(pages_of(count, four), 1), "its description tells of 4 pages, but it has " + std::to_string(count));
+    EXPECT_SAYS(image(pages_of(count, four), 1),
+                "its description tells of 4 pages, but it has " + std::to_string(count));
     expect_no_volume(pages_of(count, four), "its description tells of 4 pages");
   }
   EXPECT_SAYS(image(pages_of(1, "{\"shape\": [4, 1, 2]}")), "its description tells of 4 pages");
@@ -113,13 +117,14 @@ TEST_F(Tiff, TwoStacksInOneFileAreNoVolume) {
   expect_no_volume(pages_of(4, "ImageJ=1.53t\nimages=2\nslices=2\n"), "tells of 2 of the 4 pages");
   expect_no_volume(pages_of(4, "{\"shape\": [1, 2]}"), "tells of 1 of the 4 pages");
   EXPECT_EQ(volume({{"{\"shape\": [1, 2]}"}, {"{\"shape\": [1, 2]}"}}).grid.size[2], 2);  // written page by page
-  EXPECT_EQ(image(pages, 3).pixels.at<std::uint16_t>(0, 0), 3000);  // of images, one is picked
+  EXPECT_EQ(image(pages, 3).pixels.at<std::uint16_t>(0, 0), 3000);                        // of images, one is picked
 }
 
 TEST_F(Tiff, OmeIsReadAsXmlIs) {
   const std::string sizes = "SizeX=\"2\" SizeY=\"1\" SizeZ=\"2\" SizeC=\"2\" SizeT=\"1\"";
   const auto each = [](std::string text, const std::string& from, const std::string& to) {
-    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size()) text.replace(at, from.size(), to);
+    for (std::size_t at = 0; (at = text.find(from, at)) != std::string::npos; at += to.size())
+      text.replace(at, from.size(), to);
     return text;
   };
   const std::string plain = ome(sizes);
@@ -127,7 +132,8 @@ TEST_F(Tiff, OmeIsReadAsXmlIs) {
   prefixed = each(each(each(prefixed, "<o:?", "<?"), "<o:/", "</o:"), "xmlns=", "xmlns:o=");
   for (const std::string& text :
        {plain, each(plain, "\"", "'"), each(plain, " Size", "\nSize"), each(plain, "SizeC=", "SizeC = "), prefixed,
-        each(plain, "<Image", "<!--" + std::string(70000, 'x') + "--><Image"), each(plain, "<Image", "<!-- <Pixels> --><Image")})
+        each(plain, "<Image", "<!--" + std::string(70000, 'x') + "--><Image"),
+        each(plain, "<Image", "<!-- <Pixels> --><Image")})
     expect_no_volume(pages_of(4, text), "is an OME stack of 2 channels");
   expect_no_volume(pages_of(4, each(plain, "<Image", "<!--" + std::string(1 << 20, 'x') + "--><Image")),
                    "bytes, more than the 1048576 that are read");
