@@ -46,6 +46,13 @@ class Tables(Case):
         self.assertEqual({row[rows[0].index("m.value")] for row in rows[1:]}, {"", "-5"})
         self.assertEqual({len(row) for row in rows}, {len(rows[0])})
 
+    def test_each_figure_is_that_of_its_name(self):
+        file = self.experiment("e.yaml", ["a"], "variants: {a: {}}\n")
+        file.write_text(file.read_text().replace("metrics: [number.value]", "metrics: [number.twice, number.value]"))
+        self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)
+        row = next(csv.DictReader((self.scratch / "out" / "cells.csv").read_text().splitlines()))
+        self.assertEqual((row["number.twice"], row["number.value"]), ("4", "2"))
+
     def test_no_terminal_obeys_a_field(self):
         file = self.experiment("e.yaml", ["a"], "variants: {a: {}, b: {k.how: error, k.text: \"\\e[31mred\\nnext line\"}}\n")
         self.assertEqual(self.marrow("compare", file, "--out", "out").returncode, 0)

@@ -151,7 +151,7 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   put(folder / ("tidied" + dead));
   for (const std::string& foreign :
        {std::string("photos.tmp-0/a.jpg"), "photos" + dead, std::string(kHex) + "/letter.txt", std::string(kHex) + dead,
-        "ff/" + std::string(kHex), two + "/" + two + std::string(30, 'A'),
+        "ff/" + std::string(kHex), "0123/" + std::string(kHex), two + "/" + two + std::string(30, 'A'),
         two + "/" + two + std::string(30, '0') + "/x", two + "/notes.txt", two + "/" + key + ".tmp-1x-0",
         two + "/" + key + ".tmp--0", two + "/" + key + ".tmp-0-0", "cases/" + std::string(31, '1') + "/x",
         "cases/" + std::string(32, '4') + "/mine.txt",

@@ -31,7 +31,7 @@ Metrics misbehave(const Metrics& a, const Options& options) {
     hoard.emplace_back(std::size_t(20) << 20, 'x');
     std::this_thread::sleep_for(std::chrono::milliseconds(5));
   }
-  return {{{"value", value, "mm"}}};
+  return {{{"value", value, "mm"}, {"twice", 2 * value, "mm"}}};
 }
 }  // namespace
 
