@@ -107,8 +107,8 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
     return marrow::read::is_mirrored_as_read(file_in(folder, map, key).value());
   };
   if (!has_image || is_mirrored("image") == is_mirrored("mask")) return mask->pixels;
-  cv::Mat mirrored(mask->pixels.size(), mask->pixels.type());
-  for (int u = 0; u < mirrored.cols; ++u) mask->pixels.col(mirrored.cols - 1 - u).copyTo(mirrored.col(u));
+  cv::Mat mirrored;
+  cv::flip(mask->pixels, mirrored, 1);
   return mirrored;
 }
 

@@ -37,8 +37,7 @@ void refuse_record(const fs::path& folder, const std::string& why) {
 
 nlohmann::json read_record(const fs::path& folder) {
   const fs::path file = folder / "run.json";
-  if (leads_outside(folder, "run.json"))
-    throw Error(file.string() + " is a link to a file outside of the folder, of which nothing is shown; copy it there");
+  refuse_outside(folder, "run.json");
   nlohmann::json record;
   try {
     record = parse_json(read_text_file(file, kMostRecordBytes), file.string());
@@ -62,6 +61,11 @@ std::optional<fs::path> file_of_run(const fs::path& folder, const std::string& n
 bool leads_outside(const fs::path& folder, const std::string& name) {
   const fs::path target = target_of(folder, name);
   return !target.empty() && !is_inside(folder, target);
+}
+
+void refuse_outside(const fs::path& folder, const std::string& name) {
+  if (leads_outside(folder, name))
+    throw Error((folder / name).string() + " is a link to a file outside of the folder, of which nothing is shown; copy it there");
 }
 
 RgbPixels read_png(const fs::path& file) {

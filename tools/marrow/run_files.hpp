@@ -22,6 +22,9 @@ std::optional<std::filesystem::path> file_of_run(const std::filesystem::path& fo
 /// Whether the name leads to something outside the folder.
 bool leads_outside(const std::filesystem::path& folder, const std::string& name);
 
+/// Throws Error where it does.
+void refuse_outside(const std::filesystem::path& folder, const std::string& name);
+
 /// A PNG's pixels, three bytes each.
 struct RgbPixels {
   int width_px = 0, height_px = 0;

@@ -112,16 +112,15 @@ class Checks {
 
 /// The names of the nodes meant by a node's name, a kind or a library's file.
 std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string& what) {
+  const auto is_meant = [&](const LibraryInfo& library) {
+    std::error_code error;
+    return library.file.filename() == what || std::filesystem::equivalent(library.file, what, error);
+  };
   std::vector<std::string> names;
-  for (const std::string& name : catalogue.node_names()) {
-    const LibraryInfo* library = catalogue.library_of(name);
-    std::error_code error;
-    if (name == what || name.substr(0, name.find('.')) == what || library->file.filename() == what || std::filesystem::equivalent(library->file, what, error))
-      names.push_back(name);
-  }
+  for (const std::string& name : catalogue.node_names())
+    if (name == what || name.substr(0, name.find('.')) == what || is_meant(*catalogue.library_of(name))) names.push_back(name);
   for (const LibraryInfo& library : catalogue.libraries()) {
-    std::error_code error;
-    if (!library.refused.empty() && (library.file.filename() == what || std::filesystem::equivalent(library.file, what, error)))
+    if (!library.refused.empty() && is_meant(library))
       throw Error("the library " + library.file.string() + " is not used: " + library.refused);
   }
   if (names.empty()) throw Error("there is no node, kind or library '" + what + "'; " + suggestion(what, catalogue.node_names()) + "; marrow doctor shows the folders searched");

@@ -236,8 +236,7 @@ RunRecord read_run(const fs::path& folder) {
     throw Error(folder.string() + " is not the folder of a run: it has no run.json" + advice);
   }
   if (!has_pipeline) throw Error(folder.string() + " is not the whole folder of a run: it has a run.json, but no pipeline.yaml" + advice);
-  if (leads_outside(folder, "pipeline.yaml"))
-    throw Error((folder / "pipeline.yaml").string() + " is a link to a file outside of the folder, of which nothing is shown; copy it there");
+  refuse_outside(folder, "pipeline.yaml");
   const json record = read_record(folder);
   const YAML::Node pipeline = pipeline_of(folder / "pipeline.yaml");
   check_age(folder, record);
