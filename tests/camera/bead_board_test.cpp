@@ -238,6 +238,10 @@ TEST(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
   EXPECT_EQ(board.beads[17].centre_mm, Eigen::Vector3d(25, 55, 40));
   EXPECT_SAYS(read(with(kPlain, "[60, 40, 0], [10, 50, 0]]", "[60, 40, 0]]")), "side 'a': has 3 landmarks; a side is found in an image by at least 4");
   EXPECT_SAYS(read(with(kPlain, "diameter_mm: 1.5", "diameter_mm: 2.5")), "landmarks of 3 mm are not told apart from beads of 2.5 mm");
+  std::string small = kPlain;
+  for (int side = 0; side < 2; ++side)
+    small = with(with(small, "diameter_mm: 1.5", "diameter_mm: 0.8"), "diameter_mm: 3", "diameter_mm: 1.1");
+  EXPECT_EQ(read(small).beads[0].diameter_mm, 1.1);
   EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30, 8]")), "out of the side's plane, at most 1 mm expected");
   EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30]")), "board.yaml:5:65: side 'a': beads: at_mm: expected a point [x, y, z] in mm, got a list of 2");
   EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[20, 10.2, 0]")), "beads 5 and 7 (counted as the file lists them) overlap");

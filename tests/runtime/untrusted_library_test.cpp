@@ -12,6 +12,7 @@
 #include <chrono>
 #include <thread>
 
+#include "framework/runtime/trust.hpp"
 #include "runtime/library_fixture.hpp"
 
 namespace {
@@ -136,6 +137,27 @@ TEST_F(UntrustedLibraryTest, ThePrivateGroupOfTheUserMayWrite) {
   EXPECT_EQ(marrow::library_info(file, framework).note, "");
   ASSERT_EQ(chown(folder.c_str(), 0, kSomebody), 0);
   expect_untrusted(file, others_may_write(folder, "0775"));
+  ASSERT_EQ(setegid(kSomebody), 0);  // as after newgrp: a group that is used for once is no private one
+  const std::string fault = marrow::changeable_by_others(file);
+  ASSERT_EQ(setegid(0), 0);
+  EXPECT_NE(fault.find("others may write to '" + folder.string() + "'"), std::string::npos) << fault;
+}
+TEST_F(UntrustedLibraryTest, TheGroupOfAUserWithoutANameMayWrite) {
+  if (geteuid() != 0) GTEST_SKIP() << "only root can be somebody else";
+  const fs::path file = copy_good(true);  // in a container, users may have numbers alone
+  fs::permissions(scratch.path, fs::perms(0755));
+  fs::permissions(folder, fs::perms(0775));
+  ASSERT_EQ(chown(folder.c_str(), kSomebody, kSomebody), 0);
+  const auto fault_as = [&](gid_t group) {
+    if (setegid(group) != 0 || seteuid(kSomebody) != 0) return std::string("nobody else can be had here");
+    const std::string fault = marrow::changeable_by_others(file);
+    if (seteuid(0) != 0 || setegid(0) != 0) std::abort();
+    return fault;
+  };
+  EXPECT_EQ(fault_as(kSomebody), "");
+  ASSERT_EQ(chown(folder.c_str(), kSomebody, kSomebody + 1), 0);
+  EXPECT_EQ(fault_as(kSomebody + 1), "");
+  EXPECT_NE(fault_as(kSomebody).find("others may write to '" + folder.string() + "' (owner user 54321, mode 0775)"), std::string::npos);
 }
 TEST_F(UntrustedLibraryTest, AnAccessListIsNoPrivateGroup) {
   // With a list, the mode shows as the group's what the list gives anyone at most.

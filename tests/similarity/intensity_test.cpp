@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// The parts of which the measures are made, on patches of a few pixels, against values computed by hand.
+#include "plugins/similarity/intensity.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace {
+
+using marrow::similarity::Gradients;
+using marrow::similarity::Patch;
+
+/// Five columns and four rows. The radiograph is 2 u + 3 v, the image 10 u - v; all pixels count.
+Patch ramps() {
+  Patch patch{5, 4, 0, 0, {}, {}, std::vector<char>(20, 1)};
+  for (int v = 0; v < 4; ++v)
+    for (int u = 0; u < 5; ++u) {
+      patch.rendered.push_back(float(2 * u + 3 * v));
+      patch.seen.push_back(float(10 * u - v));
+    }
+  return patch;
+}
+
+TEST(Gradients, OfARampAreItsSlopes) {
+  const Patch patch = ramps();
+  const Gradients gradients = marrow::similarity::gradients_of(patch);
+  for (int v = 0; v < 4; ++v)
+    for (int u = 0; u < 5; ++u) {
+      const std::size_t i = patch.at(u, v);
+      const bool is_inside = u > 0 && u < 4 && v > 0 && v < 3;
+      EXPECT_EQ(gradients.counts[i], is_inside) << u << ' ' << v;
+      // Half the difference between neighbours is the slope.
+      EXPECT_EQ(gradients.rendered_u[i], is_inside ? 2 : 0) << u << ' ' << v;
+      EXPECT_EQ(gradients.rendered_v[i], is_inside ? 3 : 0);
+      EXPECT_EQ(gradients.seen_u[i], is_inside ? 10 : 0);
+      EXPECT_EQ(gradients.seen_v[i], is_inside ? -1 : 0);
+    }
+  // (2 * 10 + 3 * -1) / (2^2 + 3^2) at each of the six pixels.
+  EXPECT_NEAR(marrow::similarity::scale_of(gradients), 17.0 / 13.0, 1e-12);
+}
+
+TEST(Gradients, CountWhereAllNinePixelsDo) {
+  for (int v = 0; v < 4; ++v)
+    for (int u = 0; u < 5; ++u) {
+      Patch patch = ramps();
+      patch.counts[patch.at(u, v)] = 0;
+      const Gradients gradients = marrow::similarity::gradients_of(patch);
+      for (int row = 1; row < 3; ++row)
+        for (int column = 1; column < 4; ++column)
+          EXPECT_EQ(gradients.counts[patch.at(column, row)], std::abs(column - u) > 1 || std::abs(row - v) > 1)
+              << "without pixel " << u << ' ' << v << ", at " << column << ' ' << row;
+    }
+}
+
+TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
+  Patch patch = ramps();
+  Gradients gradients = marrow::similarity::gradients_of(patch);
+  gradients.seen_u[patch.at(1, 1)] = 1e6f;
+  gradients.counts[patch.at(1, 1)] = 0;
+  EXPECT_NEAR(marrow::similarity::scale_of(gradients), 17.0 / 13.0, 1e-12);
+  gradients.counts.assign(20, 0);
+  EXPECT_EQ(marrow::similarity::scale_of(gradients), 0);
+}
+
+TEST(LineIntegrals, AreLogarithmsOfWhatIsLeft) {
+  const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 3) << 1000, 500, 0);
+  const cv::Mat of_grey = marrow::similarity::line_integrals(grey);
+  EXPECT_EQ(of_grey.at<float>(0), 0);
+  EXPECT_FLOAT_EQ(of_grey.at<float>(1), std::log(2.0f));
+  EXPECT_FLOAT_EQ(of_grey.at<float>(2), std::log(1000.0f)) << "0 is one step of grey";
+  const cv::Mat real = (cv::Mat_<float>(1, 3) << 0.5f, 0.25f, -1.0f);
+  const cv::Mat of_real = marrow::similarity::line_integrals(real);
+  EXPECT_FLOAT_EQ(of_real.at<float>(1), std::log(2.0f));
+  EXPECT_FLOAT_EQ(of_real.at<float>(2), std::log(1e5f)) << "a hundred-thousandth of the brightest";
+}
+
+TEST(Moments, OfTheValuesThatCount) {
+  // 0 to 15, and a last one that does not count.
+  std::vector<float> a, b, odd;
+  for (int i = 0; i < 17; ++i) a.push_back(float(i)), b.push_back(float(100 - 3 * i)), odd.push_back(float(i % 2));
+  std::vector<char> counts(17, 1);
+  a[16] = b[16] = odd[16] = 1e6f;
+  counts[16] = 0;
+  EXPECT_NEAR(marrow::similarity::correlation(a, a, counts), 1, 1e-12);
+  EXPECT_NEAR(marrow::similarity::correlation(a, b, counts), -1, 1e-12);
+  // The covariance of i and i % 2 is 1/4; the variances are 255/12 and 1/4.
+  EXPECT_NEAR(marrow::similarity::correlation(a, odd, counts), 0.25 / std::sqrt(255 / 12.0 * 0.25), 1e-12);
+  EXPECT_EQ(marrow::similarity::correlation(a, std::vector<float>(17, 5), counts), 0);
+  EXPECT_NEAR(marrow::similarity::deviation(a, counts), std::sqrt(255 / 12.0), 1e-12);
+  EXPECT_NEAR(marrow::similarity::deviation(odd, counts), 0.5, 1e-12);
+  counts[3] = 0;
+  EXPECT_EQ(marrow::similarity::correlation(a, a, counts), 0) << "fewer than 16";
+  EXPECT_EQ(marrow::similarity::deviation(a, counts), 0);
+}
+
+}  // namespace
