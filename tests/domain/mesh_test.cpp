@@ -33,6 +33,22 @@ TEST(Mesh, ClosedMeansEachEdgeTwiceInOppositeSenses) {
   EXPECT_FALSE(is_closed(mesh)) << "each edge is used four times";
 }
 
+TEST(Mesh, EachTriangleThatIsFlippedIsFound) {
+  // Whatever the numbers of the vertices, and so the order of the edges.
+  std::array<std::uint32_t, 4> v = {0, 1, 2, 3};
+  do {
+    Mesh mesh;
+    mesh.vertices_mm = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
+    mesh.triangles = {{v[0], v[2], v[1]}, {v[0], v[1], v[3]}, {v[0], v[3], v[2]}, {v[1], v[2], v[3]}};
+    EXPECT_TRUE(is_closed(mesh));
+    for (auto& triangle : mesh.triangles) {
+      std::swap(triangle[1], triangle[2]);
+      EXPECT_FALSE(is_closed(mesh));
+      std::swap(triangle[1], triangle[2]);
+    }
+  } while (std::next_permutation(v.begin(), v.end()));
+}
+
 TEST(Mesh, TwoSheetsThatMeetInOneVertexAreNoManifold) {
   Mesh mesh = box({0, 0, 0}, {2, 2, 2});
   EXPECT_TRUE(is_manifold(mesh));
