@@ -102,16 +102,17 @@ class NearestEdges {
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       const marrow::EdgePixel& edge = edges_[i];
       if (edge.direction_u * cu + edge.direction_v * cv < least) continue;
-      const int column = std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1);
-      const int row = std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1);
-      std::int32_t& label = labels[row * columns_ + column];
+      std::int32_t& label = labels[row_of(edge) * columns_ + column_of(edge)];
       if (label < 0 || edges_[std::size_t(label)].magnitude < edge.magnitude) label = std::int32_t(i);
     }
     nearest_in_columns(labels);
     for (int row = 0; row < rows_; ++row) nearest_in_row(labels + std::size_t(row) * std::size_t(columns_), row);
   }
 
-  int row_of(std::int32_t label) const { return int(edges_[std::size_t(label)].v_px + 0.5f) / kCell_px; }
+  // The cell of an edge; of one that smoothing moved out of the image, the cell at the border.
+  int column_of(const marrow::EdgePixel& edge) const { return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1); }
+  int row_of(const marrow::EdgePixel& edge) const { return std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1); }
+  int row_of(std::int32_t label) const { return row_of(edges_[std::size_t(label)]); }
 
   /// Each cell gets the nearest edge of its own column.
   void nearest_in_columns(std::int32_t* labels) const {
