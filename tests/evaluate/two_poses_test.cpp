@@ -104,6 +104,14 @@ TEST(ReductionGap, SaysWhatIsWrong) {
   apart["models"] = both(kLower, marrow::test::box({0, 0, 35}, {20, 20, 30}));
   EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", apart),
             "the surfaces of 'distal' and 'proximal' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
+  auto elsewhere = here;
+  elsewhere.source = "atlas";
+  for (const bool is_moved : {true, false}) {
+    shipped::Inputs mixed = good;
+    mixed["poses"] = is_moved ? both(pose(elsewhere), pose(here)) : both(pose(here), pose(elsewhere));
+    EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", mixed), "the pose is " + here.target + "_from_atlas, but the truth is " + here.target + "_from_" + here.source +
+                                                                     "; compare poses between the same two frames");
+  }
 }
 
 }  // namespace
