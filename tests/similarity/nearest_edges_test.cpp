@@ -15,8 +15,9 @@ marrow::EdgeMap random_edges(int width, int height, int count, std::mt19937& ran
   marrow::EdgeMap edges;
   edges.width_px = width;
   edges.height_px = height;
+  const float middle = 6.2831853f * part(random);
   for (int i = 0; i < count; ++i) {
-    const float angle = 6.2831853f * part(random);
+    const float angle = i % 2 ? 6.2831853f * part(random) : middle + part(random);  // half of them alike, so that smoothing moves them
     marrow::EdgePixel edge;
     edge.u_px = -0.49f + (float(width) - 0.02f) * part(random);
     edge.v_px = -0.49f + (float(height) - 0.02f) * part(random);
@@ -74,6 +75,7 @@ TEST(NearestEdges, AreThoseThatASearchFinds) {
     compare_with_a_search(33, 41, 60, seed);
     compare_with_a_search(20, 8, 3, seed);
   }
+  for (unsigned seed = 0; seed < 40; ++seed) compare_with_a_search(12, 10, 80, seed);  // often moved out of the image
 }
 
 TEST(NearestEdges, LieInsideTheMaskAndTheImage) {
