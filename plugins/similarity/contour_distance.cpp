@@ -122,7 +122,6 @@ class ContourDistance : public marrow::Cost {
       double squares = 0, least = 0;
       for (const Residual& r : view.residuals) {
         const double d2 = distance2(r, offset);
-        if (!loss_.counts(d2)) continue;
         curvature += weight * loss_.second_derivative(d2) / points;
         Block& block = blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}];
         block.slope += loss_.weight(d2) * (double(r.along_normal) - offset);

@@ -8,7 +8,6 @@ class EdgeLoss {
   EdgeLoss(double scale, double reach) : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
   double worst() const { return worst_; }
   double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
-  bool counts(double distance2) const { return distance2 < reach2_; }
   /// Derivative by the distance, divided by it.
   double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
   double second_derivative(double distance2) const { return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0; }
