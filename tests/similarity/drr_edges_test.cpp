@@ -27,6 +27,22 @@ class WallProjector : public Projector {
   }
 };
 
+/// A wall whose normal points 30 degrees downwards, through (100 + x, 80).
+class ObliqueWallProjector : public Projector {
+ public:
+  static Eigen::Vector2d normal() { return {std::cos(marrow::radians(30)), std::sin(marrow::radians(30))}; }
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose, const marrow::PixelGrid& grid) const override {
+    std::vector<float> values;
+    for (int row = 0; row < grid.rows; ++row)
+      for (int column = 0; column < grid.columns; ++column) {
+        const double across = normal().dot(grid.pixel(column, row) - Eigen::Vector2d(100 + pose.translation_mm.x(), 80));
+        values.push_back(float(20 + 20 * std::erf(across / (std::sqrt(2.0) * kWidth_px))));
+      }
+    return values;
+  }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {70, 50, 1, 60, 60}; }
+};
+
 /// A square whose region ends with it, or further out.
 class SquareProjector : public Projector {
  public:
@@ -71,6 +87,31 @@ double loss(double distance) { return std::sqrt(1 + distance * distance) - 1; }
 TEST(DrrEdges, FindsTheRadiographsEdgesBetweenPixels) {
   for (const std::int64_t step : {1, 2, 3})
     for (const double x : {-4.0, -1.3, 0.0, 0.45, 2.0}) EXPECT_NEAR(value(inputs(100.4), at(x, 0), step), loss(x - 0.4), 0.05) << step << " " << x;
+}
+
+TEST(DrrEdges, DistancesAreAcrossAnObliqueEdge) {
+  marrow::EdgeMap map{200, 170, {}};
+  const Eigen::Vector2d normal = ObliqueWallProjector::normal();
+  for (int v = 10; v < 160; ++v)
+    map.pixels.push_back({float(100 - (v - 80) * normal.y() / normal.x()), float(v), float(-normal.x()), float(-normal.y()), 1});
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  shipped::Inputs in = inputs(100);
+  in["projector"] = marrow::Value::of<Projector>(std::make_shared<const ObliqueWallProjector>());
+  in["edges"] = shipped::list(edges, "view");
+  for (const double x : {-4.0, 0.0, 2.0}) EXPECT_NEAR(value(in, at(x, 0)), loss(x * normal.x()), 0.05) << x;
+}
+
+TEST(DrrEdges, DistancesAlongAnEdgeBeginBeyondAPixel) {
+  // One edge pixel alone, at (101, 80): the wall's rows from 15 to 155 lie 1 px across and up to 75 px along from it.
+  marrow::EdgeMap map{200, 170, {{101, 80, -1, 0, 1}}};
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  shipped::Inputs in = inputs(100);
+  in["edges"] = shipped::list(edges, "view");
+  double expected = 0;
+  for (int v = 15; v <= 155; ++v) expected += loss(std::min(10.0, std::hypot(1, std::max(0.0, std::abs(v - 80) - 1.5)))) / 141;
+  EXPECT_NEAR(value(in, at(0, 0)), expected, 0.01);
 }
 
 TEST(DrrEdges, WhatDoesNotMatchIsTheWorst) {
