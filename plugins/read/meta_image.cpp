@@ -2,6 +2,7 @@
 // MetaImage (.mha, .mhd): https://itk.org/Wiki/MetaIO/Documentation. MetaIO itself hands on what the memory held where
 // samples are missing, and opens whatever a header names, so its format is read here.
 #include <algorithm>
+#include <cmath>
 
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
@@ -114,7 +115,7 @@ VolumeSamples read_samples(const Header& header, const InputFile& data, std::uin
   std::array<long long, 3> size{1, 1, 1};
   const auto sizes = fields.numbers("dimsize", std::size_t(dimensions));
   for (std::size_t k = 0; k < sizes.size(); ++k) {
-    if (sizes[k] != double((long long)sizes[k])) fields.refuse("dimsize", "whole numbers");
+    if (sizes[k] != std::floor(sizes[k]) || !(std::abs(sizes[k]) < 1e15)) fields.refuse("dimsize", "whole numbers");
     if (k < 3)
       size[k] = (long long)sizes[k];
     else if (sizes[k] != 1)

@@ -137,6 +137,7 @@ TEST_F(Hostile, MetaImageFieldsAreReadStrictly) {
   const std::string bytes = good("a.mha");
   expect("b.mha", with(bytes, "DimSize = 8 6 5", "DimSize = 8 6 5\nDimSize = 8 6 5"), "gives 'dimsize' twice");
   expect("b.mha", with(bytes, "DimSize = 8 6 5", "DimSize = 8 6 5.5"), "expected whole numbers");
+  expect("b.mha", with(bytes, "DimSize = 8 6 5", "DimSize = 8 6 7e60"), "expected whole numbers");
   expect("b.mha", with(bytes, "MET_SHORT", "MET_STRING"), "expected a kind of number");
   expect("b.mha", with(bytes, "BinaryData = True", "BinaryData = False"), "written as text, which is not read");
   expect("b.mha", with(bytes, "BinaryData = True", "BinaryData = perhaps"), "expected True or False");
