@@ -28,7 +28,8 @@ std::optional<Unclosed> last_unclosed(const std::string& text) {
     const bool quoted = !open.empty() && (open.back().mark == '"' || open.back().mark == '\'');
     if (in_comment) continue;
     if (quoted) {
-      if (c == '\\' && open.back().mark == '"') ++i, ++column;
+      // What is escaped ends no quote; a line break is counted all the same.
+      if (c == '\\' && open.back().mark == '"' && text.compare(i + 1, 1, "\n") != 0) ++i, ++column;
       else if (c == open.back().mark) open.pop_back();
       continue;
     }
