@@ -52,10 +52,6 @@ class CaseReader {
   /// False, with a fault, for a case that cannot be added: its others are not worth looking at.
   bool add(ExperimentCase one, const Place& place) {
     if (!check_name(yaml_, one.name, place, "a case's name")) return false;
-    if (experiment_.cases.size() == kMostCells) {
-      yaml_.fault(place, "there are more than " + std::to_string(kMostCells) + " cases", "take fewer, or make several experiments of them");
-      return false;
-    }
     const auto [known, is_new] = known_.emplace(in_small_letters(one.name), experiment_.cases.size());
     if (is_new) {
       experiment_.cases.push_back(std::move(one));
