@@ -46,6 +46,9 @@ void expect_explained(const Camera& camera, const SeenPoints& points, const std:
   const auto sentence = camera::explanation(camera, points);
   ASSERT_TRUE(sentence) << said;
   EXPECT_NE(sentence->find(said), std::string::npos) << *sentence;
+  const std::size_t at = sentence->find("only ");
+  ASSERT_NE(at, std::string::npos) << *sentence;
+  EXPECT_LT(std::stod(sentence->substr(at + 5)), 0.4) << "but for the noise, nothing is left: " << *sentence;
 }
 
 TEST(Explanation, NoneForARightCamera) {
