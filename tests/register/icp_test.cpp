@@ -97,6 +97,18 @@ TEST(Icp, IsTheSameEveryTime) {
   EXPECT_EQ(one.at("pose").as<marrow::Pose>().world_from_model.rotation, other.at("pose").as<marrow::Pose>().world_from_model.rotation);
 }
 
+TEST(Icp, KeepsNothingThatWasSaidOfTheStart) {
+  marrow::Pose start = bone().start(displacement());
+  start.covariance = marrow::Matrix6d::Identity();
+  start.warnings = {"the direction along the axis is not determined"};
+  start.convergence = {{100, 0.5}};
+  const auto outputs = run(start, bone().target());
+  const marrow::Pose& pose = outputs.at("pose").as<marrow::Pose>();
+  EXPECT_TRUE(pose.warnings.empty());
+  EXPECT_FALSE(pose.covariance);
+  EXPECT_TRUE(pose.convergence.empty());
+}
+
 TEST(Icp, WarnsWhereItWasStoppedOrHadFewPairs) {
   const marrow::Pose start = bone().start(displacement());
   EXPECT_EQ(run(start, bone().target(), {{"max_iterations", std::int64_t(3)}}).at("pose").as<marrow::Pose>().warnings,
