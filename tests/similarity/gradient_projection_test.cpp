@@ -96,6 +96,31 @@ TEST(GradientProjection, DirectionsCount) {
   EXPECT_NEAR(made.as<marrow::Cost>().value(shifted(0, 0, 0)), 1, 1e-6);
 }
 
+TEST(GradientProjection, ABrightSpotCountsTwiceAtMost) {
+  // Beside the ball a small one that the images do not show; so it only adds to what the points could reach.
+  const Eigen::Vector3d spot_mm = kMiddle_mm + Eigen::Vector3d(20, 20, 20);
+  constexpr double kSpot_mm = 6;
+  marrow::Mesh mesh = shapes::sphere(kRadius_mm), spot = shapes::sphere(kSpot_mm);
+  const auto first = std::uint32_t(mesh.vertices_mm.size());
+  for (const Eigen::Vector3d& vertex : spot.vertices_mm) mesh.vertices_mm.push_back(vertex + spot_mm - Eigen::Vector3d(0, 0, kSpot_mm));
+  for (const auto& t : spot.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
+  const auto possible = [&](double brightness) {
+    marrow::Volume volume = ball();
+    for (std::size_t i = 0; i < volume.values.size(); ++i) {
+      const Eigen::Vector3d index(double(i % 60), double(i / 60 % 60), double(i / 3600));
+      const double depth = kSpot_mm - (volume.grid.point_from_index(index) - spot_mm).norm();
+      volume.values[i] += float(brightness * 800 * std::clamp(depth + 0.5, 0.0, 1.0));
+    }
+    shipped::Inputs in = inputs();
+    in["mesh"] = shipped::item(mesh);
+    in["volume"] = shipped::item(volume);
+    return 1 / (1 - shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().value(shifted(0, 0, 0)));
+  };
+  const double none = possible(0.001), as_bright = possible(1) - none, far_brighter = possible(100) - none;
+  EXPECT_GT(as_bright, 0.02);
+  EXPECT_NEAR(far_brighter / as_bright, 2, 0.4);
+}
+
 TEST(GradientProjection, WhatIsMaskedDoesNotCount) {
   const auto value = [](double grey) {
     marrow::View view = view_of(0);
