@@ -5,21 +5,27 @@
 
 namespace {
 
-/// A rectangle of columns and rows, both ends of which belong to it. It may reach beyond the image, against the contract.
+/// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the image, against
+/// the contract.
 class RectangleOutline : public marrow::Projector {
  public:
-  RectangleOutline(int left, int right, int top, int bottom) : left_(left), right_(right), top_(top), bottom_(bottom) {}
+  RectangleOutline(int left, int right, int top, int bottom, bool is_open_above) : left_(left), right_(right), top_(top), bottom_(bottom), is_open_above_(is_open_above) {}
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&, double) const override {
     std::vector<marrow::OutlinePoint> points;
-    for (int v = top_; v <= bottom_; ++v) {
+    for (int v = top_; v <= bottom_ && is_open_above_; ++v) {
       points.push_back({float(left_), float(v), -1, 0});
       points.push_back({float(right_), float(v), 1, 0});
+    }
+    for (int u = left_; u <= right_ && !is_open_above_; ++u) {
+      points.push_back({float(u), float(top_), 0, -1});
+      points.push_back({float(u), float(bottom_), 0, 1});
     }
     return points;
   }
 
  private:
   int left_, right_, top_, bottom_;
+  bool is_open_above_;
 };
 
 TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
@@ -28,14 +34,16 @@ TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
   view.image.pixels = cv::Mat(kRows, kColumns, CV_8U, cv::Scalar(100));
   marrow::List<marrow::View> views;
   views.add("ap", view);
-  // Inside, over the left border, over the right one, and over both.
-  for (const auto& [left, right] : std::vector<std::pair<int, int>>{{3, 7}, {-5, 4}, {15, 25}, {-5, 25}}) {
-    const RectangleOutline outline(left, right, 4, 8);
-    const auto masked = marrow::similarity::without_shadows(views, {{&outline, {}}});
-    for (int v = 0; v < kRows; ++v)
-      for (int u = 0; u < kColumns; ++u)
-        EXPECT_EQ(masked[0].mask.at<std::uint8_t>(v, u) == 0, v >= 4 && v <= 8 && u >= left && u <= right) << left << " to " << right << " at " << u << ' ' << v;
-  }
+  // Inside, over one border, over the other, and over both.
+  for (const auto& [first, last] : std::vector<std::pair<int, int>>{{3, 7}, {-5, 4}, {9, 25}, {-5, 25}})
+    for (const bool is_open_above : {true, false}) {
+      const int left = is_open_above ? first : 4, right = is_open_above ? last : 8, top = is_open_above ? 4 : first, bottom = is_open_above ? 8 : last;
+      const RectangleOutline outline(left, right, top, bottom, is_open_above);
+      const auto masked = marrow::similarity::without_shadows(views, {{&outline, {}}});
+      for (int v = 0; v < kRows; ++v)
+        for (int u = 0; u < kColumns; ++u)
+          EXPECT_EQ(masked[0].mask.at<std::uint8_t>(v, u) == 0, v >= top && v <= bottom && u >= left && u <= right) << first << " to " << last << " at " << u << ' ' << v;
+    }
 }
 
 }  // namespace
