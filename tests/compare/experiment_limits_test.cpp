@@ -76,7 +76,7 @@ TEST_F(ExperimentLimits, SeedsAtTheEndOfTheIntegers) {
   const std::string ranges = "'seeds' must be a range such as 1..20, of at most 100000, or a list of integers";
   for (const char* wrong : {"9223372036854775800..9223372036854775807999", "99999999999999999999..99999999999999999999",
                             "18446744073709551610..18446744073709551615", "1..2x", "1...3", "1 ..3", "+1..3", "0x1..3",
-                            "1..3..5", "1..100001"})
+                            "1..3..5", "1..100001", "1xx3", "1.x3", "1x.3", "xx3", "..3", "1..", "12"})
     expect_fault(std::string(kHead) + "cases: {seeds: " + wrong + "}\ninputs: {case: cases/a}\n" + kVariants + kMetrics,
                  ranges);
   const auto e =
