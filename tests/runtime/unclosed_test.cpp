@@ -8,7 +8,8 @@ namespace {
 /// As "mark line:column"; "" where all is closed.
 std::string unclosed(const std::string& text) {
   const auto found = marrow::last_unclosed(text);
-  return found ? std::string(1, found->mark) + " " + std::to_string(found->line) + ":" + std::to_string(found->column) : "";
+  return found ? std::string(1, found->mark) + " " + std::to_string(found->line) + ":" + std::to_string(found->column)
+               : "";
 }
 
 TEST(Unclosed, NamesTheInnermostMark) {

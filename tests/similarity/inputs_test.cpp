@@ -5,12 +5,14 @@
 
 namespace {
 
-/// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the image, against
-/// the contract.
+/// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the
+/// image, against the contract.
 class RectangleOutline : public marrow::Projector {
  public:
-  RectangleOutline(int left, int right, int top, int bottom, bool is_open_above) : left_(left), right_(right), top_(top), bottom_(bottom), is_open_above_(is_open_above) {}
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&, double) const override {
+  RectangleOutline(int left, int right, int top, int bottom, bool is_open_above)
+      : left_(left), right_(right), top_(top), bottom_(bottom), is_open_above_(is_open_above) {}
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&,
+                                            double) const override {
     std::vector<marrow::OutlinePoint> points;
     for (int v = top_; v <= bottom_ && is_open_above_; ++v) {
       points.push_back({float(left_), float(v), -1, 0});
@@ -37,12 +39,14 @@ TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
   // Inside, over one border, over the other, and over both.
   for (const auto& [first, last] : std::vector<std::pair<int, int>>{{3, 7}, {-5, 4}, {9, 25}, {-5, 25}})
     for (const bool is_open_above : {true, false}) {
-      const int left = is_open_above ? first : 4, right = is_open_above ? last : 8, top = is_open_above ? 4 : first, bottom = is_open_above ? 8 : last;
+      const int left = is_open_above ? first : 4, right = is_open_above ? last : 8, top = is_open_above ? 4 : first,
+                bottom = is_open_above ? 8 : last;
       const RectangleOutline outline(left, right, top, bottom, is_open_above);
       const auto masked = marrow::similarity::without_shadows(views, {{&outline, {}}});
       for (int v = 0; v < kRows; ++v)
         for (int u = 0; u < kColumns; ++u)
-          EXPECT_EQ(masked[0].mask.at<std::uint8_t>(v, u) == 0, v >= top && v <= bottom && u >= left && u <= right) << first << " to " << last << " at " << u << ' ' << v;
+          EXPECT_EQ(masked[0].mask.at<std::uint8_t>(v, u) == 0, v >= top && v <= bottom && u >= left && u <= right)
+              << first << " to " << last << " at " << u << ' ' << v;
     }
 }
 

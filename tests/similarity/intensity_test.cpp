@@ -97,7 +97,8 @@ TEST(Moments, OfTheValuesThatCount) {
 }
 
 TEST(Patches, WeighEachSquareByItsVariance) {
-  // Two squares of 4 x 4 without overlap of their values: the radiograph agrees with the image in the left one, and is opposite in the right.
+  // Two squares of 4 x 4 without overlap of their values: the radiograph agrees with the image in the left one, and is
+  // opposite in the right.
   Patch patch{8, 4, 0, 0, {}, {}, std::vector<char>(32, 1)};
   std::vector<float> a, b;
   for (int row = 0; row < 4; ++row)
@@ -106,10 +107,12 @@ TEST(Patches, WeighEachSquareByItsVariance) {
       a.push_back(column < 4 ? 3 * step : step);
       b.push_back(column < 4 ? step : -step);
     }
-  // Variances of the squares at columns 0, 2 and 4: 16 x 9/4, of both halves, and 16 x 1/4; the correlations of the first and last are 1 and -1.
+  // Variances of the squares at columns 0, 2 and 4: 16 x 9/4, of both halves, and 16 x 1/4; the correlations of the
+  // first and last are 1 and -1.
   const double middle_a = 8 * 9.0 + 8 * 1.0, mean_a = (4 * 3.0 + 4 * 1.0) / 16;
   const double variance_a = middle_a / 2 - 16 * mean_a * mean_a, variance_b = 8 - 0.0, covariance = 4 * 3.0 - 4 * 1.0;
-  const double expected = (36 * 1 + variance_a * covariance / std::sqrt(variance_a * variance_b) + 4 * -1) / (36 + variance_a + 4);
+  const double expected =
+      (36 * 1 + variance_a * covariance / std::sqrt(variance_a * variance_b) + 4 * -1) / (36 + variance_a + 4);
   EXPECT_NEAR(marrow::similarity::mean_patch_correlation(patch, a, b, patch.counts, 4), expected, 1e-12);
 }
 
@@ -117,7 +120,8 @@ TEST(Patches, LieWhereTheyLieInTheImage) {
   // Of 6 columns that begin at the image's column 3, the square of 4 x 4 at the image's column 4 alone is whole.
   Patch patch{6, 4, 3, 0, {}, {}, std::vector<char>(24, 1)};
   std::vector<float> a(24), b(24);
-  for (int i = 0; i < 24; ++i) a[std::size_t(i)] = float(i * i % 7), b[std::size_t(i)] = i % 6 == 0 || i % 6 == 5 ? 50.0f : float(i * i % 7);
+  for (int i = 0; i < 24; ++i)
+    a[std::size_t(i)] = float(i * i % 7), b[std::size_t(i)] = i % 6 == 0 || i % 6 == 5 ? 50.0f : float(i * i % 7);
   EXPECT_NEAR(marrow::similarity::mean_patch_correlation(patch, a, b, patch.counts, 4), 1, 1e-12);
 }
 
@@ -126,7 +130,10 @@ TEST(Patches, AConstantRadiographSaysNothing) {
   std::vector<float> b;
   for (int i = 0; i < 36; ++i) b.push_back(float(i % 5));
   for (int i = 0; i < 100; ++i)  // whatever rounding leaves of it
-    EXPECT_EQ(marrow::similarity::mean_patch_correlation(patch, std::vector<float>(36, 1000.1f + 77.7f * float(i)), b, patch.counts, 6), -1) << i;
+    EXPECT_EQ(marrow::similarity::mean_patch_correlation(patch, std::vector<float>(36, 1000.1f + 77.7f * float(i)), b,
+                                                         patch.counts, 6),
+              -1)
+        << i;
 }
 
 }  // namespace

@@ -17,7 +17,8 @@ marrow::EdgeMap random_edges(int width, int height, int count, std::mt19937& ran
   edges.height_px = height;
   const float middle = 6.2831853f * part(random);
   for (int i = 0; i < count; ++i) {
-    const float angle = i % 2 ? 6.2831853f * part(random) : middle + part(random);  // half of them alike, so that smoothing moves them
+    const float angle =
+        i % 2 ? 6.2831853f * part(random) : middle + part(random);  // half of them alike, so that smoothing moves them
     marrow::EdgePixel edge;
     edge.u_px = -0.49f + (float(width) - 0.02f) * part(random);
     edge.v_px = -0.49f + (float(height) - 0.02f) * part(random);
@@ -63,7 +64,8 @@ void compare_with_a_search(int width, int height, int count, unsigned seed) {
         const Eigen::Vector2i cell = cell_of(found->u_px, found->v_px, width, height);
         ASSERT_EQ((cell - from).squaredNorm(), least) << "at " << u << ' ' << v << " in sector " << sector;
         for (const marrow::EdgePixel& edge : nearest.all())
-          if (edge.direction_u * middle.x() + edge.direction_v * middle.y() >= std::cos(kTolerance_rad) && cell_of(edge.u_px, edge.v_px, width, height) == cell)
+          if (edge.direction_u * middle.x() + edge.direction_v * middle.y() >= std::cos(kTolerance_rad) &&
+              cell_of(edge.u_px, edge.v_px, width, height) == cell)
             ASSERT_LE(edge.magnitude, found->magnitude) << "a cell keeps its strongest edge";
       }
   }
@@ -102,7 +104,8 @@ TEST(NearestEdges, AreSmoothedAlongTheirBorder) {
   edges.pixels.push_back({10.6f, 10, -1, 0, 1});  // another border
   const NearestEdges nearest(edges, {}, kTolerance_rad);
   // Of seven pixels in the middle, three or four lie on either side.
-  for (int v = 3; v < 18; ++v) EXPECT_NEAR(nearest.all()[std::size_t(v)].u_px, v % 2 ? 10 - 0.3 / 7 : 10 + 0.3 / 7, 1e-5) << v;
+  for (int v = 3; v < 18; ++v)
+    EXPECT_NEAR(nearest.all()[std::size_t(v)].u_px, v % 2 ? 10 - 0.3 / 7 : 10 + 0.3 / 7, 1e-5) << v;
   EXPECT_EQ(nearest.all()[21].u_px, 12.5f);
   EXPECT_EQ(nearest.all()[22].u_px, 10.6f);
 }
