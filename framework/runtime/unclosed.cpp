@@ -29,7 +29,8 @@ std::optional<Unclosed> last_unclosed(const std::string& text) {
     if (in_comment) continue;
     if (quoted) {
       // What is escaped ends no quote; a line break is counted all the same.
-      if (c == '\\' && open.back().mark == '"' && text.compare(i + 1, 1, "\n") != 0) ++i, ++column;
+      if (c == '\\' && open.back().mark == '"' && text.compare(i + 1, 1, "\n") != 0)
+        ++i, ++column;
       else if (c == open.back().mark) open.pop_back();
       continue;
     }

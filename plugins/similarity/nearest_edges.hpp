@@ -110,7 +110,9 @@ class NearestEdges {
   }
 
   // The cell of an edge; of one that smoothing moved out of the image, the cell at the border.
-  int column_of(const marrow::EdgePixel& edge) const { return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1); }
+  int column_of(const marrow::EdgePixel& edge) const {
+    return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1);
+  }
   int row_of(const marrow::EdgePixel& edge) const { return std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1); }
   int row_of(std::int32_t label) const { return row_of(edges_[std::size_t(label)]); }
 

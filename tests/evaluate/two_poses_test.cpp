@@ -109,8 +109,9 @@ TEST(ReductionGap, SaysWhatIsWrong) {
   for (const bool is_moved : {true, false}) {
     shipped::Inputs mixed = good;
     mixed["poses"] = is_moved ? both(pose(elsewhere), pose(here)) : both(pose(here), pose(elsewhere));
-    EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", mixed), "the pose is " + here.target + "_from_atlas, but the truth is " + here.target + "_from_" + here.source +
-                                                                     "; compare poses between the same two frames");
+    EXPECT_EQ(shipped::refusal("evaluate.reduction_gap", mixed),
+              "the pose is " + here.target + "_from_atlas, but the truth is " + here.target + "_from_" + here.source +
+                  "; compare poses between the same two frames");
   }
 }
 

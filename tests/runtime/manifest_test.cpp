@@ -173,7 +173,8 @@ TEST(Manifest, NamesAndTextsAreThoseOfADeclaration) {
   marrow::LibraryInfo many = library();
   many.linked.resize(1000, many.linked[0]);
   expect_consistent(many);
-  expect_refused([](json& j) { j["linked"] = std::vector<json>(1001, j["linked"][0]); }, "it names more than 1000 linked libraries");
+  expect_refused([](json& j) { j["linked"] = std::vector<json>(1001, j["linked"][0]); },
+                 "it names more than 1000 linked libraries");
 }
 TEST(Manifest, HasAllFieldsAndNoOthers) {
   expect_refused([](json& j) { j["more"] = 1; }, "it has 7 fields, expected 6");

@@ -157,7 +157,8 @@ TEST_F(UntrustedLibraryTest, TheGroupOfAUserWithoutANameMayWrite) {
   EXPECT_EQ(fault_as(kSomebody), "");
   ASSERT_EQ(chown(folder.c_str(), kSomebody, kSomebody + 1), 0);
   EXPECT_EQ(fault_as(kSomebody + 1), "");
-  EXPECT_NE(fault_as(kSomebody).find("others may write to '" + folder.string() + "' (owner user 54321, mode 0775)"), std::string::npos);
+  EXPECT_NE(fault_as(kSomebody).find("others may write to '" + folder.string() + "' (owner user 54321, mode 0775)"),
+            std::string::npos);
 }
 TEST_F(UntrustedLibraryTest, AnAccessListIsNoPrivateGroup) {
   // With a list, the mode shows as the group's what the list gives anyone at most.

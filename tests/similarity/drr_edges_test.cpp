@@ -31,16 +31,20 @@ class WallProjector : public Projector {
 class ObliqueWallProjector : public Projector {
  public:
   static Eigen::Vector2d normal() { return {std::cos(marrow::radians(30)), std::sin(marrow::radians(30))}; }
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose, const marrow::PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose,
+                                const marrow::PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
       for (int column = 0; column < grid.columns; ++column) {
-        const double across = normal().dot(grid.pixel(column, row) - Eigen::Vector2d(100 + pose.translation_mm.x(), 80));
+        const double across =
+            normal().dot(grid.pixel(column, row) - Eigen::Vector2d(100 + pose.translation_mm.x(), 80));
         values.push_back(float(20 + 20 * std::erf(across / (std::sqrt(2.0) * kWidth_px))));
       }
     return values;
   }
-  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {70, 50, 1, 60, 60}; }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
+    return {70, 50, 1, 60, 60};
+  }
 };
 
 /// A square whose region ends with it, or further out.
@@ -93,7 +97,8 @@ TEST(DrrEdges, DistancesAreAcrossAnObliqueEdge) {
   marrow::EdgeMap map{200, 170, {}};
   const Eigen::Vector2d normal = ObliqueWallProjector::normal();
   for (int v = 10; v < 160; ++v)
-    map.pixels.push_back({float(100 - (v - 80) * normal.y() / normal.x()), float(v), float(-normal.x()), float(-normal.y()), 1});
+    map.pixels.push_back(
+        {float(100 - (v - 80) * normal.y() / normal.x()), float(v), float(-normal.x()), float(-normal.y()), 1});
   marrow::List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
   shipped::Inputs in = inputs(100);
@@ -110,7 +115,8 @@ TEST(DrrEdges, DistancesAlongAnEdgeBeginBeyondAPixel) {
   shipped::Inputs in = inputs(100);
   in["edges"] = shipped::list(edges, "view");
   double expected = 0;
-  for (int v = 15; v <= 155; ++v) expected += loss(std::min(10.0, std::hypot(1, std::max(0.0, std::abs(v - 80) - 1.5)))) / 141;
+  for (int v = 15; v <= 155; ++v)
+    expected += loss(std::min(10.0, std::hypot(1, std::max(0.0, std::abs(v - 80) - 1.5)))) / 141;
   EXPECT_NEAR(value(in, at(0, 0)), expected, 0.01);
 }
 

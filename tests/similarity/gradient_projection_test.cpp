@@ -102,7 +102,8 @@ TEST(GradientProjection, ABrightSpotCountsTwiceAtMost) {
   constexpr double kSpot_mm = 6;
   marrow::Mesh mesh = shapes::sphere(kRadius_mm), spot = shapes::sphere(kSpot_mm);
   const auto first = std::uint32_t(mesh.vertices_mm.size());
-  for (const Eigen::Vector3d& vertex : spot.vertices_mm) mesh.vertices_mm.push_back(vertex + spot_mm - Eigen::Vector3d(0, 0, kSpot_mm));
+  for (const Eigen::Vector3d& vertex : spot.vertices_mm)
+    mesh.vertices_mm.push_back(vertex + spot_mm - Eigen::Vector3d(0, 0, kSpot_mm));
   for (const auto& t : spot.triangles) mesh.triangles.push_back({t[0] + first, t[1] + first, t[2] + first});
   const auto possible = [&](double brightness) {
     marrow::Volume volume = ball();
@@ -114,7 +115,9 @@ TEST(GradientProjection, ABrightSpotCountsTwiceAtMost) {
     shipped::Inputs in = inputs();
     in["mesh"] = shipped::item(mesh);
     in["volume"] = shipped::item(volume);
-    return 1 / (1 - shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().value(shifted(0, 0, 0)));
+    return 1 /
+           (1 -
+            shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().value(shifted(0, 0, 0)));
   };
   const double none = possible(0.001), as_bright = possible(1) - none, far_brighter = possible(100) - none;
   EXPECT_GT(as_bright, 0.02);
