@@ -11,7 +11,7 @@ import tempfile
 import unittest
 
 BUILD = pathlib.Path(sys.argv[1])
-WRONG = {  # node: checks of which at least one must fail; the others of the suite may
+WRONG = {  # node: checks of which at least one must fail
     "camera.silent": {"mirrored", "wrong_unit"},
     "camera.anxious": {"right_cameras"},
     "camera.careless": {"nan_camera"},
@@ -87,7 +87,8 @@ class Conformance(unittest.TestCase):
     def test_each_wrong_node_is_caught_by_name(self):
         for node, expected in WRONG.items():
             with self.subTest(node):
-                result, nodes = conformance(node)
+                result, nodes = conformance(node, *("--check=" + check for check in expected))
+                self.assertLessEqual(set(nodes[node]), expected)
                 failed = {name for name, (passed, _) in nodes[node].items() if not passed}
                 self.assertEqual(result.returncode, 1)
                 self.assertTrue(failed & expected, "failed: %s, expected one of %s" % (failed, expected))
@@ -100,9 +101,9 @@ class Conformance(unittest.TestCase):
     def test_what_happened_is_said(self):
         texts = {name: text for name, (_, text) in conformance("edges.crashing", seconds=60)[1]["edges.crashing"].items()}
         self.assertEqual(texts["one_pixel"], "it crashed: Aborted")
-        texts = {name: text for name, (_, text) in conformance("mesh.endless")[1]["mesh.endless"].items()}
+        texts = {name: text for name, (_, text) in conformance("mesh.endless", "--check", "nothing_inside")[1]["mesh.endless"].items()}
         self.assertEqual(texts["nothing_inside"], "it took longer than 10 s")
-        texts = {name: text for name, (_, text) in conformance("mesh.fat", seconds=60)[1]["mesh.fat"].items()}
+        texts = {name: text for name, (_, text) in conformance("mesh.fat", "--check", "sphere_distance", seconds=60)[1]["mesh.fat"].items()}
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_files_lie_in_a_folder_that_nobody_foresees_and_are_removed(self):
@@ -143,8 +144,16 @@ class Conformance(unittest.TestCase):
         self.assertEqual(result.returncode, 2)
         self.assertIn("there is no node, kind or library 'edges.cany'; did you mean 'edges.canny'?", result.stderr)
 
+    def test_checks_by_their_names(self):
+        result, nodes = conformance("edges", "--check", "one_pixel", "--check", "contract")
+        self.assertEqual(set(map(tuple, nodes.values())), {("contract", "one_pixel")})
+        self.assertIn("edges.crashing", nodes)
+        result, _ = conformance("edges.plain", "--check", "one_pixels", "--check", "contract")
+        self.assertEqual((result.returncode, result.stdout), (2, ""))
+        self.assertIn("there is no check 'one_pixels'; did you mean 'one_pixel'?", result.stderr)
+
     def test_a_library_means_its_nodes(self):
-        result, nodes = conformance("marrow_wrong_edges.so")
+        result, nodes = conformance("marrow_wrong_edges.so", "--check", "contract")
         self.assertEqual(sorted(nodes), ["edges.changing", "edges.crashing", "edges.plain", "edges.shifted", "edges.turned", "edges.unsorted"])
 
     def test_a_library_of_any_folder(self):

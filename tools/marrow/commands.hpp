@@ -52,8 +52,8 @@ int inspect(const std::string& node, bool yaml, bool json);
 int graph(const PipelineRequest& request, bool dot);
 int schema(const std::filesystem::path& file);
 int doctor(bool json);
-/// Nodes, kinds or libraries; each node must pass the suite of its kind.
-int run_conformance(const std::vector<std::string>& subjects);
+/// Nodes, kinds or libraries; each node must pass the checks of its kind that are named, or all where none are.
+int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& checks);
 /// Takes single checks from the standard input; started by conformance.
 int check_worker(const std::filesystem::path& files_folder);
 /// The checks that a node of this kind must pass, with their limits.

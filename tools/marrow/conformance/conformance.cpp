@@ -3,6 +3,7 @@
 // other.
 #include <stdlib.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstdlib>
@@ -25,6 +26,8 @@ using nlohmann::json;
 using OptionValues = std::map<std::string, OptionValue>;
 
 constexpr double kMemory_mb = 8192;
+
+bool is_in(const std::vector<std::string>& names, const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); }
 
 /// Seconds that one check may take.
 int time_limit_s() {
@@ -163,30 +166,48 @@ void search_folders_of(const std::vector<std::string>& subjects) {
   }
 }
 
-int run_conformance(const std::vector<std::string>& subjects) try {
+/// Throws Error for a name that no node's suite has.
+void expect_known(const std::vector<std::string>& wanted, const Catalogue& catalogue, const std::vector<std::string>& nodes) {
+  std::vector<std::string> known;
+  for (const std::string& node : nodes)
+    if (const Suite* suite = conformance::suite_of(catalogue.find(node)->kind()))
+      for (const Check& check : conformance::checks_of(*suite))
+        if (!is_in(known, check.name)) known.push_back(check.name);
+  for (const std::string& name : wanted)
+    if (!is_in(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
+}
+
+/// Runs the wanted checks of a node, or all where none are named, and counts their verdicts.
+void check_node(const std::string& node, const Suite& suite, const std::vector<std::string>& wanted, Checks& checks, std::map<char, int>& count) {
+  const std::vector<Check> all = conformance::checks_of(suite);
+  std::printf("%s\n", node.c_str());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!wanted.empty() && !is_in(wanted, all[i].name)) continue;
+    const Outcome outcome = checks.run(i);
+    ++count[outcome.verdict];
+    std::printf("  %s %-26s %s\n", outcome.verdict == '+' ? "pass" : outcome.verdict == '~' ? "n/a " : "FAIL", all[i].name.c_str(), outcome.text.c_str());
+    std::fflush(stdout);
+  }
+}
+
+int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& wanted) try {
   search_folders_of(subjects);
   const Catalogue catalogue;
   const std::atomic<bool>& stopped = stop_on_signals();
+  std::vector<std::string> nodes;
+  for (const std::string& subject : subjects)
+    for (const std::string& node : nodes_of(catalogue, subject)) nodes.push_back(node);
+  expect_known(wanted, catalogue, nodes);
   const FilesFolder files;
   std::map<char, int> count;
-  for (const std::string& subject : subjects)
-    for (const std::string& name : nodes_of(catalogue, subject)) {
-      const Suite* suite = conformance::suite_of(catalogue.find(name)->kind());
-      if (!suite) {
-        std::printf("%s: its kind has no suite\n", name.c_str());
-        continue;
-      }
-      std::printf("%s\n", name.c_str());
-      const std::vector<Check> all = conformance::checks_of(*suite);
-      Checks checks(name, files, stopped);
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        const Check& check = all[i];
-        const Outcome outcome = checks.run(i);
-        ++count[outcome.verdict];
-        std::printf("  %s %-26s %s\n", outcome.verdict == '+' ? "pass" : outcome.verdict == '~' ? "n/a " : "FAIL", check.name.c_str(), outcome.text.c_str());
-        std::fflush(stdout);
-      }
+  for (const std::string& node : nodes) {
+    if (const Suite* suite = conformance::suite_of(catalogue.find(node)->kind())) {
+      Checks checks(node, files, stopped);
+      check_node(node, *suite, wanted, checks, count);
+    } else {
+      std::printf("%s: its kind has no suite\n", node.c_str());
     }
+  }
   std::printf("%d passed, %d do not apply, %d failed\n", count['+'], count['~'], count['-']);
   return count['-'] ? 1 : 0;
 } catch (const Cancelled&) {
