@@ -170,7 +170,9 @@ int run_program(int argc, char** argv) {
   std::vector<std::string> subjects, checks;
   auto* conformance_command = app.add_subcommand("conformance", "check that nodes do what every node of their kind must do");
   conformance_command->add_option("subject", subjects, "node, kind or library (.so file)")->required();
-  conformance_command->add_option("--check", checks, "only this of the checks that marrow inspect NODE lists; may be given again")->allow_extra_args(false);
+  conformance_command
+      ->add_option("--check", checks, "only this of the checks that marrow inspect NODE lists; may be given again")
+      ->allow_extra_args(false);
   conformance_command->callback([&] { code = run_conformance(subjects, checks); });
 
   auto* check_worker_command = app.add_subcommand("check-worker", "take checks from the standard input; started by conformance");

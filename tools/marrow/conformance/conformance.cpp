@@ -27,7 +27,9 @@ using OptionValues = std::map<std::string, OptionValue>;
 
 constexpr double kMemory_mb = 8192;
 
-bool is_in(const std::vector<std::string>& names, const std::string& name) { return std::find(names.begin(), names.end(), name) != names.end(); }
+bool is_in(const std::vector<std::string>& names, const std::string& name) {
+  return std::find(names.begin(), names.end(), name) != names.end();
+}
 
 /// Seconds that one check may take.
 int time_limit_s() {
@@ -167,7 +169,8 @@ void search_folders_of(const std::vector<std::string>& subjects) {
 }
 
 /// Throws Error for a name that no node's suite has.
-void expect_known(const std::vector<std::string>& wanted, const Catalogue& catalogue, const std::vector<std::string>& nodes) {
+void expect_known(const std::vector<std::string>& wanted, const Catalogue& catalogue,
+                  const std::vector<std::string>& nodes) {
   std::vector<std::string> known;
   for (const std::string& node : nodes)
     if (const Suite* suite = conformance::suite_of(catalogue.find(node)->kind()))
@@ -178,14 +181,19 @@ void expect_known(const std::vector<std::string>& wanted, const Catalogue& catal
 }
 
 /// Runs the wanted checks of a node, or all where none are named, and counts their verdicts.
-void check_node(const std::string& node, const Suite& suite, const std::vector<std::string>& wanted, Checks& checks, std::map<char, int>& count) {
+void check_node(const std::string& node, const Suite& suite, const std::vector<std::string>& wanted, Checks& checks,
+                std::map<char, int>& count) {
   const std::vector<Check> all = conformance::checks_of(suite);
   std::printf("%s\n", node.c_str());
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!wanted.empty() && !is_in(wanted, all[i].name)) continue;
     const Outcome outcome = checks.run(i);
     ++count[outcome.verdict];
-    std::printf("  %s %-26s %s\n", outcome.verdict == '+' ? "pass" : outcome.verdict == '~' ? "n/a " : "FAIL", all[i].name.c_str(), outcome.text.c_str());
+    std::printf("  %s %-26s %s\n",
+                outcome.verdict == '+'   ? "pass"
+                : outcome.verdict == '~' ? "n/a "
+                                         : "FAIL",
+                all[i].name.c_str(), outcome.text.c_str());
     std::fflush(stdout);
   }
 }
