@@ -89,7 +89,7 @@ class CaseReader {
       if (fs::is_directory(folder, error)) {
         any = true;
         const std::string name = folder.filename().string();
-        if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder, false, 1}, place)) return;
+        if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder}, place)) return;
       } else if (fs::is_symlink(folder, error)) {  // not what else lies among the cases: it may have been one
         if (fs::exists(folder, error)) continue;
         return yaml_.fault(place, "the link " + printable(folder.string()) + " leads nowhere",

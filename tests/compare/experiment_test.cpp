@@ -14,6 +14,8 @@ TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[0].name, "a");
+  EXPECT_FALSE(e.cases[0].is_simulated);
+  EXPECT_EQ(e.cases[0].seed, 1u);
   EXPECT_EQ(e.baseline, 1u);
   EXPECT_EQ(e.metrics[0].limit, 3.0);
   EXPECT_EQ(e.cell_count(), 4u);
