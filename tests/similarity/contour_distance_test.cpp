@@ -186,23 +186,3 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
     EXPECT_GT(within, 5);
   }
 }
-
-TEST(NearestEdges, AgreesWithASearchThroughAll) {
-  // Single edges far apart, so that no smoothing moves them.
-  marrow::EdgeMap map{120, 90, {}};
-  for (int i = 0; i < 40; ++i) {
-    const double angle = 0.7 * i;
-    map.pixels.push_back(
-        {float((i * 37) % 119), float((i * 53) % 89), float(std::cos(angle)), float(std::sin(angle)), 1});
-  }
-  const NearestEdges nearest(map, {}, marrow::kPi);  // any direction
-  for (int v = 0; v < 90; v += 3)
-    for (int u = 0; u < 120; u += 3) {
-      double best = 1e9;
-      for (const auto& e : map.pixels) best = std::min(best, std::hypot(double(e.u_px) - u, double(e.v_px) - v));
-      const marrow::EdgePixel* found = nearest.find(float(u), float(v), 0.6f, 0.8f);
-      ASSERT_NE(found, nullptr);
-      EXPECT_LE(std::hypot(double(found->u_px) - u, double(found->v_px) - v), best + 3)
-          << "cells of 2 px, half a cell at each end";
-    }
-}
