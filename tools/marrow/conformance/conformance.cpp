@@ -156,6 +156,8 @@ int check_worker(const std::filesystem::path& files_folder) {
                         }}});
 }
 
+namespace {
+
 /// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is searched as well.
 void search_folders_of(const std::vector<std::string>& subjects) {
   for (const std::string& subject : subjects) {
@@ -197,6 +199,8 @@ void check_node(const std::string& node, const Suite& suite, const std::vector<s
     std::fflush(stdout);
   }
 }
+
+}  // namespace
 
 int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& wanted) try {
   search_folders_of(subjects);
