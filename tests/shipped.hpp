@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Calls nodes as they are shipped: by name, out of their libraries. So a test is compiled in a moment, and says no more of a node
-// than a pipeline could.
+// Calls nodes as they are shipped: by name, out of their libraries. So a test is compiled in a moment, and says no more
+// of a node than a pipeline could.
 #include <map>
 #include <marrow/domain/error.hpp>
 #include <marrow/runtime/catalogue.hpp>
@@ -25,9 +25,10 @@ marrow::Value list(const marrow::List<T>& items, const std::string& axis) {
   return marrow::Value::of<T>(items, axis);
 }
 
-/// The outputs of a node by port, with the options given and its defaults for the others. Exceptions of the node pass through;
-/// ports and options that it has not are an Error.
-inline Outputs call(const std::string& node, const Inputs& inputs, const Options& options = {}, marrow::Context context = marrow::Context()) {
+/// The outputs of a node by port, with the options given and its defaults for the others. Exceptions of the node pass
+/// through; ports and options that it has not are an Error.
+inline Outputs call(const std::string& node, const Inputs& inputs, const Options& options = {},
+                    marrow::Context context = marrow::Context()) {
   static const marrow::Catalogue catalogue;
   const marrow::NodeDefinition& definition = catalogue.load(node);
   const std::shared_ptr<void> settings = definition.make_options();
@@ -42,7 +43,8 @@ inline Outputs call(const std::string& node, const Inputs& inputs, const Options
   known = 0;
   for (const marrow::PortInfo& port : definition.info.inputs) {
     const auto given = inputs.find(port.name);
-    if (given == inputs.end() && !port.optional) throw marrow::Error("the test does not give '" + node + "' its input '" + port.name + "'");
+    if (given == inputs.end() && !port.optional)
+      throw marrow::Error("the test does not give '" + node + "' its input '" + port.name + "'");
     values.push_back(given == inputs.end() ? marrow::Value() : given->second);
     known += given != inputs.end();
   }

@@ -2,7 +2,9 @@
 #include <marrow/plugin.hpp>
 
 namespace {
-struct Options { double least = 500; };
+struct Options {
+  double least = 500;
+};
 
 marrow::EdgeMap steepest(const marrow::View& view, const Options& options) {
   cv::Mat_<float> grey;
@@ -23,5 +25,6 @@ MARROW_PLUGIN(plugin) {
       .summary("Every pixel whose grey value changes fast")
       .in("view", "X-ray view")
       .out("edges", "edge pixels")
-      .option("least", &Options::least, "least change that makes an edge", marrow::at_least(0), marrow::unit("grey/px"));
+      .option("least", &Options::least, "least change that makes an edge", marrow::at_least(0),
+              marrow::unit("grey/px"));
 }

@@ -1,7 +1,7 @@
 # marrow_add_plugin(NAME source.cpp [...] [LINK library ...] [FOLDER folder])
 #
-# Builds the shared library marrow_NAME.so and, by running it, its manifest marrow_NAME.json beside it. Symbols are hidden,
-# so that two plugins with a same-named function or static never meet.
+# Builds the shared library marrow_NAME.so and, by running it, its manifest marrow_NAME.json beside it. Symbols are
+# hidden, so that two plugins with a same-named function or static never meet.
 function(marrow_add_plugin name)
   cmake_parse_arguments(PARSE_ARGV 1 plugin "" "FOLDER" "LINK")
   set(target plugin_${name})
@@ -48,5 +48,6 @@ function(marrow_add_shared name)
   target_link_libraries(${name} PUBLIC marrow::marrow ${shared_LINK})
   target_compile_features(${name} PRIVATE cxx_std_20)
   target_compile_options(${name} PRIVATE -Wall -Wextra)
-  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden VISIBILITY_INLINES_HIDDEN ON)
+  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
+    VISIBILITY_INLINES_HIDDEN ON)
 endfunction()

@@ -41,18 +41,21 @@ Pipeline checked(const fs::path& file, const PipelineArguments& arguments, const
 std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
     if (result.nodes[i].status == NodeRecord::Status::failed || result.nodes[i].status == NodeRecord::Status::cancelled)
-      return "node '" + pipeline.nodes[i].id + "' (" + pipeline.nodes[i].info.name + ") failed: " + result.nodes[i].reason;
+      return "node '" + pipeline.nodes[i].id + "' (" + pipeline.nodes[i].info.name +
+             ") failed: " + result.nodes[i].reason;
   return "";
 }
 
 /// The figure that a path names. Throws Error where it is not there or is no number.
 Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
   const std::vector<std::string> parts = split(path);
-  const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(), [&](const PipelineOutput& one) { return one.name == parts[0]; });
+  const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
+                                   [&](const PipelineOutput& one) { return one.name == parts[0]; });
   Value value = value_of(result, output->source);
   std::size_t used = 1;
   for (; value.is_list(); ++used) {
-    const auto item = used < parts.size() ? std::find(value.names.begin(), value.names.end(), parts[used]) : value.names.end();
+    const auto item =
+        used < parts.size() ? std::find(value.names.begin(), value.names.end(), parts[used]) : value.names.end();
     if (item == value.names.end()) {
       std::string names;
       for (const std::string& name : value.names) names += (names.empty() ? "" : ", ") + name;
@@ -61,14 +64,17 @@ Metric figure(const Pipeline& pipeline, const RunResult& result, const std::stri
     const Value picked = value.items[std::size_t(item - value.names.begin())];
     value = picked;
   }
-  if (value.is_absent()) throw Error("'" + path + "' was not made" + (value.missing.empty() ? ": its case has no truth, or an item is absent" : ": " + value.missing));
+  if (value.is_absent())
+    throw Error("'" + path + "' was not made" +
+                (value.missing.empty() ? ": its case has no truth, or an item is absent" : ": " + value.missing));
   std::string name;
   for (; used < parts.size(); ++used) name += (name.empty() ? "" : ".") + parts[used];
   std::vector<std::string> known;
   for (const Metric& metric : value.as<Metrics>().items) {
     known.push_back(metric.name);
     if (metric.name != name) continue;
-    if (!std::isfinite(metric.value)) throw Error("'" + path + "' is " + std::to_string(metric.value) + ", not a finite number");
+    if (!std::isfinite(metric.value))
+      throw Error("'" + path + "' is " + std::to_string(metric.value) + ", not a finite number");
     return metric;
   }
   throw Error("'" + path + "': there is no figure '" + name + "'; " + suggestion(name, known));
@@ -131,15 +137,21 @@ std::optional<double> kept_seconds(const Store& store, const Digest& key) {
 
 }  // namespace
 
-CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder, int threads,
-                       const FileLimits& file_limits)
-    : experiment_(experiment), catalogue_(catalogue), store_(store), folder_(std::move(folder)), threads_(threads), file_limits_(file_limits) {}
+CellRunner::CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, fs::path folder,
+                       int threads, const FileLimits& file_limits)
+    : experiment_(experiment),
+      catalogue_(catalogue),
+      store_(store),
+      folder_(std::move(folder)),
+      threads_(threads),
+      file_limits_(file_limits) {}
 
 fs::path CellRunner::folder_of(const CellIndex& cell) const { return folder_ / "cells" / cell_id(experiment_, cell); }
 
 Pipeline CellRunner::simulation_of(std::size_t index) const {
   Pipeline pipeline = checked(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, index), catalogue_);
-  std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) { return output.name != experiment_.simulation.output; });
+  std::erase_if(pipeline.outputs,
+                [&](const PipelineOutput& output) { return output.name != experiment_.simulation.output; });
   return pipeline;
 }
 
@@ -156,13 +168,17 @@ fs::path CellRunner::case_folder(std::size_t index) {
   // Another process may tidy the store up until this one uses the folder.
   for (int tries = 0; !found.use; ++tries) {
     std::shared_ptr<const void> use = use_folder(folder);
-    if (use && is_whole_case(folder, outputs)) found = {outputs, use};
-    else if (tries < 10) simulate(index, folder);
-    else throw Error("case '" + one.name + "' is removed again and again; let nothing tidy up " +
-                     folder.parent_path().string() + " meanwhile");
+    if (use && is_whole_case(folder, outputs))
+      found = {outputs, use};
+    else if (tries < 10)
+      simulate(index, folder);
+    else
+      throw Error("case '" + one.name + "' is removed again and again; let nothing tidy up " +
+                  folder.parent_path().string() + " meanwhile");
   }
   std::error_code ignored;
-  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);  // used just now: what a cell needs is removed last
+  fs::last_write_time(folder, fs::file_time_type::clock::now(),
+                      ignored);  // used just now: what a cell needs is removed last
   return outputs;
 }
 
@@ -202,10 +218,13 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
   std::set<std::string> wanted;
   if (depth == Depth::pictures) wanted.insert(experiment_.pictures.begin(), experiment_.pictures.end());
   for (const MetricChoice& metric : experiment_.metrics) wanted.insert(metric.path.substr(0, metric.path.find('.')));
-  if (!experiment_.initial_error.empty()) wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
+  if (!experiment_.initial_error.empty())
+    wanted.insert(experiment_.initial_error.substr(0, experiment_.initial_error.find('.')));
   std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
-    const PortInfo& port = pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
-    const bool is_shown = depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
+    const PortInfo& port =
+        pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
+    const bool is_shown =
+        depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
     return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>();
   });
   return pipeline;
@@ -235,10 +254,12 @@ CellRunner::Done CellRunner::run_into(const fs::path& folder, const Pipeline& pi
   settings.observer = observer;
   Done done{run_pipeline(pipeline, catalogue_, settings), ""};
   const auto outputs = written.write_outputs(pipeline, done.result, catalogue_);
-  written.write_record(pipeline, done.result, settings, catalogue_, arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
+  written.write_record(pipeline, done.result, settings, catalogue_,
+                       arguments_of(experiment_, cell, case_folder(cell.case_index)), outputs);
   done.fault = reason_of(pipeline, done.result);
   for (const RunFolder::Written& output : outputs)
-    if (done.fault.empty() && !output.fault.empty() && !output.fault.starts_with("not made")) done.fault = "output '" + output.output + "': " + output.fault;
+    if (done.fault.empty() && !output.fault.empty() && !output.fault.starts_with("not made"))
+      done.fault = "output '" + output.output + "': " + output.fault;
   return done;
 }
 
@@ -269,17 +290,21 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
     row.nodes[pipeline.nodes[i].id] = {node.calls, node.cached, node.seconds + node.cached_seconds};
   }
   row.failed = done.fault;
-  for (const PipelineOutput& output : pipeline.outputs) row.evaluations += evaluations_in(value_of(done.result, output.source));
+  for (const PipelineOutput& output : pipeline.outputs)
+    row.evaluations += evaluations_in(value_of(done.result, output.source));
   if (!row.failed.empty()) return;
   for (const MetricChoice& metric : experiment_.metrics) {
     const Metric found = figure(pipeline, done.result, metric.path);
     row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
     row.units.push_back(found.unit);
   }
-  if (!experiment_.initial_error.empty()) row.initial_error = figure(pipeline, done.result, experiment_.initial_error).value;
+  if (!experiment_.initial_error.empty())
+    row.initial_error = figure(pipeline, done.result, experiment_.initial_error).value;
 }
 
-fs::path CellRunner::pictures_of(const CellIndex& cell) const { return folder_ / "pictures" / cell_id(experiment_, cell); }
+fs::path CellRunner::pictures_of(const CellIndex& cell) const {
+  return folder_ / "pictures" / cell_id(experiment_, cell);
+}
 
 bool CellRunner::draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer) {
   const fs::path folder = pictures_of(cell);
@@ -297,13 +322,15 @@ std::set<std::string> CellRunner::own_nodes(const CellIndex& cell, const Pipelin
   const std::string& case_name = experiment_.cases[cell.case_index].name;
   std::map<Digest, std::size_t> variants_with;
   for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
-    const auto others = histories(pipeline_of({v, cell.case_index, cell.start}, case_folder(cell.case_index), Depth::figures), case_name);
+    const auto others = histories(
+        pipeline_of({v, cell.case_index, cell.start}, case_folder(cell.case_index), Depth::figures), case_name);
     for (const Digest& one : std::set<Digest>(others.begin(), others.end())) ++variants_with[one];
   }
   const std::vector<Digest> own = histories(pipeline, case_name);
   std::set<std::string> ids;
   for (std::size_t i = 0; i < own.size(); ++i)
-    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size()) ids.insert(pipeline.nodes[i].id);
+    if (experiment_.variants.size() == 1 || variants_with[own[i]] < experiment_.variants.size())
+      ids.insert(pipeline.nodes[i].id);
   return ids;
 }
 
@@ -321,7 +348,8 @@ double CellRunner::time(const CellIndex& cell) {
   hasher.add(std::string("seconds"));
   hasher.add(before.key);
   hasher.add(std::int64_t(threads_));
-  for (const std::string& id : settings.made_anew) hasher.add(id);  // another experiment's variants may share more or less
+  for (const std::string& id : settings.made_anew)
+    hasher.add(id);  // another experiment's variants may share more or less
   const Digest key = hasher.digest();
   if (const auto known = store_ ? kept_seconds(*store_, key) : std::nullopt) return *known;
 
@@ -330,7 +358,8 @@ double CellRunner::time(const CellIndex& cell) {
   if (watched(cell, pipeline) != before) throw Error(kChanged);
   Value seconds = Value::of(std::make_shared<const Metrics>(Metrics{{{"seconds", result.seconds, "s"}}}));
   seconds.key = seconds.type.content->hash(seconds.data.get());
-  if (store_) store_->save(key, {seconds}, {"time of " + cell_id(experiment_, cell), {}, {}, {}, false, 0, result.seconds, {}});
+  if (store_)
+    store_->save(key, {seconds}, {"time of " + cell_id(experiment_, cell), {}, {}, {}, false, 0, result.seconds, {}});
   return result.seconds;
 }
 

@@ -23,7 +23,8 @@ int count(const json& j, const std::string& what) { return int(integer_of(j, 0, 
 
 const json& list_of(const json& row, const char* key, std::size_t size) {
   const json& list = row.at(key);
-  if (!list.is_array() || list.size() != size) throw Error(std::string("'") + key + "' must be a list of " + std::to_string(size));
+  if (!list.is_array() || list.size() != size)
+    throw Error(std::string("'") + key + "' must be a list of " + std::to_string(size));
   return list;
 }
 
@@ -33,17 +34,29 @@ bool CellRow::is_success(const Experiment& experiment) const {
   if (!failed.empty()) return false;
   for (std::size_t i = 0; i < experiment.metrics.size() && i < values.size(); ++i)
     if (const MetricChoice& metric = experiment.metrics[i]; metric.limit)
-      if (!values[i] || !(metric.higher_is_better() ? *values[i] > *metric.limit : *values[i] < *metric.limit)) return false;
+      if (!values[i] || !(metric.higher_is_better() ? *values[i] > *metric.limit : *values[i] < *metric.limit))
+        return false;
   return true;
 }
 
 std::string to_json(const CellRow& row) {
-  json j = {{"id", row.id}, {"variant", row.variant}, {"case", row.case_name}, {"start", row.start}, {"status", row.failed.empty() ? "done" : "failed"},
-            {"tries", row.tries}, {"values", json::array()}, {"units", row.units}, {"initial_error", of(row.initial_error)},
-            {"seconds", of(row.seconds)}, {"evaluations", row.evaluations}, {"nodes", json::object()}, {"key", row.key}};
+  json j = {{"id", row.id},
+            {"variant", row.variant},
+            {"case", row.case_name},
+            {"start", row.start},
+            {"status", row.failed.empty() ? "done" : "failed"},
+            {"tries", row.tries},
+            {"values", json::array()},
+            {"units", row.units},
+            {"initial_error", of(row.initial_error)},
+            {"seconds", of(row.seconds)},
+            {"evaluations", row.evaluations},
+            {"nodes", json::object()},
+            {"key", row.key}};
   if (!row.failed.empty()) j["reason"] = row.failed;
   for (const auto& value : row.values) j["values"].push_back(of(value));
-  for (const auto& [name, calls] : row.nodes) j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
+  for (const auto& [name, calls] : row.nodes)
+    j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
   return j.dump(-1, ' ', false, json::error_handler_t::replace);
 }
 
@@ -57,15 +70,18 @@ CellRow row_from_json(const std::string& text, const Experiment& experiment) {
     row.tries = count(j.at("tries"), "'tries'");
     for (const json& value : list_of(j, "values", metrics)) {
       row.values.push_back(number(value, "an item of 'values'"));
-      if (row.failed.empty() != row.values.back().has_value()) throw Error("a cell that is done has all values, one that failed has none");
+      if (row.failed.empty() != row.values.back().has_value())
+        throw Error("a cell that is done has all values, one that failed has none");
     }
     for (const json& unit : list_of(j, "units", metrics)) row.units.push_back(unit);
     row.initial_error = number(j.at("initial_error"), "'initial_error'");
-    if (row.failed.empty() && row.initial_error.has_value() == experiment.initial_error.empty()) throw Error("'initial_error' is there where the experiment has none, or is not there");
+    if (row.failed.empty() && row.initial_error.has_value() == experiment.initial_error.empty())
+      throw Error("'initial_error' is there where the experiment has none, or is not there");
     row.seconds = number(j.at("seconds"), "'seconds'");
     row.evaluations = count(j.at("evaluations"), "'evaluations'");
     for (const auto& [name, calls] : j.at("nodes").items())
-      row.nodes[name] = {count(calls.at("made"), "'made'"), count(calls.at("cached"), "'cached'"), number(calls.at("seconds"), "'seconds'").value_or(0)};
+      row.nodes[name] = {count(calls.at("made"), "'made'"), count(calls.at("cached"), "'cached'"),
+                         number(calls.at("seconds"), "'seconds'").value_or(0)};
     row.key = j.at("key");
     return row;
   } catch (const std::exception& error) {

@@ -13,7 +13,8 @@ namespace {
 
 /// Direction uniform on the sphere, length uniform in [0, most].
 std::array<double, 3> draw_vector(Random& random, double most) {
-  const double z = 2 * random.uniform() - 1, angle = 2 * std::numbers::pi * random.uniform(), length = most * random.uniform();
+  const double z = 2 * random.uniform() - 1, angle = 2 * std::numbers::pi * random.uniform(),
+               length = most * random.uniform();
   const double r = std::sqrt(std::max(0.0, 1 - z * z));
   return {length * r * std::cos(angle), length * r * std::sin(angle), length * z};
 }

@@ -33,7 +33,8 @@ std::vector<CellIndex> cells_of(const Experiment& experiment) {
 }
 
 std::string cell_id(const Experiment& experiment, const CellIndex& cell) {
-  return experiment.variants[cell.variant].name + "/" + experiment.cases[cell.case_index].name + "/" + experiment.starts[cell.start].name;
+  return experiment.variants[cell.variant].name + "/" + experiment.cases[cell.case_index].name + "/" +
+         experiment.starts[cell.start].name;
 }
 
 std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string& id) {
@@ -50,7 +51,8 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
   PipelineArguments arguments;
   arguments.inputs = experiment.inputs;
   const ExperimentCase& one = experiment.cases[cell.case_index];
-  if (one.is_simulated || !one.folder.empty()) arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
+  if (one.is_simulated || !one.folder.empty())
+    arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
   arguments.overrides = experiment.common;
   const std::vector<Override>& own = experiment.variants[cell.variant].overrides;
   arguments.overrides.insert(arguments.overrides.end(), own.begin(), own.end());
@@ -59,7 +61,8 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
   const Start& start = experiment.starts[cell.start];
   arguments.overrides.push_back({protocol.node + ".rotation_deg", list_text(start.rotation_deg), protocol.place});
   arguments.overrides.push_back({protocol.node + ".translation_mm", list_text(start.translation_mm), protocol.place});
-  if (protocol.distance_mm > 0) arguments.overrides.push_back({protocol.node + ".distance_mm", number_text(start.distance_mm), protocol.place});
+  if (protocol.distance_mm > 0)
+    arguments.overrides.push_back({protocol.node + ".distance_mm", number_text(start.distance_mm), protocol.place});
   return arguments;
 }
 
@@ -68,7 +71,8 @@ PipelineArguments simulation_arguments_of(const Experiment& experiment, std::siz
   const std::uint64_t seed = experiment.cases[case_index].seed;
   PipelineArguments arguments{simulation.inputs, simulation.changes};
   for (InputValue& input : draw_inputs(simulation.drawn, seed)) arguments.inputs.push_back(std::move(input));
-  for (const auto& [name, place] : simulation.seed_inputs) arguments.inputs.push_back({name, std::to_string(seed), place});
+  for (const auto& [name, place] : simulation.seed_inputs)
+    arguments.inputs.push_back({name, std::to_string(seed), place});
   return arguments;
 }
 

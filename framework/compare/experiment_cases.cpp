@@ -39,7 +39,9 @@ class CaseReader {
     const std::vector<YamlEntry> entries = yaml_.map(section.value, section.place, "'cases'", &kKeys);
     for (const YamlEntry& entry : entries) {
       if (entry.key == "seeds" && entries.size() > 1)
-        yaml_.fault(entry.place, "'seeds' beside other cases", "by themselves they mean that the pipeline makes its data; those of a simulation stand in 'simulate'");
+        yaml_.fault(
+            entry.place, "'seeds' beside other cases",
+            "by themselves they mean that the pipeline makes its data; those of a simulation stand in 'simulate'");
       if (entry.key == "input") experiment_.case_input = yaml_.text(entry.value, entry.place, "input").value_or("");
       if (entry.key == "folders")
         for (const auto& [pattern, place] : texts_of(yaml_, entry)) add_folders(pattern, place);
@@ -58,7 +60,9 @@ class CaseReader {
       return true;
     }
     const ExperimentCase& other = experiment_.cases[known->second];
-    const std::string names = "'" + one.name + "'" + (other.name == one.name ? "" : " and '" + other.name + "', which is one folder to some file systems");
+    const std::string names =
+        "'" + one.name + "'" +
+        (other.name == one.name ? "" : " and '" + other.name + "', which is one folder to some file systems");
     yaml_.fault(place, "two cases are named " + names,
                 one.folder.empty() ? "give each seed once"
                 : other.folder.empty()
@@ -76,11 +80,13 @@ class CaseReader {
     std::vector<fs::path> found;
     try {
       found = search_.matches(plain_path(folder_ / pattern));
-      std::transform(found.begin(), found.end(), found.begin(), plain_path);  // '..' after a '*' leads to one folder again and again
+      std::transform(found.begin(), found.end(), found.begin(),
+                     plain_path);  // '..' after a '*' leads to one folder again and again
       std::sort(found.begin(), found.end());
       found.erase(std::unique(found.begin(), found.end()), found.end());
     } catch (const Error& error) {
-      return yaml_.fault(place, "the cases at '" + (pattern.size() > 100 ? pattern.substr(0, 80) + "..." : pattern) + "' cannot be found: " + error.what());
+      return yaml_.fault(place, "the cases at '" + (pattern.size() > 100 ? pattern.substr(0, 80) + "..." : pattern) +
+                                    "' cannot be found: " + error.what());
     }
     bool any = false;
     for (fs::path& folder : found) {
@@ -120,11 +126,13 @@ class CaseReader {
       if (entry.key == "seeds") seeds = read_seeds(entry);
       if (entry.key == "inputs") simulation.inputs = inputs_of(yaml_, entry);
       if (entry.key == "draw")
-        for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'")) simulation.drawn.push_back({range.key, read_range(range), range.place});
+        for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'"))
+          simulation.drawn.push_back({range.key, read_range(range), range.place});
       if (entry.key == "seed_input") simulation.seed_inputs = texts_of(yaml_, entry);
     }
     if (!section.value.IsMap()) return;
-    if (!has_pipeline) yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
+    if (!has_pipeline)
+      yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     add_seeds(seeds, true, section.place);
   }
@@ -153,12 +161,15 @@ class CaseReader {
   std::array<double, 2> read_range(const YamlEntry& entry) {
     std::array<double, 2> range{};
     if (!entry.value.IsSequence() || entry.value.size() != 2) {
-      yaml_.fault(entry.place, "'" + entry.key + "' must be the two ends of a range", "write it as  " + entry.key + ": [-10, 10]");
+      yaml_.fault(entry.place, "'" + entry.key + "' must be the two ends of a range",
+                  "write it as  " + entry.key + ": [-10, 10]");
       return range;
     }
-    for (std::size_t i = 0; i < 2; ++i) range[i] = yaml_.number(entry.value[i], yaml_.place(entry.value[i]), entry.key).value_or(0);
+    for (std::size_t i = 0; i < 2; ++i)
+      range[i] = yaml_.number(entry.value[i], yaml_.place(entry.value[i]), entry.key).value_or(0);
     if (range[0] > range[1]) yaml_.fault(entry.place, "the range of '" + entry.key + "' ends before it begins");
-    if (!std::isfinite(range[1] - range[0])) yaml_.fault(entry.place, "the range of '" + entry.key + "' is too wide for a number to be drawn from it");
+    if (!std::isfinite(range[1] - range[0]))
+      yaml_.fault(entry.place, "the range of '" + entry.key + "' is too wide for a number to be drawn from it");
     return range;
   }
 

@@ -15,11 +15,14 @@ class Checker {
     check_simulation();
     for (std::size_t v = 0; v < experiment_.variants.size(); ++v) {
       Diagnostics faults;
-      const Pipeline pipeline = read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
+      const Pipeline pipeline =
+          read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
       diagnostics_.add_all(faults);  // what is wrong in every variant is said once
       if (!faults.empty()) continue;
-      if (v == 0) check_names(pipeline);
-      else check_figures_of(experiment_.variants[v], pipeline);
+      if (v == 0)
+        check_names(pipeline);
+      else
+        check_figures_of(experiment_.variants[v], pipeline);
     }
   }
 
@@ -28,7 +31,8 @@ class Checker {
     for (std::size_t c = 0; c < experiment_.cases.size(); ++c) {
       if (!experiment_.cases[c].is_simulated) continue;
       Diagnostics faults;
-      const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c), catalogue_, faults, true);
+      const Pipeline pipeline = read_pipeline(experiment_.simulation.pipeline, simulation_arguments_of(experiment_, c),
+                                              catalogue_, faults, true);
       diagnostics_.add_all(faults);
       if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place);
       return;  // the others differ in numbers alone
@@ -36,16 +40,22 @@ class Checker {
   }
 
   void check_names(const Pipeline& pipeline) {
-    for (std::size_t i = 0; i < experiment_.metrics.size(); ++i) check_figure(pipeline, experiment_.metrics[i].path, written_.metric_places[i]);
-    if (!experiment_.initial_error.empty()) check_figure(pipeline, experiment_.initial_error, written_.initial_error_place);
-    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i) find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
+    for (std::size_t i = 0; i < experiment_.metrics.size(); ++i)
+      check_figure(pipeline, experiment_.metrics[i].path, written_.metric_places[i]);
+    if (!experiment_.initial_error.empty())
+      check_figure(pipeline, experiment_.initial_error, written_.initial_error_place);
+    for (std::size_t i = 0; i < experiment_.pictures.size(); ++i)
+      find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
   }
 
   /// A variant may use a node whose output is something else. The outputs' names are the same in all.
   void check_figures_of(const Variant& variant, const Pipeline& pipeline) {
     for (const PipelineOutput& output : pipeline.outputs)
       if (const PortInfo& port = port_of(pipeline, output); figures_.contains(output.name) && port.type.id != "metrics")
-        diagnostics_.add(variant.place, "in variant '" + variant.name + "' output '" + output.name + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
+        diagnostics_.add(variant.place,
+                         "in variant '" + variant.name + "' output '" + output.name + "' is " + port.type.id +
+                             ", not figures of merit",
+                         "name an output of an evaluate node");
   }
 
   static const PortInfo& port_of(const Pipeline& pipeline, const PipelineOutput& output) {
@@ -58,10 +68,12 @@ class Checker {
     if (!found) return;
     const PortInfo& port = port_of(pipeline, *found);
     if (port.type.id != "metrics")
-      return diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit", "name an output of an evaluate node");
+      return diagnostics_.add(place, "output '" + output + "' is " + port.type.id + ", not figures of merit",
+                              "name an output of an evaluate node");
     figures_.insert(output);
     if (path.find('.') == std::string::npos)
-      diagnostics_.add(place, "'" + path + "' does not say which figure", "write it as  " + path + ".mtre_mm, with the items of its lists between");
+      diagnostics_.add(place, "'" + path + "' does not say which figure",
+                       "write it as  " + path + ".mtre_mm, with the items of its lists between");
   }
 
   const PipelineOutput* find_output(const Pipeline& pipeline, const std::string& name, const Place& place) {

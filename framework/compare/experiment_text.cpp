@@ -18,7 +18,8 @@ namespace fs = std::filesystem;
 
 class Reader {
  public:
-  Reader(const fs::path& file, Diagnostics& diagnostics) : diagnostics_(diagnostics), yaml_(file.string(), diagnostics) {
+  Reader(const fs::path& file, Diagnostics& diagnostics)
+      : diagnostics_(diagnostics), yaml_(file.string(), diagnostics) {
     experiment_.file = file;
     folder_ = fs::absolute(file).parent_path();
   }
@@ -28,7 +29,8 @@ class Reader {
     try {
       experiment_.text = read_text_file(file, kMostSourceBytes);
     } catch (const Error& error) {
-      diagnostics_.add({file.string()}, "the experiment file" + std::string(error.what()).substr(file.string().size()), "check the path");
+      diagnostics_.add({file.string()}, "the experiment file" + std::string(error.what()).substr(file.string().size()),
+                       "check the path");
       return written_;
     }
     diagnostics_.remember(file.string(), experiment_.text);
@@ -39,49 +41,67 @@ class Reader {
 
  private:
   void read_root(const YAML::Node& root) {
-    static const std::vector<std::string> kKeys{"experiment", "name", "help", "pipeline", "inputs", "set", "cases", "variants", "matrix",
-                                                "starts", "metrics", "success", "initial_error", "baseline", "pictures", "timed_cells"};
+    static const std::vector<std::string> kKeys{
+        "experiment", "name",   "help",    "pipeline", "inputs",        "set",      "cases",    "variants",
+        "matrix",     "starts", "metrics", "success",  "initial_error", "baseline", "pictures", "timed_cells"};
     const Place start{experiment_.file.string(), 1, 1};
     const std::vector<YamlEntry> entries = yaml_.map(root, start, "the experiment", &kKeys);
     if (!root.IsMap()) return;
     for (const YamlEntry& entry : entries) read_entry(entry);
     if (experiment_.name.empty() && name_of_file_is_good(start)) experiment_.name = experiment_.file.stem().string();
     const auto need = [&](const std::string& key, const std::string& hint) {
-      if (std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) { return e.key == key; })) yaml_.fault(start, "the key '" + key + "' is missing", hint);
+      if (std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) { return e.key == key; }))
+        yaml_.fault(start, "the key '" + key + "' is missing", hint);
     };
     need("experiment", "begin the file with  experiment: 1");
     need("pipeline", "name the pipeline file whose variants are compared");
-    need("cases", "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its data itself,  {seeds: 1..20}");
+    need("cases",
+         "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its data "
+         "itself,  {seeds: 1..20}");
     need("metrics", "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
     if (experiment_.cases.empty() && diagnostics_.empty())
-      yaml_.fault(experiment_.cases_place, "there are no cases", "name folders, as  folders: [data/*]  or a simulation");
+      yaml_.fault(experiment_.cases_place, "there are no cases",
+                  "name folders, as  folders: [data/*]  or a simulation");
     apply_matrix();
     if (experiment_.variants.empty() && diagnostics_.empty())
       yaml_.fault(start, "there are no variants", "name at least one under  variants:  or options under  matrix:");
     for (const auto& [path, value, place] : success_) set_success(path, value, place);
     set_baseline();
     if (is_too_large(start)) return;
-    if (experiment_.protocol) experiment_.starts = draw_starts(*experiment_.protocol);
-    else experiment_.starts.push_back({"0", {}, {}});
+    if (experiment_.protocol)
+      experiment_.starts = draw_starts(*experiment_.protocol);
+    else
+      experiment_.starts.push_back({"0", {}, {}});
   }
 
   bool name_of_file_is_good(const Place& start) {
     const std::string name = experiment_.file.stem().string(), fault = fault_of_name(name);
-    if (!fault.empty()) yaml_.fault(start, "the experiment is named after its file, which becomes a folder's name: " + in_quotes(name) + " cannot be one, " + fault, "give it another, as  name: edges");
+    if (!fault.empty())
+      yaml_.fault(start,
+                  "the experiment is named after its file, which becomes a folder's name: " + in_quotes(name) +
+                      " cannot be one, " + fault,
+                  "give it another, as  name: edges");
     return fault.empty();
   }
 
   bool is_too_large(const Place& start) {
-    const std::size_t variants = experiment_.variants.size(), cases = experiment_.cases.size(), starts = experiment_.protocol ? experiment_.protocol->count : 1;
+    const std::size_t variants = experiment_.variants.size(), cases = experiment_.cases.size(),
+                      starts = experiment_.protocol ? experiment_.protocol->count : 1;
     if (variants > kMostVariants) {
-      yaml_.fault(variants_place_, "there are " + std::to_string(variants) + " variants, at most " + std::to_string(kMostVariants) + " can be compared", "make several experiments of them");
+      yaml_.fault(variants_place_,
+                  "there are " + std::to_string(variants) + " variants, at most " + std::to_string(kMostVariants) +
+                      " can be compared",
+                  "make several experiments of them");
       return true;
     }
     if (double(variants) * double(cases) * double(starts) <= double(kMostCells)) return false;
     char cells[40];
     std::snprintf(cells, sizeof cells, "%.0f", double(variants) * double(cases) * double(starts));
-    yaml_.fault(start, std::to_string(variants) + " variants, " + std::to_string(cases) + " cases and " + std::to_string(starts) + " starts are " + cells +
-                " cells, at most " + std::to_string(kMostCells) + " can be compared", "take fewer of them, or make several experiments");
+    yaml_.fault(start,
+                std::to_string(variants) + " variants, " + std::to_string(cases) + " cases and " +
+                    std::to_string(starts) + " starts are " + cells + " cells, at most " + std::to_string(kMostCells) +
+                    " can be compared",
+                "take fewer of them, or make several experiments");
     return true;
   }
 
@@ -90,11 +110,13 @@ class Reader {
     if (entry.key == "experiment") {
       const auto version = yaml_.integer(entry.value, entry.place, "experiment");
       if (version && *version != 1)
-        yaml_.fault(entry.place, "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+        yaml_.fault(entry.place,
+                    "this file is of format " + std::to_string(*version) + ", this program reads format 1");
     }
     if (entry.key == "name") {
       experiment_.name = text();
-      if (!entry.value.IsScalar() || !check_name(yaml_, experiment_.name, entry.place, "an experiment's name")) experiment_.name = "?";
+      if (!entry.value.IsScalar() || !check_name(yaml_, experiment_.name, entry.place, "an experiment's name"))
+        experiment_.name = "?";
     }
     if (entry.key == "help") experiment_.help = text();
     if (entry.key == "pipeline") experiment_.pipeline = file_of(yaml_, entry, folder_);
@@ -107,7 +129,8 @@ class Reader {
     if (entry.key == "metrics") read_metrics(entry);
     if (entry.key == "success")
       for (const YamlEntry& limit : yaml_.map(entry.value, entry.place, "'success'"))
-        if (const auto value = yaml_.number(limit.value, limit.place, limit.key)) success_.emplace_back(limit.key, *value, limit.place);
+        if (const auto value = yaml_.number(limit.value, limit.place, limit.key))
+          success_.emplace_back(limit.key, *value, limit.place);
     if (entry.key == "initial_error") {
       experiment_.initial_error = text();
       written_.initial_error_place = entry.place;
@@ -130,8 +153,13 @@ class Reader {
     for (const YamlEntry& variant : yaml_.map(section.value, section.place, "'variants'")) {
       if (!check_name(yaml_, variant.key, variant.place, "a variant's name")) continue;
       const auto [other, is_new] = seen.emplace(in_small_letters(variant.key), variant.key);
-      if (!is_new) yaml_.fault(variant.place, "the variants '" + other->second + "' and '" + variant.key + "' are one folder to some file systems", "rename one of them");
-      experiment_.variants.push_back({variant.key, variant.place, patches_of(yaml_, variant, "variant '" + variant.key + "'")});
+      if (!is_new)
+        yaml_.fault(
+            variant.place,
+            "the variants '" + other->second + "' and '" + variant.key + "' are one folder to some file systems",
+            "rename one of them");
+      experiment_.variants.push_back(
+          {variant.key, variant.place, patches_of(yaml_, variant, "variant '" + variant.key + "'")});
     }
   }
 
@@ -139,7 +167,8 @@ class Reader {
     matrix_place_ = section.place;
     for (const YamlEntry& entry : yaml_.map(section.value, section.place, "'matrix'")) {
       if (!entry.value.IsSequence() || entry.value.size() == 0) {
-        yaml_.fault(entry.place, "'" + entry.key + "' in the matrix must be a list of values", "write it as  " + entry.key + ": [a, b]");
+        yaml_.fault(entry.place, "'" + entry.key + "' in the matrix must be a list of values",
+                    "write it as  " + entry.key + ": [a, b]");
         continue;
       }
       std::vector<Override> column;
@@ -186,12 +215,16 @@ class Reader {
     if (count > double(kMostVariants)) {
       char variants[40];
       std::snprintf(variants, sizeof variants, count < 1e15 ? "%.0f" : "%.0e", count);
-      yaml_.fault(matrix_place_, std::string("the matrix makes ") + variants + " variants, at most " + std::to_string(kMostVariants) + " can be compared",
+      yaml_.fault(matrix_place_,
+                  std::string("the matrix makes ") + variants + " variants, at most " + std::to_string(kMostVariants) +
+                      " can be compared",
                   "leave values out, or name the combinations that matter under  variants:");
       return true;
     }
     if (longest <= kMostNameBytes) return false;
-    yaml_.fault(matrix_place_, "the matrix makes a variant's name of " + std::to_string(longest) + " bytes of its values; as a folder's name it may have " + std::to_string(kMostNameBytes),
+    yaml_.fault(matrix_place_,
+                "the matrix makes a variant's name of " + std::to_string(longest) +
+                    " bytes of its values; as a folder's name it may have " + std::to_string(kMostNameBytes),
                 "name the combinations under  variants:");
     return true;
   }
@@ -213,14 +246,17 @@ class Reader {
   /// The part of a value that names it best: of a node, what follows its kind.
   static std::string short_value(std::string value) {
     const std::size_t dot = value.find('.');
-    if (dot != std::string::npos && dot < kMostNameBytes && dot + 1 < value.size() && std::isalpha(static_cast<unsigned char>(value[dot + 1]))) value = value.substr(dot + 1);
+    if (dot != std::string::npos && dot < kMostNameBytes && dot + 1 < value.size() &&
+        std::isalpha(static_cast<unsigned char>(value[dot + 1])))
+      value = value.substr(dot + 1);
     for (char& c : value)
       if (std::string("/\\ \t\n").find(c) != std::string::npos) c = '_';
     return value;
   }
 
   void read_starts(const YamlEntry& section) {
-    static const std::vector<std::string> kKeys{"node", "count", "seed", "rotation_deg", "translation_mm", "distance_mm"};
+    static const std::vector<std::string> kKeys{"node",         "count",          "seed",
+                                                "rotation_deg", "translation_mm", "distance_mm"};
     StartProtocol protocol;
     protocol.place = section.place;
     bool has_node = false, has_count = false;
@@ -245,13 +281,15 @@ class Reader {
     if (!entry.value.IsSequence()) return yaml_.fault(entry.place, "'metrics' must be a list", hint);
     if (entry.value.size() == 0) return yaml_.fault(entry.place, "'metrics' names no figure", hint);
     if (entry.value.size() > kMostMetrics)
-      return yaml_.fault(entry.place, "'metrics' names " + std::to_string(entry.value.size()) + " figures, at most " + std::to_string(kMostMetrics) + " can be compared");
+      return yaml_.fault(entry.place, "'metrics' names " + std::to_string(entry.value.size()) + " figures, at most " +
+                                          std::to_string(kMostMetrics) + " can be compared");
     for (const YAML::Node& item : entry.value) {
       const Place place = yaml_.place(item);
       const MetricChoice metric = read_metric(item, place);
       const auto is_same = [&](const MetricChoice& other) { return other.path == metric.path; };
       if (metric.path.empty()) continue;
-      if (std::any_of(experiment_.metrics.begin(), experiment_.metrics.end(), is_same)) yaml_.fault(place, "'" + metric.path + "' is given twice in 'metrics'");
+      if (std::any_of(experiment_.metrics.begin(), experiment_.metrics.end(), is_same))
+        yaml_.fault(place, "'" + metric.path + "' is given twice in 'metrics'");
       experiment_.metrics.push_back(metric);
       written_.metric_places.push_back(place);
     }
@@ -266,10 +304,14 @@ class Reader {
       for (const YamlEntry& part : yaml_.map(item, place, "a metric", &kKeys)) {
         has_figure |= part.key == "figure";
         const std::string text = yaml_.text(part.value, part.place, part.key).value_or("");
-        if (part.key == "better") metric.better = read_better(text, part.place);
-        else (part.key == "figure" ? metric.path : metric.label) = text;
+        if (part.key == "better")
+          metric.better = read_better(text, part.place);
+        else
+          (part.key == "figure" ? metric.path : metric.label) = text;
       }
-      if (!has_figure) yaml_.fault(place, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
+      if (!has_figure)
+        yaml_.fault(place, "a metric does not say which figure",
+                    "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
     } else {
       metric.path = yaml_.text(item, place, "an item of 'metrics'").value_or("");
     }
@@ -319,6 +361,8 @@ class Reader {
 
 }  // namespace
 
-WrittenExperiment read_written_experiment(const fs::path& file, Diagnostics& diagnostics) { return Reader(file, diagnostics).read(); }
+WrittenExperiment read_written_experiment(const fs::path& file, Diagnostics& diagnostics) {
+  return Reader(file, diagnostics).read();
+}
 
 }  // namespace marrow::compare

@@ -19,15 +19,18 @@ PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry) {
     return result;
   }
   for (const YAML::Node& item : entry.value)
-    if (const auto text = yaml.text(item, yaml.place(item), "an item of '" + entry.key + "'")) result.emplace_back(*text, yaml.place(item));
+    if (const auto text = yaml.text(item, yaml.place(item), "an item of '" + entry.key + "'"))
+      result.emplace_back(*text, yaml.place(item));
   return result;
 }
 
 std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section) {
   std::vector<InputValue> result;
   for (const YamlEntry& entry : yaml.map(section.value, section.place, "'" + section.key + "'")) {
-    if (entry.value.IsScalar()) result.push_back({entry.key, entry.value.Scalar(), entry.place});
-    else yaml.fault(entry.place, "'" + entry.key + "' must be one value");
+    if (entry.value.IsScalar())
+      result.push_back({entry.key, entry.value.Scalar(), entry.place});
+    else
+      yaml.fault(entry.place, "'" + entry.key + "' must be one value");
   }
   return result;
 }
@@ -45,7 +48,8 @@ void put_uses_first(std::vector<Override>& patches) {
 std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what) {
   std::vector<Override> result;
   if (section.value.IsNull()) return result;
-  for (const YamlEntry& entry : yaml.map(section.value, section.place, what)) result.push_back({entry.key, patch_value(entry.value), entry.place});
+  for (const YamlEntry& entry : yaml.map(section.value, section.place, what))
+    result.push_back({entry.key, patch_value(entry.value), entry.place});
   put_uses_first(result);
   return result;
 }
@@ -54,7 +58,8 @@ std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t le
   const auto value = yaml.integer(entry.value, entry.place, entry.key);
   if (!value) return std::uint64_t(least);
   if (*value >= least && *value <= most) return std::uint64_t(*value);
-  yaml.fault(entry.place, "'" + entry.key + "' must be " + std::to_string(least) + " to " + std::to_string(most) + ", got " + std::to_string(*value));
+  yaml.fault(entry.place, "'" + entry.key + "' must be " + std::to_string(least) + " to " + std::to_string(most) +
+                              ", got " + std::to_string(*value));
   return std::uint64_t(least);
 }
 
@@ -68,7 +73,8 @@ double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most) {
 
 bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what) {
   const std::string fault = fault_of_name(name);
-  if (!fault.empty()) yaml.fault(place, what + " becomes a file name: " + in_quotes(name) + " cannot be one, " + fault, kNameHint);
+  if (!fault.empty())
+    yaml.fault(place, what + " becomes a file name: " + in_quotes(name) + " cannot be one, " + fault, kNameHint);
   return fault.empty();
 }
 

@@ -13,9 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool is_pattern(const std::string& name) {
-  return name.find_first_of("*?[\\") != std::string::npos;
-}
+bool is_pattern(const std::string& name) { return name.find_first_of("*?[\\") != std::string::npos; }
 
 }  // namespace
 

@@ -36,7 +36,8 @@ std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& 
   std::vector<Dependence> result;
   for (const PipelineNode& node : pipeline.nodes) {
     Dependence own{names_a_path(node.info) || node.info.random,
-                   protocol && protocol->node == node.id && (protocol->rotation_deg > 0 || protocol->translation_mm > 0 || protocol->distance_mm > 0)};
+                   protocol && protocol->node == node.id &&
+                       (protocol->rotation_deg > 0 || protocol->translation_mm > 0 || protocol->distance_mm > 0)};
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
         own.on_case |= result[std::size_t(source.node)].on_case;

@@ -29,9 +29,7 @@ void check_confidence(double confidence) {
 }
 
 /// Chance that a standard normal deviate is larger than z.
-double upper_tail(double z) {
-  return 0.5 * std::erfc(z / std::sqrt(2.0));
-}
+double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
 
 /// z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles.
 double z_of_tail(double tail) {

@@ -62,8 +62,9 @@ void check_view(const View& view) {
   if (view.image.pixels.empty()) throw Error(what + ": the image is empty");
   check_camera(view.camera, what);
   if (view.image.width() != view.camera.width_px || view.image.height() != view.camera.height_px)
-    throw Error(what + ": the image has " + size(view.image.width(), view.image.height()) + " pixels, but its camera is for " +
-                size(view.camera.width_px, view.camera.height_px) + "; give the camera that belongs to this image");
+    throw Error(what + ": the image has " + size(view.image.width(), view.image.height()) +
+                " pixels, but its camera is for " + size(view.camera.width_px, view.camera.height_px) +
+                "; give the camera that belongs to this image");
   if (!view.mask.empty() && (view.mask.cols != view.image.width() || view.mask.rows != view.image.height()))
     throw Error(what + ": the mask has " + size(view.mask.cols, view.mask.rows) + " pixels, the image " +
                 size(view.image.width(), view.image.height()));

@@ -18,8 +18,11 @@ Projector::~Projector() = default;
 std::vector<OutlinePoint> Projector::outline(const Camera&, const RigidTransform&, double) const {
   throw Error("the projector makes radiographs only; wire one that draws the outline of a mesh");
 }
-std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&, const PixelGrid&) const { refuse_radiograph(); }
-std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&, const std::vector<Eigen::Vector2f>&) const {
+std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&, const PixelGrid&) const {
+  refuse_radiograph();
+}
+std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&,
+                                         const std::vector<Eigen::Vector2f>&) const {
   refuse_radiograph();
 }
 PixelGrid Projector::region(const Camera&, const RigidTransform&) const { refuse_radiograph(); }
@@ -33,7 +36,9 @@ std::vector<double> Cost::values(const std::vector<RigidTransform>& poses) const
   return results;
 }
 
-std::optional<Cost::Expansion> Cost::expansion(const RigidTransform&, const FragmentFrame&) const { return std::nullopt; }
+std::optional<Cost::Expansion> Cost::expansion(const RigidTransform&, const FragmentFrame&) const {
+  return std::nullopt;
+}
 std::optional<double> Cost::likelihood_factor(const RigidTransform&) const { return std::nullopt; }
 
 }  // namespace marrow

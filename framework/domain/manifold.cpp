@@ -9,7 +9,9 @@ bool is_manifold(const Mesh& mesh) {
   if (!is_closed(mesh)) return false;
   struct Corner {
     std::uint32_t vertex, next, last;  ///< of a triangle
-    bool operator<(const Corner& other) const { return vertex != other.vertex ? vertex < other.vertex : next < other.next; }
+    bool operator<(const Corner& other) const {
+      return vertex != other.vertex ? vertex < other.vertex : next < other.next;
+    }
   };
   std::vector<Corner> corners;
   corners.reserve(3 * mesh.triangles.size());
@@ -17,7 +19,8 @@ bool is_manifold(const Mesh& mesh) {
     for (std::size_t k = 0; k < 3; ++k) corners.push_back({t[k], t[(k + 1) % 3], t[(k + 2) % 3]});
   std::sort(corners.begin(), corners.end());
   for (auto begin = corners.begin(); begin != corners.end();) {
-    const auto end = std::find_if(begin, corners.end(), [&](const Corner& corner) { return corner.vertex != begin->vertex; });
+    const auto end =
+        std::find_if(begin, corners.end(), [&](const Corner& corner) { return corner.vertex != begin->vertex; });
     // From one triangle to the one on its other side, around the vertex: the mesh is closed, so this comes back.
     auto at = begin;
     std::ptrdiff_t passed = 0;

@@ -83,7 +83,8 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
          at = (double(points.size()) + 0.5) * step) {
       const double r = (at - passed) / area, q = std::fmod(double(points.size()) * 0.6180339887498949, 1.0);
       const double s = std::sqrt(r);
-      points.push_back((1 - s) * mesh.vertices_mm[t[0]] + s * (1 - q) * mesh.vertices_mm[t[1]] + s * q * mesh.vertices_mm[t[2]]);
+      points.push_back((1 - s) * mesh.vertices_mm[t[0]] + s * (1 - q) * mesh.vertices_mm[t[1]] +
+                       s * q * mesh.vertices_mm[t[2]]);
     }
     passed += area;
   }
@@ -101,7 +102,8 @@ FragmentFrame fragment_frame(const Mesh& mesh) {
     const Eigen::Vector3d centre = (a + b + c) / 3;
     area += weight;
     first += weight * centre;
-    second += weight / 12 * (9 * centre * centre.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
+    second +=
+        weight / 12 * (9 * centre * centre.transpose() + a * a.transpose() + b * b.transpose() + c * c.transpose());
   }
   FragmentFrame frame;
   frame.origin_mm = first / area;

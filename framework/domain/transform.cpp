@@ -9,9 +9,9 @@ namespace marrow {
 
 RigidTransform operator*(const RigidTransform& c_from_b, const RigidTransform& b_from_a) {
   if (c_from_b.source != b_from_a.target)
-    throw Error("cannot compose " + c_from_b.target + "_from_" + c_from_b.source + " with " + b_from_a.target + "_from_" +
-                b_from_a.source + ": the first takes points in '" + c_from_b.source + "', the second gives points in '" +
-                b_from_a.target + "'");
+    throw Error("cannot compose " + c_from_b.target + "_from_" + c_from_b.source + " with " + b_from_a.target +
+                "_from_" + b_from_a.source + ": the first takes points in '" + c_from_b.source +
+                "', the second gives points in '" + b_from_a.target + "'");
   return {c_from_b.target, b_from_a.source, c_from_b.rotation * b_from_a.rotation,
           c_from_b.rotation * b_from_a.translation_mm + c_from_b.translation_mm};
 }

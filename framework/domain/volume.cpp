@@ -45,8 +45,9 @@ float sample_trilinear(const Grid& grid, const std::vector<float>& values, const
 void check_volume(const Volume& volume, const std::string& what) {
   const Grid& grid = volume.grid;
   for (int k = 0; k < 3; ++k) {
-    if (grid.size[k] <= 0) throw Error(what + ": the volume is empty (size " + std::to_string(grid.size[0]) + " x " +
-                                       std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + ")");
+    if (grid.size[k] <= 0)
+      throw Error(what + ": the volume is empty (size " + std::to_string(grid.size[0]) + " x " +
+                  std::to_string(grid.size[1]) + " x " + std::to_string(grid.size[2]) + ")");
     if (!(grid.spacing_mm[k] > 0) || !std::isfinite(grid.spacing_mm[k]))
       throw Error(what + ": voxel spacing " + std::to_string(grid.spacing_mm[k]) + " mm is not a positive length");
     if (grid.spacing_mm[k] < kFinest_mm || grid.spacing_mm[k] > kCoarsest_mm)
@@ -65,7 +66,8 @@ void check_volume(const Volume& volume, const std::string& what) {
     const std::size_t at = std::size_t(bad - volume.values.begin());
     const std::size_t row = std::size_t(grid.size[0]), slice = row * grid.size[1];
     throw Error(what + ": voxel (" + std::to_string(at % row) + ", " + std::to_string(at % slice / row) + ", " +
-                std::to_string(at / slice) + ") is not a finite number; replace NaN and infinities (with -1000 HU for air)");
+                std::to_string(at / slice) +
+                ") is not a finite number; replace NaN and infinities (with -1000 HU for air)");
   }
 }
 

@@ -88,8 +88,10 @@ std::string file_of(const PipelineNode& node, const Worker& worker) {
   return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
 }
 
-/// What the worker made. Large pieces are read from its memory, or where that is not allowed, from memory that both share.
-std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker, const SharedMemory& made) {
+/// What the worker made. Large pieces are read from its memory, or where that is not allowed, from memory that both
+/// share.
+std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker,
+                               const SharedMemory& made) {
   const auto content_of = [&](const TypeInfo& type) -> const Content* {
     if (const Content* content = content_of_own(type)) return content;
     for (const PortInfo& port : catalogue.load(node.info.name).info.outputs)
@@ -106,8 +108,8 @@ std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& n
   }
 }
 
-/// The processes that read files for this one. Where the system grants no further one, another of them must end first. One
-/// that has just ended, or a thread, may still be counted for a moment.
+/// The processes that read files for this one. Where the system grants no further one, another of them must end first.
+/// One that has just ended, or a thread, may still be counted for a moment.
 class Readers {
  public:
   std::unique_ptr<Worker> start(const WorkerSettings& settings, const std::atomic<bool>* cancelled) {
@@ -156,7 +158,8 @@ class Readers {
 
 class Reader {
  public:
-  Reader(const WorkerSettings& settings, const std::atomic<bool>* cancelled) : worker_(all().start(settings, cancelled)) {}
+  Reader(const WorkerSettings& settings, const std::atomic<bool>* cancelled)
+      : worker_(all().start(settings, cancelled)) {}
   ~Reader() { all().end(std::move(worker_)); }
   Reader(const Reader&) = delete;
   Reader& operator=(const Reader&) = delete;
@@ -193,15 +196,18 @@ std::string failure_of(const std::string& file, const WorkerEnd& end, const Call
            "--file-memory";
   if (end.signal == SIGXCPU)
     return file + ": to read it takes more than " + number_text(limits.processor_s) +
-           " s, which is more than a file of its size should; where the file is good, raise the limit with --file-seconds";
+           " s, which is more than a file of its size should; where the file is good, raise the limit with "
+           "--file-seconds";
   if (end.signal)
     return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
            "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
   if (end.is_late)
     return file + ": to read it takes more than " + number_text(limits.seconds) +
-           " s by the clock, which is more than a file of its size should; where the machine has much other work, try again, or "
+           " s by the clock, which is more than a file of its size should; where the machine has much other work, try "
+           "again, or "
            "raise the limit with --file-seconds";
-  if (end.died) return file + ": could not be read: the process that was started for it " + without_place(end.failed, file);
+  if (end.died)
+    return file + ": could not be read: the process that was started for it " + without_place(end.failed, file);
   return end.failed;
 }
 
@@ -244,8 +250,8 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   if (!end.failed.empty()) throw Error(failure_of(file_of(node, worker), end, limits));
   std::vector<Value> outputs = handed_over(catalogue, node, worker, made);
   if (outputs.size() != node.info.outputs.size())
-    throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) + " values, expected " +
-                std::to_string(node.info.outputs.size()));
+    throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) +
+                " values, expected " + std::to_string(node.info.outputs.size()));
   for (std::size_t i = 0; i < outputs.size(); ++i)
     if (!(outputs[i].type == node.info.outputs[i].type) ||
         (!outputs[i].is_absent() && outputs[i].axis != node.info.outputs[i].axis))

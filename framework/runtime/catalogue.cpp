@@ -35,7 +35,8 @@ Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders
     std::error_code error;
     for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
       if (at->path().extension() == ".so") files.push_back(at->path());
-    if (error && error != std::errc::no_such_file_or_directory) refuse(folder, "cannot be searched for libraries: " + error.message());
+    if (error && error != std::errc::no_such_file_or_directory)
+      refuse(folder, "cannot be searched for libraries: " + error.message());
     std::sort(files.begin(), files.end());
     for (const fs::path& file : files) {
       try {
@@ -46,8 +47,10 @@ Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders
     }
   }
   for (std::size_t l = 0; l < libraries_.size(); ++l) {
-    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i) nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
-    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i) writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
+    for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i)
+      nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
+    for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i)
+      writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
   }
 }
 
@@ -72,7 +75,8 @@ const LibraryInfo* Catalogue::library_of(const std::string& name) const {
 std::vector<PortInfo> Catalogue::ports_of_kind(const std::string& kind) const {
   std::vector<PortInfo> ports;
   const auto add = [&](PortInfo port) {
-    if (std::none_of(ports.begin(), ports.end(), [&](const PortInfo& p) { return p.name == port.name; })) ports.push_back(std::move(port));
+    if (std::none_of(ports.begin(), ports.end(), [&](const PortInfo& p) { return p.name == port.name; }))
+      ports.push_back(std::move(port));
   };
   for (const auto& [name, entry] : nodes_) {
     const NodeInfo& node = libraries_[entry.library].nodes[entry.index];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of a node's declaration when its plugin registers it: a wrong default or port is found without running anything.
+// Checks of a node's declaration when its plugin registers it: a wrong default or port is found without running
+// anything.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -16,7 +17,8 @@ namespace {
 
 bool is_name(const std::string& text) {
   return !text.empty() && std::islower(static_cast<unsigned char>(text[0])) &&
-         std::all_of(text.begin(), text.end(), [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; });
+         std::all_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::islower(c) || std::isdigit(c) || c == '_'; });
 }
 
 /// Whether a text can be shown on a terminal and written as JSON: UTF-8 without control characters.
@@ -29,7 +31,8 @@ bool is_plain(const std::string& text) try {
 }
 
 void check_texts(const std::string& what, const std::vector<std::string>& texts, std::vector<std::string>& faults) {
-  if (!std::all_of(texts.begin(), texts.end(), is_plain)) faults.push_back(what + ": its texts must be UTF-8 without control characters");
+  if (!std::all_of(texts.begin(), texts.end(), is_plain))
+    faults.push_back(what + ": its texts must be UTF-8 without control characters");
 }
 
 std::vector<double> numbers_of(const OptionValue& value) {
@@ -49,10 +52,13 @@ std::vector<std::string> texts_of(const OptionValue& value) {
 void check_numbers(const OptionInfo& option, const std::string& name, std::vector<std::string>& faults) {
   constexpr double kLargest = std::numeric_limits<double>::max();
   const double least = option.minimum.value_or(-kLargest), most = option.maximum.value_or(kLargest);
-  if (!std::isfinite(least) || !std::isfinite(most) || least > most) faults.push_back(name + ": its range is empty or not finite");
+  if (!std::isfinite(least) || !std::isfinite(most) || least > most)
+    faults.push_back(name + ": its range is empty or not finite");
   for (const double number : numbers_of(option.default_value)) {
-    if (!std::isfinite(number)) faults.push_back(name + ": its default is not a finite number");
-    else if (!option.required && (number < least || number > most)) faults.push_back(name + ": its default is outside its own range");
+    if (!std::isfinite(number))
+      faults.push_back(name + ": its default is not a finite number");
+    else if (!option.required && (number < least || number > most))
+      faults.push_back(name + ": its default is outside its own range");
   }
 }
 
@@ -65,7 +71,8 @@ void check_option(const OptionInfo& option, std::vector<std::string>& faults) {
   check_texts(name, texts_of(option.default_value), faults);
   check_numbers(option, name, faults);
   const auto* text = std::get_if<std::string>(&option.default_value);
-  if (text && !option.required && !option.choices.empty() && std::find(option.choices.begin(), option.choices.end(), *text) == option.choices.end())
+  if (text && !option.required && !option.choices.empty() &&
+      std::find(option.choices.begin(), option.choices.end(), *text) == option.choices.end())
     faults.push_back(name + ": its default '" + *text + "' is not one of its choices");
 }
 
@@ -83,11 +90,14 @@ void check_ports(const std::vector<PortInfo>& ports, const char* what, std::vect
 void check_against(const std::vector<PortInfo>& ports, const std::vector<KindPort>& contract, const std::string& kind,
                    const char* what, std::vector<std::string>& faults) {
   for (const PortInfo& port : ports) {
-    const auto found = std::find_if(contract.begin(), contract.end(), [&](const KindPort& p) { return p.name == port.name; });
+    const auto found =
+        std::find_if(contract.begin(), contract.end(), [&](const KindPort& p) { return p.name == port.name; });
     if (found == contract.end()) {
       faults.push_back(std::string(what) + " '" + port.name + "': the kind '" + kind + "' has none of that name");
     } else if (found->type != port.type.id || found->axis != port.axis) {
-      const auto say = [](const std::string& type, const std::string& axis) { return axis.empty() ? type : "list of " + type + " over " + axis; };
+      const auto say = [](const std::string& type, const std::string& axis) {
+        return axis.empty() ? type : "list of " + type + " over " + axis;
+      };
       faults.push_back(std::string(what) + " '" + port.name + "': the kind '" + kind + "' has it as " +
                        say(found->type, found->axis) + ", not " + say(port.type.id, port.axis));
     }

@@ -21,9 +21,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-fs::path manifest_beside(const fs::path& library) {
-  return fs::path(library).replace_extension(".json");
-}
+fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
 
 /// Empty for a variable that is not set, is empty or is relative to wherever the program happens to run.
 fs::path folder_of(const char* variable) {

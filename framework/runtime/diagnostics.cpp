@@ -27,7 +27,8 @@ std::size_t edit_distance(const std::string& a, const std::string& b) {
     (*now)[0] = i;
     for (std::size_t j = 1; j <= b.size(); ++j) {
       (*now)[j] = std::min({(*last)[j] + 1, (*now)[j - 1] + 1, (*last)[j - 1] + (a[i - 1] != b[j - 1])});
-      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1]) (*now)[j] = std::min((*now)[j], (*before_last)[j - 2] + 1);
+      if (i > 1 && j > 1 && a[i - 1] == b[j - 2] && a[i - 2] == b[j - 1])
+        (*now)[j] = std::min((*now)[j], (*before_last)[j - 2] + 1);
     }
     std::tie(before_last, last, now) = std::tuple(last, now, before_last);
   }
@@ -46,7 +47,9 @@ std::string line_of(const std::string& text, int line) {
 /// The line, and a caret below what is at the column, which counts bytes; of a long line what is around that.
 std::string quoted_line(const std::string& line, int column) {
   const std::size_t at = std::min(std::size_t(std::max(0, column - 1)), line.size());
-  const auto is_inside = [&](std::size_t i) { return i < line.size() && (static_cast<unsigned char>(line[i]) & 0xC0) == 0x80; };
+  const auto is_inside = [&](std::size_t i) {
+    return i < line.size() && (static_cast<unsigned char>(line[i]) & 0xC0) == 0x80;
+  };
   std::size_t begin = line.size() > kMostInLine && at > kMostInLine / 2 ? at - kMostInLine / 2 : 0;
   std::size_t end = std::min(line.size(), begin + kMostInLine);
   while (is_inside(begin)) ++begin;
@@ -59,7 +62,8 @@ std::string quoted_line(const std::string& line, int column) {
   const std::string before = (begin ? "\u2026" : "") + shown(begin, at);
   const auto is_first_byte = [](unsigned char c) { return (c & 0xC0) != 0x80; };
   const auto width = std::size_t(std::count_if(before.begin(), before.end(), is_first_byte));
-  return "  " + before + shown(at, end) + (end < line.size() ? "\u2026" : "") + "\n  " + std::string(width, ' ') + "^\n";
+  return "  " + before + shown(at, end) + (end < line.size() ? "\u2026" : "") + "\n  " + std::string(width, ' ') +
+         "^\n";
 }
 
 }  // namespace
@@ -67,12 +71,16 @@ std::string quoted_line(const std::string& line, int column) {
 bool Diagnostics::is_full() const { return items_.size() >= kMostKept; }
 
 void Diagnostics::add(Place place, std::string message, std::string hint) {
-  if (is_full()) ++not_kept_;
-  else items_.push_back({std::move(place), cut(message, kMostInMessage), cut(hint, kMostInMessage)});
+  if (is_full())
+    ++not_kept_;
+  else
+    items_.push_back({std::move(place), cut(message, kMostInMessage), cut(hint, kMostInMessage)});
 }
 
 void Diagnostics::add_all(const Diagnostics& other) {
-  const auto key = [](const Diagnostic& item) { return std::tie(item.place.file, item.place.line, item.place.column, item.message); };
+  const auto key = [](const Diagnostic& item) {
+    return std::tie(item.place.file, item.place.line, item.place.column, item.message);
+  };
   const auto is_before = [&](const Diagnostic* a, const Diagnostic* b) { return key(*a) < key(*b); };
   items_.reserve(items_.size() + other.items_.size());  // what is known points into it
   std::set<const Diagnostic*, decltype(is_before)> known(is_before);
@@ -103,10 +111,12 @@ std::string Diagnostics::text() const {
     if (item.place.line) out << ':' << item.place.line << ':' << item.place.column;
     out << ": error: " << printable_lines(item.message) << '\n';
     const auto source = sources_.find(item.place.file);
-    if (item.place.line && source != sources_.end()) out << quoted_line(line_of(source->second, item.place.line), item.place.column);
+    if (item.place.line && source != sources_.end())
+      out << quoted_line(line_of(source->second, item.place.line), item.place.column);
     if (!item.hint.empty()) out << "  hint: " << printable_lines(item.hint) << '\n';
   }
-  if (size() > kMostShown) out << "and " << size() - kMostShown << (size() == kMostShown + 1 ? " more fault\n" : " more faults\n");
+  if (size() > kMostShown)
+    out << "and " << size() - kMostShown << (size() == kMostShown + 1 ? " more fault\n" : " more faults\n");
   return out.str();
 }
 
@@ -116,7 +126,8 @@ std::string nearest_name(const std::string& wrong, const std::vector<std::string
   if (wrong.size() > kMostInName) return best;
   for (const std::string& name : known) {
     const std::size_t longer = std::max(name.size(), wrong.size()), shorter = std::min(name.size(), wrong.size());
-    if (longer > kMostInName || longer - shorter >= least) continue;  // the distance is at least the difference of lengths
+    if (longer > kMostInName || longer - shorter >= least)
+      continue;  // the distance is at least the difference of lengths
     const std::size_t distance = edit_distance(wrong, name);
     if (distance < least) {
       least = distance;

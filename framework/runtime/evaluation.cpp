@@ -30,7 +30,8 @@ void for_leaves(V& value, const Visit& visit) {
   for (auto& item : value.items) for_leaves(item, visit);
 }
 
-/// Whether a stored value is one that the output gives: by its own account, it may come from another build or be damaged.
+/// Whether a stored value is one that the output gives: by its own account, it may come from another build or be
+/// damaged.
 bool is_of(const Value& value, const PortInfo& output) {
   if (value.type != output.type || (value.is_list() && value.axis != output.axis)) return false;
   if (!output.axis.empty() && !value.is_list()) return value.is_absent();
@@ -123,7 +124,8 @@ class Evaluation::DeferredSource : public Source {
       }
     }
     const CallResult& result = call_->result();
-    if (result.status == Status::failed) throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' failed", ""};
+    if (result.status == Status::failed)
+      throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' failed", ""};
     if (result.status != Status::done) throw MissingInput{result.status, result.reason, ""};
     std::size_t at = 0;
     std::shared_ptr<const void> data;
@@ -141,12 +143,19 @@ class Evaluation::DeferredSource : public Source {
   std::shared_ptr<Source> stored_;
 };
 
-Evaluation::Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings, std::vector<NodeRecord>& records,
-                       std::mutex& mutex, std::function<void(std::size_t, Call&)> finished)
-    : pipeline_(pipeline), catalogue_(catalogue), settings_(settings), records_(records), mutex_(mutex), finished_(std::move(finished)) {}
+Evaluation::Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings,
+                       std::vector<NodeRecord>& records, std::mutex& mutex,
+                       std::function<void(std::size_t, Call&)> finished)
+    : pipeline_(pipeline),
+      catalogue_(catalogue),
+      settings_(settings),
+      records_(records),
+      mutex_(mutex),
+      finished_(std::move(finished)) {}
 Evaluation::~Evaluation() = default;
 
-void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction, double seconds) const {
+void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text,
+                        double fraction, double seconds) const {
   if (!settings_.observer) return;
   const std::scoped_lock lock(observer_mutex_);
   settings_.observer({kind, pipeline_.nodes[node].id, item, std::move(text), fraction, seconds});
@@ -162,7 +171,8 @@ Evaluation::Recipe Evaluation::recipe(std::size_t node, const Call& call, Conten
 Evaluation::Recipe Evaluation::noted_recipe(std::size_t node, const Call& call) {
   const auto note = [&](const Contents& contents) {
     const std::scoped_lock lock(mutex_);
-    if (!contents.empty() || records_[node].files.empty()) records_[node].files = contents_of_options(pipeline_.nodes[node], contents);
+    if (!contents.empty() || records_[node].files.empty())
+      records_[node].files = contents_of_options(pipeline_.nodes[node], contents);
   };
   Contents contents;
   note(contents);
@@ -174,7 +184,8 @@ Evaluation::Recipe Evaluation::noted_recipe(std::size_t node, const Call& call) 
 
 bool Evaluation::makes_functions(std::size_t node) const {
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
-  return std::all_of(outputs.begin(), outputs.end(), [](const PortInfo& output) { return output.type.is_function && output.axis.empty(); });
+  return std::all_of(outputs.begin(), outputs.end(),
+                     [](const PortInfo& output) { return output.type.is_function && output.axis.empty(); });
 }
 
 void Evaluation::evaluate(std::size_t node, Call& call) {
@@ -208,10 +219,12 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
     int said = 0;
     const auto on_wait = [&](bool waits) {
       const bool is_long = waits ? said++ > 0 : said > 1;
-      const std::string text = waits ? "waits for another run that is making the same result" : "goes on after waiting for another run";
+      const std::string text =
+          waits ? "waits for another run that is making the same result" : "goes on after waiting for another run";
       report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item, is_long ? text : "");
     };
-    const Store::Claim claim = settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
+    const Store::Claim claim =
+        settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
     // Another process may have made it in the meantime.
     if (!read_back(node, call, key)) call.result = perform(node, call.inputs, call.item, key);
   }
@@ -257,7 +270,8 @@ bool Evaluation::read_back(std::size_t node, Call& call, const Recipe& recipe) {
       if (value.source) value.source = std::make_shared<DeferredSource>(deferred, leaf, value.source);
       ++leaf;
     });
-  for (const std::string& warning : stored->provenance.warnings) report(RunEvent::Kind::warning, node, call.item, warning_now(warning, pipeline_.nodes[node], stored->provenance));
+  for (const std::string& warning : stored->provenance.warnings)
+    report(RunEvent::Kind::warning, node, call.item, warning_now(warning, pipeline_.nodes[node], stored->provenance));
   report(RunEvent::Kind::cached, node, call.item, "", 1, stored->provenance.seconds);
   call.result = {Status::done, "", std::move(stored->outputs), false, true};
   const std::scoped_lock lock(mutex_);
@@ -281,7 +295,8 @@ void Evaluation::share(const Digest& key, const CallResult& result) {
   }
 }
 
-CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, const std::string& item, const Recipe& recipe) {
+CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, const std::string& item,
+                               const Recipe& recipe) {
   CallResult result;
   std::vector<std::string> warnings;
   const Clock::time_point start = Clock::now();
@@ -315,7 +330,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     result.reason = error.what();
   }
   working_folder_.go_back();  // also where it failed
-  if (result.status == Status::failed) report(RunEvent::Kind::failed, node, item, failure_text(node, item, result.reason));
+  if (result.status == Status::failed)
+    report(RunEvent::Kind::failed, node, item, failure_text(node, item, result.reason));
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);
   NodeRecord& record = records_[node];
@@ -329,13 +345,15 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   return result;
 }
 
-/// What was read must be what the key counts, or the store would keep it for another content for ever. A file that was changed
-/// and changed back has another state than before.
-void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const Digest& states) const {
+/// What was read must be what the key counts, or the store would keep it for another content for ever. A file that was
+/// changed and changed back has another state than before.
+void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
+                                 const Digest& states) const {
   const std::vector<std::string> paths = paths_of(pipeline_.nodes[node]);
   if (paths.empty()) return;
   if (states_of_files(pipeline_.nodes[node]) != states || recipe_of(pipeline_.nodes[node], inputs) != recipe.recipe)
-    throw Error(paths[0] + (paths.size() > 1 ? " or another file of the node" : "") + " changed while it was read; run it again");
+    throw Error(paths[0] + (paths.size() > 1 ? " or another file of the node" : "") +
+                " changed while it was read; run it again");
 }
 
 void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value>& inputs) {
@@ -351,8 +369,8 @@ void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value
     });
 }
 
-std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item, const Recipe& recipe,
-                                         std::vector<std::string>& warnings) {
+std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
+                                         const Recipe& recipe, std::vector<std::string>& warnings) {
   const PipelineNode& called = pipeline_.nodes[node];
   const bool apart = runs_apart(called);
   if (!apart || !inputs.empty()) make_inputs(catalogue_.load(called.info.name), inputs);
@@ -366,10 +384,12 @@ std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& i
   return definition.call(inputs, options.get(), context);
 }
 
-void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result, double seconds,
-                      std::vector<std::string> warnings) {
+void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
+                      const CallResult& result, double seconds, std::vector<std::string> warnings) {
   const std::vector<PortInfo>& outputs = pipeline_.nodes[node].info.outputs;
-  if (!settings_.store || std::any_of(outputs.begin(), outputs.end(), [](const PortInfo& output) { return output.type.is_function; })) return;
+  if (!settings_.store ||
+      std::any_of(outputs.begin(), outputs.end(), [](const PortInfo& output) { return output.type.is_function; }))
+    return;
   Provenance made_from = provenance(node, inputs);
   made_from.seconds = seconds;
   made_from.warnings = std::move(warnings);
@@ -382,7 +402,8 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
   report(RunEvent::Kind::warning, node, "", "results are not kept: " + fault);
 }
 
-Context::Hooks Evaluation::make_hooks(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings) {
+Context::Hooks Evaluation::make_hooks(std::size_t node, const std::string& item, std::uint64_t seed,
+                                      std::vector<std::string>& warnings) {
   Context::Hooks hooks;
   hooks.seed = seed;
   hooks.cancelled = settings_.cancelled;
@@ -427,11 +448,13 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
 }
 
 std::string Evaluation::place(std::size_t node, const std::string& item) const {
-  return std::filesystem::absolute(pipeline_.file).lexically_normal().string() + "\n" + pipeline_.nodes[node].id + "\n" + item;
+  return std::filesystem::absolute(pipeline_.file).lexically_normal().string() + "\n" + pipeline_.nodes[node].id +
+         "\n" + item;
 }
 
 void Evaluation::remember(std::size_t node, const Call& call, const Recipe& recipe) {
-  if (settings_.store && settings_.remember) settings_.store->remember(place(node, call.item), {recipe.key, provenance(node, call.inputs)});
+  if (settings_.store && settings_.remember)
+    settings_.store->remember(place(node, call.item), {recipe.key, provenance(node, call.inputs)});
 }
 
 void Evaluation::make(Value& value, const std::function<const TypeInfo&()>& type) {
@@ -458,7 +481,9 @@ std::string Evaluation::change_since_last(std::size_t node, const Call& call) co
   const auto last = settings_.store ? settings_.store->last(place(node, call.item)) : std::nullopt;
   if (!last) return "it has not run before";
   const std::string changes = difference(last->provenance, provenance(node, call.inputs));
-  return changes.empty() ? "the store has no result of it: it failed, was stopped or removed, or the processor is another" : changes;
+  return changes.empty()
+             ? "the store has no result of it: it failed, was stopped or removed, or the processor is another"
+             : changes;
 }
 
 }  // namespace marrow

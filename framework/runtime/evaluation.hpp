@@ -30,14 +30,15 @@ struct Call {
   CallResult result;
 };
 
-/// Finds the results of calls: each recipe once within a run, from the store where an earlier run left it there, else by
-/// calling the node. Functions are made only when something that runs needs them. Safe to use from several threads of the
-/// run's pool.
+/// Finds the results of calls: each recipe once within a run, from the store where an earlier run left it there, else
+/// by calling the node. Functions are made only when something that runs needs them. Safe to use from several threads
+/// of the run's pool.
 class Evaluation {
  public:
   /// `finished(node, call)` is told of each call whose result is known. `records` is written under `mutex`.
-  Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings, std::vector<NodeRecord>& records,
-             std::mutex& mutex, std::function<void(std::size_t node, Call& call)> finished);
+  Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings,
+             std::vector<NodeRecord>& records, std::mutex& mutex,
+             std::function<void(std::size_t node, Call& call)> finished);
   ~Evaluation();
 
   void evaluate(std::size_t node, Call& call);
@@ -49,7 +50,8 @@ class Evaluation {
   /// Whether the store has the result, or the node makes functions; then the call's result is set as evaluate() does.
   bool find(std::size_t node, Call& call);
 
-  void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0, double seconds = 0) const;
+  void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0,
+              double seconds = 0) const;
   std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
 
  private:
@@ -70,13 +72,15 @@ class Evaluation {
   bool read_back(std::size_t node, Call& call, const Recipe& recipe);
   void share(const Digest& key, const CallResult& result);
   CallResult perform(std::size_t node, std::vector<Value> inputs, const std::string& item, const Recipe& recipe);
-  std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item, const Recipe& recipe,
-                               std::vector<std::string>& warnings);
-  void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result, double seconds,
-            std::vector<std::string> warnings);
-  void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const Digest& states) const;
+  std::vector<Value> call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
+                               const Recipe& recipe, std::vector<std::string>& warnings);
+  void save(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe, const CallResult& result,
+            double seconds, std::vector<std::string> warnings);
+  void check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
+                       const Digest& states) const;
   static void make_inputs(const NodeDefinition& definition, std::vector<Value>& inputs);
-  Context::Hooks make_hooks(std::size_t node, const std::string& item, std::uint64_t seed, std::vector<std::string>& warnings);
+  Context::Hooks make_hooks(std::size_t node, const std::string& item, std::uint64_t seed,
+                            std::vector<std::string>& warnings);
 
   const Pipeline& pipeline_;
   const Catalogue& catalogue_;

@@ -30,9 +30,13 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 class Executor {
  public:
   Executor(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings)
-      : pipeline_(pipeline), catalogue_(catalogue), settings_(settings),
-        needed_(pipeline.needed([&](const std::string& id) { return settings.given.count(id) > 0; })), states_(pipeline.nodes.size()),
-        evaluation_(pipeline, catalogue, settings, result_.nodes, mutex_, [this](std::size_t node, Call& call) { finish_call(node, call); }) {
+      : pipeline_(pipeline),
+        catalogue_(catalogue),
+        settings_(settings),
+        needed_(pipeline.needed([&](const std::string& id) { return settings.given.count(id) > 0; })),
+        states_(pipeline.nodes.size()),
+        evaluation_(pipeline, catalogue, settings, result_.nodes, mutex_,
+                    [this](std::size_t node, Call& call) { finish_call(node, call); }) {
     result_.nodes.resize(pipeline.nodes.size());
     for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
       const auto given = settings.given.find(pipeline.nodes[i].id);
@@ -45,7 +49,8 @@ class Executor {
   RunResult run() {
     // The pool is the only source of threads: OpenCV's own loops stay on the thread of the node that calls them.
     cv::setNumThreads(1);
-    const int wanted = settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
+    const int wanted =
+        settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
     const int threads = threads_to_be_had(wanted);
     if (threads == 0) {
       note_call_without_process();
@@ -93,7 +98,8 @@ class Executor {
   /// Data made outside a run has no key yet; without one, all of it would pass for the same.
   static void complete_key(Value& value) {
     for (Value& item : value.items) complete_key(item);
-    if (value.data && value.type.content && value.key == Digest{}) value.key = value.type.content->hash(value.data.get());
+    if (value.data && value.type.content && value.key == Digest{})
+      value.key = value.type.content->hash(value.data.get());
   }
 
   /// What the pipeline is to give is made while the nodes can still be called.
@@ -101,7 +107,9 @@ class Executor {
     for (const PipelineOutput& output : pipeline_.outputs) {
       NodeRecord& record = result_.nodes[std::size_t(output.source.node)];
       const PipelineNode& node = pipeline_.nodes[std::size_t(output.source.node)];
-      const auto type = [&]() -> const TypeInfo& { return catalogue_.load(node.info.name).info.outputs[std::size_t(output.source.output)].type; };
+      const auto type = [&]() -> const TypeInfo& {
+        return catalogue_.load(node.info.name).info.outputs[std::size_t(output.source.output)].type;
+      };
       if (!record.outputs.empty()) Evaluation::make(record.outputs[std::size_t(output.source.output)], type);
     }
   }
@@ -113,7 +121,8 @@ class Executor {
       for (const Reference& source : wire.sources) {
         const PlannedNode& from = planned[std::size_t(source.node)];
         if (from.what == PlannedNode::What::runs) result.waits_for.insert(pipeline_.nodes[std::size_t(source.node)].id);
-        if (from.what == PlannedNode::What::depends) result.waits_for.insert(from.waits_for.begin(), from.waits_for.end());
+        if (from.what == PlannedNode::What::depends)
+          result.waits_for.insert(from.waits_for.begin(), from.waits_for.end());
       }
     if (!result.waits_for.empty()) {
       result.what = PlannedNode::What::depends;
@@ -130,11 +139,14 @@ class Executor {
         continue;
       }
       ++result.calls_to_make;
-      if (result.why.empty()) result.why = (call.item.empty() ? "" : call.item + ": ") + evaluation_.change_since_last(index, call);
+      if (result.why.empty())
+        result.why = (call.item.empty() ? "" : call.item + ": ") + evaluation_.change_since_last(index, call);
       result.seconds += evaluation_.seconds_last_time(index, call);
     }
-    if (result.calls_to_make) result.what = PlannedNode::What::runs;
-    else assemble(index);
+    if (result.calls_to_make)
+      result.what = PlannedNode::What::runs;
+    else
+      assemble(index);
     return result;
   }
 
@@ -169,7 +181,8 @@ class Executor {
     } catch (const std::exception& error) {  // no thread for it: in this process TBB waits for that thread from now on
       withdraw(*is_taken);
       note_call_without_process();
-      throw NoProcess(std::string("cannot start a thread (") + error.what() + "); the limit of processes is reached (ulimit -u)");
+      throw NoProcess(std::string("cannot start a thread (") + error.what() +
+                      "); the limit of processes is reached (ulimit -u)");
     }
   }
 
@@ -215,7 +228,8 @@ class Executor {
       state.calls.assign(1, {});
       state.calls[0].result.status = cancelled() ? Status::cancelled : Status::failed;
       state.calls[0].result.reason = error.what();
-      if (!cancelled()) evaluation_.report(RunEvent::Kind::failed, index, "", evaluation_.failure_text(index, "", error.what()));
+      if (!cancelled())
+        evaluation_.report(RunEvent::Kind::failed, index, "", evaluation_.failure_text(index, "", error.what()));
       finish_node(index);
       return;
     }
@@ -229,7 +243,8 @@ class Executor {
     const PipelineNode& node = pipeline_.nodes[index];
     NodeState& state = states_[index];
     std::vector<Value> inputs(node.info.inputs.size());
-    for (const Wire& wire : node.wires) inputs[std::size_t(wire.port)] = wired_value(wire, node.info.inputs[std::size_t(wire.port)]);
+    for (const Wire& wire : node.wires)
+      inputs[std::size_t(wire.port)] = wired_value(wire, node.info.inputs[std::size_t(wire.port)]);
     std::vector<std::string> names_text;
     for (const std::string& axis : node.mapped_axes) {
       std::vector<std::string> names;
@@ -242,8 +257,8 @@ class Executor {
           names = along;
           first = node.info.inputs[i].name;
         } else if (names != along) {
-          throw Error("inputs '" + first + "' and '" + node.info.inputs[i].name + "' do not go in step along '" + axis + "': the first has " +
-                      list_text(names) + ", the second " + list_text(along));
+          throw Error("inputs '" + first + "' and '" + node.info.inputs[i].name + "' do not go in step along '" + axis +
+                      "': the first has " + list_text(names) + ", the second " + list_text(along));
         }
       }
       if (names.empty()) names = {""};  // its list is absent as a whole
@@ -268,7 +283,8 @@ class Executor {
     for (std::size_t k = 0; k < state.names[depth].size(); ++k) {
       std::vector<Value> slice = inputs;
       for (std::size_t i = 0; i < slice.size(); ++i)
-        if (node.info.inputs[i].axis != node.mapped_axes[depth]) slice[i] = sliced(slice[i], node.mapped_axes[depth], k);
+        if (node.info.inputs[i].axis != node.mapped_axes[depth])
+          slice[i] = sliced(slice[i], node.mapped_axes[depth], k);
       spread(index, slice, depth + 1, item.empty() ? state.names[depth][k] : item + "/" + state.names[depth][k]);
     }
   }
@@ -339,7 +355,8 @@ class Executor {
   }
 
   void finish_call(std::size_t index, Call& call) {
-    if (call.result.status == Status::skipped) evaluation_.report(RunEvent::Kind::skipped, index, call.item, call.result.reason);
+    if (call.result.status == Status::skipped)
+      evaluation_.report(RunEvent::Kind::skipped, index, call.item, call.result.reason);
     bool last = false;
     {
       const std::scoped_lock lock(mutex_);
@@ -353,7 +370,8 @@ class Executor {
     NodeState& state = states_[index];
     NodeRecord& record = result_.nodes[index];
     // A node all of whose calls are deferred is not needed until something that runs asks for what it makes.
-    const bool deferred = !state.calls.empty() && std::all_of(state.calls.begin(), state.calls.end(), [](const Call& call) { return call.result.is_deferred; });
+    const bool deferred = !state.calls.empty() && std::all_of(state.calls.begin(), state.calls.end(),
+                                                              [](const Call& call) { return call.result.is_deferred; });
     record.status = deferred ? Status::not_needed : Status::done;
     for (const Call& call : state.calls) {
       // The worst of its calls is the node's status; `failed` outranks what follows from other failures.
@@ -387,11 +405,16 @@ class Executor {
 
   static int rank(Status status) {
     switch (status) {
-      case Status::failed: return 4;
-      case Status::cancelled: return 3;
-      case Status::not_run: return 2;
-      case Status::skipped: return 1;
-      default: return 0;
+      case Status::failed:
+        return 4;
+      case Status::cancelled:
+        return 3;
+      case Status::not_run:
+        return 2;
+      case Status::skipped:
+        return 1;
+      default:
+        return 0;
     }
   }
 
@@ -410,15 +433,18 @@ class Executor {
       list.type = node.info.outputs[output].type;
       list.axis = node.mapped_axes[depth];
       list.names = state.names[depth];
-      for (std::size_t k = 0; k < list.names.size(); ++k) list.items.push_back(assembled(index, output, depth + 1, next));
+      for (std::size_t k = 0; k < list.names.size(); ++k)
+        list.items.push_back(assembled(index, output, depth + 1, next));
       return list;
     }
     const CallResult& result = state.calls[next++].result;
     if (result.status == Status::done) return result.outputs[output];
     Value absent;
     absent.type = node.info.outputs[output].type;
-    if (result.status == Status::failed) absent.missing = "node '" + node.id + "' failed";
-    else if (result.status != Status::skipped) absent.missing = result.reason;
+    if (result.status == Status::failed)
+      absent.missing = "node '" + node.id + "' failed";
+    else if (result.status != Status::skipped)
+      absent.missing = result.reason;
     return absent;
   }
 
@@ -451,7 +477,8 @@ bool RunResult::failed() const {
 }
 
 bool RunResult::cancelled() const {
-  return std::any_of(nodes.begin(), nodes.end(), [](const NodeRecord& node) { return node.status == Status::cancelled; });
+  return std::any_of(nodes.begin(), nodes.end(),
+                     [](const NodeRecord& node) { return node.status == Status::cancelled; });
 }
 
 Value value_of(const RunResult& result, const Reference& source) {
@@ -462,7 +489,8 @@ Value value_of(const RunResult& result, const Reference& source) {
   return value;
 }
 
-std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings) {
+std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue,
+                                       const RunSettings& settings) {
   return Executor(pipeline, catalogue, settings).plan();
 }
 

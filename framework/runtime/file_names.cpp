@@ -11,7 +11,7 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostInName = 100;  // bytes
+constexpr std::size_t kMostInName = 100;      // bytes
 constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix below the usual 255
 
 /// As in addresses; `text` may be several bytes.

@@ -15,8 +15,10 @@ void FilesRead::note(const Contents& contents) {
     const fs::path real = fs::weakly_canonical(fs::absolute(path, error), error);
     for (const auto& [file, digest] : content.files) note(file, digest, path);
     // A folder may have lost a file, or have one more.
-    if (!content.is_there) note(real, Digest{}, path);
-    else if (fs::is_directory(real, error)) note(real, content.digest, path);
+    if (!content.is_there)
+      note(real, Digest{}, path);
+    else if (fs::is_directory(real, error))
+      note(real, content.digest, path);
     contents_.try_emplace(path, content);
   }
 }
@@ -32,7 +34,9 @@ Contents FilesRead::of(const PipelineNode& node) const {
 void FilesRead::note(const fs::path& real, const Digest& content, const std::string& said) {
   const auto [known, is_new] = known_.try_emplace(real, content);
   if (is_new || known->second == content) return;
-  throw Error(said + " was changed while the run went on: another node read something else there; run it again when nothing writes to it");
+  throw Error(said +
+              " was changed while the run went on: another node read something else there; run it again when nothing "
+              "writes to it");
 }
 
 std::map<std::string, Digest> contents_of_options(const PipelineNode& node, const Contents& contents) {

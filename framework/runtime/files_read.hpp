@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// What the nodes of a run found in the files that they read. All of them must find the same: a file that is edited between two
-/// nodes would give results that mix both contents. Safe to use from several threads.
+/// What the nodes of a run found in the files that they read. All of them must find the same: a file that is edited
+/// between two nodes would give results that mix both contents. Safe to use from several threads.
 class FilesRead {
  public:
   /// Throws Error where something else was found before.
@@ -23,7 +23,8 @@ class FilesRead {
   Contents contents_;
 };
 
-/// By option of type path that names something: its content; zero where any of its paths is not among `contents` or not there.
+/// By option of type path that names something: its content; zero where any of its paths is not among `contents` or not
+/// there.
 std::map<std::string, Digest> contents_of_options(const PipelineNode& node, const Contents& contents);
 
 }  // namespace marrow

@@ -27,9 +27,10 @@ struct OpenFolder {
 };
 
 bool is_still(const OpenFolder& open_folder, const fs::path& folder) {
-  struct stat held {}, named {};
-  return fstat(open_folder.descriptor, &held) == 0 && lstat(folder.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
-         held.st_ino == named.st_ino;
+  struct stat held {
+  }, named{};
+  return fstat(open_folder.descriptor, &held) == 0 && lstat(folder.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
 }
 
 }  // namespace

@@ -23,15 +23,17 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What tells one state of a file from another: a write changes the time of its last change, which nobody can set. Where the file
-/// is mapped into memory, only the first write after write_back() does.
+/// What tells one state of a file from another: a write changes the time of its last change, which nobody can set.
+/// Where the file is mapped into memory, only the first write after write_back() does.
 struct FileState {
   dev_t device = 0;
   ino_t number = 0;
   off_t size = 0;
   timespec written{}, changed{};
   bool operator==(const FileState& other) const {
-    const auto same = [](const timespec& a, const timespec& b) { return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec; };
+    const auto same = [](const timespec& a, const timespec& b) {
+      return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec;
+    };
     return device == other.device && number == other.number && size == other.size && same(written, other.written) &&
            same(changed, other.changed);
   }
@@ -53,8 +55,8 @@ void write_back(const fs::path& file) {
   close(descriptor);
 }
 
-/// A file that was changed just now may change again within the resolution of its time; one that lies in memory alone may change
-/// without any other time.
+/// A file that was changed just now may change again within the resolution of its time; one that lies in memory alone
+/// may change without any other time.
 bool is_settled(const fs::path& file, const FileState& state) {
   struct statfs system {};
   if (statfs(file.c_str(), &system) != 0 || system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC) return false;
@@ -95,7 +97,8 @@ PathContent content_of(const std::string& path) {
   std::error_code error;
   const bool is_folder = !is_itself && fs::is_directory(path, error);
   content.is_there = is_itself || is_folder;
-  // The kind and the number keep a file apart from a folder that holds it alone, and what one path names from what the next does.
+  // The kind and the number keep a file apart from a folder that holds it alone, and what one path names from what the
+  // next does.
   hasher.add(std::string(is_itself ? "file" : is_folder ? "folder" : "absent"));
   hasher.add(std::uint64_t(files.size()));
   for (const NamedFile& file : files) {
@@ -168,9 +171,7 @@ Digest result_key(const Digest& recipe, const Digest& build_id, bool random, std
   return hasher.digest();
 }
 
-Digest path_digest(const fs::path& path) {
-  return content_of(path.string()).digest;
-}
+Digest path_digest(const fs::path& path) { return content_of(path.string()).digest; }
 
 Digest function_key(const Digest& result, std::size_t output) {
   Hasher hasher;
@@ -187,40 +188,49 @@ std::string text_of(const OptionValue& value, OptionType type, const Contents& c
     const Digest digest = known == contents.end() ? path_digest(path) : known->second.digest;
     out << path << " (content " << digest.hex().substr(0, 8) << ")";
   };
-  std::visit([&](const auto& one) {
-    using T = std::decay_t<decltype(one)>;
-    if constexpr (std::is_same_v<T, bool>) {
-      out << (one ? "true" : "false");
-    } else if constexpr (std::is_same_v<T, std::string>) {
-      if (type == OptionType::path) add_file(one);
-      else out << one;
-    } else if constexpr (requires { one.size(); }) {
-      out << '[';
-      for (std::size_t i = 0; i < one.size(); ++i) {
-        if (i) out << ", ";
-        if constexpr (std::is_same_v<T, std::vector<std::string>>) {
-          if (type == OptionType::paths) add_file(one[i]);
-          else out << one[i];
+  std::visit(
+      [&](const auto& one) {
+        using T = std::decay_t<decltype(one)>;
+        if constexpr (std::is_same_v<T, bool>) {
+          out << (one ? "true" : "false");
+        } else if constexpr (std::is_same_v<T, std::string>) {
+          if (type == OptionType::path)
+            add_file(one);
+          else
+            out << one;
+        } else if constexpr (requires { one.size(); }) {
+          out << '[';
+          for (std::size_t i = 0; i < one.size(); ++i) {
+            if (i) out << ", ";
+            if constexpr (std::is_same_v<T, std::vector<std::string>>) {
+              if (type == OptionType::paths)
+                add_file(one[i]);
+              else
+                out << one[i];
+            } else {
+              out << one[i];
+            }
+          }
+          out << ']';
         } else {
-          out << one[i];
+          out << one;
         }
-      }
-      out << ']';
-    } else {
-      out << one;
-    }
-  }, value);
+      },
+      value);
   return out.str();
 }
 
 std::string difference(const Provenance& before, const Provenance& now) {
   std::vector<std::string> changes;
-  if (before.node != now.node) changes.push_back("it uses " + now.node + ", used " + before.node);
-  else if (before.build_id != now.build_id) changes.push_back("the plugin of " + now.node + " was rebuilt");
+  if (before.node != now.node)
+    changes.push_back("it uses " + now.node + ", used " + before.node);
+  else if (before.build_id != now.build_id)
+    changes.push_back("the plugin of " + now.node + " was rebuilt");
   for (const auto& [name, value] : now.options) {
     const auto old = before.options.find(name);
     if (before.node == now.node && (old == before.options.end() || old->second != value))
-      changes.push_back("option '" + name + "' is " + value + (old == before.options.end() ? ", was not there" : ", was " + old->second));
+      changes.push_back("option '" + name + "' is " + value +
+                        (old == before.options.end() ? ", was not there" : ", was " + old->second));
   }
   for (const auto& [name, key] : now.inputs) {
     const auto old = before.inputs.find(name);
@@ -240,7 +250,8 @@ std::string warning_now(std::string warning, const PipelineNode& node, const Pro
     const std::string before = option->second.substr(0, option->second.rfind(" (content "));
     const std::string& now = std::get<std::string>(node.options[i]);
     if (!before.starts_with('/') || before == now) continue;
-    for (std::size_t at = 0; (at = warning.find(before, at)) != std::string::npos; at += now.size()) warning.replace(at, before.size(), now);
+    for (std::size_t at = 0; (at = warning.find(before, at)) != std::string::npos; at += now.size())
+      warning.replace(at, before.size(), now);
   }
   return warning;
 }

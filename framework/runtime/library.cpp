@@ -31,27 +31,31 @@ constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
 /// What differs between the plugin's stamp and ours, in words with both values and the cure; empty when they agree.
 std::string stamp_mismatch(const AbiStamp& theirs) {
   constexpr AbiStamp ours = abi_stamp();
-  const auto differs = [](const std::string& what, const std::string& got, const std::string& expected, const std::string& cure) {
+  const auto differs = [](const std::string& what, const std::string& got, const std::string& expected,
+                          const std::string& cure) {
     return "was built with " + what + " " + got + ", this marrow with " + expected + "; " + cure;
   };
   const std::string rebuild = "build both with the same compiler and flags";
   if (std::strncmp(theirs.compiler, ours.compiler, sizeof ours.compiler) != 0)
     return differs("compiler", theirs.compiler, ours.compiler, rebuild);
   if (theirs.eigen_max_align != ours.eigen_max_align)
-    return differs("EIGEN_MAX_ALIGN_BYTES", std::to_string(theirs.eigen_max_align), std::to_string(ours.eigen_max_align),
+    return differs("EIGEN_MAX_ALIGN_BYTES", std::to_string(theirs.eigen_max_align),
+                   std::to_string(ours.eigen_max_align),
                    "leave out -march=native, -mavx and the like, which change how Eigen aligns memory");
   if (theirs.glibcxx_debug != ours.glibcxx_debug)
-    return differs("_GLIBCXX_DEBUG (debug mode)", theirs.glibcxx_debug ? "on" : "off", ours.glibcxx_debug ? "on" : "off",
-                   "debug mode changes the layout of every container");
+    return differs("_GLIBCXX_DEBUG (debug mode)", theirs.glibcxx_debug ? "on" : "off",
+                   ours.glibcxx_debug ? "on" : "off", "debug mode changes the layout of every container");
   if (theirs.sanitizers != ours.sanitizers)
     return differs("sanitizers", std::to_string(theirs.sanitizers), std::to_string(ours.sanitizers), rebuild);
   if (theirs.cxx_standard / 100 != ours.cxx_standard / 100)
-    return differs("C++ standard", std::to_string(theirs.cxx_standard), std::to_string(ours.cxx_standard), "use -std=c++20");
+    return differs("C++ standard", std::to_string(theirs.cxx_standard), std::to_string(ours.cxx_standard),
+                   "use -std=c++20");
   if (theirs.cxx11_abi != ours.cxx11_abi)
     return differs("_GLIBCXX_USE_CXX11_ABI", std::to_string(theirs.cxx11_abi), std::to_string(ours.cxx11_abi), rebuild);
   if (theirs.eigen_version != ours.eigen_version || theirs.opencv_version != ours.opencv_version)
-    return differs("Eigen and OpenCV", std::to_string(theirs.eigen_version) + " and " + std::to_string(theirs.opencv_version),
-                   std::to_string(ours.eigen_version) + " and " + std::to_string(ours.opencv_version), "use the same versions");
+    return differs(
+        "Eigen and OpenCV", std::to_string(theirs.eigen_version) + " and " + std::to_string(theirs.opencv_version),
+        std::to_string(ours.eigen_version) + " and " + std::to_string(ours.opencv_version), "use the same versions");
   if (std::memcmp(theirs.sizes, ours.sizes, sizeof ours.sizes) != 0)
     return "was built against other headers (a domain type has another size); rebuild it with this marrow's headers";
   return "";
@@ -59,12 +63,16 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
 
 const PluginEntry& checked_entry(void* handle) {
   const auto function = reinterpret_cast<const PluginEntry* (*)()>(dlsym(handle, "marrow_plugin_entry"));
-  if (!function) throw Error("is no marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
+  if (!function)
+    throw Error("is no marrow plugin: it has no function marrow_plugin_entry (open it with MARROW_PLUGIN)");
   const PluginEntry* entry = function();
-  if (!entry || std::memcmp(entry->magic, "marrow!", 8) != 0) throw Error("is no marrow plugin: its entry has another magic");
+  if (!entry || std::memcmp(entry->magic, "marrow!", 8) != 0)
+    throw Error("is no marrow plugin: its entry has another magic");
   if (entry->api_major != MARROW_API_MAJOR || entry->api_minor > MARROW_API_MINOR)
-    throw Error("was built for plugin interface " + std::to_string(entry->api_major) + "." + std::to_string(entry->api_minor) +
-                ", this marrow has " MARROW_TEXT(MARROW_API_MAJOR) "." MARROW_TEXT(MARROW_API_MINOR) "; rebuild it with this marrow's headers");
+    throw Error("was built for plugin interface " + std::to_string(entry->api_major) + "." +
+                std::to_string(entry->api_minor) +
+                ", this marrow has " MARROW_TEXT(MARROW_API_MAJOR) "." MARROW_TEXT(
+                    MARROW_API_MINOR) "; rebuild it with this marrow's headers");
   if (entry->size != sizeof(PluginEntry))
     throw Error("was built against other headers (its entry has " + std::to_string(entry->size) + " bytes, expected " +
                 std::to_string(sizeof(PluginEntry)) + "); rebuild it with this marrow's headers");
@@ -73,9 +81,11 @@ const PluginEntry& checked_entry(void* handle) {
   return *entry;
 }
 
-/// What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait for ever.
+/// What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait
+/// for ever.
 void* load_without_throwing(const char* path, int mode) noexcept {
-  // dlopen is declared as a function that throws nothing. A compiler that knows this leaves out the end of the process here.
+  // dlopen is declared as a function that throws nothing. A compiler that knows this leaves out the end of the process
+  // here.
   void* (*volatile load)(const char*, int) = dlopen;
   return load(path, mode);
 }
@@ -105,7 +115,8 @@ LibraryInfo describe_here(const fs::path& file) {
     try {
       handle = open_library(file, RTLD_NOW);
     } catch (const Error&) {
-      // With lazy binding a library whose symbols do not fit can still say with what it was built, which is the better reason.
+      // With lazy binding a library whose symbols do not fit can still say with what it was built, which is the better
+      // reason.
       checked_entry(open_library(file, RTLD_LAZY));
       throw;
     }
@@ -139,13 +150,20 @@ LibraryInfo describe_apart(const fs::path& file) {
   worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
   const WorkerEnd end = worker.wait({kDescribeLimit_s, kDescribeLimit_mb}, nullptr, nullptr);
   LibraryInfo info;
-  if (end.is_late) info.refused = "did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded";
-  else if (end.is_out_of_memory) info.refused = "takes more than " + std::to_string(kDescribeLimit_mb) + " MB of memory to be loaded";
-  else if (end.signal) info.refused = std::string("crashed while being loaded (") + strsignal(end.signal) + ")";
-  else if (end.died) info.refused = "ended the process that loaded it";
-  else if (!end.failed.empty()) info.refused = "cannot be described: " + end.failed;
-  else if (!end.answer.is_string()) info.refused = "describes itself in a way that cannot be used";
-  else return described(end.answer.get<std::string>());
+  if (end.is_late)
+    info.refused = "did not say what it holds within " + std::to_string(kDescribeLimit_s) + " s of being loaded";
+  else if (end.is_out_of_memory)
+    info.refused = "takes more than " + std::to_string(kDescribeLimit_mb) + " MB of memory to be loaded";
+  else if (end.signal)
+    info.refused = std::string("crashed while being loaded (") + strsignal(end.signal) + ")";
+  else if (end.died)
+    info.refused = "ended the process that loaded it";
+  else if (!end.failed.empty())
+    info.refused = "cannot be described: " + end.failed;
+  else if (!end.answer.is_string())
+    info.refused = "describes itself in a way that cannot be used";
+  else
+    return described(end.answer.get<std::string>());
   return info;
 }
 
@@ -163,12 +181,13 @@ using Versions = std::set<std::tuple<std::string, std::uint64_t, Digest>>;
 
 Versions versions_of(const std::vector<LinkedLibrary>& libraries) {
   Versions result;
-  for (const LinkedLibrary& library : libraries) result.insert({fs::path(library.path).filename().string(), library.size, identity_of(library)});
+  for (const LinkedLibrary& library : libraries)
+    result.insert({fs::path(library.path).filename().string(), library.size, identity_of(library)});
   return result;
 }
 
-/// Everything before the load went by the description: options were checked and set, and keys were made. Where it is not what the
-/// library registers, nothing of the library may be called.
+/// Everything before the load went by the description: options were checked and set, and keys were made. Where it is
+/// not what the library registers, nothing of the library may be called.
 void expect_described(const LibraryInfo& described, const LibraryInfo& registered) {
   std::string found = difference(described, registered);
   const Versions before = versions_of(described.linked), now = versions_of(registered.linked);
@@ -199,7 +218,8 @@ std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
     void* handle = open_library(real, RTLD_NOW);
     auto plugin = std::make_unique<Plugin>();
     run_registration(*plugin, checked_entry(handle));
-    if (digest_of(RegularFile(real)) != described.digest) throw Error("was changed since this program began; start it again");
+    if (digest_of(RegularFile(real)) != described.digest)
+      throw Error("was changed since this program began; start it again");
     expect_described(described, registered(*plugin, handle));
     return plugin;
   } catch (const Error& error) {

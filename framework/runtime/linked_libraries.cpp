@@ -110,7 +110,8 @@ std::string build_note(const RegularFile& file) {
       const std::size_t name = at + sizeof note, content = name + padded(note.n_namesz);
       at = content + padded(note.n_descsz);
       if (at > text.size() || note.n_namesz > text.size() || note.n_descsz > text.size()) break;
-      if (note.n_type == NT_GNU_BUILD_ID && text.compare(name, 4, "GNU", 4) == 0) return text.substr(content, note.n_descsz);
+      if (note.n_type == NT_GNU_BUILD_ID && text.compare(name, 4, "GNU", 4) == 0)
+        return text.substr(content, note.n_descsz);
     }
   }
   return "";
@@ -192,7 +193,8 @@ Digest identity_of(const LinkedLibrary& library) {
   static std::map<std::string, Known> known;
   const std::scoped_lock lock(mutex);
   const auto found = known.find(library.path);
-  if (found != known.end() && found->second.status.st_ino == status.st_ino && found->second.status.st_size == status.st_size &&
+  if (found != known.end() && found->second.status.st_ino == status.st_ino &&
+      found->second.status.st_size == status.st_size &&
       std::memcmp(&found->second.status.st_ctim, &status.st_ctim, sizeof status.st_ctim) == 0)
     return found->second.identity;
   const Digest identity = identity_of_package(library.path, status);

@@ -38,8 +38,8 @@ std::string processor_features() {
   return features;
 }
 
-/// OpenCV's switches for the processor's features, the choice of code of two libraries of linear algebra that OpenCV may call, and
-/// libraries that are put before all others.
+/// OpenCV's switches for the processor's features, the choice of code of two libraries of linear algebra that OpenCV
+/// may call, and libraries that are put before all others.
 bool counts(std::string_view variable) {
   if (variable.starts_with("OPENCV_LOG")) return false;
   for (const char* beginning : {"OPENCV_", "OPENBLAS_CORETYPE=", "MKL_CBWR=", "LD_PRELOAD="})
@@ -47,7 +47,8 @@ bool counts(std::string_view variable) {
   return false;
 }
 
-/// The C library's switches for the processor's features, among others that change no result: worker processes set one of those.
+/// The C library's switches for the processor's features, among others that change no result: worker processes set one
+/// of those.
 void add_switches(std::string_view tunables, std::set<std::string>& variables) {
   std::istringstream stream{std::string(tunables)};
   for (std::string one; std::getline(stream, one, ':');)
@@ -62,8 +63,10 @@ Digest machine_digest() {
   constexpr std::string_view kTunables = "GLIBC_TUNABLES=";
   for (char** one = environ; one && *one; ++one) {
     const std::string_view variable(*one);
-    if (counts(variable)) variables.insert(*one);
-    else if (variable.starts_with(kTunables)) add_switches(variable.substr(kTunables.size()), variables);
+    if (counts(variable))
+      variables.insert(*one);
+    else if (variable.starts_with(kTunables))
+      add_switches(variable.substr(kTunables.size()), variables);
   }
   Hasher hasher;
   hasher.add(features);

@@ -47,9 +47,7 @@ json json_of(const WriterInfo& writer) {
   return {{"type", json_of(writer.type)}, {"extension", writer.extension}, {"help", writer.help}};
 }
 
-[[noreturn]] void damaged(const std::string& what) {
-  throw Error("it is damaged: " + what);
-}
+[[noreturn]] void damaged(const std::string& what) { throw Error("it is damaged: " + what); }
 
 /// An object of the manifest: each of its fields is there, has its type, and is read.
 class Fields {
@@ -237,9 +235,7 @@ std::string difference(const json& described, const json& registered, const std:
 
 }  // namespace
 
-const char* option_type_name(OptionType type) {
-  return kOptionTypes[int(type)];
-}
+const char* option_type_name(OptionType type) { return kOptionTypes[int(type)]; }
 
 json json_of(const OptionValue& value) {
   return std::visit([](const auto& v) { return json(v); }, value);

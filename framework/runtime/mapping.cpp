@@ -12,7 +12,8 @@ Value picked(const Value& value, const std::string& item, const std::string& ref
   if (value.is_absent()) return value;
   const auto found = std::find(value.names.begin(), value.names.end(), item);
   if (found == value.names.end())
-    throw Error("'" + reference + "': there is no '" + item + "' along the axis '" + value.axis + "'; " + suggestion(item, value.names));
+    throw Error("'" + reference + "': there is no '" + item + "' along the axis '" + value.axis + "'; " +
+                suggestion(item, value.names));
   return value.items[std::size_t(found - value.names.begin())];
 }
 

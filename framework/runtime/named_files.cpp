@@ -22,7 +22,8 @@ NamedFile linked_file(const fs::path& root, const fs::directory_entry& entry) {
   NamedFile file{entry.path(), "", !error};
   if (error) return file;
   if (!is_below(root, target))
-    throw Error(entry.path().string() + ": is a link to a place outside " + root.string() + "; copy it into the folder");
+    throw Error(entry.path().string() + ": is a link to a place outside " + root.string() +
+                "; copy it into the folder");
   if (fs::is_directory(target, error))
     throw Error(entry.path().string() + ": is a link to a folder; put the folder itself there");
   file.is_there = fs::is_regular_file(target, error);
@@ -40,9 +41,12 @@ void add_folder(const fs::path& root, const fs::path& folder, std::vector<NamedF
     if (error) fail(folder);
     const fs::file_status status = at->symlink_status(error);
     if (error) fail(at->path());
-    if (fs::is_symlink(status)) files.push_back(linked_file(root, *at));
-    else if (fs::is_directory(status)) add_folder(root, at->path(), files);
-    else if (fs::is_regular_file(status)) files.push_back({at->path(), ""});
+    if (fs::is_symlink(status))
+      files.push_back(linked_file(root, *at));
+    else if (fs::is_directory(status))
+      add_folder(root, at->path(), files);
+    else if (fs::is_regular_file(status))
+      files.push_back({at->path(), ""});
   }
   if (error) fail(folder);
 }

@@ -15,9 +15,9 @@ struct NamedFile {
   bool is_there = true;  ///< false for a link that leads nowhere
 };
 
-/// All regular files that a path names: itself, or all below it, sorted. Empty where there is nothing. A node may open these
-/// and no other, since they are what its key counts. Throws Error for what would be missed: a folder that cannot be read, and
-/// links inside a folder that lead out of it or to another folder.
+/// All regular files that a path names: itself, or all below it, sorted. Empty where there is nothing. A node may open
+/// these and no other, since they are what its key counts. Throws Error for what would be missed: a folder that cannot
+/// be read, and links inside a folder that lead out of it or to another folder.
 std::vector<NamedFile> files_named_by(const std::filesystem::path& path);
 
 /// The texts of one of a node's options; none where it is not of type path.

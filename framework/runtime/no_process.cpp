@@ -10,11 +10,7 @@ std::atomic<long> calls{0};
 
 }  // namespace
 
-long calls_without_process() {
-  return calls;
-}
-void note_call_without_process() {
-  ++calls;
-}
+long calls_without_process() { return calls; }
+void note_call_without_process() { ++calls; }
 
 }  // namespace marrow

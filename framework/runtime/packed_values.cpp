@@ -28,7 +28,7 @@ struct Trailer {
 
 /// A large piece of a value, in the memory of the process that made it.
 struct Piece {
-  std::uint64_t place = 0;    ///< in the value's packed data
+  std::uint64_t place = 0;  ///< in the value's packed data
   std::uint64_t address = 0, size = 0;
   static constexpr auto fields() { return std::make_tuple(&Piece::place, &Piece::address, &Piece::size); }
 };
@@ -36,7 +36,9 @@ struct Piece {
 /// Gathers small pieces; larger ones go straight to the file, or are noted by their address.
 class FilePacker : public Archive {
  public:
-  FilePacker(int descriptor, bool in_place) : descriptor_(descriptor), in_place_(in_place) { gathered_.reserve(kGathered); }
+  FilePacker(int descriptor, bool in_place) : descriptor_(descriptor), in_place_(in_place) {
+    gathered_.reserve(kGathered);
+  }
 
   void bytes(const void* data, std::size_t size) override {
     packed_ += size;
@@ -45,8 +47,10 @@ class FilePacker : public Archive {
       return;
     }
     if (gathered_.size() + size > kGathered) flush();
-    if (size >= kGathered) put(static_cast<const char*>(data), size);
-    else gathered_.append(static_cast<const char*>(data), size);
+    if (size >= kGathered)
+      put(static_cast<const char*>(data), size);
+    else
+      gathered_.append(static_cast<const char*>(data), size);
     written_ += size;
   }
   void flush() {
@@ -122,7 +126,8 @@ class PieceUnpacker : public Unpacker {
     while (size > 0) {
       iovec here{to, size}, there{reinterpret_cast<void*>(std::uintptr_t(address)), size};
       const ssize_t count = process_vm_readv(process_, &here, 1, &there, 1, 0);
-      if (count <= 0) throw NoAccess(std::string("the memory of another process cannot be read: ") + std::strerror(errno));
+      if (count <= 0)
+        throw NoAccess(std::string("the memory of another process cannot be read: ") + std::strerror(errno));
       to += count;
       address += std::uint64_t(count);
       size -= std::size_t(count);
@@ -159,7 +164,8 @@ void describe(const Value& value, FilePacker& data, Packer& description) {
 
 class Reader {
  public:
-  Reader(std::string_view bytes, pid_t process, const ContentOf& content_of) : bytes_(bytes), process_(process), content_of_(content_of) {}
+  Reader(std::string_view bytes, pid_t process, const ContentOf& content_of)
+      : bytes_(bytes), process_(process), content_of_(content_of) {}
 
   std::vector<Value> values() {
     Trailer trailer;
@@ -268,10 +274,10 @@ std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& c
 
 const Content* content_of_own(const TypeInfo& type) {
   static const std::vector<TypeInfo> kOwn{
-      TypeInfo::of<Image>(),   TypeInfo::of<Picture>(), TypeInfo::of<Volume>(),     TypeInfo::of<SignedField>(),
-      TypeInfo::of<Seeds>(),   TypeInfo::of<Mesh>(),    TypeInfo::of<Camera>(),     TypeInfo::of<View>(),
+      TypeInfo::of<Image>(),   TypeInfo::of<Picture>(),    TypeInfo::of<Volume>(),    TypeInfo::of<SignedField>(),
+      TypeInfo::of<Seeds>(),   TypeInfo::of<Mesh>(),       TypeInfo::of<Camera>(),    TypeInfo::of<View>(),
       TypeInfo::of<EdgeMap>(), TypeInfo::of<ShaftLines>(), TypeInfo::of<Landmarks>(), TypeInfo::of<Pose>(),
-      TypeInfo::of<Truth>(),   TypeInfo::of<Metrics>(), TypeInfo::of<Scene>(),      TypeInfo::of<Landscape>(),
+      TypeInfo::of<Truth>(),   TypeInfo::of<Metrics>(),    TypeInfo::of<Scene>(),     TypeInfo::of<Landscape>(),
       TypeInfo::of<Case>()};
   const auto found = std::find(kOwn.begin(), kOwn.end(), type);
   return found == kOwn.end() ? nullptr : found->content;

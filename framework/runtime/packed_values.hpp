@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Values handed from one process to another: the packed data of one after the other, then their description, then where it is.
-// Small pieces lie in memory that both share. Large ones are copied once, from one process's memory into the other's.
+// Values handed from one process to another: the packed data of one after the other, then their description, then where
+// it is. Small pieces lie in memory that both share. Large ones are copied once, from one process's memory into the
+// other's.
 #include <sys/types.h>
 
 #include <functional>
@@ -26,8 +27,8 @@ class SharedMemory {
   int descriptor_;
 };
 
-/// Writes values into an open file. Large pieces stay where they are when `in_place`: only their addresses are written, and the
-/// values must stay until they were read. Throws Error for functions, and where the file cannot take them.
+/// Writes values into an open file. Large pieces stay where they are when `in_place`: only their addresses are written,
+/// and the values must stay until they were read. Throws Error for functions, and where the file cannot take them.
 void write_values(int descriptor, const std::vector<Value>& values, bool in_place);
 
 /// How many bytes the file holds.

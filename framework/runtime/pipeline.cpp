@@ -87,7 +87,8 @@ class Resolver {
         if (name.starts_with(kind + ".")) siblings.push_back(name);
       std::string hint = suggested(written.uses, siblings.empty() ? names : siblings);
       for (const LibraryInfo& library : catalogue_.libraries())
-        if (!library.refused.empty() && library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
+        if (!library.refused.empty() &&
+            library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
           hint += "; " + library.file.filename().string() + " was refused: it " + library.refused;
       diagnostics_.add(written.uses_place, "unknown node " + in_quotes(written.uses), hint);
     }
@@ -117,18 +118,26 @@ class Resolver {
     const std::vector<std::string> known = names_of(node.info.options);
     for (const auto& [name, value] : written.options)
       if (!contains(known, name))
-        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name), suggested(name, known));
+        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
+                         suggested(name, known));
     for (const OptionInfo& option : node.info.options) {
       OptionValue result = option.default_value;
-      const auto given = std::find_if(written.options.begin(), written.options.end(), [&](const auto& item) { return item.first == option.name; });
+      const auto given = std::find_if(written.options.begin(), written.options.end(),
+                                      [&](const auto& item) { return item.first == option.name; });
       if (given != written.options.end()) {
         const WrittenValue& value = given->second;
         StrictYaml yaml = yaml_of(value);
-        const auto substitute = [&](const std::string& text, const Place& place) { return input_texts_.put_into(text, place.line ? place : value.place); };
-        auto converted = yaml.option(value.value, value.place, option, "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
+        const auto substitute = [&](const std::string& text, const Place& place) {
+          return input_texts_.put_into(text, place.line ? place : value.place);
+        };
+        auto converted = yaml.option(value.value, value.place, option,
+                                     "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
         if (converted) result = in_folder(std::move(*converted), option.type, value.folder);
       } else if (option.required) {
-        diagnostics_.add(written.place, "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name + " must be given", option.help);
+        diagnostics_.add(written.place,
+                         "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name +
+                             " must be given",
+                         option.help);
       }
       node.options.push_back(std::move(result));
     }
@@ -148,11 +157,14 @@ class Resolver {
     if (node.info.name.empty()) return;
     const std::vector<PortInfo>& of_kind = ports_of_kind(node.info.kind());
     for (const auto& [name, value] : written.wires) {
-      const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+      const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(),
+                                     [&, n = name](const PortInfo& p) { return p.name == n; });
       const bool own = port != node.info.inputs.end();
-      const auto sibling = std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+      const auto sibling =
+          std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
       if (!own && sibling == of_kind.end()) {
-        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name), suggested(name, names_of(of_kind)));
+        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
+                         suggested(name, names_of(of_kind)));
         continue;
       }
       // A port that only siblings use is checked like any other, and then left unwired.
@@ -162,8 +174,11 @@ class Resolver {
       node.wires.push_back(std::move(wire));
     }
     for (const PortInfo& port : node.info.inputs)
-      if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(), [&](const auto& wire) { return wire.first == port.name; }))
-        diagnostics_.add(written.place, "node " + in_quotes(node.id) + ": input " + in_quotes(port.name) + " of " + node.info.name + " is not wired",
+      if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(),
+                                         [&](const auto& wire) { return wire.first == port.name; }))
+        diagnostics_.add(written.place,
+                         "node " + in_quotes(node.id) + ": input " + in_quotes(port.name) + " of " + node.info.name +
+                             " is not wired",
                          "add  in: {" + port.name + ": ...}  with a " + port.type.id + " (" + port.help + ")");
   }
 
@@ -171,7 +186,8 @@ class Resolver {
     Wire wire;
     const auto add = [&](const YAML::Node& text, const Place& place) {
       if (!text.IsScalar()) {
-        diagnostics_.add(place, "input " + in_quotes(port.name) + " must name a node", "write it as  " + port.name + ": node  or  node.output");
+        diagnostics_.add(place, "input " + in_quotes(port.name) + " must name a node",
+                         "write it as  " + port.name + ": node  or  node.output");
         return;
       }
       Reference source = resolve_reference(text.Scalar(), place, &port.type);
@@ -184,7 +200,8 @@ class Resolver {
     }
     wire.is_list_literal = true;
     if (port.axis.empty()) {
-      diagnostics_.add(value.place, "input " + in_quotes(port.name) + " of " + node.info.name + " takes one " + port.type.id + ", not a list");
+      diagnostics_.add(value.place, "input " + in_quotes(port.name) + " of " + node.info.name + " takes one " +
+                                        port.type.id + ", not a list");
       return wire;
     }
     const StrictYaml yaml = yaml_of(value);
@@ -217,10 +234,13 @@ class Resolver {
     }
     if (output < 0) {
       if (parts.size() > 1)
-        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]), suggested(parts[1], names_of(outputs)));
+        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]),
+                         suggested(parts[1], names_of(outputs)));
       else
-        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has several outputs" + (type ? " and not just one " + type->id : ""),
-                         "say which: " + parts[0] + "." + joined(names_of(outputs), ", " ));
+        diagnostics_.add(
+            place,
+            "node " + in_quotes(parts[0]) + " has several outputs" + (type ? " and not just one " + type->id : ""),
+            "say which: " + parts[0] + "." + joined(names_of(outputs), ", "));
       return source;
     }
     source.node = int(index);
@@ -249,13 +269,14 @@ class Resolver {
     const bool contract_only = port.type.size == 0;
     const Kind* kind = find_kind(node.info.kind());
     if (output.type.id == "truth" && (!kind || !kind->sees_truth)) {
-      diagnostics_.add(source.place, "the truth may be wired only to nodes that evaluate or render, not to " + node.info.name,
+      diagnostics_.add(source.place,
+                       "the truth may be wired only to nodes that evaluate or render, not to " + node.info.name,
                        "a method that sees the truth proves nothing");
     } else if (contract_only ? output.type.id != port.type.id : output.type != port.type) {
       const bool layout = output.type.id == port.type.id;
       diagnostics_.add(source.place,
-                       "input " + in_quotes(port.name) + " of " + node.info.name + " expects " + port.type.id + ", but " + in_quotes(source.text) + " is " +
-                           output.type.id + " (" + output.help + ")",
+                       "input " + in_quotes(port.name) + " of " + node.info.name + " expects " + port.type.id +
+                           ", but " + in_quotes(source.text) + " is " + output.type.id + " (" + output.help + ")",
                        layout ? "the two plugins were built with different versions of this type; rebuild both" : "");
     }
   }
@@ -277,8 +298,8 @@ class Resolver {
     point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
   }
 
-  void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined, const std::set<std::string>& used,
-                        const std::set<std::string>& unknown) {
+  void point_at_renamed(const std::string& what, const std::map<std::string, Place>& defined,
+                        const std::set<std::string>& used, const std::set<std::string>& unknown) {
     std::vector<std::string> names;
     for (const auto& [name, place] : defined) names.push_back(name);
     for (const std::string& wanted : unknown) {
@@ -318,8 +339,9 @@ class Resolver {
     const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
     const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
     if (source.items.size() > axes)
-      diagnostics_.add(source.place, in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
-                                         (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
+      diagnostics_.add(source.place,
+                       in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
+                           (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
   }
 
   void find_axes(std::size_t index) {
@@ -331,7 +353,8 @@ class Resolver {
         if (!diagnostics_.empty()) return;
         for (const std::string& axis : pipeline_.axes_of(source)) {
           if (axis == consumed && wire.is_list_literal)
-            diagnostics_.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis), "pick one item of it");
+            diagnostics_.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis),
+                             "pick one item of it");
           else if (axis != consumed && !contains(node.mapped_axes, axis))
             node.mapped_axes.push_back(axis);
         }
@@ -339,8 +362,10 @@ class Resolver {
     }
     for (const PortInfo& output : node.info.outputs)
       if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
-        diagnostics_.add(node.place, "node " + in_quotes(node.id) + " is called for each item along " + in_quotes(output.axis) + ", but its output '" +
-                                         output.name + "' is itself a list over it", "pick one item of its input");
+        diagnostics_.add(node.place,
+                         "node " + in_quotes(node.id) + " is called for each item along " + in_quotes(output.axis) +
+                             ", but its output '" + output.name + "' is itself a list over it",
+                         "pick one item of its input");
   }
 
   void check_outputs() {
@@ -360,8 +385,8 @@ class Resolver {
 
 }  // namespace
 
-Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue, Diagnostics& diagnostics,
-                       bool inputs_required) {
+Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
+                       Diagnostics& diagnostics, bool inputs_required) {
   const WrittenPipeline written = read_written_pipeline(file, arguments, diagnostics, inputs_required);
   if (written.nodes.empty()) return {};
   return Resolver(written, catalogue, diagnostics).resolve();

@@ -9,7 +9,8 @@
 namespace marrow {
 namespace {
 
-/// An item of an option as it is written: a dollar in a text is doubled, so that it is not taken for the name of an input.
+/// An item of an option as it is written: a dollar in a text is doubled, so that it is not taken for the name of an
+/// input.
 template <class T>
 T written(const T& item) {
   return item;
@@ -45,11 +46,13 @@ std::vector<bool> Pipeline::needed(const std::function<bool(const std::string&)>
 
 std::string resolved_yaml(const Pipeline& pipeline) {
   YAML::Emitter out;
-  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value << pipeline.name;
+  out << YAML::BeginMap << YAML::Key << "marrow" << YAML::Value << 1 << YAML::Key << "name" << YAML::Value
+      << pipeline.name;
   out << YAML::Key << "nodes" << YAML::Value << YAML::BeginMap;
   out.SetDoublePrecision(17);
   for (const PipelineNode& node : pipeline.nodes) {
-    out << YAML::Key << node.id << YAML::Value << YAML::BeginMap << YAML::Key << "uses" << YAML::Value << node.info.name;
+    out << YAML::Key << node.id << YAML::Value << YAML::BeginMap << YAML::Key << "uses" << YAML::Value
+        << node.info.name;
     if (!node.wires.empty()) {
       out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
       for (const Wire& wire : node.wires) {
@@ -64,22 +67,26 @@ std::string resolved_yaml(const Pipeline& pipeline) {
       out << YAML::Key << "with" << YAML::Value << YAML::BeginMap;
       for (std::size_t i = 0; i < node.options.size(); ++i) {
         out << YAML::Key << node.info.options[i].name << YAML::Value;
-        std::visit([&](const auto& value) {
-          if constexpr (requires { value.begin(); } && !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
-            out << YAML::Flow << YAML::BeginSeq;
-            for (const auto& item : value) out << written(item);
-            out << YAML::EndSeq;
-          } else {
-            out << written(value);
-          }
-        }, node.options[i]);
+        std::visit(
+            [&](const auto& value) {
+              if constexpr (requires { value.begin(); } &&
+                            !std::is_same_v<std::decay_t<decltype(value)>, std::string>) {
+                out << YAML::Flow << YAML::BeginSeq;
+                for (const auto& item : value) out << written(item);
+                out << YAML::EndSeq;
+              } else {
+                out << written(value);
+              }
+            },
+            node.options[i]);
       }
       out << YAML::EndMap;
     }
     out << YAML::EndMap;
   }
   out << YAML::EndMap << YAML::Key << "outputs" << YAML::Value << YAML::BeginMap;
-  for (const PipelineOutput& output : pipeline.outputs) out << YAML::Key << output.name << YAML::Value << output.source.text;
+  for (const PipelineOutput& output : pipeline.outputs)
+    out << YAML::Key << output.name << YAML::Value << output.source.text;
   out << YAML::EndMap << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

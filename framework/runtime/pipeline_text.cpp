@@ -16,7 +16,10 @@ namespace fs = std::filesystem;
 class Reader {
  public:
   Reader(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics, bool inputs_required)
-      : arguments_(arguments), diagnostics_(diagnostics), inputs_required_(inputs_required), yaml_(file.string(), diagnostics) {
+      : arguments_(arguments),
+        diagnostics_(diagnostics),
+        inputs_required_(inputs_required),
+        yaml_(file.string(), diagnostics) {
     pipeline_.file = file;
     folder_ = fs::absolute(file).parent_path();
   }
@@ -41,7 +44,8 @@ class Reader {
         versioned = true;
         const auto version = yaml_.integer(entry.value, entry.place, "marrow");
         if (version && *version != 1)
-          yaml_.fault(entry.place, "this file is of format " + std::to_string(*version) + ", this program reads format 1");
+          yaml_.fault(entry.place,
+                      "this file is of format " + std::to_string(*version) + ", this program reads format 1");
       }
       if (entry.key == "name") {
         has_name = true;
@@ -63,16 +67,23 @@ class Reader {
     if (!root.IsMap()) return;
     if (!has_name) name_after_file(start);
     if (!versioned) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
-    if (!has_nodes) yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
-    else if (pipeline_.nodes.empty() && diagnostics_.empty()) yaml_.fault(start, "the pipeline has no nodes", "name them under  nodes:");
-    if (!has_outputs) yaml_.fault(start, "the key 'outputs' is missing", "name what the pipeline is to compute, as  outputs: {name: node}");
+    if (!has_nodes)
+      yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
+    else if (pipeline_.nodes.empty() && diagnostics_.empty())
+      yaml_.fault(start, "the pipeline has no nodes", "name them under  nodes:");
+    if (!has_outputs)
+      yaml_.fault(start, "the key 'outputs' is missing",
+                  "name what the pipeline is to compute, as  outputs: {name: node}");
     check_given_inputs();
   }
 
   void name_after_file(const Place& start) {
     pipeline_.name = pipeline_.file.stem().string();
     if (const std::string fault = fault_of_name(pipeline_.name); !fault.empty())
-      yaml_.fault(start, "the pipeline takes its name from its file, and " + in_quotes(pipeline_.name) + " cannot name a folder, " + fault, "add  name: ...");
+      yaml_.fault(start,
+                  "the pipeline takes its name from its file, and " + in_quotes(pipeline_.name) +
+                      " cannot name a folder, " + fault,
+                  "add  name: ...");
   }
 
   void read_inputs(const YamlEntry& section) {
@@ -98,7 +109,8 @@ class Reader {
         const auto type = yaml_.text(entry.value, entry.place, "type");
         if (!type) continue;
         if (std::find(kTypes.begin(), kTypes.end(), *type) == kTypes.end())
-          yaml_.fault(entry.place, "unknown type " + in_quotes(*type) + " of input " + in_quotes(input.key), suggestion(*type, kTypes));
+          yaml_.fault(entry.place, "unknown type " + in_quotes(*type) + " of input " + in_quotes(input.key),
+                      suggestion(*type, kTypes));
         if (*type == "path") info.type = OptionType::path;
         if (*type == "number") info.type = OptionType::number;
         if (*type == "integer") info.type = OptionType::integer;
@@ -114,7 +126,8 @@ class Reader {
     if (!value) {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
-        yaml_.fault(input.place, "input " + in_quotes(input.key) + " has no value", "give it on the command line as  " + input.key + "=VALUE");
+        yaml_.fault(input.place, "input " + in_quotes(input.key) + " has no value",
+                    "give it on the command line as  " + input.key + "=VALUE");
       return;
     }
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };
@@ -127,11 +140,16 @@ class Reader {
   void check_given_inputs() {
     for (const InputValue& one : arguments_.inputs)
       if (std::find(declared_.begin(), declared_.end(), one.name) == declared_.end())
-        diagnostics_.add(place_of(one), "the pipeline has no input " + in_quotes(one.name), suggestion(one.name, declared_));
+        diagnostics_.add(place_of(one), "the pipeline has no input " + in_quotes(one.name),
+                         suggestion(one.name, declared_));
   }
 
-  static Place place_of(const InputValue& one) { return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place; }
-  static fs::path folder_of(const Place& written) { return written.file.empty() ? fs::current_path() : fs::absolute(written.file).parent_path(); }
+  static Place place_of(const InputValue& one) {
+    return one.place.file.empty() ? Place{one.name + "=" + one.value} : one.place;
+  }
+  static fs::path folder_of(const Place& written) {
+    return written.file.empty() ? fs::current_path() : fs::absolute(written.file).parent_path();
+  }
 
   void read_node(const YamlEntry& entry) {
     static const std::vector<std::string> kKeys{"uses", "with", "in"};
@@ -140,7 +158,8 @@ class Reader {
     node.place = entry.place;
     node.uses_place = entry.place;
     if (entry.key.find('.') != std::string::npos)
-      yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a dot", "dots are for outputs, as in case.views");
+      yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a dot",
+                  "dots are for outputs, as in case.views");
     if (entry.key.empty()) yaml_.fault(entry.place, "a node has no name", "write it as  name: {uses: kind.name}");
     bool has_uses = false;
     for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys)) {
@@ -150,11 +169,13 @@ class Reader {
         node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
       } else {
         auto& target = part.key == "with" ? node.options : node.wires;
-        for (const YamlEntry& item : yaml_.map(part.value, part.place, in_quotes(part.key) + " of node " + in_quotes(node.id)))
+        for (const YamlEntry& item :
+             yaml_.map(part.value, part.place, in_quotes(part.key) + " of node " + in_quotes(node.id)))
           target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
       }
     }
-    if (!has_uses && entry.value.IsMap()) yaml_.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses", "add  uses: kind.name");
+    if (!has_uses && entry.value.IsMap())
+      yaml_.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses", "add  uses: kind.name");
     pipeline_.nodes.push_back(std::move(node));
   }
 
@@ -164,26 +185,31 @@ class Reader {
     const std::size_t dot = key.find('.');
     std::vector<std::string> ids;
     for (const WrittenNode& node : pipeline_.nodes) ids.push_back(node.id);
-    const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(), [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
+    const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(),
+                                   [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
     if (dot == std::string::npos || dot + 1 == key.size()) {
       diagnostics_.add(place, "an override is node.option=value, node.uses=kind.name or node.in.port=reference");
       return;
     }
     if (node == pipeline_.nodes.end()) {
-      diagnostics_.add(place, "the pipeline has no node " + in_quotes(key.substr(0, dot)), suggestion(key.substr(0, dot), ids));
+      diagnostics_.add(place, "the pipeline has no node " + in_quotes(key.substr(0, dot)),
+                       suggestion(key.substr(0, dot), ids));
       return;
     }
     const std::string what = key.substr(dot + 1);
     const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
     if (what == "uses" && text.empty()) {
-      diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses", "write it as  " + key + "=kind.name");
+      diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses",
+                       "write it as  " + key + "=kind.name");
       return;
     }
     if (what == "uses") {
-      // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for this run, in any order.
+      // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for
+      // this run, in any order.
       const auto of_file = [](const auto& option) { return !option.second.is_override; };
       if (text != node->uses && std::erase_if(node->options, of_file) > 0)
-        pipeline_.notes.push_back("node " + in_quotes(node->id) + ": the options written for " + node->uses + " are not used by " + text);
+        pipeline_.notes.push_back("node " + in_quotes(node->id) + ": the options written for " + node->uses +
+                                  " are not used by " + text);
       node->uses = text;
       node->uses_place = place;
       return;
@@ -191,8 +217,10 @@ class Reader {
     auto& target = what.starts_with("in.") ? node->wires : node->options;
     const std::string name = what.starts_with("in.") ? what.substr(3) : what;
     const auto old = std::find_if(target.begin(), target.end(), [&](const auto& item) { return item.first == name; });
-    if (old != target.end()) old->second = value;
-    else target.emplace_back(name, value);
+    if (old != target.end())
+      old->second = value;
+    else
+      target.emplace_back(name, value);
   }
 
   const PipelineArguments& arguments_;
@@ -206,8 +234,8 @@ class Reader {
 
 }  // namespace
 
-WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics,
-                                      bool inputs_required) {
+WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineArguments& arguments,
+                                      Diagnostics& diagnostics, bool inputs_required) {
   return Reader(file, arguments, diagnostics, inputs_required).read();
 }
 

@@ -15,7 +15,8 @@ struct WrittenValue {
   Place place;
   YAML::Node value;
   std::filesystem::path folder;
-  bool is_override = false;  ///< its text was cut out of where it was written, so that parts of it have no place of their own
+  bool is_override =
+      false;  ///< its text was cut out of where it was written, so that parts of it have no place of their own
 };
 
 struct WrittenNode {
@@ -31,9 +32,9 @@ struct WrittenNode {
 struct WrittenPipeline {
   std::string name, help;
   std::filesystem::path file;
-  std::map<std::string, std::string> inputs;     ///< values, as texts
-  std::vector<std::string> missing_inputs;       ///< declared, with neither a value nor a default
-  std::map<std::string, Place> input_places;     ///< where each is declared
+  std::map<std::string, std::string> inputs;  ///< values, as texts
+  std::vector<std::string> missing_inputs;    ///< declared, with neither a value nor a default
+  std::map<std::string, Place> input_places;  ///< where each is declared
   std::vector<WrittenNode> nodes;
   std::vector<std::pair<std::string, WrittenValue>> outputs;
   std::vector<std::string> notes;

@@ -57,13 +57,9 @@ std::string printable(std::string_view text, const char* after_line_break) {
 
 }  // namespace
 
-std::string printable(std::string_view text) {
-  return printable(text, nullptr);
-}
+std::string printable(std::string_view text) { return printable(text, nullptr); }
 
-std::string printable_lines(std::string_view text) {
-  return printable(text, "  ");
-}
+std::string printable_lines(std::string_view text) { return printable(text, "  "); }
 
 std::string cut(std::string_view text, std::size_t most) {
   if (text.size() <= most) return std::string(text);
@@ -72,8 +68,6 @@ std::string cut(std::string_view text, std::size_t most) {
   return std::string(text.substr(0, end)) + "\u2026";
 }
 
-std::string in_quotes(std::string_view text) {
-  return "'" + cut(text) + "'";
-}
+std::string in_quotes(std::string_view text) { return "'" + cut(text) + "'"; }
 
 }  // namespace marrow

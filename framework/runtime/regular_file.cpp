@@ -30,17 +30,11 @@ void expect_regular(const struct stat& status) {
   throw Error(std::string("is ") + kind + ", not a regular file");
 }
 
-Error unreadable() {
-  return Error(std::string("cannot be read: ") + std::strerror(errno));
-}
+Error unreadable() { return Error(std::string("cannot be read: ") + std::strerror(errno)); }
 
-Error changed() {
-  return Error("was changed while it was read; try again when nothing writes to it");
-}
+Error changed() { return Error("was changed while it was read; try again when nothing writes to it"); }
 
-bool same(const timespec& a, const timespec& b) {
-  return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec;
-}
+bool same(const timespec& a, const timespec& b) { return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec; }
 
 bool write_all(int descriptor, const std::string& text) {
   for (std::size_t at = 0; at < text.size();) {
@@ -83,9 +77,7 @@ RegularFile::RegularFile(const fs::path& file) {
   }
 }
 
-RegularFile::~RegularFile() {
-  close(descriptor_);
-}
+RegularFile::~RegularFile() { close(descriptor_); }
 
 std::size_t RegularFile::read(void* to, std::size_t wanted, std::uint64_t offset) const {
   std::size_t got = 0;

@@ -36,7 +36,8 @@ constexpr const char* kAdvice = "; choose another with --out";
   throw Error("the output folder " + folder.string() + " is already there and not empty" + kAdvice + ", or remove it");
 }
 
-void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue, RunFolder::Written& written) {
+void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue,
+                 RunFolder::Written& written) {
   if (value.is_list()) {
     const std::vector<std::string> names = distinct_names(value.names);
     for (std::size_t i = 0; i < value.items.size(); ++i)
@@ -77,15 +78,16 @@ std::string utc_now() {
   return text;
 }
 
-/// The keys of the single items of a list, each with its place along the axes, in the order in which files are written. The
-/// place is written as the file's path is, so that no two items have the same.
+/// The keys of the single items of a list, each with its place along the axes, in the order in which files are written.
+/// The place is written as the file's path is, so that no two items have the same.
 void add_items(const Value& value, const std::string& place, json& items) {
   if (!value.is_list()) {
     items.push_back({place, value.key.hex()});
     return;
   }
   const std::vector<std::string> names = distinct_names(value.names);
-  for (std::size_t i = 0; i < value.items.size(); ++i) add_items(value.items[i], (place.empty() ? "" : place + "/") + file_name_of(names[i]), items);
+  for (std::size_t i = 0; i < value.items.size(); ++i)
+    add_items(value.items[i], (place.empty() ? "" : place + "/") + file_name_of(names[i]), items);
 }
 
 json items_of(const Value& value) {
@@ -108,14 +110,16 @@ json inputs_of(const PipelineNode& node, const RunResult& result) {
   return inputs;
 }
 
-/// The contents that the node's options of type path named when it read them; null for what was not there or not to be read.
+/// The contents that the node's options of type path named when it read them; null for what was not there or not to be
+/// read.
 json files_of(const NodeRecord& record) {
   json files = json::object();
   for (const auto& [option, content] : record.files) files[option] = content == Digest{} ? json() : json(content.hex());
   return files;
 }
 
-/// The contents of files that were written, so that it can be told when one is damaged later; null for what cannot be read.
+/// The contents of files that were written, so that it can be told when one is damaged later; null for what cannot be
+/// read.
 json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
   json digests = json::array();
   for (const std::string& file : files) try {
@@ -127,7 +131,8 @@ json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
 }
 
 bool took_part(const NodeRecord& record) {
-  return record.status != NodeRecord::Status::not_needed || !record.outputs.empty();  // a function that nothing called has a key all the same
+  return record.status != NodeRecord::Status::not_needed ||
+         !record.outputs.empty();  // a function that nothing called has a key all the same
 }
 
 json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue& catalogue) {
@@ -166,7 +171,8 @@ json plugins_used(const Pipeline& pipeline, const RunResult& result, const Catal
     if (!took_part(result.nodes[i]) || !library || !seen.insert(library->file).second) continue;
     json linked = json::array();
     for (const LinkedLibrary& one : library->linked) linked.push_back(fs::path(one.path).filename().string());
-    list.push_back({{"file", library->file.filename().string()}, {"build_id", library->build_id.hex()}, {"links", linked}});
+    list.push_back(
+        {{"file", library->file.filename().string()}, {"build_id", library->build_id.hex()}, {"links", linked}});
   }
   return list;
 }
@@ -209,9 +215,11 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
 
 bool RunFolder::take(const Pipeline& pipeline) {
   const fs::path log = folder_ / "log.txt";
-  const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);  // succeeds for one process alone
+  const int file =
+      ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);  // succeeds for one process alone
   if (file < 0 && errno == EEXIST) return false;
-  if (file < 0) throw Error("cannot write to the output folder " + folder_.string() + ": " + std::strerror(errno) + kAdvice);
+  if (file < 0)
+    throw Error("cannot write to the output folder " + folder_.string() + ": " + std::strerror(errno) + kAdvice);
   ::close(file);
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error))
@@ -224,12 +232,14 @@ bool RunFolder::take(const Pipeline& pipeline) {
     fs::create_directory(folder_ / "outputs");
     return true;
   } catch (const std::exception& fault) {
-    for (const char* name : {"log.txt", "pipeline.yaml"}) fs::remove(folder_ / name, error);  // so that a second try finds it empty
+    for (const char* name : {"log.txt", "pipeline.yaml"})
+      fs::remove(folder_ / name, error);  // so that a second try finds it empty
     throw Error(fault.what());
   }
 }
 
-std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue) {
+std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipeline, const RunResult& result,
+                                                         const Catalogue& catalogue) {
   std::vector<Written> all;
   for (const PipelineOutput& output : pipeline.outputs) {
     Written written{output.name, {}, ""};
@@ -249,16 +259,20 @@ void RunFolder::append_log(const std::string& line) {
   stream << printable_lines(line) << '\n';
   stream.close();
   if (!stream && log_fault_.empty())
-    log_fault_ = "lines are missing in " + (folder_ / "log.txt").string() + (errno ? std::string(": ") + std::strerror(errno) : "");
+    log_fault_ = "lines are missing in " + (folder_ / "log.txt").string() +
+                 (errno ? std::string(": ") + std::strerror(errno) : "");
 }
 
-void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings, const Catalogue& catalogue,
-                             const PipelineArguments& arguments, const std::vector<Written>& written) {
+void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,
+                             const Catalogue& catalogue, const PipelineArguments& arguments,
+                             const std::vector<Written>& written) {
   json record = {{"marrow", MARROW_VERSION},
                  {"framework", file_digest(framework_file()).hex()},
                  {"pipeline", pipeline.name},
                  {"finished", utc_now()},
-                 {"status", result.cancelled() ? "cancelled" : result.failed() ? "failed" : "done"},
+                 {"status", result.cancelled() ? "cancelled"
+                            : result.failed()  ? "failed"
+                                               : "done"},
                  {"seconds", result.seconds},
                  {"seed", settings.seed},
                  {"threads", settings.threads > 0 ? settings.threads : int(std::thread::hardware_concurrency())},

@@ -43,9 +43,7 @@ fs::path Store::file_of(const Digest& key) const {
   return folder_ / name.substr(0, 2) / name;
 }
 
-std::string Store::fault() const {
-  return examine_store(folder_).fault;
-}
+std::string Store::fault() const { return examine_store(folder_).fault; }
 
 bool Store::is_there() const {
   if (!is_checked_) is_checked_ = examine_store(folder_).is_store;

@@ -64,8 +64,8 @@ bool remove_item(const StoreItem& item, std::error_code& error) {
   return !error;
 }
 
-/// Of what nodes last came to. It is written when a call begins, which may take long: only where it is much older than all
-/// results that are kept, its own is gone.
+/// Of what nodes last came to. It is written when a call begins, which may take long: only where it is much older than
+/// all results that are kept, its own is gone.
 void remove_older(const std::vector<StoreItem>& remembered, fs::file_time_type oldest) {
   std::error_code error;
   for (const StoreItem& item : remembered)
@@ -119,8 +119,7 @@ Store::Freed Store::collect(std::uint64_t keep_bytes) const {
   const auto remove = [&](const StoreItem& item) {
     if (remove_item(item, error)) return true;
     const bool is_fault = error != std::errc::no_such_file_or_directory && error != std::errc::device_or_resource_busy;
-    if (is_fault && freed.fault.empty())
-      freed.fault = "cannot remove " + item.path.string() + ": " + error.message();
+    if (is_fault && freed.fault.empty()) freed.fault = "cannot remove " + item.path.string() + ": " + error.message();
     return false;
   };
   std::uint64_t total = 0;

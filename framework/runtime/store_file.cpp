@@ -95,9 +95,7 @@ bool StoreFile::read(void* data, std::size_t size, std::uint64_t offset) const {
   return true;
 }
 
-void StoreFile::mark_as_used() const {
-  futimens(descriptor_, nullptr);
-}
+void StoreFile::mark_as_used() const { futimens(descriptor_, nullptr); }
 
 FileUnpacker::FileUnpacker(const StoreFile& file, std::uint64_t offset, std::uint64_t size)
     : Unpacker(std::size_t(size)),

@@ -55,8 +55,8 @@ std::optional<TemporaryName> temporary_of_name(const std::string& name) {
   return found;
 }
 
-/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and all else are left out. `fault`
-/// says which folder could not be read, unless it already says something.
+/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and all else are left out.
+/// `fault` says which folder could not be read, unless it already says something.
 template <class Visit>
 void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit) {
   std::error_code error;

@@ -43,8 +43,8 @@ struct StoreItem {
   Digest key;       ///< of an entry or a simulated case; what names a place in last/
   int process = 0;  ///< that writes a temporary
 };
-/// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there. `fault`: why
-/// there may be more, where a folder of the store could not be read.
+/// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there.
+/// `fault`: why there may be more, where a folder of the store could not be read.
 std::vector<StoreItem> items_of_store(const std::filesystem::path& folder, std::string& fault);
 
 }  // namespace marrow

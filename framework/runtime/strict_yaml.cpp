@@ -75,7 +75,8 @@ std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& wher
     if (key == "<<") {
       fault(key_place, "merge keys (<<) are not supported", "repeat the entries");
     } else if (!is_new) {
-      fault(key_place, in_quotes(key) + " is given twice in " + what, "the first is at line " + std::to_string(twin->second));
+      fault(key_place, in_quotes(key) + " is given twice in " + what,
+            "the first is at line " + std::to_string(twin->second));
     } else if (printable(key) != key) {
       fault(key_place, "the key " + in_quotes(key) + " in " + what + " holds a control character", "write it without");
     } else if (known && std::find(known->begin(), known->end(), key) == known->end()) {
@@ -142,9 +143,9 @@ bool StrictYaml::check_range(double value, const Place& where, const OptionInfo&
   return true;
 }
 
-std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const Place& where, const OptionInfo& info,
-                                              const std::string& what,
-                                              const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute) {
+std::optional<OptionValue> StrictYaml::option(
+    const YAML::Node& original, const Place& where, const OptionInfo& info, const std::string& what,
+    const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute) {
   bool known = true;  // every $name has a value
   const auto replaced = [&](const YAML::Node& node) {
     if (!node.IsScalar() || node.Scalar().find('$') == std::string::npos) return node;
@@ -159,7 +160,8 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
       if (const auto value = boolean(node, where, what)) return *value;
       return std::nullopt;
     case OptionType::integer:
-      if (const auto value = integer(node, where, what); value && check_range(double(*value), where, info, what)) return *value;
+      if (const auto value = integer(node, where, what); value && check_range(double(*value), where, info, what))
+        return *value;
       return std::nullopt;
     case OptionType::number:
       if (const auto value = number(node, where, what); value && check_range(*value, where, info, what)) return *value;
@@ -174,7 +176,8 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
       }
       return *value;
     }
-    default: break;
+    default:
+      break;
   }
   if (!node.IsSequence()) {
     fault(where, what + ": expected a list, got " + describe(node), "write it as [a, b, c]");
@@ -198,14 +201,16 @@ std::optional<OptionValue> StrictYaml::option(const YAML::Node& original, const 
   }
   if (!good) return std::nullopt;
   if (info.length && numbers.size() != info.length) {
-    fault(where, what + ": expected " + std::to_string(info.length) + " numbers, got " + std::to_string(numbers.size()));
+    fault(where,
+          what + ": expected " + std::to_string(info.length) + " numbers, got " + std::to_string(numbers.size()));
     return std::nullopt;
   }
   if (info.type == OptionType::numbers) return numbers;
   return texts;
 }
 
-std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what, Diagnostics& diagnostics) {
+std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
+                                       Diagnostics& diagnostics) {
   try {
     std::string text = read_text_file(file, kMostSourceBytes);
     diagnostics.remember(file.string(), text);

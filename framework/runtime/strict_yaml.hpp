@@ -21,8 +21,8 @@ struct YamlEntry {
   YAML::Node value;
 };
 
-/// The one way in which marrow's runtime reads YAML. yaml-cpp accepts duplicate keys, does not merge `<<`, reads 010 as 8 and
-/// yes as true; here each of these is a diagnostic at its place.
+/// The one way in which marrow's runtime reads YAML. yaml-cpp accepts duplicate keys, does not merge `<<`, reads 010 as
+/// 8 and yes as true; here each of these is a diagnostic at its place.
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
@@ -39,10 +39,11 @@ class StrictYaml {
   std::optional<bool> boolean(const YAML::Node& node, const Place& where, const std::string& what);
   std::optional<std::int64_t> integer(const YAML::Node& node, const Place& where, const std::string& what);
   std::optional<double> number(const YAML::Node& node, const Place& where, const std::string& what);
-  /// A value for an option, converted and checked against its range, choices and length. `substitute` replaces $names in
-  /// texts before they are read; where it gives nothing, neither does this.
-  std::optional<OptionValue> option(const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
-                                    const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute);
+  /// A value for an option, converted and checked against its range, choices and length. `substitute` replaces $names
+  /// in texts before they are read; where it gives nothing, neither does this.
+  std::optional<OptionValue> option(
+      const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
+      const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute);
 
   void fault(const Place& place, std::string message, std::string hint = {}) {
     diagnostics_.add(place, std::move(message), std::move(hint));
@@ -56,8 +57,9 @@ class StrictYaml {
   std::optional<Place> only_;
 };
 
-/// The text of a file that people write, kept for showing its lines; `what` names it in the fault ("the pipeline file") where
-/// it cannot be read or is longer than 4 MB, and nothing is given.
-std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what, Diagnostics& diagnostics);
+/// The text of a file that people write, kept for showing its lines; `what` names it in the fault ("the pipeline file")
+/// where it cannot be read or is longer than 4 MB, and nothing is given.
+std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
+                                       Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -34,9 +34,7 @@ class Descriptor {
   int number_;
 };
 
-std::string reason() {
-  return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno);
-}
+std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
 
 bool write_all(int descriptor, const std::string& text) {
   for (std::size_t done = 0; done < text.size();) {

@@ -72,10 +72,9 @@ std::string mode_text(mode_t mode) {
   return text;
 }
 
-/// An access list lets other users write as far as the mode lets the group; the group itself may have nothing to do with it.
-bool has_access_list(const fs::path& path) {
-  return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0;
-}
+/// An access list lets other users write as far as the mode lets the group; the group itself may have nothing to do
+/// with it.
+bool has_access_list(const fs::path& path) { return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0; }
 
 /// What lets others change a file or the entries of a folder. Of a folder further above, a sticky bit keeps them from
 /// replacing what is not theirs.

@@ -8,7 +8,9 @@ namespace marrow {
 namespace {
 
 /// Whether a bracket or quote after this character begins something; inside a word, as in "bone's", it is text.
-bool begins_after(char before) { return std::isspace(static_cast<unsigned char>(before)) || before == '{' || before == '[' || before == ','; }
+bool begins_after(char before) {
+  return std::isspace(static_cast<unsigned char>(before)) || before == '{' || before == '[' || before == ',';
+}
 
 }  // namespace
 
@@ -31,7 +33,8 @@ std::optional<Unclosed> last_unclosed(const std::string& text) {
       // What is escaped ends no quote; a line break is counted all the same.
       if (c == '\\' && open.back().mark == '"' && text.compare(i + 1, 1, "\n") != 0)
         ++i, ++column;
-      else if (c == open.back().mark) open.pop_back();
+      else if (c == open.back().mark)
+        open.pop_back();
       continue;
     }
     if (c == '#' && std::isspace(static_cast<unsigned char>(before))) in_comment = true;

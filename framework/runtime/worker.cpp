@@ -40,9 +40,9 @@ constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
   getrlimit(RLIMIT_NOFILE, &files);
   if (code == EMFILE || (code == EINVAL && files.rlim_cur <= kMostFiles))
     throw NoProcess("cannot start a process: no more than " + std::to_string(files.rlim_cur) +
-                " files may be open at once; raise the limit (ulimit -n " + std::to_string(kEnoughFiles) + ")");
+                    " files may be open at once; raise the limit (ulimit -n " + std::to_string(kEnoughFiles) + ")");
   throw NoProcess(std::string("cannot start a process: ") + std::strerror(code) +
-              (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
+                  (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
 }
 
 /// An open file that closes itself, with a number that no descriptor of the worker has.
@@ -128,8 +128,8 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   return process;
 }
 
-/// With what it has started itself, which is in its group unless it has left it. To be called before the process is waited for:
-/// until then the group's number is no other's.
+/// With what it has started itself, which is in its group unless it has left it. To be called before the process is
+/// waited for: until then the group's number is no other's.
 void kill_group(pid_t process) {
   kill(process, SIGKILL);
   kill(-process, SIGKILL);
@@ -229,7 +229,8 @@ WorkerEnd Worker::died() {
   int status = 0;
   siginfo_t gone{};
   // Its answers have ended; where the process itself has not, it is of no use.
-  for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0; ++i)
+  for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0;
+       ++i)
     usleep(10'000);
   kill_group(process_);
   waitpid(process_, &status, 0);

@@ -29,7 +29,8 @@ std::atomic<WorkerReports*> current_reports{nullptr};
 /// What it made; kept until the process ends, since it is read from where it lies.
 std::vector<Value> made;
 
-/// Beyond it, memory cannot be had and the process is ended. A library's own use up to here is not counted as the call's time.
+/// Beyond it, memory cannot be had and the process is ended. A library's own use up to here is not counted as the
+/// call's time.
 void set_limits(double memory_mb, double processor_s) {
   const auto set = [](auto what, double most) {
     rlimit limit{};
@@ -50,13 +51,19 @@ void set_limits(double memory_mb, double processor_s) {
 
 OptionValue option_value(const json& value, OptionType type) {
   switch (type) {
-    case OptionType::boolean: return value.get<bool>();
-    case OptionType::integer: return value.get<std::int64_t>();
-    case OptionType::number: return value.get<double>();
+    case OptionType::boolean:
+      return value.get<bool>();
+    case OptionType::integer:
+      return value.get<std::int64_t>();
+    case OptionType::number:
+      return value.get<double>();
     case OptionType::text:
-    case OptionType::path: return bytes_of_json(value);
-    case OptionType::numbers: return value.get<std::vector<double>>();
-    default: break;
+    case OptionType::path:
+      return bytes_of_json(value);
+    case OptionType::numbers:
+      return value.get<std::vector<double>>();
+    default:
+      break;
   }
   std::vector<std::string> texts;
   for (const json& text : value) texts.push_back(bytes_of_json(text));
@@ -75,7 +82,8 @@ std::shared_ptr<void> options_of(const NodeDefinition& node, const json& options
     throw Error("the library has other options than a moment ago; run it again");
   for (std::size_t i = 0; i < options.size(); ++i) {
     const OptionInfo& info = node.info.options[i];
-    if (options[i].at("name") != info.name) throw Error("the library has other options than a moment ago; run it again");
+    if (options[i].at("name") != info.name)
+      throw Error("the library has other options than a moment ago; run it again");
     node.set_option[i](result.get(), option_value(options[i].at("value"), info.type));
   }
   return result;
@@ -105,7 +113,8 @@ json answer_call(const json& request, WorkerReports& reports) {
   const std::unique_ptr<Plugin> plugin = load_library(library);
   const NodeDefinition& node = find_node(*plugin, request.at("node"));
   const std::shared_ptr<void> options = options_of(node, request.at("options"));
-  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism, request.at("threads").get<std::size_t>());
+  const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
+                                    request.at("threads").get<std::size_t>());
   cv::setNumThreads(1);
   std::vector<Value> inputs;
   if (request.at("has_inputs")) {
@@ -115,7 +124,8 @@ json answer_call(const json& request, WorkerReports& reports) {
       return nullptr;
     });
   }
-  if (inputs.size() != node.info.inputs.size()) throw Error("the library has other inputs than a moment ago; run it again");
+  if (inputs.size() != node.info.inputs.size())
+    throw Error("the library has other inputs than a moment ago; run it again");
   set_limits(request.at("memory_mb"), request.at("processor_s"));
   current_reports = &reports;
   Context context(hooks_of(request, reports));
@@ -126,7 +136,8 @@ json answer_call(const json& request, WorkerReports& reports) {
 }
 
 json answer_share(const json&, WorkerReports&) {
-  if (ftruncate(kMadeDescriptor, 0) != 0 || lseek(kMadeDescriptor, 0, SEEK_SET) != 0) throw Error("cannot share its memory");
+  if (ftruncate(kMadeDescriptor, 0) != 0 || lseek(kMadeDescriptor, 0, SEEK_SET) != 0)
+    throw Error("cannot share its memory");
   write_values(kMadeDescriptor, made, false);
   return made.size();
 }

@@ -8,7 +8,8 @@
 
 int main() {
   try {
-    return marrow::serve_worker({{"call", marrow::answer_call}, {"share", marrow::answer_share}, {"describe", marrow::answer_describe}});
+    return marrow::serve_worker(
+        {{"call", marrow::answer_call}, {"share", marrow::answer_share}, {"describe", marrow::answer_describe}});
   } catch (const std::exception& error) {
     std::fprintf(stderr, "marrow-worker: error: %s\n", error.what());
     return 2;

@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// The folder that this process works in, from which all relative paths count. A library of a plugin may go elsewhere: then
-/// inputs would be read and results be written where nobody asked for it. Safe to use from several threads.
+/// The folder that this process works in, from which all relative paths count. A library of a plugin may go elsewhere:
+/// then inputs would be read and results be written where nobody asked for it. Safe to use from several threads.
 class WorkingFolder {
  public:
   WorkingFolder();

@@ -15,9 +15,7 @@ namespace {
 constexpr std::size_t kMostLevels = 100;
 constexpr std::size_t kMostRepeated = 100'000;  // values, by aliases
 
-[[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) {
-  throw YAML::Exception(mark, why);
-}
+[[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
 
 /// Counts values and levels as they would be with every alias written out.
 class Survey : public YAML::EventHandler {

@@ -6,8 +6,8 @@
 
 #include "correspondence.hpp"
 #include "plugins/render/canvas.hpp"
-#include "plugins/write/yaml_text.hpp"
 #include "plugins/write/atomic_write.hpp"
+#include "plugins/write/yaml_text.hpp"
 
 namespace {
 
@@ -41,7 +41,8 @@ struct Outliers {
 };
 
 /// Takes out the beads that lie too many deviations of the others off. True when there were any.
-bool take_outliers(std::vector<ViewPoints>& views, const CalibrationResult& fit, double deviations, Outliers& outliers) {
+bool take_outliers(std::vector<ViewPoints>& views, const CalibrationResult& fit, double deviations,
+                   Outliers& outliers) {
   std::vector<double> sizes;
   for (const auto& view : fit.views)
     for (const auto& residual : view.residuals_px) sizes.push_back(residual.norm());
@@ -113,10 +114,12 @@ Metrics report_of(const CalibrationResult& fit, const Outliers& outliers) {
 }
 
 Metrics pose_report(const camera::CalibratedView& view) {
-  Metrics report{{{"beads", double(view.residuals_px.size()), ""}, {"residual", root_mean_square(view.residuals_px), "px"}}};
+  Metrics report{
+      {{"beads", double(view.residuals_px.size()), ""}, {"residual", root_mean_square(view.residuals_px), "px"}}};
   const char* directions[] = {"x", "y", "z"};
   for (int i = 0; i < 3; ++i)
-    report.items.push_back({std::string("rotation_") + directions[i] + "_deviation", degrees(view.deviation[i]), "deg"});
+    report.items.push_back(
+        {std::string("rotation_") + directions[i] + "_deviation", degrees(view.deviation[i]), "deg"});
   for (int i = 0; i < 3; ++i)
     report.items.push_back({std::string("translation_") + directions[i] + "_deviation", view.deviation[3 + i], "mm"});
   return report;
@@ -145,12 +148,14 @@ Picture picture_of(const Image& image, const ViewPoints& points, const camera::C
 void check_images(const List<Image>& images) {
   if (images.size() < 3)
     throw Error(std::to_string(images.size()) +
-                " images of the board are given; at least 3 are needed, and 8 are better, with the board tilted differently in each");
+                " images of the board are given; at least 3 are needed, and 8 are better, with the board tilted "
+                "differently in each");
   for (std::size_t i = 1; i < images.size(); ++i)
     if (images[i].pixels.size() != images[0].pixels.size())
       throw Error("image '" + images.name(i) + "' has " + std::to_string(images[i].width()) + " x " +
-                  std::to_string(images[i].height()) + " pixels, '" + images.name(0) + "' " + std::to_string(images[0].width()) +
-                  " x " + std::to_string(images[0].height()) + "; one calibration is for one size");
+                  std::to_string(images[i].height()) + " pixels, '" + images.name(0) + "' " +
+                  std::to_string(images[0].width()) + " x " + std::to_string(images[0].height()) +
+                  "; one calibration is for one size");
 }
 
 BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& options, Context& context) {
@@ -183,40 +188,45 @@ std::string list_of(const std::array<double, 3>& values) {
 }
 
 void write_calibration(const read::Calibration& c, const std::string& path) {
-  write::write_text(path, "marrow-calibration: 1\nwidth_px: " + std::to_string(c.width_px) + "\nheight_px: " +
-                              std::to_string(c.height_px) + "\nintrinsics:\n" + write::matrix(c.intrinsics, "  ") +
-                              "radial_distortion: " + list_of(c.distortion.k) +
-                              "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
-                              "deviation:  # one standard deviation\n  focal_px: " + write::vector(c.focal_deviation_px) +
-                              "\n  principal_px: " + write::vector(c.principal_deviation_px) +
-                              "\n  radial_distortion: " + list_of(c.distortion_deviation) +
-                              "\nresidual_px: " + write::number(c.residual_px) + "\n");
+  write::write_text(
+      path,
+      "marrow-calibration: 1\nwidth_px: " + std::to_string(c.width_px) + "\nheight_px: " + std::to_string(c.height_px) +
+          "\nintrinsics:\n" + write::matrix(c.intrinsics, "  ") + "radial_distortion: " + list_of(c.distortion.k) +
+          "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
+          "deviation:  # one standard deviation\n  focal_px: " +
+          write::vector(c.focal_deviation_px) + "\n  principal_px: " + write::vector(c.principal_deviation_px) +
+          "\n  radial_distortion: " + list_of(c.distortion_deviation) +
+          "\nresidual_px: " + write::number(c.residual_px) + "\n");
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.bead_board", bead_board)
-      .summary("Calibration from images of a board with beads on both sides (Tsai 1987), with radial distortion and uncertainties")
+      .summary(
+          "Calibration from images of a board with beads on both sides (Tsai 1987), with radial distortion and "
+          "uncertainties")
       .in("images", "images of the board as taken, in at least 3 poses", over("view"))
-      .out("camera", &BeadBoardResult::cameras, "geometry of each view without distortion; the board's frame is the world",
-           over("view"))
+      .out("camera", &BeadBoardResult::cameras,
+           "geometry of each view without distortion; the board's frame is the world", over("view"))
       .out("calibration", &BeadBoardResult::calibration, "camera matrix and distortion of the device, with deviations")
-      .out("report", &BeadBoardResult::report, "camera matrix and distortion with standard deviations, and the residuals")
-      .out("poses", &BeadBoardResult::poses, "per view: beads, residual, and standard deviations of the camera's pose, in its own axes", over("view"))
+      .out("report", &BeadBoardResult::report,
+           "camera matrix and distortion with standard deviations, and the residuals")
+      .out("poses", &BeadBoardResult::poses,
+           "per view: beads, residual, and standard deviations of the camera's pose, in its own axes", over("view"))
       .out("picture", &BeadBoardResult::pictures, "the beads that were found and how far each is off", over("view"))
       .option("board", &BeadBoardOptions::board, "the board's beads (YAML, docs/case.md)", required())
-      .option("radial_terms", &BeadBoardOptions::radial_terms, "terms of the radial distortion: r^2, r^4, r^6", at_least(0),
-              at_most(3))
+      .option("radial_terms", &BeadBoardOptions::radial_terms, "terms of the radial distortion: r^2, r^4, r^6",
+              at_least(0), at_most(3))
       .option("square_pixels", &BeadBoardOptions::square_pixels, "one focal length for both directions")
       .option("largest_bead_px", &BeadBoardOptions::largest_bead_px,
               "diameter of the largest bead in the images; 0: a sixteenth of their width", at_least(0))
-      .option("least_contrast", &BeadBoardOptions::least_contrast, "darkness of the faintest bead, as a fraction of the darkest",
-              at_least(0.01), at_most(1), unit("1"))
+      .option("least_contrast", &BeadBoardOptions::least_contrast,
+              "darkness of the faintest bead, as a fraction of the darkest", at_least(0.01), at_most(1), unit("1"))
       .option("outlier_deviations", &BeadBoardOptions::outlier_deviations,
               "beads farther off than this many standard deviations are left out", at_least(3), unit("1"))
-      .option("residual_scale", &BeadBoardOptions::residual_scale, "how many times longer residuals are drawn", at_least(1),
-              unit("1"))
+      .option("residual_scale", &BeadBoardOptions::residual_scale, "how many times longer residuals are drawn",
+              at_least(1), unit("1"))
       .option("size_px", &BeadBoardOptions::size_px, "longer side of the pictures", at_least(100), at_most(4096));
   plugin.writer<read::Calibration>(".yaml", write_calibration, "camera matrix and distortion with their deviations");
 }

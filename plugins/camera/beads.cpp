@@ -11,7 +11,7 @@
 namespace marrow::camera {
 namespace {
 
-constexpr double kNoiseFactor = 6;      ///< what is this many deviations of the noise darker may be a bead
+constexpr double kNoiseFactor = 6;       ///< what is this many deviations of the noise darker may be a bead
 constexpr double kLeastRoundness = 0.8;  ///< shorter by longer axis
 constexpr double kLeastArea_px = 12;
 
@@ -64,9 +64,11 @@ Blob blob_at_half_peak(const cv::Mat1f& darkness, const cv::Mat1i& labels, int l
   return blob;
 }
 
-/// A full ellipse has the area 4 pi sqrt(det) of its second moments; two beads that merge, a ring or a corner have less.
+/// A full ellipse has the area 4 pi sqrt(det) of its second moments; two beads that merge, a ring or a corner have
+/// less.
 bool is_round(const Blob& blob) {
-  const Eigen::Vector2d axes = Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(blob.spread, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector2d axes =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(blob.spread, Eigen::EigenvaluesOnly).eigenvalues();
   const double filled = blob.area / (4 * 3.14159265358979 * std::sqrt(axes[0] * axes[1]));
   return axes[0] > kLeastRoundness * kLeastRoundness * axes[1] && filled > 0.9 && filled < 1.1;
 }
@@ -77,14 +79,17 @@ class Background {
   Background(const cv::Mat1f& image, const Eigen::Vector2d& centre, double inner, double outer) {
     std::vector<Eigen::Vector3d> samples;
     for (int v = std::max(0, int(centre.y() - outer)); v <= std::min(image.rows - 1, int(centre.y() + outer) + 1); ++v)
-      for (int u = std::max(0, int(centre.x() - outer)); u <= std::min(image.cols - 1, int(centre.x() + outer) + 1); ++u) {
+      for (int u = std::max(0, int(centre.x() - outer)); u <= std::min(image.cols - 1, int(centre.x() + outer) + 1);
+           ++u) {
         const double distance = std::hypot(u - centre.x(), v - centre.y());
         if (distance > inner && distance < outer) samples.emplace_back(u - centre.x(), v - centre.y(), image(v, u));
       }
     centre_ = centre;
     for (int round = 0; round < 4; ++round) fit(samples);
   }
-  double at(double u, double v) const { return plane_[0] + plane_[1] * (u - centre_.x()) + plane_[2] * (v - centre_.y()); }
+  double at(double u, double v) const {
+    return plane_[0] + plane_[1] * (u - centre_.x()) + plane_[2] * (v - centre_.y());
+  }
 
  private:
   void fit(std::vector<Eigen::Vector3d>& samples) {
@@ -116,8 +121,10 @@ Eigen::Vector2d refined_centre(const cv::Mat1f& image, Eigen::Vector2d centre, d
   for (int round = 0; round < 5; ++round) {
     const Background background(image, centre, window, window + 4);
     Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    for (int v = std::max(0, int(centre.y() - window)); v <= std::min(image.rows - 1, int(centre.y() + window) + 1); ++v)
-      for (int u = std::max(0, int(centre.x() - window)); u <= std::min(image.cols - 1, int(centre.x() + window) + 1); ++u) {
+    for (int v = std::max(0, int(centre.y() - window)); v <= std::min(image.rows - 1, int(centre.y() + window) + 1);
+         ++v)
+      for (int u = std::max(0, int(centre.x() - window)); u <= std::min(image.cols - 1, int(centre.x() + window) + 1);
+           ++u) {
         // Weights fall off over the last pixel, so that the window's edge does not jump over whole pixels.
         const double weight = std::clamp(window - std::hypot(u - centre.x(), v - centre.y()), 0.0, 1.0);
         if (weight > 0) sum += weight * (background.at(u, v) - image(v, u)) * Eigen::Vector3d(u, v, 1);
@@ -135,7 +142,8 @@ Eigen::Vector2d refined_centre(const cv::Mat1f& image, Eigen::Vector2d centre, d
 }  // namespace
 
 std::vector<BeadImage> find_beads(const Image& image, const BeadSearch& search) {
-  if (image.pixels.empty() || image.pixels.channels() != 1) throw Error("the image is empty or has colours; an X-ray has one channel");
+  if (image.pixels.empty() || image.pixels.channels() != 1)
+    throw Error("the image is empty or has colours; an X-ray has one channel");
   cv::Mat1f grey;
   image.pixels.convertTo(grey, CV_32F);
   const double largest = search.largest_px > 0 ? search.largest_px : image.width() / 16.0;
@@ -156,7 +164,8 @@ std::vector<BeadImage> find_beads(const Image& image, const BeadSearch& search) 
     const double diameter = 2 * std::sqrt(blob.area / 3.14159265358979);
     beads.push_back({refined_centre(grey, blob.centre, diameter), diameter, blob.peak});
   }
-  std::stable_sort(beads.begin(), beads.end(), [](const BeadImage& a, const BeadImage& b) { return a.diameter_px > b.diameter_px; });
+  std::stable_sort(beads.begin(), beads.end(),
+                   [](const BeadImage& a, const BeadImage& b) { return a.diameter_px > b.diameter_px; });
   return beads;
 }
 

@@ -15,9 +15,9 @@ namespace {
 using read::YamlFile;
 using read::YamlMap;
 
-constexpr double kFlat_mm = 1;               ///< how far the beads of a side may lie out of its plane
-constexpr double kLeastThickness_mm = 10;    ///< between the sides: without depth there is no focal length
-constexpr double kLandmarkRatio = 1.3;       ///< landmarks are this much larger than the other beads
+constexpr double kFlat_mm = 1;             ///< how far the beads of a side may lie out of its plane
+constexpr double kLeastThickness_mm = 10;  ///< between the sides: without depth there is no focal length
+constexpr double kLandmarkRatio = 1.3;     ///< landmarks are this much larger than the other beads
 constexpr std::size_t kMostBeads = 1000;
 
 std::string millimetres(double length) {
@@ -51,7 +51,8 @@ void add_beads(const YamlMap& side, const std::string& key, int index, Board& bo
   const YamlMap group(side.file(), *node, side.what() + ": " + key, {"diameter_mm", "at_mm"});
   const auto diameter = group.number("diameter_mm");
   if (diameter && !(*diameter > 0 && *diameter < 100))
-    group.fault("diameter_mm", "diameter_mm: expected a length above 0 and below 100 mm, got " + std::to_string(*diameter));
+    group.fault("diameter_mm",
+                "diameter_mm: expected a length above 0 and below 100 mm, got " + std::to_string(*diameter));
   for (const Eigen::Vector3d& point : group.points("at_mm"))
     board.beads.push_back({point, diameter.value_or(0), index, key == "landmarks"});
 }
@@ -62,14 +63,15 @@ void check_side(const Board& board, int side, const std::string& what) {
     throw Error(what + ": has " + std::to_string(landmarks.size()) +
                 " landmarks; a side is found in an image by at least 4, so make 4 of its beads larger than the others");
   if (landmarks.size() > 8)
-    throw Error(what + ": has " + std::to_string(landmarks.size()) + " landmarks; 4 to 8 are enough, list the rest as beads");
+    throw Error(what + ": has " + std::to_string(landmarks.size()) +
+                " landmarks; 4 to 8 are enough, list the rest as beads");
   if (all.size() < 8) throw Error(what + ": has " + std::to_string(all.size()) + " beads; at least 8 are needed");
   const Flat plane = flat_of(board, side);
   for (int i : all) {
     const double height = std::abs(plane.normal.dot(board.beads[std::size_t(i)].centre_mm - plane.centre));
     if (height > kFlat_mm)
-      throw Error(what + ": bead " + std::to_string(i + 1) + " lies " + millimetres(height) + " out of the side's plane, at most " +
-                  millimetres(kFlat_mm) + " expected; check its coordinates");
+      throw Error(what + ": bead " + std::to_string(i + 1) + " lies " + millimetres(height) +
+                  " out of the side's plane, at most " + millimetres(kFlat_mm) + " expected; check its coordinates");
   }
 }
 
@@ -100,9 +102,11 @@ void check_sides(const Board& board, const std::string& what) {
   for (int side : {0, 1})
     if (can_be_mistaken(board, side, side))
       throw Error(what + ": side '" + board.sides[std::size_t(side)] +
-                  "' looks the same when it is turned or mirrored, so its beads cannot be told apart; move one of its landmarks");
+                  "' looks the same when it is turned or mirrored, so its beads cannot be told apart; move one of its "
+                  "landmarks");
   if (can_be_mistaken(board, 0, 1) || can_be_mistaken(board, 1, 0))
-    throw Error(what + ": the two sides look the same, so they cannot be told apart; place the landmarks of one differently");
+    throw Error(what +
+                ": the two sides look the same, so they cannot be told apart; place the landmarks of one differently");
 }
 
 }  // namespace
@@ -143,7 +147,8 @@ Board read_board_file(const std::filesystem::path& path) {
   }
   file.finish();
   if (board.beads.size() > kMostBeads)
-    throw Error(path.string() + ": has " + std::to_string(board.beads.size()) + " beads; at most 1000 can be told apart");
+    throw Error(path.string() + ": has " + std::to_string(board.beads.size()) +
+                " beads; at most 1000 can be told apart");
   for (int side : {0, 1}) check_side(board, side, path.string() + ": side '" + board.sides[std::size_t(side)] + "'");
   check_sizes_and_places(board, path.string());
   check_sides(board, path.string());

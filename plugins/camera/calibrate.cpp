@@ -18,8 +18,9 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   return svd.matrixU() * svd.matrixV().transpose();
 }
 
-/// The first two rows of [R|t] up to a common factor, from the radial alignment constraint: whatever the focal length, the
-/// distance and the radial distortion, a point is seen in the direction (r_1 X + t_x, r_2 X + t_y) from the principal point.
+/// The first two rows of [R|t] up to a common factor, from the radial alignment constraint: whatever the focal length,
+/// the distance and the radial distortion, a point is seen in the direction (r_1 X + t_x, r_2 X + t_y) from the
+/// principal point.
 std::optional<Eigen::Matrix<double, 2, 4>> aligned_rows(const std::vector<Eigen::Vector4d>& points,
                                                         const std::vector<Eigen::Vector2d>& seen) {
   Eigen::MatrixXd system(points.size(), 8);
@@ -87,12 +88,14 @@ std::optional<ClosedForm> closed_form_camera(const ViewPoints& view, const Eigen
 Eigen::Vector2d seen_at(const read::Calibration& calibration, const RigidTransform& camera_from_world,
                         const Eigen::Vector3d& board_mm) {
   const Eigen::Vector3d x = camera_from_world * board_mm;
-  return read::distorted_pixel(calibration.intrinsics, calibration.distortion, (calibration.intrinsics * x).hnormalized());
+  return read::distorted_pixel(calibration.intrinsics, calibration.distortion,
+                               (calibration.intrinsics * x).hnormalized());
 }
 
 namespace {
 
-/// Derivatives of where a point is seen by f_u, f_v, u_0, v_0, k_1..k_3 and by a small rotation and translation of the camera.
+/// Derivatives of where a point is seen by f_u, f_v, u_0, v_0, k_1..k_3 and by a small rotation and translation of the
+/// camera.
 Eigen::Matrix<double, 2, 13> derivatives(const read::Calibration& calibration, const RigidTransform& pose,
                                          const Eigen::Vector3d& board_mm) {
   const Eigen::Vector3d turned = pose.rotation * board_mm, x = turned + pose.translation_mm;
@@ -126,8 +129,9 @@ std::vector<int> free_columns(const CalibrationModel& model) {
   return columns;
 }
 
-/// Fills in residuals and, from the derivatives at the minimum and the size of the residuals, one standard deviation of each
-/// parameter. The poses of the views meet only in the inner parameters, so each is eliminated by itself (Schur complement).
+/// Fills in residuals and, from the derivatives at the minimum and the size of the residuals, one standard deviation of
+/// each parameter. The poses of the views meet only in the inner parameters, so each is eliminated by itself (Schur
+/// complement).
 void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel& model, CalibrationResult& result) {
   const std::vector<int> columns = free_columns(model);
   const Eigen::Index inner = Eigen::Index(columns.size());
@@ -179,12 +183,15 @@ double starting_focal_px(const std::vector<ViewPoints>& views, const Eigen::Vect
     const auto start = closed_form_camera(view, middle_px);
     if (start && start->is_mirrored)
       throw Error("view '" + view.name +
-                  "': only a mirrored image explains where the beads are seen; mirror the images left to right, or check that the "
+                  "': only a mirrored image explains where the beads are seen; mirror the images left to right, or "
+                  "check that the "
                   "board's file has a right-handed frame");
     if (start) focals.push_back(start->focal_px);
   }
   if (focals.empty())
-    throw Error("the beads that are seen do not determine a camera: at least 8 of them, on both sides of the board, are needed in a view");
+    throw Error(
+        "the beads that are seen do not determine a camera: at least 8 of them, on both sides of the board, are needed "
+        "in a view");
   std::nth_element(focals.begin(), focals.begin() + std::ptrdiff_t(focals.size() / 2), focals.end());
   return focals[focals.size() / 2];
 }
@@ -201,7 +208,8 @@ int solver_flags(const CalibrationModel& model) {
 
 }  // namespace
 
-CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, int height_px, const CalibrationModel& model) {
+CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, int height_px,
+                            const CalibrationModel& model) {
   const Eigen::Vector2d middle((width_px - 1) / 2.0, (height_px - 1) / 2.0);
   const double focal = starting_focal_px(views, middle);
   std::vector<std::vector<cv::Point3f>> points(views.size());
@@ -220,7 +228,8 @@ CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, 
     cv::calibrateCamera(points, pixels, {width_px, height_px}, matrix, distortion, turns, shifts, solver_flags(model),
                         {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 200, 1e-12});
   } catch (const cv::Exception& failure) {
-    throw Error("the beads that are seen do not determine a camera (" + failure.err + "); take views with the board filling the image, tilted "
+    throw Error("the beads that are seen do not determine a camera (" + failure.err +
+                "); take views with the board filling the image, tilted "
                 "differently each time");
   }
   CalibrationResult result;

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Calibration from views of a board whose points are known (Tsai, IEEE J. Robotics and Automation 1987): a closed-form start that
-// does not depend on the radial distortion, then the reprojection error minimised over all views and parameters.
+// Calibration from views of a board whose points are known (Tsai, IEEE J. Robotics and Automation 1987): a closed-form
+// start that does not depend on the radial distortion, then the reprojection error minimised over all views and
+// parameters.
 #include <Eigen/Core>
 #include <optional>
 #include <string>
@@ -28,7 +29,8 @@ struct CalibrationModel {
 
 struct CalibratedView {
   RigidTransform camera_from_world{"camera", "world"};  ///< the board is the world
-  /// One standard deviation of a small rotation [rad] and translation [mm] of the camera's frame, about and along its axes.
+  /// One standard deviation of a small rotation [rad] and translation [mm] of the camera's frame, about and along its
+  /// axes.
   Vector6d deviation = Vector6d::Zero();
   std::vector<Eigen::Vector2d> residuals_px;  ///< seen minus predicted
 };
@@ -38,8 +40,8 @@ struct CalibrationResult {
   std::vector<CalibratedView> views;
 };
 
-/// A camera by Tsai's closed form from one view of points that do not lie in one plane, the principal point taken to be the
-/// middle of the image. No value where the points do not determine it.
+/// A camera by Tsai's closed form from one view of points that do not lie in one plane, the principal point taken to be
+/// the middle of the image. No value where the points do not determine it.
 struct ClosedForm {
   double focal_px = 0;
   bool is_mirrored = false;  ///< only a mirrored image explains the points; the pose is then of no use
@@ -48,7 +50,8 @@ struct ClosedForm {
 std::optional<ClosedForm> closed_form_camera(const ViewPoints& view, const Eigen::Vector2d& middle_px);
 
 /// Throws Error where the points do not determine the parameters or the image is mirrored.
-CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, int height_px, const CalibrationModel& model);
+CalibrationResult calibrate(const std::vector<ViewPoints>& views, int width_px, int height_px,
+                            const CalibrationModel& model);
 
 /// Where a board point is seen in the image as taken, by a camera in this pose.
 Eigen::Vector2d seen_at(const read::Calibration& calibration, const RigidTransform& camera_from_world,

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Are the cameras right? A known object is drawn into the images, and where its points are seen is compared with where they
-// should be.
+// Are the cameras right? A known object is drawn into the images, and where its points are seen is compared with where
+// they should be.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -56,7 +56,8 @@ void check_names(const std::vector<KnownPoint>& points, const List<View>& views)
       if (!views.find(name)) {
         std::string known;
         for (const std::string& other : views.names()) known += (known.empty() ? "'" : ", '") + other + "'";
-        throw Error("point '" + point.name + "' is seen in '" + name + "', but there is no view of that name; there are " + known);
+        throw Error("point '" + point.name + "' is seen in '" + name +
+                    "', but there is no view of that name; there are " + known);
       }
 }
 
@@ -84,9 +85,11 @@ InView points_in(const View& view, const std::vector<KnownPoint>& points, const 
 /// Edges between triangles that face the source and triangles that do not, and the edges of holes.
 std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> outline_edges(const Mesh& mesh, const Camera& camera) {
   const Eigen::Vector3d source = source_position_mm(camera);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;  // 1: seen from the front, 2: from behind, 4: more than once
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int>
+      sides;  // 1: seen from the front, 2: from behind, 4: more than once
   for (const auto& triangle : mesh.triangles) {
-    const Eigen::Vector3d &a = mesh.vertices_mm[triangle[0]], &b = mesh.vertices_mm[triangle[1]], &c = mesh.vertices_mm[triangle[2]];
+    const Eigen::Vector3d &a = mesh.vertices_mm[triangle[0]], &b = mesh.vertices_mm[triangle[1]],
+                          &c = mesh.vertices_mm[triangle[2]];
     const int side = (b - a).cross(c - a).dot(source - a) > 0 ? 1 : 2;
     for (int k = 0; k < 3; ++k) {
       const auto [low, high] = std::minmax(triangle[std::size_t(k)], triangle[std::size_t((k + 1) % 3)]);
@@ -100,14 +103,16 @@ std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> outline_edges(const Mes
   return edges;
 }
 
-Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const std::string& verdict, const Options& options) {
+Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const std::string& verdict,
+             const Options& options) {
   using namespace render;
   Panel panel = make_panel(view, whole_image(view), options.size_px, Contrast::local);
   std::vector<LegendItem> legend;
   if (mesh) {
     for (const auto& [from, to] : outline_edges(*mesh, view.camera)) {
       const Eigen::Vector2d a = project(view.camera, from), b = project(view.camera, to);
-      if (a.allFinite() && b.allFinite()) draw_line(panel.pixels, panel.at(a.x(), a.y()), panel.at(b.x(), b.y()), kSkyBlue);
+      if (a.allFinite() && b.allFinite())
+        draw_line(panel.pixels, panel.at(a.x(), a.y()), panel.at(b.x(), b.y()), kSkyBlue);
     }
     legend.push_back({"object", kSkyBlue});
   }
@@ -138,7 +143,8 @@ std::string text(double value) {
 }
 
 /// What is to be said of one view, the likeliest first.
-std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options, double error) {
+std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options,
+                                     double error) {
   std::vector<Eigen::Vector3d> object = points.known.world_mm;
   if (mesh) object.insert(object.end(), mesh->vertices_mm.begin(), mesh->vertices_mm.end());
   std::vector<std::string> warnings;
@@ -150,14 +156,17 @@ std::vector<std::string> warnings_of(const View& view, const InView& points, con
   if (mistake || points.all.pixels.empty() || error <= options.warn_above_px) return warnings;
   const auto refit = camera::refit_pose(view.camera, points.known);
   if (refit && refit->error_px < error / 3)
-    warnings.push_back("the points are " + text(error) + " px off, but only " + text(refit->error_px) + " px if the camera is turned by " +
-                       text(refit->turn_deg) + " degrees and moved by " + text(refit->shift_mm) +
+    warnings.push_back("the points are " + text(error) + " px off, but only " + text(refit->error_px) +
+                       " px if the camera is turned by " + text(refit->turn_deg) + " degrees and moved by " +
+                       text(refit->shift_mm) +
                        " mm: its inner parameters are right, its pose is not, or the object has moved");
   else
     warnings.push_back("the points are " + text(error) + " px off" +
-                       (refit ? ", and still " + text(refit->error_px) + " px with the best pose: focal length, principal point, distortion or the "
-                                "points themselves are wrong"
-                              : std::string(", more than the ") + text(options.warn_above_px) + " px of warn_above_px"));
+                       (refit
+                            ? ", and still " + text(refit->error_px) +
+                                  " px with the best pose: focal length, principal point, distortion or the "
+                                  "points themselves are wrong"
+                            : std::string(", more than the ") + text(options.warn_above_px) + " px of warn_above_px"));
   return warnings;
 }
 
@@ -182,11 +191,13 @@ void add_metrics(const View& view, const InView& points, double error, Metrics& 
 void check_directions(const List<View>& views, Context& context, int& warnings) {
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) {
-      const auto axis = [&](std::size_t n) { return Eigen::Vector3d(views[n].camera.camera_from_world.rotation.row(2)); };
+      const auto axis = [&](std::size_t n) {
+        return Eigen::Vector3d(views[n].camera.camera_from_world.rotation.row(2));
+      };
       const double angle = degrees(std::acos(std::min(1.0, std::abs(axis(i).dot(axis(k))))));
       if (angle > 10) continue;
-      context.warn("views '" + views.name(k) + "' and '" + views.name(i) + "' look along nearly the same line (" + text(angle) +
-                   " degrees apart); is one camera given twice?");
+      context.warn("views '" + views.name(k) + "' and '" + views.name(i) + "' look along nearly the same line (" +
+                   text(angle) + " degrees apart); is one camera given twice?");
       ++warnings;
     }
 }
@@ -210,10 +221,12 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
     for (const std::string& sentence : sentences) context.warn("view '" + view.name + "': " + sentence);
     warnings += int(sentences.size());
     const std::string verdict = seen.all.pixels.empty() ? "" : ": " + text(error) + " px";
-    checked.pictures.add(view.name, draw(view, seen.all, mesh, verdict + (sentences.empty() ? "" : ", see warnings"), options));
+    checked.pictures.add(view.name,
+                         draw(view, seen.all, mesh, verdict + (sentences.empty() ? "" : ", see warnings"), options));
   }
   check_directions(views, context, warnings);
-  if (count > 0) checked.metrics.items.insert(checked.metrics.items.begin(), {"error", std::sqrt(squares / count), "px"});
+  if (count > 0)
+    checked.metrics.items.insert(checked.metrics.items.begin(), {"error", std::sqrt(squares / count), "px"});
   checked.metrics.items.push_back({"warnings", double(warnings), ""});
   return checked;
 }
@@ -222,16 +235,22 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.check", check)
-      .summary("Draws a known object into the images, measures the reprojection error and says in words what is wrong with a camera")
+      .summary(
+          "Draws a known object into the images, measures the reprojection error and says in words what is wrong with "
+          "a camera")
       .in("views", "images with the cameras to check", over("view"))
       .in("mesh", "surface of a known object in world coordinates, to draw")
       .out("metrics", &Checked::metrics, "reprojection errors, and the number of warnings")
       .out("picture", &Checked::pictures, "the image with what is seen and what is expected", over("view"))
       .option("points", &Options::points, "points of a known object and where they are seen (YAML, docs/case.md)")
       .option("warn_above_px", &Options::warn_above_px, "reprojection error that is warned of", at_least(0))
-      .option("source_to_detector_mm", &Options::source_to_detector_mm, "of the device, to compare with; 0 = not known", at_least(0))
-      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, to compare with; 0 = not known", at_least(0))
-      .option("detector_mm", &Options::detector_mm, "longer side of the detector, to compare with; 0 = not known", at_least(0))
-      .option("residual_scale", &Options::residual_scale, "how many times longer differences are drawn", at_least(1), unit("1"))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm, "of the device, to compare with; 0 = not known",
+              at_least(0))
+      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, to compare with; 0 = not known",
+              at_least(0))
+      .option("detector_mm", &Options::detector_mm, "longer side of the detector, to compare with; 0 = not known",
+              at_least(0))
+      .option("residual_scale", &Options::residual_scale, "how many times longer differences are drawn", at_least(1),
+              unit("1"))
       .option("size_px", &Options::size_px, "longer side of the pictures", at_least(100), at_most(4096));
 }

@@ -15,11 +15,12 @@
 namespace marrow::camera {
 namespace {
 
-constexpr double kLeastFound = 0.6;      ///< of a side's beads that lie in the image, beside the four that make the map
-constexpr std::size_t kLeastBeads = 8;   ///< found per side
-constexpr std::size_t kSurelyFound = 12; ///< more are never hit by chance where most of the side's beads are
-constexpr double kReach = 0.02;          ///< of the image's width: how far the distortion may move a bead off the projective map
-constexpr double kReachOfCamera = 0.006; ///< the same once a camera with distortion is fitted
+constexpr double kLeastFound = 0.6;     ///< of a side's beads that lie in the image, beside the four that make the map
+constexpr std::size_t kLeastBeads = 8;  ///< found per side
+constexpr std::size_t kSurelyFound = 12;  ///< more are never hit by chance where most of the side's beads are
+constexpr double kReach =
+    0.02;  ///< of the image's width: how far the distortion may move a bead off the projective map
+constexpr double kReachOfCamera = 0.006;  ///< the same once a camera with distortion is fitted
 
 using Points = std::vector<Eigen::Vector2d>;
 
@@ -32,9 +33,11 @@ double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Which way the four triangles of four points run: a projective map of a plane in front of the source keeps or reverses all.
+/// Which way the four triangles of four points run: a projective map of a plane in front of the source keeps or
+/// reverses all.
 std::array<bool, 4> turns_of(const std::array<Eigen::Vector2d, 4>& p) {
-  return {turn(p[0], p[1], p[2]) > 0, turn(p[0], p[1], p[3]) > 0, turn(p[0], p[2], p[3]) > 0, turn(p[1], p[2], p[3]) > 0};
+  return {turn(p[0], p[1], p[2]) > 0, turn(p[0], p[1], p[3]) > 0, turn(p[0], p[2], p[3]) > 0,
+          turn(p[1], p[2], p[3]) > 0};
 }
 
 /// True when no three of the four lie nearly on a line.
@@ -48,9 +51,7 @@ bool in_general_position(const std::array<Eigen::Vector2d, 4>& p) {
 }
 
 /// The four beads that make a map are hit whatever they are, so the others decide.
-bool are_enough(std::size_t hits, int expected, double share) {
-  return double(hits) - 4 >= share * (expected - 4);
-}
+bool are_enough(std::size_t hits, int expected, double share) { return double(hits) - 4 >= share * (expected - 4); }
 
 Eigen::Matrix3d to_eigen(const cv::Mat& m) {
   Eigen::Matrix3d result;
@@ -123,8 +124,8 @@ std::array<Eigen::Vector2d, 4> pick(const Points& points, const std::array<int, 
           points[std::size_t(indices[3])]};
 }
 
-/// The map of a side into the image under which most of its beads fall on discs. `judge` sees every map that is tried, with
-/// its number of hits, and returns true to stop.
+/// The map of a side into the image under which most of its beads fall on discs. `judge` sees every map that is tried,
+/// with its number of hits, and returns true to stop.
 void for_each_map(const Side& side, const Points& discs, int candidates,
                   const std::function<bool(const Eigen::Matrix3d&)>& judge) {
   bool stop = false;
@@ -205,8 +206,8 @@ double root_mean_square(const std::vector<Eigen::Vector2d>& residuals) {
   return std::sqrt(squares / double(std::max<std::size_t>(1, residuals.size())));
 }
 
-/// A camera through the beads of both sides predicts where each bead is seen: what lies there is that bead, and what was
-/// matched elsewhere was not.
+/// A camera through the beads of both sides predicts where each bead is seen: what lies there is that bead, and what
+/// was matched elsewhere was not.
 ViewPoints match_by_camera(const Board& board, const Points& discs, ViewPoints points, int width_px, int height_px) {
   const CalibrationModel model{.radial_terms = 1, .square_pixels = true, .principal_point = false};
   for (const double reach : {2 * kReachOfCamera * width_px, kReachOfCamera * width_px, kReachOfCamera * width_px}) {
@@ -214,7 +215,8 @@ ViewPoints match_by_camera(const Board& board, const Points& discs, ViewPoints p
     const double rms = root_mean_square(camera.views[0].residuals_px);
     if (rms > kReach * width_px)
       throw Error("view '" + points.name + "': the board's two sides are found but do not fit one camera (" +
-                  std::to_string(int(rms)) + " px off); check the distance and the position of the sides in the board's file");
+                  std::to_string(int(rms)) +
+                  " px off); check the distance and the position of the sides in the board's file");
     Points predicted;
     for (const Bead& bead : board.beads)
       predicted.push_back(seen_at(camera.calibration, camera.views[0].camera_from_world, bead.centre_mm));
@@ -235,10 +237,11 @@ ViewPoints match_board(const Board& board, const std::vector<BeadImage>& images,
     const std::vector<int> beads = board.of_side(side);
     const SideFound found = find_side(side_of(board, side), discs, landmarks, width_px, height_px);
     if (found.hits.size() < kLeastBeads || !are_enough(found.hits.size(), found.in_image, kLeastFound))
-      throw Error("view '" + view + "': side '" + board.sides[std::size_t(side)] + "' of the board is not found: among " +
-                  std::to_string(discs.size()) + " dark discs, the best match explains " + std::to_string(found.hits.size()) +
-                  " of its " + std::to_string(beads.size()) +
-                  " beads; at least 4 of its landmarks must be seen whole, not hidden by another bead or cut by the border");
+      throw Error(
+          "view '" + view + "': side '" + board.sides[std::size_t(side)] + "' of the board is not found: among " +
+          std::to_string(discs.size()) + " dark discs, the best match explains " + std::to_string(found.hits.size()) +
+          " of its " + std::to_string(beads.size()) +
+          " beads; at least 4 of its landmarks must be seen whole, not hidden by another bead or cut by the border");
     for (const Hit& hit : found.hits) hits.push_back({beads[std::size_t(hit.point)], hit.disc});
   }
   // A disc that both sides claim is left to the camera.
@@ -253,12 +256,13 @@ bool can_be_mistaken(const Board& board, int side, int other) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < as.points.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) nearest = std::min(nearest, (as.points[i] - as.points[k]).norm());
-  // The other side takes the place of an image, its landmarks first; of the same side, only the map that leaves all beads
-  // where they are may fit.
+  // The other side takes the place of an image, its landmarks first; of the same side, only the map that leaves all
+  // beads where they are may fit.
   Points discs;
   for (int i : as.landmarks) discs.push_back(as.points[std::size_t(i)]);
   for (std::size_t i = 0; i < as.points.size(); ++i)
-    if (std::find(as.landmarks.begin(), as.landmarks.end(), int(i)) == as.landmarks.end()) discs.push_back(as.points[i]);
+    if (std::find(as.landmarks.begin(), as.landmarks.end(), int(i)) == as.landmarks.end())
+      discs.push_back(as.points[i]);
   bool mistaken = false;
   for_each_map(flat, discs, int(as.landmarks.size()), [&](const Eigen::Matrix3d& map) {
     const Points predicted = mapped(map, flat.points);

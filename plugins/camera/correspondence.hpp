@@ -7,9 +7,10 @@
 
 namespace marrow::camera {
 
-/// The beads of the board that are found among the discs of an image. Each side is found by itself: every way to take four of
-/// the larger discs for its landmarks gives a projective map, and the one under which most other beads fall on discs is
-/// right. Both sides then have to fit one camera, which finds the rest. Throws Error that says what is missing.
+/// The beads of the board that are found among the discs of an image. Each side is found by itself: every way to take
+/// four of the larger discs for its landmarks gives a projective map, and the one under which most other beads fall on
+/// discs is right. Both sides then have to fit one camera, which finds the rest. Throws Error that says what is
+/// missing.
 ViewPoints match_board(const Board& board, const std::vector<BeadImage>& discs, int width_px, int height_px,
                        const std::string& view);
 

@@ -27,7 +27,8 @@ marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& cont
     marrow::check_item_name("view", name);
     if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
     const auto geometry = marrow::read::read_xray_geometry(
-        options.paths[i], options.frame, {options.source_to_detector_mm, options.source_to_isocentre_mm, options.pixel_mm});
+        options.paths[i], options.frame,
+        {options.source_to_detector_mm, options.source_to_isocentre_mm, options.pixel_mm});
     for (const std::string& warning : geometry.warnings) context.warn(warning);
     cameras.add(name, geometry.camera);
   }

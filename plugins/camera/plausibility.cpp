@@ -11,11 +11,11 @@
 namespace marrow::camera {
 namespace {
 
-constexpr double kLeastAngle_deg = 2, kLargestAngle_deg = 60;        ///< that an image opens
-constexpr double kNearest_mm = 150, kFarthest_mm = 5000;             ///< from the source to what is seen
-constexpr double kSmallest_mm = 3, kLargest_mm = 2500;               ///< extent of what is seen
-constexpr double kBetter = 5;       ///< times that a mistake has to explain the points better
-constexpr double kExplained = 0.02; ///< of the image's width: what may be left then
+constexpr double kLeastAngle_deg = 2, kLargestAngle_deg = 60;  ///< that an image opens
+constexpr double kNearest_mm = 150, kFarthest_mm = 5000;       ///< from the source to what is seen
+constexpr double kSmallest_mm = 3, kLargest_mm = 2500;         ///< extent of what is seen
+constexpr double kBetter = 5;        ///< times that a mistake has to explain the points better
+constexpr double kExplained = 0.02;  ///< of the image's width: what may be left then
 
 std::string text(double value) {
   char characters[32];
@@ -23,28 +23,33 @@ std::string text(double value) {
   return characters;
 }
 
-std::string size_text(double width, double height) {
-  return text(width) + " x " + text(height);
-}
+std::string size_text(double width, double height) { return text(width) + " x " + text(height); }
 
 void check_focal_length(const Camera& camera, const Device& device, std::vector<std::string>& found) {
   const double f_u = camera.intrinsics(0, 0), f_v = camera.intrinsics(1, 1);
   const double angle = 2 * degrees(std::atan(0.5 * camera.width_px / f_u));
   if (angle > kLargestAngle_deg || angle < kLeastAngle_deg)
-    found.push_back("the focal length of " + text(f_u) + " px opens an image of " + text(camera.width_px) + " px to " + text(angle) +
-                    " degrees, where X-ray devices open 5 to 30; is it in mm (it is the source-to-detector distance over the size of a pixel), or "
+    found.push_back("the focal length of " + text(f_u) + " px opens an image of " + text(camera.width_px) + " px to " +
+                    text(angle) +
+                    " degrees, where X-ray devices open 5 to 30; is it in mm (it is the source-to-detector distance "
+                    "over the size of a pixel), or "
                     "of an image of another size?");
   if (std::abs(f_u / f_v - 1) > 0.1)
-    found.push_back("the focal lengths " + text(f_u) + " and " + text(f_v) +
-                    " px differ, so pixels would not be square; are width and height of a pixel exchanged or one of them wrong?");
+    found.push_back(
+        "the focal lengths " + text(f_u) + " and " + text(f_v) +
+        " px differ, so pixels would not be square; are width and height of a pixel exchanged or one of them wrong?");
   if (device.source_to_detector_mm > 0 && device.pixel_mm > 0) {
     const double expected = device.source_to_detector_mm / device.pixel_mm;
     if (std::abs(f_u / expected - 1) > 0.05)
-      found.push_back("the focal length is " + text(f_u) + " px, but " + text(device.source_to_detector_mm) + " mm from source to detector and pixels of " +
-                      text(device.pixel_mm) + " mm make " + text(expected) + "; the pixels are scaled to the patient, or binned?");
+      found.push_back("the focal length is " + text(f_u) + " px, but " + text(device.source_to_detector_mm) +
+                      " mm from source to detector and pixels of " + text(device.pixel_mm) + " mm make " +
+                      text(expected) + "; the pixels are scaled to the patient, or binned?");
   }
-  const double pixel_mm = device.pixel_mm > 0 ? device.pixel_mm : device.source_to_detector_mm > 0 ? device.source_to_detector_mm / f_u : 0;
-  if (device.detector_mm > 0 && pixel_mm > 0 && std::max(camera.width_px, camera.height_px) * pixel_mm > 1.02 * device.detector_mm)
+  const double pixel_mm = device.pixel_mm > 0                ? device.pixel_mm
+                          : device.source_to_detector_mm > 0 ? device.source_to_detector_mm / f_u
+                                                             : 0;
+  if (device.detector_mm > 0 && pixel_mm > 0 &&
+      std::max(camera.width_px, camera.height_px) * pixel_mm > 1.02 * device.detector_mm)
     found.push_back("the detector is " + text(device.detector_mm) + " mm wide, smaller than the image says: " +
                     size_text(camera.width_px * pixel_mm, camera.height_px * pixel_mm) + " mm at " + text(pixel_mm) +
                     " mm per pixel; the size of a pixel is too large, or the image was enlarged");
@@ -55,20 +60,24 @@ void check_principal_point(const Camera& camera, std::vector<std::string>& found
   const Eigen::Vector2d share = principal.cwiseQuotient(size);
   for (const double factor : {0.25, 0.5, 2.0, 4.0})
     if ((share - Eigen::Vector2d::Constant(0.5 * factor)).cwiseAbs().maxCoeff() < 0.03 * factor) {
-      found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) + ") lies in the middle of an image of " +
-                      size_text(factor * size.x(), factor * size.y()) + " pixels, but this one has " + size_text(size.x(), size.y()) +
+      found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
+                      ") lies in the middle of an image of " + size_text(factor * size.x(), factor * size.y()) +
+                      " pixels, but this one has " + size_text(size.x(), size.y()) +
                       "; the camera matrix is that of the image before it was resized or binned");
       return;
     }
   if ((share.array() < 0).any() || (share.array() > 1).any())
-    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) + ") lies outside the image of " +
-                    size_text(size.x(), size.y()) + " pixels; is it in mm, or of an image before it was cropped?");
+    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
+                    ") lies outside the image of " + size_text(size.x(), size.y()) +
+                    " pixels; is it in mm, or of an image before it was cropped?");
   else if ((share.array() - 0.5).abs().maxCoeff() > 0.25)
-    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) + ") lies far from the middle of the image of " +
-                    size_text(size.x(), size.y()) + " pixels; are its two numbers exchanged, or was the image cropped?");
+    found.push_back("the principal point (" + text(principal.x()) + ", " + text(principal.y()) +
+                    ") lies far from the middle of the image of " + size_text(size.x(), size.y()) +
+                    " pixels; are its two numbers exchanged, or was the image cropped?");
 }
 
-void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& object_mm, std::vector<std::string>& found) {
+void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& object_mm,
+                  std::vector<std::string>& found) {
   Eigen::AlignedBox3d box;
   std::size_t behind = 0, outside = 0;
   for (const auto& point : object_mm) {
@@ -77,7 +86,8 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
     behind += !at.allFinite();
     outside += at.allFinite() && !(at.x() > -1 && at.y() > -1 && at.x() < camera.width_px && at.y() < camera.height_px);
   }
-  const Eigen::Vector3d centre = object_mm.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(box.center());
+  const Eigen::Vector3d centre =
+      object_mm.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : Eigen::Vector3d(box.center());
   const double distance = (source_position_mm(camera) - centre).norm();
   const std::string what = object_mm.empty() ? "the world's origin" : "the object";
   const double extent = object_mm.size() > 1 ? box.diagonal().norm() : 0;
@@ -85,11 +95,13 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
     found.push_back("the object is " + text(extent) + " mm large; are its coordinates in " +
                     (extent < kSmallest_mm ? "metres or centimetres?" : "a smaller unit than mm?"));
   if (!object_mm.empty() && (distance < kNearest_mm || distance > kFarthest_mm))
-    found.push_back(what + " is " + text(distance) + " mm from the X-ray source, where C-arms have 300 to 1500; is the camera's translation, or " +
+    found.push_back(what + " is " + text(distance) +
+                    " mm from the X-ray source, where C-arms have 300 to 1500; is the camera's translation, or " +
                     "the object, in another unit than mm?");
   if (behind > 0)
     found.push_back(text(double(behind)) + " of " + text(double(object_mm.size())) +
-                    " points of the object lie behind the X-ray source; is the camera's pose given the other way round (world from camera), or "
+                    " points of the object lie behind the X-ray source; is the camera's pose given the other way round "
+                    "(world from camera), or "
                     "does its z axis run away from the detector?");
   else if (!object_mm.empty() && outside == object_mm.size())
     found.push_back("the object is projected wholly outside the image; is the camera that of another image?");
@@ -101,7 +113,8 @@ struct Mistake {
   std::function<void(Camera&, SeenPoints&)> undo;
 };
 
-Mistake pixel_mistake(const std::string& sentence, std::function<Eigen::Vector2d(const Eigen::Vector2d&, double, double)> change) {
+Mistake pixel_mistake(const std::string& sentence,
+                      std::function<Eigen::Vector2d(const Eigen::Vector2d&, double, double)> change) {
   return {sentence, [change](Camera& camera, SeenPoints& points) {
             for (auto& pixel : points.pixels) pixel = change(pixel, camera.width_px - 1, camera.height_px - 1);
           }};
@@ -136,24 +149,28 @@ std::vector<Mistake> all_mistakes() {
       point_mistake("the y axis of the points is reversed", {1, -1, 1}),
       point_mistake("the z axis of the points is reversed", {1, 1, -1}),
       point_mistake("the x and y axes of the points are reversed (RAS in place of LPS)", {-1, -1, 1}),
-      pose_mistake("the camera's pose is given the other way round (world from camera)", [](RigidTransform& pose) {
-        pose.rotation.transposeInPlace();
-        pose.translation_mm = -(pose.rotation * pose.translation_mm).eval();
-      }),
-      pose_mistake("the camera's rotation is transposed", [](RigidTransform& pose) { pose.rotation.transposeInPlace(); }),
-      pose_mistake("the camera's y axis runs up and its z axis away from the detector (OpenGL's convention)", [](RigidTransform& pose) {
-        const Eigen::Vector3d flip(1, -1, -1);
-        pose.rotation = flip.asDiagonal() * pose.rotation;
-        pose.translation_mm = pose.translation_mm.cwiseProduct(flip);
-      }),
-      pose_mistake("the camera's translation is the source's position; it must be -R times that", [](RigidTransform& pose) {
-        pose.translation_mm = -(pose.rotation * pose.translation_mm).eval();
-      }),
+      pose_mistake("the camera's pose is given the other way round (world from camera)",
+                   [](RigidTransform& pose) {
+                     pose.rotation.transposeInPlace();
+                     pose.translation_mm = -(pose.rotation * pose.translation_mm).eval();
+                   }),
+      pose_mistake("the camera's rotation is transposed",
+                   [](RigidTransform& pose) { pose.rotation.transposeInPlace(); }),
+      pose_mistake("the camera's y axis runs up and its z axis away from the detector (OpenGL's convention)",
+                   [](RigidTransform& pose) {
+                     const Eigen::Vector3d flip(1, -1, -1);
+                     pose.rotation = flip.asDiagonal() * pose.rotation;
+                     pose.translation_mm = pose.translation_mm.cwiseProduct(flip);
+                   }),
+      pose_mistake("the camera's translation is the source's position; it must be -R times that",
+                   [](RigidTransform& pose) { pose.translation_mm = -(pose.rotation * pose.translation_mm).eval(); }),
       matrix_mistake("the camera matrix is that of an image half as large; multiply its first two rows by 2", 2),
       matrix_mistake("the camera matrix is that of an image twice as large; multiply its first two rows by 0.5", 0.5)};
-  const std::vector<std::pair<const char*, double>> units{{"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}};
+  const std::vector<std::pair<const char*, double>> units{
+      {"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}};
   for (const auto& [unit, factor] : units) {
-    mistakes.push_back(point_mistake("the points are in " + std::string(unit) + ", not mm", Eigen::Vector3d::Constant(factor)));
+    mistakes.push_back(
+        point_mistake("the points are in " + std::string(unit) + ", not mm", Eigen::Vector3d::Constant(factor)));
     mistakes.push_back(pose_mistake("the camera's translation is in " + std::string(unit) + ", not mm",
                                     [factor = factor](RigidTransform& pose) { pose.translation_mm *= factor; }));
   }
@@ -162,7 +179,8 @@ std::vector<Mistake> all_mistakes() {
 
 }  // namespace
 
-std::vector<std::string> implausible_numbers(const Camera& camera, const Device& device, const std::vector<Eigen::Vector3d>& object_mm) {
+std::vector<std::string> implausible_numbers(const Camera& camera, const Device& device,
+                                             const std::vector<Eigen::Vector3d>& object_mm) {
   std::vector<std::string> found;
   check_focal_length(camera, device, found);
   check_principal_point(camera, found);
@@ -192,7 +210,8 @@ std::optional<std::string> explanation(const Camera& camera, const SeenPoints& p
     const double left = reprojection_error_px(right, changed);
     if (!(left < best)) continue;
     best = left;
-    sentence = "the reprojection error is " + (std::isfinite(error) ? text(error) + " px" : std::string("without bound")) + ", and only " +
+    sentence = "the reprojection error is " +
+               (std::isfinite(error) ? text(error) + " px" : std::string("without bound")) + ", and only " +
                text(left) + " px if " + mistake.sentence;
   }
   return sentence;
@@ -219,7 +238,8 @@ std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points) 
   Camera moved = camera;
   moved.camera_from_world.rotation =
       rotation_from_vector({rotation.at<double>(0), rotation.at<double>(1), rotation.at<double>(2)});
-  moved.camera_from_world.translation_mm = {translation.at<double>(0), translation.at<double>(1), translation.at<double>(2)};
+  moved.camera_from_world.translation_mm = {translation.at<double>(0), translation.at<double>(1),
+                                            translation.at<double>(2)};
   const double error = reprojection_error_px(moved, points);
   if (!std::isfinite(error) || error > reprojection_error_px(camera, points)) return std::nullopt;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();

@@ -12,7 +12,7 @@ namespace marrow::camera {
 
 struct KnownPoint {
   std::string name;
-  std::optional<Eigen::Vector3d> world_mm;          ///< none where only views tell
+  std::optional<Eigen::Vector3d> world_mm;         ///< none where only views tell
   std::map<std::string, Eigen::Vector2d> seen_px;  ///< by the name of the view
 };
 

@@ -11,14 +11,15 @@ using marrow::read::Calibration;
 
 marrow::Metrics calibration_error(const Calibration& found, const Calibration& truth) {
   if (found.width_px != truth.width_px || found.height_px != truth.height_px)
-    throw marrow::Error("the calibration is of images of " + std::to_string(found.width_px) + " x " + std::to_string(found.height_px) +
-                        " pixels, the truth of " + std::to_string(truth.width_px) + " x " + std::to_string(truth.height_px));
+    throw marrow::Error("the calibration is of images of " + std::to_string(found.width_px) + " x " +
+                        std::to_string(found.height_px) + " pixels, the truth of " + std::to_string(truth.width_px) +
+                        " x " + std::to_string(truth.height_px));
   const auto focal_error = [&](int i) {
     return 100 * std::abs(found.intrinsics(i, i) - truth.intrinsics(i, i)) / truth.intrinsics(i, i);
   };
   const auto principal_error = [&](int i) { return std::abs(found.intrinsics(i, 2) - truth.intrinsics(i, 2)); };
-  // What counts for a measurement is where the two put the same ray. A shift of the principal point is nearly a turn of the
-  // whole device, which the poses of the views take up, so the mean shift over the image is taken out.
+  // What counts for a measurement is where the two put the same ray. A shift of the principal point is nearly a turn of
+  // the whole device, which the poses of the views take up, so the mean shift over the image is taken out.
   std::vector<Eigen::Vector2d> shifts;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   constexpr int kGrid = 20;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): how wide the valley is, where
-// its floor lies, and which direction is poorly determined.
+// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): how wide the valley is,
+// where its floor lies, and which direction is poorly determined.
 #include <array>
 #include <marrow/plugin.hpp>
 
@@ -54,7 +54,9 @@ MARROW_PLUGIN(plugin) {
       .in("pose", "pose in the middle; its frame gives the axes")
       .in("truth", "exact pose; its part about or along each axis is noted")
       .out("landscape", "six profiles; offsets in degrees or mm from the pose")
-      .option("range_deg", &Options::range_deg, "rotations to either side", marrow::at_least(1e-3), marrow::at_most(180))
-      .option("range_mm", &Options::range_mm, "translations to either side", marrow::at_least(1e-3), marrow::at_most(1000))
+      .option("range_deg", &Options::range_deg, "rotations to either side", marrow::at_least(1e-3),
+              marrow::at_most(180))
+      .option("range_mm", &Options::range_mm, "translations to either side", marrow::at_least(1e-3),
+              marrow::at_most(1000))
       .option("samples", &Options::samples, "points of a profile", marrow::at_least(3), marrow::at_most(2001));
 }

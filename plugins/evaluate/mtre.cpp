@@ -13,7 +13,8 @@ struct Options {
   int points = 500;
 };
 
-Metrics mtre(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks, const Options& options) {
+Metrics mtre(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
+             const Options& options) {
   evaluate::check_poses(pose.world_from_model, truth.world_from_model);
   const std::vector<double> errors =
       evaluate::target_errors_mm(pose.world_from_model, truth.world_from_model,
@@ -29,7 +30,8 @@ Metrics mtre(const Pose& pose, const Truth& truth, const Mesh* model, const Land
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.mtre", mtre)
-      .summary("Target registration error over the fragment's surface or its landmarks: mean, root mean square, maximum")
+      .summary(
+          "Target registration error over the fragment's surface or its landmarks: mean, root mean square, maximum")
       .in("pose", "pose found")
       .in("truth", "exact pose")
       .in("model", "the fragment's surface: the targets are spread over it")

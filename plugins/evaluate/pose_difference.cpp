@@ -10,7 +10,8 @@ struct Options {
   int points = 500;
 };
 
-marrow::Metrics pose_difference(const marrow::Pose& pose, const marrow::Pose& reference, const marrow::Mesh& model, const Options& options) {
+marrow::Metrics pose_difference(const marrow::Pose& pose, const marrow::Pose& reference, const marrow::Mesh& model,
+                                const Options& options) {
   namespace evaluate = marrow::evaluate;
   const marrow::RigidTransform &found = pose.world_from_model, &other = reference.world_from_model;
   evaluate::check_poses(found, other, "reference");
@@ -26,10 +27,14 @@ marrow::Metrics pose_difference(const marrow::Pose& pose, const marrow::Pose& re
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.pose_difference", pose_difference)
-      .summary("How far two poses of one fragment are apart, where no truth is known: of two methods, or of a result and a placement by hand")
+      .summary(
+          "How far two poses of one fragment are apart, where no truth is known: of two methods, or of a result and a "
+          "placement by hand")
       .in("pose", "pose found")
       .in("reference", "the other pose")
       .in("model", "the fragment's surface: gives its axes, its centroid and the points")
-      .out("metrics", "geodesic angle; signed rotation about the long axis; displacement of the centroid; mean distance between the surface's points in both")
+      .out("metrics",
+           "geodesic angle; signed rotation about the long axis; displacement of the centroid; mean distance between "
+           "the surface's points in both")
       .option("points", &Options::points, "points spread over the surface", marrow::at_least(1), marrow::at_most(1e6));
 }

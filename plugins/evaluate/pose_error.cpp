@@ -68,7 +68,10 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
       {"along_frontal_mm", shift_mm[0], "mm"},
       {"along_lateral_mm", shift_mm[1], "mm"},
       {"across_mm", std::hypot(shift_mm[0], shift_mm[1]), "mm"},
-      {"mtre_mm", marrow::evaluate::mean(marrow::evaluate::target_errors_mm(found, exact, marrow::sample_surface(model, std::size_t(options.points)))), "mm"},
+      {"mtre_mm",
+       marrow::evaluate::mean(marrow::evaluate::target_errors_mm(
+           found, exact, marrow::sample_surface(model, std::size_t(options.points)))),
+       "mm"},
       {"chapter_rotation_deg", degrees(turn_rad.cwiseAbs().mean()), "deg"},
       {"chapter_translation_mm", shift_mm.cwiseAbs().mean(), "mm"},
   };
@@ -89,7 +92,8 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "geodesic angle; signed angles about the frontal, lateral and long axes; displacement of the centroid, "
            "signed along "
-           "the long, frontal and lateral axes, and across the long one; mTRE; means of the absolute angles and translations; predicted standard "
+           "the long, frontal and lateral axes, and across the long one; mTRE; means of the absolute angles and "
+           "translations; predicted standard "
            "deviations "
            "where the pose has a covariance")
       .option("points", &Options::points, "points spread over the surface for the mTRE", marrow::at_least(1),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// mPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how far apart
-// the images of the targets lie at the found and at the true pose. What a pose is wrong along the beam hardly counts.
+// mPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how far
+// apart the images of the targets lie at the found and at the true pose. What a pose is wrong along the beam hardly
+// counts.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -24,10 +25,11 @@ double source_to_detector_mm(const Options& options, std::size_t view, std::size
   const std::vector<double>& given = options.source_to_detector_mm;
   if (given.empty()) return 0;
   if (given.size() != 1 && given.size() != views)
-    throw Error("source_to_detector_mm has " + std::to_string(given.size()) + " numbers, but there are " + std::to_string(views) +
-                " views; give one for all, or one for each");
+    throw Error("source_to_detector_mm has " + std::to_string(given.size()) + " numbers, but there are " +
+                std::to_string(views) + " views; give one for all, or one for each");
   const double distance = given[given.size() == 1 ? 0 : view];
-  if (!(distance > 0)) throw Error("source_to_detector_mm: each number must be positive, got " + std::to_string(distance));
+  if (!(distance > 0))
+    throw Error("source_to_detector_mm: each number must be positive, got " + std::to_string(distance));
   return distance;
 }
 
@@ -39,7 +41,9 @@ Distances distances_of(const View& view, const RigidTransform& pose, const Rigid
     const Eigen::Vector2d apart = project(view.camera, pose * target) - project(view.camera, truth * target);
     if (!apart.allFinite())
       throw Error("view '" + view.name + "': a target does not lie in front of the X-ray source" +
-                  (project(view.camera, truth * target).allFinite() ? " at the pose found" : " at the true pose; is the truth of another world frame?"));
+                  (project(view.camera, truth * target).allFinite()
+                       ? " at the pose found"
+                       : " at the true pose; is the truth of another world frame?"));
     distances.px.push_back(apart.norm());
     distances.mm.push_back(apart.norm() * pixel_size_at_mm(view.camera, truth * target));
     const Eigen::Vector2d focal_px(view.camera.intrinsics(0, 0), view.camera.intrinsics(1, 1));
@@ -51,14 +55,16 @@ Distances distances_of(const View& view, const RigidTransform& pose, const Rigid
 void report(const std::string& prefix, const Distances& distances, Metrics& metrics) {
   metrics.items.push_back({prefix + "mpd_px", evaluate::mean(distances.px), "px"});
   metrics.items.push_back({prefix + "mpd_mm", evaluate::mean(distances.mm), "mm"});
-  if (!distances.detector_mm.empty()) metrics.items.push_back({prefix + "mpd_detector_mm", evaluate::mean(distances.detector_mm), "mm"});
+  if (!distances.detector_mm.empty())
+    metrics.items.push_back({prefix + "mpd_detector_mm", evaluate::mean(distances.detector_mm), "mm"});
 }
 
 Metrics projection_distance(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
                             const List<View>& views, const Options& options) {
   evaluate::check_poses(pose.world_from_model, truth.world_from_model);
   if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
-  const std::vector<Eigen::Vector3d> targets = evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
+  const std::vector<Eigen::Vector3d> targets =
+      evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
   Distances all;
   Metrics each, metrics;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -85,7 +91,8 @@ MARROW_PLUGIN(plugin) {
       .in("landmarks", "their points are the targets instead")
       .in("views", "X-ray views, for their cameras", over("view"))
       .out("metrics",
-           "over all views and for each: mPD in pixels, in mm at the target's depth (divided by the magnification) and, where the detector's "
+           "over all views and for each: mPD in pixels, in mm at the target's depth (divided by the magnification) "
+           "and, where the detector's "
            "distance is known, in mm on the detector")
       .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6))
       .option("source_to_detector_mm", &Options::source_to_detector_mm,

@@ -17,49 +17,68 @@ const T& named(const marrow::List<T>& items, const std::string& name, const std:
   if (const T* item = items.find(name)) return *item;
   std::string known;
   for (const std::string& other : items.names()) known += (known.empty() ? "" : ", ") + other;
-  throw marrow::Error(what + ": there is none of a fragment '" + name + "', only of " + known + "; name both fragments with moved and reference");
+  throw marrow::Error(what + ": there is none of a fragment '" + name + "', only of " + known +
+                      "; name both fragments with moved and reference");
 }
 
 /// Of the moved fragment's surface, the points that lie by the other fragment in the CT: the fracture.
-std::vector<Eigen::Vector3d> fracture_points(const marrow::Mesh& moved, const marrow::Mesh& reference, double border_mm) {
+std::vector<Eigen::Vector3d> fracture_points(const marrow::Mesh& moved, const marrow::Mesh& reference,
+                                             double border_mm) {
   constexpr std::size_t kPoints = 20000;
   const std::vector<Eigen::Vector3d> others = marrow::sample_surface(reference, kPoints);
   std::vector<Eigen::Vector3d> near;
   for (const Eigen::Vector3d& point : marrow::sample_surface(moved, kPoints))
-    if (std::any_of(others.begin(), others.end(), [&](const Eigen::Vector3d& other) { return (other - point).squaredNorm() < border_mm * border_mm; })) near.push_back(point);
+    if (std::any_of(others.begin(), others.end(), [&](const Eigen::Vector3d& other) {
+          return (other - point).squaredNorm() < border_mm * border_mm;
+        }))
+      near.push_back(point);
   return near;
 }
 
 /// The reduction that the found poses ask for is done to the fragment where it truly is.
-marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Truth>& truths, const marrow::List<marrow::Mesh>& models, const Options& options) {
-  const marrow::Pose &moved = named(poses, options.moved, "poses"), &reference = named(poses, options.reference, "poses");
-  const marrow::RigidTransform &true_moved = named(truths, options.moved, "truths").world_from_model, &true_reference = named(truths, options.reference, "truths").world_from_model;
+marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Truth>& truths,
+                              const marrow::List<marrow::Mesh>& models, const Options& options) {
+  const marrow::Pose &moved = named(poses, options.moved, "poses"),
+                     &reference = named(poses, options.reference, "poses");
+  const marrow::RigidTransform &true_moved = named(truths, options.moved, "truths").world_from_model,
+                               &true_reference = named(truths, options.reference, "truths").world_from_model;
   marrow::evaluate::check_poses(moved.world_from_model, true_moved);
   marrow::evaluate::check_poses(reference.world_from_model, true_reference);
   const marrow::RigidTransform reduction = reference.world_from_model * marrow::inverse(moved.world_from_model);
   const marrow::RigidTransform reduced = reduction * true_moved;
-  const std::vector<Eigen::Vector3d> points_mm = fracture_points(named(models, options.moved, "models"), named(models, options.reference, "models"), options.border_mm);
+  const std::vector<Eigen::Vector3d> points_mm = fracture_points(
+      named(models, options.moved, "models"), named(models, options.reference, "models"), options.border_mm);
   if (points_mm.empty())
-    throw marrow::Error("the surfaces of '" + options.moved + "' and '" + options.reference + "' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
+    throw marrow::Error(
+        "the surfaces of '" + options.moved + "' and '" + options.reference +
+        "' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
   const Eigen::Vector3d centre_mm = marrow::fragment_frame(named(models, options.moved, "models")).origin_mm;
-  const std::vector<double> before = marrow::evaluate::target_errors_mm(true_moved, true_reference, points_mm), after = marrow::evaluate::target_errors_mm(reduced, true_reference, points_mm);
-  return {{{"before_mm", marrow::evaluate::mean(before), "mm"},
-           {"gap_mm", marrow::evaluate::mean(after), "mm"},
-           {"largest_gap_mm", *std::max_element(after.begin(), after.end()), "mm"},
-           {"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(reduced.rotation, true_reference.rotation)), "deg"},
-          {"translation_mm", (reduced * centre_mm - true_reference * centre_mm).norm(), "mm"}}};
+  const std::vector<double> before = marrow::evaluate::target_errors_mm(true_moved, true_reference, points_mm),
+                            after = marrow::evaluate::target_errors_mm(reduced, true_reference, points_mm);
+  return {
+      {{"before_mm", marrow::evaluate::mean(before), "mm"},
+       {"gap_mm", marrow::evaluate::mean(after), "mm"},
+       {"largest_gap_mm", *std::max_element(after.begin(), after.end()), "mm"},
+       {"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(reduced.rotation, true_reference.rotation)), "deg"},
+       {"translation_mm", (reduced * centre_mm - true_reference * centre_mm).norm(), "mm"}}};
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.reduction_gap", reduction_gap)
-      .summary("How far a fracture stays open after the reduction that the found poses ask for: done to the fragment where it truly is")
+      .summary(
+          "How far a fracture stays open after the reduction that the found poses ask for: done to the fragment where "
+          "it truly is")
       .in("poses", "poses found", marrow::over("fragment"))
       .in("truths", "exact poses", marrow::over("fragment"))
       .in("models", "surfaces of both fragments", marrow::over("fragment"))
-      .out("metrics", "over the points of the fracture: mean distance from where they belong, before and after, the largest after; the rotation left, and the shift of the fragment's centroid: the misalignment is wrong by as much")
+      .out("metrics",
+           "over the points of the fracture: mean distance from where they belong, before and after, the largest "
+           "after; the rotation left, and the shift of the fragment's centroid: the misalignment is wrong by as much")
       .option("moved", &Options::moved, "fragment that is moved")
       .option("reference", &Options::reference, "fragment that stays")
-      .option("border_mm", &Options::border_mm, "points of the moved surface that lie so near to the other one in the CT are the fracture's", marrow::at_least(0.1));
+      .option("border_mm", &Options::border_mm,
+              "points of the moved surface that lie so near to the other one in the CT are the fracture's",
+              marrow::at_least(0.1));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// mRPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how far, at the
-// patient, the ray through a target's image at the found pose passes the target's true place.
+// mRPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how
+// far, at the patient, the ray through a target's image at the found pose passes the target's true place.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -37,11 +37,13 @@ Metrics reprojection_distance(const Pose& pose, const Truth& truth, const Mesh* 
                               const List<View>& views, const Options& options) {
   evaluate::check_poses(pose.world_from_model, truth.world_from_model);
   if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
-  const std::vector<Eigen::Vector3d> targets = evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
+  const std::vector<Eigen::Vector3d> targets =
+      evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
   Metrics metrics;
   std::vector<double> all;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const std::vector<double> distances = distances_mm(views[i], pose.world_from_model, truth.world_from_model, targets);
+    const std::vector<double> distances =
+        distances_mm(views[i], pose.world_from_model, truth.world_from_model, targets);
     add_mean(views.name(i) + "_", distances, metrics);
     all.insert(all.end(), distances.begin(), distances.end());
   }
@@ -53,7 +55,8 @@ Metrics reprojection_distance(const Pose& pose, const Truth& truth, const Mesh* 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.reprojection_distance", reprojection_distance)
-      .summary("Mean reprojection distance (mRPD) of the true targets from the rays through their images at the found pose")
+      .summary(
+          "Mean reprojection distance (mRPD) of the true targets from the rays through their images at the found pose")
       .in("pose", "pose found")
       .in("truth", "exact pose")
       .in("model", "the fragment's surface: the targets are spread over it")

@@ -15,9 +15,7 @@ struct Options {
   std::vector<double> width_mm, width_deviation_mm;
 };
 
-Eigen::Vector2d middle_of(const LineSegment& segment) {
-  return 0.5 * (segment.from_px + segment.to_px);
-}
+Eigen::Vector2d middle_of(const LineSegment& segment) { return 0.5 * (segment.from_px + segment.to_px); }
 
 /// The point of the axis that is nearest to the ray through the middle of a pair.
 Eigen::Vector3d point_in_middle(const Axis& axis, const marrow::Camera& camera, const ShaftLines& lines) {

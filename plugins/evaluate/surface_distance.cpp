@@ -18,8 +18,8 @@ struct Options {
   int points = 20000;
 };
 
-/// Signed distances (negative inside) of points spread over a surface from another one. The vertices, at which the largest
-/// distance is usually found, count for that alone: they are denser where a mesh is finer.
+/// Signed distances (negative inside) of points spread over a surface from another one. The vertices, at which the
+/// largest distance is usually found, count for that alone: they are denser where a mesh is finer.
 struct Distances {
   std::vector<double> of_points_mm;
   double largest_mm = 0;
@@ -34,7 +34,8 @@ Distances distances_from(const Mesh& mesh, const Mesh& other, int points, const 
     distances.largest_mm = std::max(distances.largest_mm, std::abs(distance));
     return distance;
   };
-  for (const Eigen::Vector3d& point : sample_surface(mesh, std::size_t(points))) distances.of_points_mm.push_back(signed_distance(point));
+  for (const Eigen::Vector3d& point : sample_surface(mesh, std::size_t(points)))
+    distances.of_points_mm.push_back(signed_distance(point));
   context.check_cancelled();
   for (const Eigen::Vector3d& vertex : mesh.vertices_mm) signed_distance(vertex);
   context.check_cancelled();
@@ -67,9 +68,13 @@ Metrics surface_distance(const Mesh& mesh, const Mesh& reference, const Options&
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.surface_distance", surface_distance)
-      .summary("Distances between two surfaces, both ways: mean, root mean square, 95th percentile, maximum (Hausdorff) and bias")
+      .summary(
+          "Distances between two surfaces, both ways: mean, root mean square, 95th percentile, maximum (Hausdorff) and "
+          "bias")
       .in("mesh", "surface")
       .in("reference", "surface to compare with")
-      .out("metrics", "symmetric figures over points of both surfaces; bias: signed mean distance of the mesh from the reference, positive where it is too large")
+      .out("metrics",
+           "symmetric figures over points of both surfaces; bias: signed mean distance of the mesh from the reference, "
+           "positive where it is too large")
       .option("points", &Options::points, "points spread over each surface", at_least(100), at_most(1e6));
 }

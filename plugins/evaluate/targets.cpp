@@ -23,9 +23,11 @@ void check_model(const RigidTransform& pose, const Mesh& model) {
                 "'; give the model that was registered");
 }
 
-std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* model, const Landmarks* landmarks, int points) {
+std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* model, const Landmarks* landmarks,
+                                        int points) {
   if (landmarks) {
-    if (landmarks->points.empty()) throw Error("the landmarks have no points in the CT; leave them out to measure on the model's surface");
+    if (landmarks->points.empty())
+      throw Error("the landmarks have no points in the CT; leave them out to measure on the model's surface");
     std::vector<Eigen::Vector3d> targets;
     for (const Landmarks::Point& point : landmarks->points) targets.push_back(point.model_mm);
     return targets;

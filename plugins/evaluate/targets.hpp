@@ -14,9 +14,10 @@ void check_poses(const RigidTransform& pose, const RigidTransform& truth, const 
 /// Throws Error unless the model is in the frame that the pose takes points in.
 void check_model(const RigidTransform& pose, const Mesh& model);
 
-/// The targets in the frame of the CT: the landmarks' points where there are landmarks, else so many points spread over the
-/// model's surface. Throws Error where both are missing, or where they do not go with the pose.
-std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* model, const Landmarks* landmarks, int points);
+/// The targets in the frame of the CT: the landmarks' points where there are landmarks, else so many points spread over
+/// the model's surface. Throws Error where both are missing, or where they do not go with the pose.
+std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* model, const Landmarks* landmarks,
+                                        int points);
 
 /// How far the pose takes each target from where the truth does.
 std::vector<double> target_errors_mm(const RigidTransform& pose, const RigidTransform& truth,

@@ -33,9 +33,13 @@ marrow::Metrics misalignment(const marrow::List<marrow::Pose>& poses, const Opti
 
 MARROW_PLUGIN(plugin) {
   plugin.node("fracture.misalignment", misalignment)
-      .summary("Angulation, malrotation, shift and shortening of one fragment against another, beside which the CT shows it in place")
+      .summary(
+          "Angulation, malrotation, shift and shortening of one fragment against another, beside which the CT shows it "
+          "in place")
       .in("poses", "poses of both fragments", marrow::over("fragment"))
-      .out("metrics", "rotations about and shifts along the moved fragment's own axes; shortening is positive where the fragments overlap")
+      .out("metrics",
+           "rotations about and shifts along the moved fragment's own axes; shortening is positive where the fragments "
+           "overlap")
       .option("moved", &Options::moved, "fragment whose misalignment is told")
       .option("reference", &Options::reference, "fragment that it is told against");
 }

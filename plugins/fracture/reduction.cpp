@@ -24,12 +24,16 @@ Reduction reduction(const marrow::List<marrow::Pose>& poses, const Options& opti
   result.pose.covariance.reset();
   result.pose.convergence.clear();
   // In the world: how far the fragment's middle moves, and by what rotation vector it turns about it.
-  const Eigen::AngleAxisd turn(Eigen::Matrix3d(reference.world_from_model.rotation * moved.world_from_model.rotation.transpose()));
+  const Eigen::AngleAxisd turn(
+      Eigen::Matrix3d(reference.world_from_model.rotation * moved.world_from_model.rotation.transpose()));
   const Eigen::Vector3d turn_deg = marrow::degrees(turn.angle()) * turn.axis();
-  const Eigen::Vector3d shift_mm = reference.world_from_model * moved.frame.origin_mm - moved.world_from_model * moved.frame.origin_mm;
-  result.motion.items = {{"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"}, {"turn_z_deg", turn_deg.z(), "deg"},
-                         {"turn_deg", marrow::degrees(motion.head<3>().norm()), "deg"},
-                         {"shift_x_mm", shift_mm.x(), "mm"}, {"shift_y_mm", shift_mm.y(), "mm"}, {"shift_z_mm", shift_mm.z(), "mm"}, {"shift_mm", shift_mm.norm(), "mm"}};
+  const Eigen::Vector3d shift_mm =
+      reference.world_from_model * moved.frame.origin_mm - moved.world_from_model * moved.frame.origin_mm;
+  result.motion.items = {
+      {"turn_x_deg", turn_deg.x(), "deg"}, {"turn_y_deg", turn_deg.y(), "deg"},
+      {"turn_z_deg", turn_deg.z(), "deg"}, {"turn_deg", marrow::degrees(motion.head<3>().norm()), "deg"},
+      {"shift_x_mm", shift_mm.x(), "mm"},  {"shift_y_mm", shift_mm.y(), "mm"},
+      {"shift_z_mm", shift_mm.z(), "mm"},  {"shift_mm", shift_mm.norm(), "mm"}};
   return result;
 }
 
@@ -40,7 +44,8 @@ MARROW_PLUGIN(plugin) {
       .summary("Where a fragment has to go to restore the bone as the CT shows it, and the motion that brings it there")
       .in("poses", "poses of both fragments", marrow::over("fragment"))
       .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
-      .out("motion", &Reduction::motion, "in the world: rotation vector, and shift of the fragment's middle, about which it turns")
+      .out("motion", &Reduction::motion,
+           "in the world: rotation vector, and shift of the fragment's middle, about which it turns")
       .option("moved", &Options::moved, "fragment that is moved")
       .option("reference", &Options::reference, "fragment that stays");
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "axis.hpp"
 
-#include <Eigen/Geometry>
 #include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
 #include <marrow/domain/error.hpp>
@@ -48,7 +48,8 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   axis.direction = squares.eigenvectors().col(0);
   const Eigen::Vector3d right = normals.transpose() * offsets;
   for (Eigen::Index i = 1; i < 3; ++i)  // the pseudo-inverse of rank two
-    axis.point_mm += squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
+    axis.point_mm +=
+        squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
   return axis;
 }
 

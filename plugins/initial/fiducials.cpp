@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A start from markers, or landmarks touched by a pointer, that a tracking system finds in the world: least squares over paired
-// points (Arun, Huang and Blostein 1987). Horn's quaternions (J Opt Soc Am A 1987) come to the same optimum.
+// A start from markers, or landmarks touched by a pointer, that a tracking system finds in the world: least squares
+// over paired points (Arun, Huang and Blostein 1987). Horn's quaternions (J Opt Soc Am A 1987) come to the same
+// optimum.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -27,9 +28,12 @@ struct Pairs {
 Pairs pairs_of(const Landmarks& landmarks) {
   Pairs pairs;
   for (const Landmarks::Tracked& tracked : landmarks.tracked) {
-    const auto point = std::find_if(landmarks.points.begin(), landmarks.points.end(), [&](const auto& one) { return one.name == tracked.name; });
+    const auto point = std::find_if(landmarks.points.begin(), landmarks.points.end(),
+                                    [&](const auto& one) { return one.name == tracked.name; });
     if (point == landmarks.points.end())
-      throw Error("'" + tracked.name + "' was tracked, but the landmarks have no point of that name in the CT; give its place there, or leave it out");
+      throw Error("'" + tracked.name +
+                  "' was tracked, but the landmarks have no point of that name in the CT; give its place there, or "
+                  "leave it out");
     pairs.names.push_back(tracked.name);
     pairs.model_mm.push_back(point->model_mm);
     pairs.world_mm.push_back(tracked.world_mm);
@@ -55,8 +59,8 @@ Residuals residuals_of(const Pairs& pairs, const RigidTransform& world_from_mode
   return residuals;
 }
 
-/// Of the small motion, where each coordinate of a pair is off by `deviation`. At any target it gives the expected error of
-/// Fitzpatrick, West and Maurer (IEEE TMI 17, 1998).
+/// Of the small motion, where each coordinate of a pair is off by `deviation`. At any target it gives the expected
+/// error of Fitzpatrick, West and Maurer (IEEE TMI 17, 1998).
 Matrix6d covariance_of(const Pairs& pairs, const FragmentFrame& frame, double deviation_mm) {
   Matrix6d information = Matrix6d::Zero();
   for (const Eigen::Vector3d& point : pairs.model_mm) {
@@ -78,12 +82,14 @@ Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& opt
   pose.cost = std::sqrt(residuals.squares / count);
   const double deviation_mm = options.noise_mm > 0 ? options.noise_mm : std::sqrt(residuals.squares / (3 * count - 6));
   pose.covariance = covariance_of(pairs, pose.frame, deviation_mm);
-  context.info("fiducial registration error " + short_number(pose.cost) + " mm over " + std::to_string(pairs.names.size()) +
-               " points, localisation error " + short_number(std::sqrt(3.0) * deviation_mm) + " mm; predicted error of the fragment's centroid " +
+  context.info("fiducial registration error " + short_number(pose.cost) + " mm over " +
+               std::to_string(pairs.names.size()) + " points, localisation error " +
+               short_number(std::sqrt(3.0) * deviation_mm) + " mm; predicted error of the fragment's centroid " +
                short_number(std::sqrt(pose.covariance->bottomRightCorner<3, 3>().trace())) + " mm");
   if (pose.cost > options.warn_above_mm) {
-    pose.warnings.push_back("the tracked points do not fit those in the CT: they are off by " + short_number(pose.cost) + " mm, '" +
-                            residuals.farthest + "' by " + short_number(residuals.largest) + " mm; are two names exchanged, or did a marker move?");
+    pose.warnings.push_back("the tracked points do not fit those in the CT: they are off by " +
+                            short_number(pose.cost) + " mm, '" + residuals.farthest + "' by " +
+                            short_number(residuals.largest) + " mm; are two names exchanged, or did a marker move?");
     context.warn(pose.warnings.back());
   }
   return pose;
@@ -93,10 +99,15 @@ Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& opt
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.fiducials", fiducials)
-      .summary("Rigid fit of the tracked landmarks to those in the CT (Arun, Huang and Blostein 1987), with its predicted error")
+      .summary(
+          "Rigid fit of the tracked landmarks to those in the CT (Arun, Huang and Blostein 1987), with its predicted "
+          "error")
       .in("model", "surface of the fragment: gives its axes")
       .in("landmarks", "points in the CT and where they were tracked")
-      .out("pose", "its cost is the fiducial registration error in mm; its covariance follows from the localisation error")
-      .option("noise_mm", &Options::noise_mm, "standard deviation of each coordinate of a pair; 0: what the residuals say", at_least(0))
-      .option("warn_above_mm", &Options::warn_above_mm, "fiducial registration error that gives a warning", at_least(0));
+      .out("pose",
+           "its cost is the fiducial registration error in mm; its covariance follows from the localisation error")
+      .option("noise_mm", &Options::noise_mm,
+              "standard deviation of each coordinate of a pair; 0: what the residuals say", at_least(0))
+      .option("warn_above_mm", &Options::warn_above_mm, "fiducial registration error that gives a warning",
+              at_least(0));
 }

@@ -44,8 +44,8 @@ marrow::registration::SearchOptions search_options(const Options& options) {
   return search;
 }
 
-marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose* start, const Options& options,
-                           marrow::Context& context) {
+marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
+                           const marrow::Pose* start, const Options& options, marrow::Context& context) {
   marrow::check_mesh(model, "model");
   const marrow::registration::SearchOptions settings = search_options(options);
   marrow::registration::check_options(settings);
@@ -69,16 +69,25 @@ MARROW_PLUGIN(plugin) {
       .in("optimizer", "minimiser that follows the best places up")
       .in("start", "middle of the ranges; none: where the CT lies in the world")
       .out("pose", "pose of least cost")
-      .option("rotation_side_deg", &Options::rotation_side_deg, "rotations about the frontal and lateral axes that are looked at, to either side", marrow::at_least(0),
+      .option("rotation_side_deg", &Options::rotation_side_deg,
+              "rotations about the frontal and lateral axes that are looked at, to either side", marrow::at_least(0),
               marrow::at_most(180))
-      .option("rotation_axial_deg", &Options::rotation_axial_deg, "rotations about the long axis, to either side", marrow::at_least(0), marrow::at_most(180))
-      .option("translation_side_mm", &Options::translation_side_mm, "shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
-      .option("translation_axial_mm", &Options::translation_axial_mm, "shifts along the long axis, to either side", marrow::at_least(0))
-      .option("poses", &Options::poses, "how many poses are looked at, spread evenly over these ranges", marrow::at_least(1))
-      .option("candidates", &Options::candidates, "best of these, no two of them neighbours, that are followed up", marrow::at_least(1))
-      .option("finalists", &Options::finalists, "best of these after the first level that go through all levels; the last level chooses", marrow::at_least(1))
+      .option("rotation_axial_deg", &Options::rotation_axial_deg, "rotations about the long axis, to either side",
+              marrow::at_least(0), marrow::at_most(180))
+      .option("translation_side_mm", &Options::translation_side_mm,
+              "shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
+      .option("translation_axial_mm", &Options::translation_axial_mm, "shifts along the long axis, to either side",
+              marrow::at_least(0))
+      .option("poses", &Options::poses, "how many poses are looked at, spread evenly over these ranges",
+              marrow::at_least(1))
+      .option("candidates", &Options::candidates, "best of these, no two of them neighbours, that are followed up",
+              marrow::at_least(1))
+      .option("finalists", &Options::finalists,
+              "best of these after the first level that go through all levels; the last level chooses",
+              marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
       .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared")
-      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost for each search of a level", marrow::at_least(1));
+      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost for each search of a level",
+              marrow::at_least(1));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A start from landmarks that are seen in one view or more. Every way to a first pose is tried: from points that two views
-// show, and from each view by itself; each is refined over all views at once, and the best stands.
+// A start from landmarks that are seen in one view or more. Every way to a first pose is tried: from points that two
+// views show, and from each view by itself; each is refined over all views at once, and the best stands.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -24,9 +24,11 @@ std::vector<Sight> sights_of(const Landmarks& landmarks, const List<View>& views
   std::vector<Sight> sights;
   std::vector<std::string> unknown;
   for (const Landmarks::Seen& seen : landmarks.seen) {
-    const auto point = std::find_if(landmarks.points.begin(), landmarks.points.end(), [&](const auto& one) { return one.name == seen.name; });
+    const auto point = std::find_if(landmarks.points.begin(), landmarks.points.end(),
+                                    [&](const auto& one) { return one.name == seen.name; });
     if (point == landmarks.points.end())
-      throw Error("view '" + seen.view + "' shows '" + seen.name + "', but the landmarks have no point of that name in the CT; give its place there, or leave it out");
+      throw Error("view '" + seen.view + "' shows '" + seen.name +
+                  "', but the landmarks have no point of that name in the CT; give its place there, or leave it out");
     if (const View* view = views.find(seen.view)) {
       check_camera(view->camera, "view '" + seen.view + "'");
       sights.push_back({seen.name, seen.view, point->model_mm, seen.pixel, &view->camera});
@@ -50,7 +52,8 @@ void check_enough(const std::vector<Sight>& sights) {
   }
   const std::size_t least = views.size() > 1 ? 3 : 4;
   if (names.size() < least)
-    throw Error(std::to_string(names.size()) + " landmarks are seen in " + std::to_string(views.size()) + (views.size() == 1 ? " view" : " views") +
+    throw Error(std::to_string(names.size()) + " landmarks are seen in " + std::to_string(views.size()) +
+                (views.size() == 1 ? " view" : " views") +
                 "; a pose takes three that are seen in two views, or four in one");
   initial::check_spread(points, "the landmarks that are seen");
 }
@@ -79,7 +82,8 @@ Normal normal_at(const std::vector<Sight>& sights, const RigidTransform& pose, c
     const Eigen::Vector2d pixel = image.hnormalized();
     Eigen::Matrix<double, 2, 3> by_image;
     by_image << 1, 0, -pixel.x(), 0, 1, -pixel.y();
-    const Eigen::Matrix<double, 2, 6> by_motion = by_image / image.z() * camera.intrinsics * camera.camera_from_world.rotation * pose.rotation *
+    const Eigen::Matrix<double, 2, 6> by_motion = by_image / image.z() * camera.intrinsics *
+                                                  camera.camera_from_world.rotation * pose.rotation *
                                                   initial::point_by_motion(frame, sight.model_mm);
     normal.curvature += by_motion.transpose() * by_motion;
     normal.gradient += by_motion.transpose() * (pixel - sight.pixel);
@@ -121,7 +125,8 @@ std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFr
     const RigidTransform pose = refined(sights, start, frame);
     if (const double squares = squares_px(sights, pose); std::isfinite(squares)) found.push_back({pose, squares});
   }
-  std::stable_sort(found.begin(), found.end(), [](const Candidate& a, const Candidate& b) { return a.squares_px < b.squares_px; });
+  std::stable_sort(found.begin(), found.end(),
+                   [](const Candidate& a, const Candidate& b) { return a.squares_px < b.squares_px; });
   return found;
 }
 
@@ -133,8 +138,10 @@ void check_unique(const std::vector<Candidate>& found, std::size_t sights, doubl
     const double apart = geodesic_angle_rad(other.pose.rotation, found.front().pose.rotation);
     if (apart < kSame_rad || other.squares_px - found.front().squares_px > kFactor_100 * noise_px * noise_px) continue;
     const auto rms = [&](const Candidate& one) { return short_number(std::sqrt(one.squares_px / double(sights))); };
-    throw Error("two poses explain the landmarks: they differ by " + short_number(degrees(apart)) + " degrees, and leave " + rms(found.front()) + " and " + rms(other) +
-                " px. In one view, points that lie nearly in a plane look the same tilted to either side; add a view, or a landmark that lies off that plane");
+    throw Error("two poses explain the landmarks: they differ by " + short_number(degrees(apart)) +
+                " degrees, and leave " + rms(found.front()) + " and " + rms(other) +
+                " px. In one view, points that lie nearly in a plane look the same tilted to either side; add a view, "
+                "or a landmark that lies off that plane");
   }
 }
 
@@ -147,11 +154,13 @@ std::string residual_warning(const std::vector<Sight>& sights, const Pose& pose,
     worst = &sight;
     largest = off;
   }
-  return "the landmarks are seen " + short_number(pose.cost) + " px from where this pose has them, '" + worst->name + "' in view '" + worst->view + "' " +
-         short_number(largest) + " px, where " + short_number(noise_px) + " px were expected; are two names exchanged, or is a camera wrong?";
+  return "the landmarks are seen " + short_number(pose.cost) + " px from where this pose has them, '" + worst->name +
+         "' in view '" + worst->view + "' " + short_number(largest) + " px, where " + short_number(noise_px) +
+         " px were expected; are two names exchanged, or is a camera wrong?";
 }
 
-Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& views, const Options& options, Context& context) {
+Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& views, const Options& options,
+               Context& context) {
   check_mesh(model, "model");
   const std::vector<Sight> sights = sights_of(landmarks, views, context);
   check_enough(sights);
@@ -159,12 +168,15 @@ Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& 
   pose.frame = fragment_frame(model);
   const std::vector<Candidate> found = minima(sights, pose.frame);
   if (found.empty())
-    throw Error("no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; mark more of them");
+    throw Error(
+        "no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; mark "
+        "more of them");
   check_unique(found, sights.size(), options.noise_px);
   pose.world_from_model = found.front().pose;
   pose.world_from_model.source = model.frame;
   pose.cost = std::sqrt(found.front().squares_px / double(sights.size()));
-  pose.covariance = options.noise_px * options.noise_px * normal_at(sights, pose.world_from_model, pose.frame).curvature.ldlt().solve(Matrix6d::Identity());
+  pose.covariance = options.noise_px * options.noise_px *
+                    normal_at(sights, pose.world_from_model, pose.frame).curvature.ldlt().solve(Matrix6d::Identity());
   if (pose.cost > 3 * options.noise_px) {
     pose.warnings.push_back(residual_warning(sights, pose, options.noise_px));
     context.warn(pose.warnings.back());
@@ -176,11 +188,15 @@ Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.landmarks", landmarks)
-      .summary("Pose under which landmarks are seen where they were marked, over all views at once, with its predicted error")
+      .summary(
+          "Pose under which landmarks are seen where they were marked, over all views at once, with its predicted "
+          "error")
       .in("model", "surface of the fragment: gives its axes")
       .in("landmarks", "points in the CT and where views show them")
       .in("views", "X-ray views, for their cameras", over("view"))
       .out("pose", "pose of least reprojection error; its cost is the root mean square of that in pixels")
-      .option("noise_px", &Options::noise_px, "expected standard deviation of each coordinate of a marked landmark: for the covariance, the warning and to tell rivals apart",
+      .option("noise_px", &Options::noise_px,
+              "expected standard deviation of each coordinate of a marked landmark: for the covariance, the warning "
+              "and to tell rivals apart",
               at_least(1e-3));
 }

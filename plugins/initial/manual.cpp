@@ -12,21 +12,28 @@ struct Options {
 };
 
 /// How far the surface's points are moved on average.
-double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidTransform& to, const std::vector<Eigen::Vector3d>& points_mm) {
+double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidTransform& to,
+                        const std::vector<Eigen::Vector3d>& points_mm) {
   double sum = 0;
   for (const Eigen::Vector3d& point : points_mm) sum += (to * point - from * point).norm();
   return sum / double(points_mm.size());
 }
 
-/// The part or multiple of a motion that moves the surface by a distance, by halving: the distance grows with the motion up to half a turn.
-marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose, const marrow::Mesh& model, double distance_mm) {
+/// The part or multiple of a motion that moves the surface by a distance, by halving: the distance grows with the
+/// motion up to half a turn.
+marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose, const marrow::Mesh& model,
+                        double distance_mm) {
   const std::vector<Eigen::Vector3d> points_mm = marrow::sample_surface(model, 500);
   const auto distance_at = [&](double scale) {
-    return mean_distance_mm(pose.world_from_model, marrow::moved(pose.world_from_model, pose.frame, scale * motion), points_mm);
+    return mean_distance_mm(pose.world_from_model, marrow::moved(pose.world_from_model, pose.frame, scale * motion),
+                            points_mm);
   };
-  double low = 0, high = motion.head<3>().norm() > 0 ? marrow::kPi / motion.head<3>().norm() : 2 * distance_mm / motion.tail<3>().norm();
+  double low = 0, high = motion.head<3>().norm() > 0 ? marrow::kPi / motion.head<3>().norm()
+                                                     : 2 * distance_mm / motion.tail<3>().norm();
   if (!std::isfinite(high) || distance_at(high) < distance_mm)
-    throw marrow::Error("distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a rotation or translation, or a shorter distance");
+    throw marrow::Error(
+        "distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a rotation or "
+        "translation, or a shorter distance");
   for (int i = 0; i < 60; ++i) (distance_at(0.5 * (low + high)) < distance_mm ? low : high) = 0.5 * (low + high);
   return high * motion;
 }

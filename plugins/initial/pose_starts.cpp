@@ -5,8 +5,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <optional>
 #include <opencv2/calib3d.hpp>
+#include <optional>
 
 #include "rigid_fit.hpp"
 
@@ -37,7 +37,8 @@ std::optional<Eigen::Vector3d> triangulated(const std::vector<Sight>& sights, co
   return across.inverse() * right;
 }
 
-/// The same view of a plane tilted to the other side: turned about the axis in the image that the plane's normal leans about.
+/// The same view of a plane tilted to the other side: turned about the axis in the image that the plane's normal leans
+/// about.
 RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::vector<Sight>& sights) {
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -46,7 +47,8 @@ RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::v
     centre += sight.model_mm / double(sights.size());
   }
   const Eigen::Vector3d normal = camera_from_model.rotation * plane_normal(points);
-  const Eigen::Vector3d there = camera_from_model * centre, beam = normal.dot(there) < 0 ? Eigen::Vector3d(-there.normalized()) : there.normalized();
+  const Eigen::Vector3d there = camera_from_model * centre,
+                        beam = normal.dot(there) < 0 ? Eigen::Vector3d(-there.normalized()) : there.normalized();
   const Eigen::Vector3d axis = normal.cross(beam);
   const double sine = axis.norm(), leaning_rad = std::atan2(sine, normal.dot(beam));
   const Eigen::Matrix3d turn = rotation_from_vector(2 * leaning_rad / std::max(sine, 1e-12) * axis);
@@ -56,8 +58,8 @@ RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::v
   return tilted;
 }
 
-/// Of three points, all poses that show them exactly there (Ke and Roumeliotis, CVPR 2017); of more, that of least algebraic
-/// error (Terzakis and Lourakis, ECCV 2020); and the same tilted back.
+/// Of three points, all poses that show them exactly there (Ke and Roumeliotis, CVPR 2017); of more, that of least
+/// algebraic error (Terzakis and Lourakis, ECCV 2020); and the same tilted back.
 std::vector<RigidTransform> starts_of_view(const std::vector<Sight>& sights) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> directions;
@@ -71,13 +73,16 @@ std::vector<RigidTransform> starts_of_view(const std::vector<Sight>& sights) {
     if (sights.size() == 3)
       cv::solveP3P(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, cv::SOLVEPNP_AP3P);
     else
-      cv::solvePnPGeneric(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false, cv::SOLVEPNP_SQPNP);
+      cv::solvePnPGeneric(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false,
+                          cv::SOLVEPNP_SQPNP);
   } catch (const cv::Exception&) {
     return {};  // points on a line: others may serve
   }
   std::vector<RigidTransform> starts;
   for (std::size_t i = 0; i < turns.size(); ++i) {
-    const auto vector = [](const cv::Mat& mat) { return Eigen::Vector3d(mat.at<double>(0), mat.at<double>(1), mat.at<double>(2)); };
+    const auto vector = [](const cv::Mat& mat) {
+      return Eigen::Vector3d(mat.at<double>(0), mat.at<double>(1), mat.at<double>(2));
+    };
     const RigidTransform camera_from_model{"camera", "ct", rotation_from_vector(vector(turns[i])), vector(shifts[i])};
     if (!camera_from_model.rotation.allFinite() || !camera_from_model.translation_mm.allFinite()) continue;
     for (const RigidTransform& one : {camera_from_model, tilted_back(camera_from_model, sights)})
@@ -93,7 +98,8 @@ std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights) {
   std::vector<Eigen::Vector3d> model_mm, world_mm;
   for (const std::string& name : different(sights, &Sight::name))
     if (const auto place = triangulated(sights, name)) {
-      model_mm.push_back(std::find_if(sights.begin(), sights.end(), [&](const Sight& sight) { return sight.name == name; })->model_mm);
+      model_mm.push_back(
+          std::find_if(sights.begin(), sights.end(), [&](const Sight& sight) { return sight.name == name; })->model_mm);
       world_mm.push_back(*place);
     }
   if (model_mm.size() >= 3 && !lie_on_a_line(model_mm) && !lie_on_a_line(world_mm))

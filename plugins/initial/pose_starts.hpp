@@ -16,8 +16,9 @@ struct Sight {
   const Camera* camera;
 };
 
-/// Poses world_from_model: from the landmarks that two views or more show, whose places follow from the rays; and from each view
-/// that shows three or more. May be empty. Throws Error where landmarks are the mirror image of those in the CT.
+/// Poses world_from_model: from the landmarks that two views or more show, whose places follow from the rays; and from
+/// each view that shows three or more. May be empty. Throws Error where landmarks are the mirror image of those in the
+/// CT.
 std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights);
 
 }  // namespace marrow::initial

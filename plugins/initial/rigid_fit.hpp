@@ -16,11 +16,12 @@ bool lie_on_a_line(const std::vector<Eigen::Vector3d>& points_mm);
 /// tracked points".
 void check_spread(const std::vector<Eigen::Vector3d>& points_mm, const std::string& what);
 
-/// The rotation and translation of least squares that take each point of one set to that of the other: by the singular value
-/// decomposition of their covariance (Arun, Huang and Blostein, IEEE PAMI 9, 1987), and where that gives a reflection, by the
-/// rotation that is best then (Umeyama, IEEE PAMI 13, 1991, Eq 40 and 43). Throws Error where check_spread does, or where the
-/// one set is the mirror image of the other.
-RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std::vector<Eigen::Vector3d>& to_mm, const std::string& what);
+/// The rotation and translation of least squares that take each point of one set to that of the other: by the singular
+/// value decomposition of their covariance (Arun, Huang and Blostein, IEEE PAMI 9, 1987), and where that gives a
+/// reflection, by the rotation that is best then (Umeyama, IEEE PAMI 13, 1991, Eq 40 and 43). Throws Error where
+/// check_spread does, or where the one set is the mirror image of the other.
+RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std::vector<Eigen::Vector3d>& to_mm,
+                         const std::string& what);
 
 /// Derivatives of a point by the small motion (r, t) of its fragment about `frame`, both in the frame of the model.
 Eigen::Matrix<double, 3, 6> point_by_motion(const FragmentFrame& frame, const Eigen::Vector3d& model_mm);

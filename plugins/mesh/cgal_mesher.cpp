@@ -40,17 +40,19 @@ class Numbered : public Base {
 // As CGAL::Surface_mesh_default_triangulation_3, but numbered.
 using Kernel = CGAL::Robust_circumcenter_traits_3<CGAL::Exact_predicates_inexact_constructions_kernel>;
 using Vertex = Numbered<CGAL::Surface_mesh_vertex_base_3<Kernel>>;
-using Cell = Numbered<CGAL::Delaunay_triangulation_cell_base_with_circumcenter_3<Kernel, CGAL::Surface_mesh_cell_base_3<Kernel>>>;
+using Cell = Numbered<
+    CGAL::Delaunay_triangulation_cell_base_with_circumcenter_3<Kernel, CGAL::Surface_mesh_cell_base_3<Kernel>>>;
 using Triangulation = CGAL::Delaunay_triangulation_3<Kernel, CGAL::Triangulation_data_structure_3<Vertex, Cell>>;
 using Complex = CGAL::Surface_mesh_complex_2_in_triangulation_3<Triangulation>;
 using Point = Kernel::Point_3;
 using Implicit = CGAL::Implicit_surface_3<Kernel, std::function<double(Point)>>;
 using Traits = CGAL::Surface_mesh_traits_generator_3<Implicit>::type;
 using Limits = CGAL::Surface_mesh_default_criteria_3<Triangulation>;
-using Mesher = CGAL::Surface_mesher_generator<Complex, Traits, Limits, CGAL::Manifold_tag, CGAL::Surface_mesher::NOT_VERBOSE>::type;
+using Mesher = CGAL::Surface_mesher_generator<Complex, Traits, Limits, CGAL::Manifold_tag,
+                                              CGAL::Surface_mesher::NOT_VERBOSE>::type;
 
-/// The facets of the complex. The line between the centres of a facet's two cells crosses the level set, so one centre lies
-/// inside; seen from the other cell, a facet's corners are counter-clockwise.
+/// The facets of the complex. The line between the centres of a facet's two cells crosses the level set, so one centre
+/// lies inside; seen from the other cell, a facet's corners are counter-clockwise.
 Surface facets_of(const Complex& complex, const Implicit& implicit) {
   const Triangulation& triangulation = complex.triangulation();
   Surface surface;
@@ -79,7 +81,8 @@ Surface facets_of(const Complex& complex, const Implicit& implicit) {
 Surface mesh(const LevelSet& level_set, const Criteria& criteria, const std::function<void()>& step) {
   const auto value = [&](const Point& p) { return level_set.value({p.x(), p.y(), p.z()}); };
   constexpr double kRelativeError = 1e-7;  // of points on the level set, relative to the ball's radius
-  const Implicit implicit(value, Kernel::Sphere_3(CGAL::ORIGIN, level_set.radius_mm * level_set.radius_mm), kRelativeError);
+  const Implicit implicit(value, Kernel::Sphere_3(CGAL::ORIGIN, level_set.radius_mm * level_set.radius_mm),
+                          kRelativeError);
   Triangulation triangulation;
   for (const Eigen::Vector3d& p : level_set.points_mm) triangulation.insert(Point(p.x(), p.y(), p.z()));
   if (triangulation.dimension() < 3) return {{}, {}, true};  // too few points to begin with

@@ -17,9 +17,9 @@ struct LevelSet {
 };
 
 struct Criteria {
-  double angle_deg = 30;    ///< smallest angle of a triangle
-  double size_mm = 2;       ///< largest radius of a triangle's circle
-  double distance_mm = 0.1; ///< largest distance of a triangle's middle from the level set
+  double angle_deg = 30;     ///< smallest angle of a triangle
+  double size_mm = 2;        ///< largest radius of a triangle's circle
+  double distance_mm = 0.1;  ///< largest distance of a triangle's middle from the level set
   std::size_t most_points = 1000000;
 };
 

@@ -52,7 +52,8 @@ std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
   std::vector<bool> taken(blocks[0] * blocks[1] * blocks[2], false);
   std::vector<Vector3d> points;
   signs.for_edges([&](int axis, int x, int y, int z) {
-    auto place = taken[(std::size_t(z / block) * blocks[1] + std::size_t(y / block)) * blocks[0] + std::size_t(x / block)];
+    auto place =
+        taken[(std::size_t(z / block) * blocks[1] + std::size_t(y / block)) * blocks[0] + std::size_t(x / block)];
     if (place) return;
     place = true;
     points.push_back(signs.crossing(axis, x, y, z));
@@ -60,7 +61,8 @@ std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
   return points;
 }
 
-/// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than its cells.
+/// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than
+/// its cells.
 std::size_t most_points(const surface::Signs& signs, const Grid& grid, const Options& options) {
   double crossings = 0;
   signs.for_edges([&](int, int, int, int) { ++crossings; });
@@ -77,7 +79,8 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
   cgal_mesher::LevelSet level_set;
   level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
-  const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm, most_points(signs, grid, options)};
+  const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
+                                       most_points(signs, grid, options)};
   std::string fault;
   // About as far apart as the triangles are large; parts that are smaller need more points to begin with.
   const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
@@ -89,29 +92,36 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
       cgal_mesher::Surface surface = cgal_mesher::mesh(level_set, criteria, [&] { context.check_cancelled(); });
       Mesh mesh;
       mesh.frame = grid.frame;
-      for (const Vector3d& p : surface.vertices_mm) mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
+      for (const Vector3d& p : surface.vertices_mm)
+        mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
       mesh.triangles = std::move(surface.triangles);
       mesh = surface::finish(std::move(mesh), options);
       if (surface.complete && marrow::is_manifold(mesh)) return mesh;
-      fault = surface.complete ? "its parts are smaller than the triangles" : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
+      fault = surface.complete ? "its parts are smaller than the triangles"
+                               : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
     } catch (const std::logic_error&) {  // a condition that CGAL asserts
       fault = "CGAL's mesher came to a degenerate case";
     }
   }
-  throw marrow::Error("field: Delaunay refinement does not close its surface: " + fault +
-                      "; smooth the field, change size_mm and distance_mm, or use mesh.marching_cubes, which takes every field");
+  throw marrow::Error(
+      "field: Delaunay refinement does not close its surface: " + fault +
+      "; smooth the field, change size_mm and distance_mm, or use mesh.marching_cubes, which takes every field");
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.delaunay", delaunay)
-      .summary("Delaunay refinement (Boissonnat and Oudot, Graphical Models 2005; CGAL, so under the GPL): even triangles")
+      .summary(
+          "Delaunay refinement (Boissonnat and Oudot, Graphical Models 2005; CGAL, so under the GPL): even triangles")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("angle_deg", &Options::angle_deg, "smallest angle of a triangle, before smoothing", marrow::at_least(0), marrow::at_most(30))
-      .option("size_mm", &Options::size_mm, "largest radius of the circle through a triangle's corners", marrow::at_least(0.01))
-      .option("distance_mm", &Options::distance_mm, "largest distance of a triangle's middle from the surface", marrow::at_least(0.001))
+      .option("angle_deg", &Options::angle_deg, "smallest angle of a triangle, before smoothing", marrow::at_least(0),
+              marrow::at_most(30))
+      .option("size_mm", &Options::size_mm, "largest radius of the circle through a triangle's corners",
+              marrow::at_least(0.01))
+      .option("distance_mm", &Options::distance_mm, "largest distance of a triangle's middle from the surface",
+              marrow::at_least(0.001))
       .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
 }

@@ -51,7 +51,8 @@ class Surface {
     Row& counts = row(y, z);
     for (int axis = 0; axis < 3; ++axis)
       for (int word = 0; word < signs_.words(); ++word)
-        if (const Word edges = signs_.edges(axis, word, y, z)) counts.vertex[axis] += std::uint32_t(std::popcount(edges));
+        if (const Word edges = signs_.edges(axis, word, y, z))
+          counts.vertex[axis] += std::uint32_t(std::popcount(edges));
     signs_.for_cells(y, z, [&](int, unsigned pattern) { counts.triangle += kTable.counts[pattern]; });
   }
 

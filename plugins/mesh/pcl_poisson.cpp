@@ -12,8 +12,8 @@
 namespace pcl_poisson {
 namespace {
 
-/// Cuts polygons into triangles so that no edge belongs to more than two: a polygon into a fan from a corner whose diagonals join
-/// vertices that nothing else joins, or, where there is none, from its middle.
+/// Cuts polygons into triangles so that no edge belongs to more than two: a polygon into a fan from a corner whose
+/// diagonals join vertices that nothing else joins, or, where there is none, from its middle.
 class Triangulation {
  public:
   Triangulation(const std::vector<pcl::Vertices>& polygons, Surface& surface) : surface_(surface) {
@@ -23,7 +23,9 @@ class Triangulation {
   }
 
  private:
-  static std::uint32_t corner(const pcl::Indices& corners, std::size_t k) { return std::uint32_t(corners[k % corners.size()]); }
+  static std::uint32_t corner(const pcl::Indices& corners, std::size_t k) {
+    return std::uint32_t(corners[k % corners.size()]);
+  }
   static std::uint64_t edge(const pcl::Indices& corners, std::size_t k, std::size_t other) {
     const std::uint64_t a = corner(corners, k), b = corner(corners, other);
     return std::min(a, b) << 32 | std::max(a, b);
@@ -42,10 +44,12 @@ class Triangulation {
     }
     std::array<float, 3> middle{};
     for (std::size_t k = 0; k < size; ++k)
-      for (std::size_t axis = 0; axis < 3; ++axis) middle[axis] += surface_.vertices[corner(corners, k)][axis] / float(size);
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        middle[axis] += surface_.vertices[corner(corners, k)][axis] / float(size);
     const auto centre = std::uint32_t(surface_.vertices.size());
     surface_.vertices.push_back(middle);
-    for (std::size_t k = 0; k < size; ++k) surface_.triangles.push_back({centre, corner(corners, k), corner(corners, k + 1)});
+    for (std::size_t k = 0; k < size; ++k)
+      surface_.triangles.push_back({centre, corner(corners, k), corner(corners, k + 1)});
   }
 
   Surface& surface_;
@@ -70,7 +74,7 @@ Surface reconstruct(const std::vector<OrientedPoint>& points, const Settings& se
   poisson.setScale(settings.scale);
   poisson.setPointWeight(settings.point_weight);
   poisson.setOutputPolygons(true);  // its own triangulation never ends where a vertex is not finite
-  poisson.setThreads(1);  // with more, sums are added up in an order that differs from run to run
+  poisson.setThreads(1);            // with more, sums are added up in an order that differs from run to run
   pcl::PointCloud<pcl::PointNormal> vertices;
   std::vector<pcl::Vertices> polygons;
   {

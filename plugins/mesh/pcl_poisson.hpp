@@ -12,9 +12,9 @@ struct OrientedPoint {
 };
 
 struct Settings {
-  int depth = 8;             ///< of the octree
-  float scale = 1.1f;        ///< side of the octree's cube over the points' extent
-  float point_weight = 4;    ///< of the points against the normals; 0: unscreened
+  int depth = 8;           ///< of the octree
+  float scale = 1.1f;      ///< side of the octree's cube over the points' extent
+  float point_weight = 4;  ///< of the points against the normals; 0: unscreened
 };
 
 struct Surface {

@@ -21,14 +21,15 @@ constexpr int kLeastDepth = 5, kMostDepth = 11;
 
 std::array<float, 3> to_array(const Vector3d& v) { return {float(v.x()), float(v.y()), float(v.z())}; }
 
-/// Where the field changes sign along the edges of its grid, with the field's direction there, in mm about the middle of the
-/// grid and along its axes.
+/// Where the field changes sign along the edges of its grid, with the field's direction there, in mm about the middle
+/// of the grid and along its axes.
 std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const Vector3d& middle) {
   const surface::Signs signs(field);
   const surface::Padded padded(field);
   const Vector3d& spacing = field.grid.spacing_mm;
   const auto gradient = [&](int x, int y, int z) {
-    return Vector3d((padded(x + 1, y, z) - padded(x - 1, y, z)) / spacing.x(), (padded(x, y + 1, z) - padded(x, y - 1, z)) / spacing.y(),
+    return Vector3d((padded(x + 1, y, z) - padded(x - 1, y, z)) / spacing.x(),
+                    (padded(x, y + 1, z) - padded(x, y - 1, z)) / spacing.y(),
                     (padded(x, y, z + 1) - padded(x, y, z - 1)) / spacing.z());
   };
   std::vector<pcl_poisson::OrientedPoint> points;
@@ -47,12 +48,14 @@ std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const V
   return points;
 }
 
-/// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges out. In
-/// it, the depth of the octree at which the smallest cells are about as large as the field's.
-pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>& points, double cell_mm, const Options& options) {
+/// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges
+/// out. In it, the depth of the octree at which the smallest cells are about as large as the field's.
+pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>& points, double cell_mm,
+                                   const Options& options) {
   double extent_mm = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
-    const auto [low, high] = std::minmax_element(points.begin(), points.end(), [axis](auto& a, auto& b) { return a.place[axis] < b.place[axis]; });
+    const auto [low, high] = std::minmax_element(points.begin(), points.end(),
+                                                 [axis](auto& a, auto& b) { return a.place[axis] < b.place[axis]; });
     extent_mm = std::max(extent_mm, double(high->place[axis] - low->place[axis]));
   }
   const double side_mm = 1.1 * extent_mm + 4 * cell_mm;
@@ -70,17 +73,22 @@ Mesh poisson(const SignedField& field, const Options& options) {
   try {
     surface = pcl_poisson::reconstruct(points, settings);
   } catch (const std::exception& error) {
-    throw marrow::Error(std::string("field: PCL's Poisson reconstruction gave up (") + error.what() + "); use mesh.marching_cubes, which takes every field");
+    throw marrow::Error(std::string("field: PCL's Poisson reconstruction gave up (") + error.what() +
+                        "); use mesh.marching_cubes, which takes every field");
   }
   Mesh mesh;
   mesh.frame = grid.frame;
-  for (const auto& [x, y, z] : surface.vertices) mesh.vertices_mm.push_back(grid.point_from_index(Vector3d(x, y, z).cwiseQuotient(grid.spacing_mm) + middle));
+  for (const auto& [x, y, z] : surface.vertices)
+    mesh.vertices_mm.push_back(grid.point_from_index(Vector3d(x, y, z).cwiseQuotient(grid.spacing_mm) + middle));
   mesh.triangles = std::move(surface.triangles);
-  const bool finite = std::all_of(mesh.vertices_mm.begin(), mesh.vertices_mm.end(), [](const Vector3d& p) { return p.allFinite(); });
+  const bool finite =
+      std::all_of(mesh.vertices_mm.begin(), mesh.vertices_mm.end(), [](const Vector3d& p) { return p.allFinite(); });
   if (finite) mesh = surface::finish(std::move(mesh), options);
   if (!finite || !marrow::is_manifold(mesh))
-    throw marrow::Error("field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; smooth the "
-                        "field, or use mesh.marching_cubes, which takes every field");
+    throw marrow::Error(
+        "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; "
+        "smooth the "
+        "field, or use mesh.marching_cubes, which takes every field");
   return mesh;
 }
 
@@ -91,9 +99,11 @@ MARROW_PLUGIN(plugin) {
       .summary("Poisson reconstruction (Kazhdan and Hoppe, ACM Transactions on Graphics 2013; PCL): smooth")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("depth", &Options::depth, "of the octree: at most 2^depth cells a side; 0: cells about as small as the field's", marrow::at_least(0),
-              marrow::at_most(kMostDepth))
-      .option("point_weight", &Options::point_weight, "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
+      .option("depth", &Options::depth,
+              "of the octree: at most 2^depth cells a side; 0: cells about as small as the field's",
+              marrow::at_least(0), marrow::at_most(kMostDepth))
+      .option("point_weight", &Options::point_weight,
+              "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
               marrow::at_least(0))
       .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));

@@ -13,8 +13,8 @@ namespace surface {
 
 using Word = std::uint64_t;
 
-/// One bit a sample, set where it is inside, with one layer of outside around the grid so that the surface closes at the
-/// border. Points are counted in the padded grid: (1, 1, 1) is the field's first sample.
+/// One bit a sample, set where it is inside, with one layer of outside around the grid so that the surface closes at
+/// the border. Points are counted in the padded grid: (1, 1, 1) is the field's first sample.
 class Signs {
  public:
   /// Throws Error for a field that check_field refuses.
@@ -72,7 +72,8 @@ class Signs {
       for (int y = 0; y < size_[1]; ++y)
         for (int word = 0; word < words_; ++word)
           for (int axis = 0; axis < 3; ++axis)
-            for (Word left = edges(axis, word, y, z); left; left &= left - 1) visit(axis, 64 * word + std::countr_zero(left), y, z);
+            for (Word left = edges(axis, word, y, z); left; left &= left - 1)
+              visit(axis, 64 * word + std::countr_zero(left), y, z);
   }
 
   /// Where the surface crosses the edge in +axis of a point, in samples of the field.

@@ -38,5 +38,6 @@ MARROW_PLUGIN(plugin) {
       .summary("Fewer triangles for display, by quadric error (Garland and Heckbert, SIGGRAPH 1997; VTK)")
       .in("mesh", "surface")
       .out("mesh", "the same surface with at most about so many triangles")
-      .option("triangles", &Options::triangles, "how many to keep; a mesh that has fewer is left as it is", marrow::at_least(100));
+      .option("triangles", &Options::triangles, "how many to keep; a mesh that has fewer is left as it is",
+              marrow::at_least(100));
 }

@@ -58,8 +58,8 @@ void check_field(const marrow::SignedField& field) {
 
 namespace {
 
-/// Vertices by component. Each points to one of its component that comes before it, the first to itself; any number of threads
-/// may join, as only a first one is made to point elsewhere, by exchange.
+/// Vertices by component. Each points to one of its component that comes before it, the first to itself; any number of
+/// threads may join, as only a first one is made to point elsewhere, by exchange.
 class Parts {
  public:
   explicit Parts(const Mesh& mesh) : before_(mesh.vertices_mm.size()) {
@@ -109,7 +109,8 @@ std::vector<double> six_volumes(const Mesh& mesh, const std::vector<std::uint32_
   const Eigen::Vector3d origin = mesh.vertices_mm[mesh.triangles.front()[0]];
   std::vector<std::vector<double>> sums(kChunks, std::vector<double>(count, 0));
   tbb::parallel_for(std::size_t(0), kChunks, [&](std::size_t chunk) {
-    for (std::size_t i = mesh.triangles.size() * chunk / kChunks; i < mesh.triangles.size() * (chunk + 1) / kChunks; ++i) {
+    for (std::size_t i = mesh.triangles.size() * chunk / kChunks; i < mesh.triangles.size() * (chunk + 1) / kChunks;
+         ++i) {
       const auto& t = mesh.triangles[i];
       const Eigen::Vector3d a = mesh.vertices_mm[t[0]] - origin, b = mesh.vertices_mm[t[1]] - origin,
                             c = mesh.vertices_mm[t[2]] - origin;

@@ -25,7 +25,8 @@ class Padded {
   float operator()(int x, int y, int z) const {
     const auto& size = field_.grid.size;
     if (field_.grid.contains(x, y, z)) return field_.at(x, y, z);
-    return std::abs(field_.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1)));
+    return std::abs(
+        field_.at(std::clamp(x, 0, size[0] - 1), std::clamp(y, 0, size[1] - 1), std::clamp(z, 0, size[2] - 1)));
   }
 
  private:
@@ -37,8 +38,8 @@ class Padded {
 marrow::Mesh largest_component(marrow::Mesh mesh);
 
 /// Smooths without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing
-/// approach to fair surface design, SIGGRAPH 1995). Shapes longer than about 2 pi / sqrt(pass_band) edges keep their size.
-/// The surface must be closed.
+/// approach to fair surface design, SIGGRAPH 1995). Shapes longer than about 2 pi / sqrt(pass_band) edges keep their
+/// size. The surface must be closed.
 struct Taubin {
   int iterations = 10;
   double lambda = 0.5, pass_band = 0.1;

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The dual of marching cubes: a vertex for each loop in which the surface crosses the edges of a cell, and a polygon around
-// each edge of the grid that it crosses. The original nets (Gibson, Constrained elastic surface nets, MICCAI 1998) have one
-// vertex a cell, which joins sheets that only pass through the same cell; a vertex a loop keeps them apart.
+// The dual of marching cubes: a vertex for each loop in which the surface crosses the edges of a cell, and a polygon
+// around each edge of the grid that it crosses. The original nets (Gibson, Constrained elastic surface nets, MICCAI
+// 1998) have one vertex a cell, which joins sheets that only pass through the same cell; a vertex a loop keeps them
+// apart.
 //
-// One case remains. Where the surface crosses the face of two cells twice, both crossings may join the same two vertices,
-// whose edge would then have four triangles. There each crossing has a vertex of its own, halfway. Thus the surface is a
-// closed 2-manifold for every field.
+// One case remains. Where the surface crosses the face of two cells twice, both crossings may join the same two
+// vertices, whose edge would then have four triangles. There each crossing has a vertex of its own, halfway. Thus the
+// surface is a closed 2-manifold for every field.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -39,7 +40,8 @@ struct LoopTable {
 };
 const LoopTable kTable;
 
-/// The corners of a cell's face at the low (high) end of `axis`: bit 0 of k along the next axis, bit 1 along the one after.
+/// The corners of a cell's face at the low (high) end of `axis`: bit 0 of k along the next axis, bit 1 along the one
+/// after.
 constexpr int face_corner(int axis, bool high, int k) {
   return int(high) << axis | (k & 1) << (axis + 1) % 3 | (k >> 1) << (axis + 2) % 3;
 }
@@ -50,7 +52,8 @@ bool crossed_twice(unsigned pattern, int axis) {
   return inside(0) == inside(3) && inside(1) == inside(2) && inside(0) != inside(1);
 }
 
-/// True when both crossings of such a face are part of one loop of the cell. Opposite sides belong to different crossings.
+/// True when both crossings of such a face are part of one loop of the cell. Opposite sides belong to different
+/// crossings.
 bool in_one_loop(unsigned pattern, int axis, bool high) {
   const auto corner = [&](int k) { return face_corner(axis, high, k); };
   const auto& loop_of = kTable.loop_of[pattern];
@@ -64,7 +67,9 @@ struct Cell {
   std::uint8_t pattern = 0;
   std::uint8_t split_faces = 0;  ///< bit per axis
 
-  std::uint32_t count() const { return std::uint32_t(kTable.loops[pattern].size()) + 2u * unsigned(std::popcount(split_faces)); }
+  std::uint32_t count() const {
+    return std::uint32_t(kTable.loops[pattern].size()) + 2u * unsigned(std::popcount(split_faces));
+  }
   std::uint32_t vertex_of_edge(int edge) const { return first_vertex + kTable.loop_of[pattern][std::size_t(edge)]; }
   std::uint32_t vertex_of_face(int axis, int which) const {
     const auto before = std::popcount(split_faces & ((1u << axis) - 1));
@@ -117,7 +122,8 @@ struct Polygons {
   }
 };
 
-/// The polygon around the edge in +axis of a point, of the four cells about it. `slices`: the one below the point and its own.
+/// The polygon around the edge in +axis of a point, of the four cells about it. `slices`: the one below the point and
+/// its own.
 void add_polygon(const Slice* const slices[2], int axis, const std::array<int, 3>& point, Polygons& polygons) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   constexpr int kSteps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise about the axis
@@ -198,7 +204,9 @@ class Net {
     std::vector<std::size_t> counts(first_.size(), 0);
     tbb::parallel_for(0, signs_.size()[2] - 1, [&](int z) {
       for (int y = 0; y + 1 < signs_.size()[1]; ++y)
-        signs_.for_cells(y, z, [&](int x, unsigned pattern) { counts[std::size_t(z)] += cell_at(signs_, x, y, z, pattern).count(); });
+        signs_.for_cells(y, z, [&](int x, unsigned pattern) {
+          counts[std::size_t(z)] += cell_at(signs_, x, y, z, pattern).count();
+        });
     });
     std::size_t total = 0;
     for (std::size_t z = 0; z < counts.size(); ++z) {
@@ -217,7 +225,8 @@ class Net {
             add_polygon(slices, axis, {64 * word + std::countr_zero(left), y, z}, polygons);
   }
 
-  /// A loop's vertex lies at the mean of its crossings, a face's halfway between the two sides that meet at an inside corner.
+  /// A loop's vertex lies at the mean of its crossings, a face's halfway between the two sides that meet at an inside
+  /// corner.
   void place_vertices(const Slice& slice, int z) {
     for (int y = 0; y + 1 < signs_.size()[1]; ++y)
       signs_.for_cells(y, z, [&](int x, unsigned pattern) {
@@ -243,16 +252,18 @@ class Net {
             cells_[vertex] = box;
             cells_[vertex].high[axis] = low[axis];
             places_[vertex++] = (crossing(cells::edge_between(corner, face_corner(axis, false, k ^ 1))) +
-                                 crossing(cells::edge_between(corner, face_corner(axis, false, k ^ 2)))) / 2;
+                                 crossing(cells::edge_between(corner, face_corner(axis, false, k ^ 2)))) /
+                                2;
           }
         }
       });
   }
 
-  /// Where to cut a polygon: along the shorter diagonal; one with a face's vertex from that, as its neighbours on the polygon may
-  /// not be joined once more.
+  /// Where to cut a polygon: along the shorter diagonal; one with a face's vertex from that, as its neighbours on the
+  /// polygon may not be joined once more.
   std::size_t fan_from(const std::uint32_t* corners, std::size_t size, const std::vector<Vector3d>& at) const {
-    if (size == 4) return (at[corners[0]] - at[corners[2]]).squaredNorm() <= (at[corners[1]] - at[corners[3]]).squaredNorm() ? 0 : 1;
+    if (size == 4)
+      return (at[corners[0]] - at[corners[2]]).squaredNorm() <= (at[corners[1]] - at[corners[3]]).squaredNorm() ? 0 : 1;
     for (std::size_t k = 0; k < size; ++k)
       if ((cells_[corners[k]].high - cells_[corners[k]].low).minCoeff() == 0) return k;
     return 0;

@@ -15,9 +15,7 @@ class Bobyqa : public marrow::Optimizer {
   }
 };
 
-std::shared_ptr<const marrow::Optimizer> bobyqa() {
-  return std::make_shared<Bobyqa>();
-}
+std::shared_ptr<const marrow::Optimizer> bobyqa() { return std::make_shared<Bobyqa>(); }
 
 }  // namespace
 

@@ -32,8 +32,16 @@ class Normal {
 class Strategy {
  public:
   Strategy(Eigen::Index n, const Options& options)
-      : n_(n), lambda_(options.population > 0 ? options.population : 4 + int(3 * std::log(double(n)))), sigma_(options.sigma), normal_(unsigned(options.seed)),
-        mean_(Eigen::VectorXd::Zero(n)), path_c_(mean_), path_s_(mean_), covariance_(Eigen::MatrixXd::Identity(n, n)), axes_(covariance_), lengths_(Eigen::VectorXd::Ones(n)) {
+      : n_(n),
+        lambda_(options.population > 0 ? options.population : 4 + int(3 * std::log(double(n)))),
+        sigma_(options.sigma),
+        normal_(unsigned(options.seed)),
+        mean_(Eigen::VectorXd::Zero(n)),
+        path_c_(mean_),
+        path_s_(mean_),
+        covariance_(Eigen::MatrixXd::Identity(n, n)),
+        axes_(covariance_),
+        lengths_(Eigen::VectorXd::Ones(n)) {
     weights_.resize(lambda_ / 2);
     for (int i = 0; i < weights_.size(); ++i) weights_[i] = std::log(0.5 * (lambda_ + 1)) - std::log(i + 1.0);
     weights_ /= weights_.sum();
@@ -59,7 +67,8 @@ class Strategy {
     }
     std::vector<int> order(points.size());
     std::iota(order.begin(), order.end(), 0);
-    std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
+    std::stable_sort(order.begin(), order.end(),
+                     [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
     adapt(points, order);
     return sigma_ * lengths_.maxCoeff() < evaluate.tolerance();
   }
@@ -81,7 +90,9 @@ class Strategy {
       const Eigen::VectorXd y = (points[std::size_t(order[std::size_t(i)])] - before) / sigma_;
       rank_mu += weights_[i] * y * y.transpose();
     }
-    covariance_ = (1 - c_1_ - c_mu_) * covariance_ + c_1_ * (path_c_ * path_c_.transpose() + (is_slow ? 0 : c_c_ * (2 - c_c_)) * covariance_) + c_mu_ * rank_mu;
+    covariance_ = (1 - c_1_ - c_mu_) * covariance_ +
+                  c_1_ * (path_c_ * path_c_.transpose() + (is_slow ? 0 : c_c_ * (2 - c_c_)) * covariance_) +
+                  c_mu_ * rank_mu;
     sigma_ *= std::exp(std::min(1.0, c_s_ / damping_ * (path_s_.norm() / expected_ - 1)));
     const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance_);
     axes_ = solver.eigenvectors();
@@ -116,7 +127,9 @@ class CmaEs : public marrow::Optimizer {
 };
 
 std::shared_ptr<const marrow::Optimizer> cma_es(const Options& options) {
-  if (options.population != 0 && options.population < 4) throw marrow::Error("population: expected 4 or more, or 0 for the usual number, got " + std::to_string(options.population));
+  if (options.population != 0 && options.population < 4)
+    throw marrow::Error("population: expected 4 or more, or 0 for the usual number, got " +
+                        std::to_string(options.population));
   return std::make_shared<CmaEs>(options);
 }
 
@@ -126,7 +139,9 @@ MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.cma_es", cma_es)
       .summary("Covariance matrix adaptation (Hansen and Ostermeier, Evolutionary Computation 2001; Hansen 2016)")
       .out("optimizer", "minimiser without derivatives, for rugged functions")
-      .option("population", &Options::population, "points in a generation; 0: 4 + 3 log n", marrow::at_least(0), marrow::at_most(10000))
-      .option("sigma", &Options::sigma, "spread of the first generation, in initial steps", marrow::at_least(1e-6), marrow::unit("1"))
+      .option("population", &Options::population, "points in a generation; 0: 4 + 3 log n", marrow::at_least(0),
+              marrow::at_most(10000))
+      .option("sigma", &Options::sigma, "spread of the first generation, in initial steps", marrow::at_least(1e-6),
+              marrow::unit("1"))
       .option("seed", &Options::seed, "of the random numbers", marrow::at_least(0));
 }

@@ -24,13 +24,18 @@ class Direct : public marrow::Optimizer {
   const double reach_;
 };
 
-std::shared_ptr<const marrow::Optimizer> direct(const Options& options) { return std::make_shared<Direct>(options.reach); }
+std::shared_ptr<const marrow::Optimizer> direct(const Options& options) {
+  return std::make_shared<Direct>(options.reach);
+}
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.direct", direct)
-      .summary("Divides the whole range into ever smaller boxes where it is promising (DIRECT-L: Gablonsky and Kelley 2001; NLopt)")
+      .summary(
+          "Divides the whole range into ever smaller boxes where it is promising (DIRECT-L: Gablonsky and Kelley 2001; "
+          "NLopt)")
       .out("optimizer", "global minimiser without derivatives")
-      .option("reach", &Options::reach, "range to either side where the problem has no bounds, in initial steps", marrow::at_least(1e-3), marrow::unit("1"));
+      .option("reach", &Options::reach, "range to either side where the problem has no bounds, in initial steps",
+              marrow::at_least(1e-3), marrow::unit("1"));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every optimizer does alike: checks the problem, counts evaluations, keeps the best point, spends no more than its budget.
+// What every optimizer does alike: checks the problem, counts evaluations, keeps the best point, spends no more than
+// its budget.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,15 +13,19 @@
 /// Throws Error for a problem that cannot be minimised.
 inline void check_problem(const marrow::MinimisationProblem& problem) {
   const auto n = problem.start.size();
-  if (problem.initial_step.size() != n || !(problem.initial_step.array() > 0).all() || !problem.initial_step.allFinite() || !problem.start.allFinite())
+  if (problem.initial_step.size() != n || !(problem.initial_step.array() > 0).all() ||
+      !problem.initial_step.allFinite() || !problem.start.allFinite())
     throw marrow::Error("the optimizer needs a finite start and one positive initial step per coordinate");
   for (const auto* bound : {&problem.lower, &problem.upper})
     if (bound->size() && bound->size() != n)
-      throw marrow::Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " + std::to_string(n) + " coordinates");
-  if ((problem.lower.size() && (problem.lower.array() > problem.start.array()).any()) || (problem.upper.size() && (problem.upper.array() < problem.start.array()).any()))
+      throw marrow::Error("the optimizer got bounds for " + std::to_string(bound->size()) + " of " + std::to_string(n) +
+                          " coordinates");
+  if ((problem.lower.size() && (problem.lower.array() > problem.start.array()).any()) ||
+      (problem.upper.size() && (problem.upper.array() < problem.start.array()).any()))
     throw marrow::Error("the optimizer's start lies outside the bounds");
   if (problem.max_evaluations < 1)
-    throw marrow::Error("the optimizer needs at least one evaluation, got max_evaluations = " + std::to_string(problem.max_evaluations));
+    throw marrow::Error("the optimizer needs at least one evaluation, got max_evaluations = " +
+                        std::to_string(problem.max_evaluations));
 }
 
 /// Evaluations of a problem in units of its initial step about its start: y = (x - start) / initial_step.
@@ -41,7 +46,9 @@ class Evaluations {
   /// The nearest point within the bounds.
   Eigen::VectorXd within(const Eigen::VectorXd& y) const { return in_steps(point(y)); }
   /// x as y.
-  Eigen::VectorXd in_steps(const Eigen::VectorXd& x) const { return (x - problem_.start).cwiseQuotient(problem_.initial_step); }
+  Eigen::VectorXd in_steps(const Eigen::VectorXd& x) const {
+    return (x - problem_.start).cwiseQuotient(problem_.initial_step);
+  }
 
   /// The value at a point within the bounds; what is not finite counts as worse than all that was seen. Throws Spent.
   double operator()(const Eigen::VectorXd& y) {
@@ -50,7 +57,8 @@ class Evaluations {
   }
 
   bool has_derivatives() const { return bool(problem_.expansion); }
-  /// The function about a point within the bounds, in steps; absent where it is not finite. One evaluation. Throws Spent.
+  /// The function about a point within the bounds, in steps; absent where it is not finite. One evaluation. Throws
+  /// Spent.
   std::optional<marrow::MinimisationProblem::Expansion> expansion(const Eigen::VectorXd& y) {
     const Eigen::VectorXd x = next(y);
     marrow::MinimisationProblem::Expansion about = problem_.expansion(x);

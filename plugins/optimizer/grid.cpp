@@ -9,7 +9,8 @@ struct Options {
   int points = 3;
 };
 
-/// All points of a grid about the best so far, then a finer one about the best of these: as wide as one step of the last.
+/// All points of a grid about the best so far, then a finer one about the best of these: as wide as one step of the
+/// last.
 std::string search(Evaluations& evaluate, int points) {
   const Eigen::Index n = evaluate.size();
   Eigen::VectorXd centre = Eigen::VectorXd::Zero(n);
@@ -44,7 +45,9 @@ class GridSearch : public marrow::Optimizer {
 };
 
 std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
-  if (options.points % 2 == 0) throw marrow::Error("points: expected an odd number, so that the middle is one of them, got " + std::to_string(options.points));
+  if (options.points % 2 == 0)
+    throw marrow::Error("points: expected an odd number, so that the middle is one of them, got " +
+                        std::to_string(options.points));
   return std::make_shared<GridSearch>(options.points);
 }
 

@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::size_t kMemory = 8;
 
-/// The gradient: as the function tells it, else by central differences of h to either side, cut at the bounds (2 n evaluations).
-/// 0 along a coordinate whose bounds meet.
+/// The gradient: as the function tells it, else by central differences of h to either side, cut at the bounds (2 n
+/// evaluations). 0 along a coordinate whose bounds meet.
 Eigen::VectorXd gradient_at(Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
   if (evaluate.has_derivatives())
     if (const auto about = evaluate.expansion(y)) return about->gradient;
@@ -31,7 +31,8 @@ class Memory {
  public:
   void add(const Eigen::VectorXd& step, const Eigen::VectorXd& change_of_gradient) {
     const double along = step.dot(change_of_gradient);
-    if (!(along > 1e-12 * step.norm() * change_of_gradient.norm())) return;  // no curvature, or none that may be believed
+    if (!(along > 1e-12 * step.norm() * change_of_gradient.norm()))
+      return;  // no curvature, or none that may be believed
     pairs_.push_back({step, change_of_gradient, 1 / along});
     if (pairs_.size() > kMemory) pairs_.pop_front();
   }
@@ -47,7 +48,8 @@ class Memory {
       q -= alpha[i] * pairs_[i].change;
     }
     q *= 1 / (pairs_.back().inverse * pairs_.back().change.squaredNorm());
-    for (std::size_t i = 0; i < pairs_.size(); ++i) q += (alpha[i] - pairs_[i].inverse * pairs_[i].change.dot(q)) * pairs_[i].step;
+    for (std::size_t i = 0; i < pairs_.size(); ++i)
+      q += (alpha[i] - pairs_[i].inverse * pairs_[i].change.dot(q)) * pairs_[i].step;
     return -q;
   }
 
@@ -59,8 +61,10 @@ class Memory {
   std::deque<Pair> pairs_;
 };
 
-/// Goes along the direction to where the value is enough lower (Armijo's condition), by parabolas. False where there is no such place.
-bool step_along(Evaluations& evaluate, const Eigen::VectorXd& direction, double slope, Eigen::VectorXd& here, double& value) {
+/// Goes along the direction to where the value is enough lower (Armijo's condition), by parabolas. False where there is
+/// no such place.
+bool step_along(Evaluations& evaluate, const Eigen::VectorXd& direction, double slope, Eigen::VectorXd& here,
+                double& value) {
   double t = 1;
   for (int i = 0; i < 8; ++i) {
     const Eigen::VectorXd there = evaluate.within(here + t * direction);
@@ -77,7 +81,8 @@ bool step_along(Evaluations& evaluate, const Eigen::VectorXd& direction, double 
 }
 
 /// 1 for the coordinates that may follow -gradient, 0 for those that a bound stops.
-Eigen::VectorXd free_coordinates(const Evaluations& evaluate, const Eigen::VectorXd& here, const Eigen::VectorXd& gradient, double h) {
+Eigen::VectorXd free_coordinates(const Evaluations& evaluate, const Eigen::VectorXd& here,
+                                 const Eigen::VectorXd& gradient, double h) {
   const Eigen::VectorXd down = here - h * gradient / std::max(gradient.norm(), 1e-300);
   return (evaluate.within(down) - down).unaryExpr([](double cut) { return std::abs(cut) > 1e-12 ? 0.0 : 1.0; });
 }
@@ -110,7 +115,9 @@ std::string search(Evaluations& evaluate) {
 
 class Lbfgs : public marrow::Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override { return Evaluations(problem).run(search); }
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return Evaluations(problem).run(search);
+  }
 };
 
 std::shared_ptr<const marrow::Optimizer> lbfgs() { return std::make_shared<Lbfgs>(); }
@@ -119,6 +126,8 @@ std::shared_ptr<const marrow::Optimizer> lbfgs() { return std::make_shared<Lbfgs
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.lbfgs", lbfgs)
-      .summary("Quasi-Newton steps by the gradients of the last eight (L-BFGS: Liu and Nocedal 1989), as the cost tells them or by differences")
+      .summary(
+          "Quasi-Newton steps by the gradients of the last eight (L-BFGS: Liu and Nocedal 1989), as the cost tells "
+          "them or by differences")
       .out("optimizer", "minimiser for smooth functions");
 }

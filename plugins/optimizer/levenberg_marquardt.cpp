@@ -10,7 +10,8 @@ namespace {
 
 using Expansion = marrow::MinimisationProblem::Expansion;
 
-/// Of a function that does not know its derivatives: by differences, the Hessian's negative eigenvalues turned positive.
+/// Of a function that does not know its derivatives: by differences, the Hessian's negative eigenvalues turned
+/// positive.
 Expansion by_differences(Evaluations& evaluate, const Eigen::VectorXd& here, double value, double h) {
   const Eigen::Index n = here.size();
   Expansion about{value, Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
@@ -29,16 +30,19 @@ Expansion by_differences(Evaluations& evaluate, const Eigen::VectorXd& here, dou
   }
   for (Eigen::Index i = 0; i < n; ++i)
     for (Eigen::Index j = 0; j < i; ++j)
-      about.curvature(i, j) = about.curvature(j, i) = (evaluate(shifted(i, h, j, h)) - above[i] - above[j] + value) / (h * h);
+      about.curvature(i, j) = about.curvature(j, i) =
+          (evaluate(shifted(i, h, j, h)) - above[i] - above[j] + value) / (h * h);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(about.curvature);
-  about.curvature = solver.eigenvectors() * solver.eigenvalues().cwiseAbs().asDiagonal() * solver.eigenvectors().transpose();
+  about.curvature =
+      solver.eigenvectors() * solver.eigenvalues().cwiseAbs().asDiagonal() * solver.eigenvectors().transpose();
   return about;
 }
 
 /// Steps that Marquardt's damping keeps short while the expansion misleads (SIAM J Appl Math 1963).
 class Search {
  public:
-  explicit Search(Evaluations& evaluate) : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())), derivatives_(evaluate.has_derivatives()) {
+  explicit Search(Evaluations& evaluate)
+      : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())), derivatives_(evaluate.has_derivatives()) {
     value_ = look(here_);
     about_ = seen_;
   }
@@ -106,7 +110,9 @@ class Search {
 
 class LevenbergMarquardt : public marrow::Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override { return Evaluations(problem).run([](Evaluations& evaluate) { return Search(evaluate).run(); }); }
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return Evaluations(problem).run([](Evaluations& evaluate) { return Search(evaluate).run(); });
+  }
 };
 
 std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() { return std::make_shared<LevenbergMarquardt>(); }
@@ -115,6 +121,8 @@ std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() { return std::mak
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.levenberg_marquardt", levenberg_marquardt)
-      .summary("Damped Gauss-Newton steps where the cost knows its derivatives, damped Newton steps by differences elsewhere (Marquardt 1963)")
+      .summary(
+          "Damped Gauss-Newton steps where the cost knows its derivatives, damped Newton steps by differences "
+          "elsewhere (Marquardt 1963)")
       .out("optimizer", "minimiser for smooth functions");
 }

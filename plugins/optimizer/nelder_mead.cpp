@@ -12,9 +12,7 @@ class NelderMead : public marrow::Optimizer {
   }
 };
 
-std::shared_ptr<const marrow::Optimizer> nelder_mead() {
-  return std::make_shared<NelderMead>();
-}
+std::shared_ptr<const marrow::Optimizer> nelder_mead() { return std::make_shared<NelderMead>(); }
 
 }  // namespace
 

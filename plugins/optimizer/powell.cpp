@@ -6,8 +6,8 @@
 
 namespace {
 
-/// The value along a line, and how far the least of it lies. The steps tried grow to where the value rises again, then a parabola
-/// through the last three, kept within them, is refined.
+/// The value along a line, and how far the least of it lies. The steps tried grow to where the value rises again, then
+/// a parabola through the last three, kept within them, is refined.
 class Line {
  public:
   Line(Evaluations& evaluate, const Eigen::VectorXd& from, double value, const Eigen::VectorXd& direction)
@@ -27,7 +27,8 @@ class Line {
       const double p = (b - a) * (fb - fc), q = (b - c) * (fb - fa);
       double x = std::abs(p - q) > 1e-300 ? b - 0.5 * ((b - a) * p - (b - c) * q) / (p - q) : b;
       const double low = std::min(a, c), high = std::max(a, c);
-      if (!(x > low && x < high) || std::abs(x - b) < fine) x = std::abs(c - b) > std::abs(b - a) ? b + 0.382 * (c - b) : b - 0.382 * (b - a);
+      if (!(x > low && x < high) || std::abs(x - b) < fine)
+        x = std::abs(c - b) > std::abs(b - a) ? b + 0.382 * (c - b) : b - 0.382 * (b - a);
       const double fx = at(x);
       if (fx < fb) {
         (x - b) * (c - b) > 0 ? (a = b, fa = fb) : (c = b, fc = fb);
@@ -49,8 +50,8 @@ class Line {
   double value_;
 };
 
-/// Powell's method with the discarding rule of his section 3: the direction of the greatest fall gives way to that of the whole
-/// round where this does not make the set dependent.
+/// Powell's method with the discarding rule of his section 3: the direction of the greatest fall gives way to that of
+/// the whole round where this does not make the set dependent.
 std::string search(Evaluations& evaluate) {
   const Eigen::Index n = evaluate.size();
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(n, n);
@@ -74,7 +75,8 @@ std::string search(Evaluations& evaluate) {
       continue;
     }
     const double beyond = evaluate(here + round);
-    if (beyond < before && 2 * (before - 2 * value + beyond) * std::pow(before - value - fall, 2) < fall * std::pow(before - beyond, 2)) {
+    if (beyond < before &&
+        2 * (before - 2 * value + beyond) * std::pow(before - value - fall, 2) < fall * std::pow(before - beyond, 2)) {
       Line line(evaluate, here, value, round.normalized());
       const double moved = line.minimise(std::max(round.norm(), evaluate.tolerance()));
       if (line.value() < value) here = evaluate.within(here + moved * round.normalized()), value = line.value();
@@ -87,7 +89,9 @@ std::string search(Evaluations& evaluate) {
 
 class Powell : public marrow::Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override { return Evaluations(problem).run(search); }
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return Evaluations(problem).run(search);
+  }
 };
 
 std::shared_ptr<const marrow::Optimizer> powell() { return std::make_shared<Powell>(); }

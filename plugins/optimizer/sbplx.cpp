@@ -7,7 +7,9 @@ namespace {
 
 class Sbplx : public marrow::Optimizer {
  public:
-  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override { return NloptRun(nlopt::LN_SBPLX, problem).run(); }
+  marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
+    return NloptRun(nlopt::LN_SBPLX, problem).run();
+  }
 };
 
 std::shared_ptr<const marrow::Optimizer> sbplx() { return std::make_shared<Sbplx>(); }

@@ -49,7 +49,8 @@ Attenuation attenuation_of(const Volume& volume, const SignedField* field, const
     for (std::size_t i = r * row; i < (r + 1) * row; ++i) {
       const double hu = volume.values[i];
       const bool is_out = hu < options.below_hu || (field && field->values_mm[i] > options.margin_mm);
-      attenuation.thousandths[i] = is_out ? 0 : std::int16_t(std::lround(std::clamp(hu - options.background_hu, 0.0, 32767.0)));
+      attenuation.thousandths[i] =
+          is_out ? 0 : std::int16_t(std::lround(std::clamp(hu - options.background_hu, 0.0, 32767.0)));
     }
   });
   find_box(attenuation);

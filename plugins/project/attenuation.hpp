@@ -26,8 +26,8 @@ struct Attenuation {
   bool is_empty() const { return last[0] < first[0]; }
 };
 
-/// Attenuation of a voxel: (HU - background_hu) / 1000, not below 0. With a field, of that fragment alone. Throws Error for a
-/// volume or a field that is none, or on another grid.
+/// Attenuation of a voxel: (HU - background_hu) / 1000, not below 0. With a field, of that fragment alone. Throws Error
+/// for a volume or a field that is none, or on another grid.
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options);
 
 /// Declares the inputs, the output and the options that all projectors of radiographs share.
@@ -37,8 +37,10 @@ Node& declare(Node&& node) {
       .in("field", "signed field of one fragment, to leave all else out")
       .out("projector", "draws the radiograph for any camera and pose")
       .option("below_hu", &Options::below_hu, "voxels below attenuate nothing", unit("HU"))
-      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone", unit("HU"))
-      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing", at_least(0));
+      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone",
+              unit("HU"))
+      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing",
+              at_least(0));
 }
 
 }  // namespace marrow::rays

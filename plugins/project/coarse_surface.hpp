@@ -8,9 +8,9 @@
 #include <unordered_map>
 #include <vector>
 
-/// A surface with about an eighth of the triangles, for outlines that are asked for coarsely: the vertices within each cube of three
-/// edge lengths become one (Rossignac and Borrel 1993). `at_border` says of each vertex whether the surface ends there; a cube's
-/// does where one of its vertices does.
+/// A surface with about an eighth of the triangles, for outlines that are asked for coarsely: the vertices within each
+/// cube of three edge lengths become one (Rossignac and Borrel 1993). `at_border` says of each vertex whether the
+/// surface ends there; a cube's does where one of its vertices does.
 struct CoarseSurface {
   marrow::Mesh mesh;
   std::vector<char> at_border;
@@ -27,7 +27,8 @@ inline CoarseSurface coarse_surface(const marrow::Mesh& mesh, const std::vector<
   std::vector<double> counts;
   for (std::size_t i = 0; i < cube_of.size(); ++i) {
     std::uint64_t key = 0;
-    for (const double x : mesh.vertices_mm[i]) key = key << 21 | (std::uint64_t(std::int64_t(std::floor(x / side_mm))) & 0x1fffff);
+    for (const double x : mesh.vertices_mm[i])
+      key = key << 21 | (std::uint64_t(std::int64_t(std::floor(x / side_mm))) & 0x1fffff);
     const auto [at, is_new] = cubes.emplace(key, std::uint32_t(counts.size()));
     if (is_new) {
       coarse.mesh.vertices_mm.emplace_back(Eigen::Vector3d::Zero());
@@ -42,7 +43,8 @@ inline CoarseSurface coarse_surface(const marrow::Mesh& mesh, const std::vector<
   for (std::size_t i = 0; i < counts.size(); ++i) coarse.mesh.vertices_mm[i] /= counts[i];
   for (const auto& t : mesh.triangles) {
     const std::array<std::uint32_t, 3> triangle{cube_of[t[0]], cube_of[t[1]], cube_of[t[2]]};
-    if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0]) coarse.mesh.triangles.push_back(triangle);
+    if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0])
+      coarse.mesh.triangles.push_back(triangle);
   }
   return coarse;
 }

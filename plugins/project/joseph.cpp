@@ -16,23 +16,28 @@ using marrow::rays::Slices;
 /// Sums over the slices across the axis that a ray runs along most, bilinear within each.
 class JosephProjector : public RayProjector {
  public:
-  explicit JosephProjector(Attenuation attenuation) : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}
+  explicit JosephProjector(Attenuation attenuation)
+      : RayProjector(std::move(attenuation)), slices_(attenuation_), bricks_(attenuation_) {}
 
   using RayProjector::radiograph;
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model, const PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
+                                const PixelGrid& grid) const override {
     const auto values = slices_.radiograph(marrow::rays::rays_of(camera, world_from_model, attenuation_.grid), grid);
     return values ? *values : RayProjector::radiograph(camera, world_from_model, grid);
   }
 
  protected:
-  float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override { return bricks_.integral(source, direction); }
+  float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
+    return bricks_.integral(source, direction);
+  }
 
  private:
   const Slices slices_;
   const Bricks bricks_;
 };
 
-std::shared_ptr<const marrow::Projector> joseph(const marrow::Volume& volume, const marrow::SignedField* field, const AttenuationOptions& options) {
+std::shared_ptr<const marrow::Projector> joseph(const marrow::Volume& volume, const marrow::SignedField* field,
+                                                const AttenuationOptions& options) {
   return std::make_shared<JosephProjector>(attenuation_of(volume, field, options));
 }
 
@@ -40,5 +45,6 @@ std::shared_ptr<const marrow::Projector> joseph(const marrow::Volume& volume, co
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.joseph", joseph);
-  marrow::rays::declare<AttenuationOptions>(node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): a sum over slices, whole images slice by slice"));
+  marrow::rays::declare<AttenuationOptions>(node.summary(
+      "Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): a sum over slices, whole images slice by slice"));
 }

@@ -10,8 +10,8 @@
 
 namespace marrow::rays {
 
-/// Memory in pages of 2 MiB where the system gives them: rays jump through volumes of tens of megabytes, and with pages of 4 KiB
-/// most of their time goes into finding the page.
+/// Memory in pages of 2 MiB where the system gives them: rays jump through volumes of tens of megabytes, and with pages
+/// of 4 KiB most of their time goes into finding the page.
 template <class T>
 struct LargePages {
   using value_type = T;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Radiographs looked up: line integrals of the volume, kept for a set of rays about each view, between which a pixel's ray is
-// interpolated. LaRose (PhD thesis, Carnegie Mellon University 2001, transgraph); Russakoff, Rohlfing et al. (IEEE Trans Med
-// Imaging 24(11), 2005, attenuation fields) after Levoy and Hanrahan (SIGGRAPH 1996).
+// Radiographs looked up: line integrals of the volume, kept for a set of rays about each view, between which a pixel's
+// ray is interpolated. LaRose (PhD thesis, Carnegie Mellon University 2001, transgraph); Russakoff, Rohlfing et al.
+// (IEEE Trans Med Imaging 24(11), 2005, attenuation fields) after Levoy and Hanrahan (SIGGRAPH 1996).
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -43,13 +43,14 @@ struct Side {
   }
 };
 
-/// The rays about one view: a ray is where it meets the plane across the view's axis through the middle of what attenuates, and its two
-/// slopes against that axis. Coordinates in mm along the grid's axes.
+/// The rays about one view: a ray is where it meets the plane across the view's axis through the middle of what
+/// attenuates, and its two slopes against that axis. Coordinates in mm along the grid's axes.
 class Field {
  public:
   Field(const Attenuation& attenuation, const marrow::Camera& camera, const Options& options) {
     const marrow::Grid& grid = attenuation.grid;
-    axes_ = (camera.camera_from_world.rotation * grid.direction).transpose();  // columns: the camera's axes, of a model that is not turned
+    axes_ = (camera.camera_from_world.rotation * grid.direction)
+                .transpose();  // columns: the camera's axes, of a model that is not turned
     Eigen::Vector3d low, high;
     for (int k = 0; k < 3; ++k) {
       low[k] = (attenuation.first[std::size_t(k)] - 1) * grid.spacing_mm[k];
@@ -60,56 +61,74 @@ class Field {
     const Eigen::Matrix3d ray_from_pixel = camera.intrinsics.inverse();
     Eigen::Vector2d steepest(0, 0);
     for (const double u : {0.0, double(camera.width_px - 1)})
-      for (const double v : {0.0, double(camera.height_px - 1)}) steepest = steepest.cwiseMax((ray_from_pixel * Eigen::Vector3d(u, v, 1)).hnormalized().cwiseAbs());
+      for (const double v : {0.0, double(camera.height_px - 1)})
+        steepest = steepest.cwiseMax((ray_from_pixel * Eigen::Vector3d(u, v, 1)).hnormalized().cwiseAbs());
     const double slope_step = std::tan(marrow::radians(options.step_deg));
     for (int k = 0; k < 2; ++k) {
-      const double most = std::tan(std::min(std::atan(steepest[k]) + marrow::radians(options.range_deg), marrow::radians(60)));
+      const double most =
+          std::tan(std::min(std::atan(steepest[k]) + marrow::radians(options.range_deg), marrow::radians(60)));
       slopes_[k] = Side::of(-most, most, slope_step);
       // All rays of these slopes that meet the box.
       double reach = 0;
       for (int corner = 0; corner < 8; ++corner) {
-        const Eigen::Vector3d half(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1), at = axes_.transpose() * half.cwiseProduct(0.5 * (high - low));
+        const Eigen::Vector3d half(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1),
+            at = axes_.transpose() * half.cwiseProduct(0.5 * (high - low));
         reach = std::max(reach, std::abs(at[k]) + most * std::abs(at.z()));
       }
       places_[k] = Side::of(-reach - options.step_mm, reach + options.step_mm, options.step_mm);
     }
   }
 
-  std::size_t count() const { return std::size_t(places_[0].count) * std::size_t(places_[1].count) * std::size_t(slopes_[0].count) * std::size_t(slopes_[1].count); }
+  std::size_t count() const {
+    return std::size_t(places_[0].count) * std::size_t(places_[1].count) * std::size_t(slopes_[0].count) *
+           std::size_t(slopes_[1].count);
+  }
   Eigen::Vector3d axis() const { return axes_.col(2); }
   const Eigen::Matrix3d& axes() const { return axes_; }
-  Eigen::Vector3d from_middle(const Eigen::Vector3d& point_mm) const { return axes_.transpose() * (point_mm - middle_); }
+  Eigen::Vector3d from_middle(const Eigen::Vector3d& point_mm) const {
+    return axes_.transpose() * (point_mm - middle_);
+  }
   double radius_mm() const { return radius_mm_; }
 
   void fill(const Bricks& bricks, const Eigen::Vector3d& spacing_mm) {
     values_.resize(count());
     const Eigen::Vector3d per_mm = spacing_mm.cwiseInverse();
-    const std::size_t directions = std::size_t(slopes_[0].count) * std::size_t(slopes_[1].count), plane = count() / directions;
+    const std::size_t directions = std::size_t(slopes_[0].count) * std::size_t(slopes_[1].count),
+                      plane = count() / directions;
     tbb::parallel_for(std::size_t(0), directions, [&](std::size_t d) {
-      const Eigen::Vector3d along = axes_ * Eigen::Vector3d(slopes_[0].at(int(d) % slopes_[0].count), slopes_[1].at(int(d) / slopes_[0].count), 1);
+      const Eigen::Vector3d along = axes_ * Eigen::Vector3d(slopes_[0].at(int(d) % slopes_[0].count),
+                                                            slopes_[1].at(int(d) / slopes_[0].count), 1);
       std::size_t at = d * plane;
       for (int y = 0; y < places_[1].count; ++y)
         for (int x = 0; x < places_[0].count; ++x) {
-          const Eigen::Vector3d start = middle_ + axes_ * Eigen::Vector3d(places_[0].at(x), places_[1].at(y), 0) - 2 * radius_mm_ * along;
+          const Eigen::Vector3d start =
+              middle_ + axes_ * Eigen::Vector3d(places_[0].at(x), places_[1].at(y), 0) - 2 * radius_mm_ * along;
           const float value = bricks.integral(start.cwiseProduct(per_mm), along.cwiseProduct(per_mm));
           values_[at++] = std::uint16_t(std::lround(std::min(value / kUnit_mm, 65535.0f)));
         }
     });
   }
 
-  /// The integral along a ray, linear in place and slopes. Nothing where it is steeper than those kept; 0 where it misses the box.
-  /// `start` and `direction` in this field's own axes.
+  /// The integral along a ray, linear in place and slopes. Nothing where it is steeper than those kept; 0 where it
+  /// misses the box. `start` and `direction` in this field's own axes.
   std::optional<float> find(const Eigen::Vector3d& start, const Eigen::Vector3d& direction) const {
     int i[4];
     float f[4];
     const double p = direction.x() / direction.z(), q = direction.y() / direction.z();
     if (!slopes_[0].find(p, i[2], f[2]) || !slopes_[1].find(q, i[3], f[3])) return std::nullopt;
-    if (!places_[0].find(start.x() - p * start.z(), i[0], f[0]) || !places_[1].find(start.y() - q * start.z(), i[1], f[1])) return 0.0f;
-    const std::size_t row = std::size_t(places_[0].count), plane = row * std::size_t(places_[1].count), sheet = plane * std::size_t(slopes_[0].count);
-    const std::uint16_t* const at = values_.data() + std::size_t(i[3]) * sheet + std::size_t(i[2]) * plane + std::size_t(i[1]) * row + std::size_t(i[0]);
+    if (!places_[0].find(start.x() - p * start.z(), i[0], f[0]) ||
+        !places_[1].find(start.y() - q * start.z(), i[1], f[1]))
+      return 0.0f;
+    const std::size_t row = std::size_t(places_[0].count), plane = row * std::size_t(places_[1].count),
+                      sheet = plane * std::size_t(slopes_[0].count);
+    const std::uint16_t* const at = values_.data() + std::size_t(i[3]) * sheet + std::size_t(i[2]) * plane +
+                                    std::size_t(i[1]) * row + std::size_t(i[0]);
     const auto mix = [](float a, float b, float t) { return a + t * (b - a); };
-    const auto in_plane = [&](const std::uint16_t* v) { return mix(mix(v[0], v[1], f[0]), mix(v[row], v[row + 1], f[0]), f[1]); };
-    return kUnit_mm * mix(mix(in_plane(at), in_plane(at + plane), f[2]), mix(in_plane(at + sheet), in_plane(at + sheet + plane), f[2]), f[3]);
+    const auto in_plane = [&](const std::uint16_t* v) {
+      return mix(mix(v[0], v[1], f[0]), mix(v[row], v[row + 1], f[0]), f[1]);
+    };
+    return kUnit_mm * mix(mix(in_plane(at), in_plane(at + plane), f[2]),
+                          mix(in_plane(at + sheet), in_plane(at + sheet + plane), f[2]), f[3]);
   }
 
  private:
@@ -124,7 +143,8 @@ class Field {
 
 class LightField : public marrow::rays::RayProjector {
  public:
-  LightField(Attenuation attenuation, Bricks bricks, std::vector<Field> fields) : RayProjector(std::move(attenuation)), bricks_(std::move(bricks)), fields_(std::move(fields)) {}
+  LightField(Attenuation attenuation, Bricks bricks, std::vector<Field> fields)
+      : RayProjector(std::move(attenuation)), bricks_(std::move(bricks)), fields_(std::move(fields)) {}
 
  protected:
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
@@ -148,9 +168,11 @@ class LightField : public marrow::rays::RayProjector {
   std::vector<Field> fields_;
 };
 
-std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume, const marrow::SignedField* field, const marrow::List<marrow::View>& views, marrow::Context& context,
+std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume, const marrow::SignedField* field,
+                                                    const marrow::List<marrow::View>& views, marrow::Context& context,
                                                     const Options& options) {
-  if (views.size() == 0) throw marrow::Error("there is no view, so it is not known about which directions to integrate; wire 'views'");
+  if (views.size() == 0)
+    throw marrow::Error("there is no view, so it is not known about which directions to integrate; wire 'views'");
   for (const marrow::View& view : views) check_camera(view.camera, "view '" + view.name + "'");
   Attenuation attenuation = attenuation_of(volume, field, options);
   std::vector<Field> fields;
@@ -161,7 +183,9 @@ std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume
   }
   const std::size_t mb = count * sizeof(std::uint16_t) >> 20;
   if (mb > std::size_t(options.most_mb))
-    throw marrow::Error("the integrals would take " + std::to_string(mb) + " MB, but most_mb is " + std::to_string(options.most_mb) + "; take wider steps (step_mm, step_deg), a smaller range_deg, or the field of a fragment");
+    throw marrow::Error("the integrals would take " + std::to_string(mb) + " MB, but most_mb is " +
+                        std::to_string(options.most_mb) +
+                        "; take wider steps (step_mm, step_deg), a smaller range_deg, or the field of a fragment");
   context.info("keeps " + std::to_string(count) + " integrals, " + std::to_string(mb) + " MB");
   Bricks bricks(attenuation);
   for (Field& one : fields) one.fill(bricks, attenuation.grid.spacing_mm);
@@ -172,16 +196,24 @@ std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume
 
 MARROW_PLUGIN(plugin) {
   plugin.node("project.lightfield", lightfield)
-      .summary("Radiographs looked up among integrals made beforehand about each view (LaRose 2001; Russakoff et al., IEEE Trans Med Imaging 2005)")
+      .summary(
+          "Radiographs looked up among integrals made beforehand about each view (LaRose 2001; Russakoff et al., IEEE "
+          "Trans Med Imaging 2005)")
       .in("volume", "CT")
       .in("field", "signed field of one fragment, to leave all else out")
       .in("views", "views, about the directions of which integrals are kept", marrow::over("view"))
       .out("projector", "draws the radiograph for any camera and pose; by Joseph's method where rays were not kept")
       .option("below_hu", &Options::below_hu, "voxels below attenuate nothing", marrow::unit("HU"))
-      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone", marrow::unit("HU"))
-      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing", marrow::at_least(0))
-      .option("range_deg", &Options::range_deg, "how far the bone may be turned, against CT axes that are the world's", marrow::at_least(0), marrow::at_most(40))
-      .option("step_mm", &Options::step_mm, "between the places of rays that are kept", marrow::at_least(0.2), marrow::at_most(20))
-      .option("step_deg", &Options::step_deg, "between the directions of rays that are kept", marrow::at_least(0.1), marrow::at_most(10))
-      .option("most_mb", &Options::most_mb, "memory that the integrals may take", marrow::at_least(1), marrow::unit("MB"));
+      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone",
+              marrow::unit("HU"))
+      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing",
+              marrow::at_least(0))
+      .option("range_deg", &Options::range_deg, "how far the bone may be turned, against CT axes that are the world's",
+              marrow::at_least(0), marrow::at_most(40))
+      .option("step_mm", &Options::step_mm, "between the places of rays that are kept", marrow::at_least(0.2),
+              marrow::at_most(20))
+      .option("step_deg", &Options::step_deg, "between the directions of rays that are kept", marrow::at_least(0.1),
+              marrow::at_most(10))
+      .option("most_mb", &Options::most_mb, "memory that the integrals may take", marrow::at_least(1),
+              marrow::unit("MB"));
 }

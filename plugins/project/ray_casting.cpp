@@ -17,7 +17,8 @@ struct Options : AttenuationOptions {
 /// Trilinear values at even steps, each standing for the step around it.
 class RayCastingProjector : public RayProjector {
  public:
-  RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm) : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}
+  RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm)
+      : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}
 
  protected:
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
@@ -40,14 +41,17 @@ class RayCastingProjector : public RayProjector {
     const std::int16_t* const values = attenuation_.thousandths.data();
     if (x >= 0 && y >= 0 && z >= 0 && x + 1 < size[0] && y + 1 < size[1] && z + 1 < size[2]) {
       const std::int16_t* const at = values + std::size_t(z) * plane + std::size_t(y) * row + std::size_t(x);
-      const auto across = [&](const std::int16_t* p) { return (1 - v) * ((1 - u) * p[0] + u * p[1]) + v * ((1 - u) * p[row] + u * p[row + 1]); };
+      const auto across = [&](const std::int16_t* p) {
+        return (1 - v) * ((1 - u) * p[0] + u * p[1]) + v * ((1 - u) * p[row] + u * p[row + 1]);
+      };
       return (1 - w) * across(at) + w * across(at + plane);
     }
     float sum = 0;
     for (int corner = 0; corner < 8; ++corner) {
       const int i = x + (corner & 1), j = y + (corner >> 1 & 1), k = z + (corner >> 2);
       if (!attenuation_.grid.contains(i, j, k)) continue;
-      sum += (corner & 1 ? u : 1 - u) * (corner & 2 ? v : 1 - v) * (corner & 4 ? w : 1 - w) * float(values[attenuation_.grid.offset(i, j, k)]);
+      sum += (corner & 1 ? u : 1 - u) * (corner & 2 ? v : 1 - v) * (corner & 4 ? w : 1 - w) *
+             float(values[attenuation_.grid.offset(i, j, k)]);
     }
     return sum;
   }
@@ -55,7 +59,8 @@ class RayCastingProjector : public RayProjector {
   const double step_mm_;
 };
 
-std::shared_ptr<const marrow::Projector> ray_casting(const marrow::Volume& volume, const marrow::SignedField* field, const Options& options) {
+std::shared_ptr<const marrow::Projector> ray_casting(const marrow::Volume& volume, const marrow::SignedField* field,
+                                                     const Options& options) {
   return std::make_shared<RayCastingProjector>(attenuation_of(volume, field, options), options.step_mm);
 }
 
@@ -63,5 +68,6 @@ std::shared_ptr<const marrow::Projector> ray_casting(const marrow::Volume& volum
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.ray_casting", ray_casting);
-  marrow::rays::declare<Options>(node.summary("Radiographs by ray casting: trilinear values at even steps")).option("step_mm", &Options::step_mm, "from one value to the next", marrow::at_least(0.01));
+  marrow::rays::declare<Options>(node.summary("Radiographs by ray casting: trilinear values at even steps"))
+      .option("step_mm", &Options::step_mm, "from one value to the next", marrow::at_least(0.01));
 }

@@ -35,7 +35,8 @@ Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const
           index_from_model * model_from_camera.rotation * camera.intrinsics.inverse(), grid.spacing_mm};
 }
 
-Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin) {
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
+                 const Eigen::Vector3d& direction, double margin) {
   Span span{0, std::numeric_limits<double>::infinity()};
   for (int k = 0; k < 3; ++k) {
     const double low = first[std::size_t(k)] - margin - source[k], high = last[std::size_t(k)] + margin - source[k];
@@ -50,14 +51,16 @@ Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last
   return span;
 }
 
-std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model, const PixelGrid& grid) const {
+std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                            const PixelGrid& grid) const {
   const Rays rays = rays_of(camera, world_from_model, attenuation_.grid);
   std::vector<float> values(grid.count(), 0.0f);
   if (attenuation_.is_empty()) return values;
   tbb::parallel_for(0, grid.rows, [&](int row) {
     for (int column = 0; column < grid.columns; ++column) {
       const Eigen::Vector2d pixel = grid.pixel(column, row);
-      values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] = integral(rays.source, rays.direction(pixel.x(), pixel.y()));
+      values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] =
+          integral(rays.source, rays.direction(pixel.x(), pixel.y()));
     }
   });
   return values;
@@ -69,12 +72,13 @@ std::vector<float> RayProjector::radiograph(const Camera& camera, const RigidTra
   std::vector<float> values(pixels.size(), 0.0f);
   if (attenuation_.is_empty()) return values;
   const std::vector<std::uint32_t> order = by_neighbourhood(pixels);
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pixels.size(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
-    for (std::size_t k = range.begin(); k < range.end(); ++k) {
-      const Eigen::Vector2f& pixel = pixels[order[k]];
-      values[order[k]] = integral(rays.source, rays.direction(pixel.x(), pixel.y()));
-    }
-  });
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, pixels.size(), 64),
+                    [&](const tbb::blocked_range<std::size_t>& range) {
+                      for (std::size_t k = range.begin(); k < range.end(); ++k) {
+                        const Eigen::Vector2f& pixel = pixels[order[k]];
+                        values[order[k]] = integral(rays.source, rays.direction(pixel.x(), pixel.y()));
+                      }
+                    });
   return values;
 }
 
@@ -92,8 +96,10 @@ PixelGrid RayProjector::region(const Camera& camera, const RigidTransform& world
     low = low.cwiseMin(pixel);
     high = high.cwiseMax(pixel);
   }
-  const int u = int(std::floor(std::clamp(low.x(), 0.0, double(camera.width_px)))), v = int(std::floor(std::clamp(low.y(), 0.0, double(camera.height_px))));
-  const int right = int(std::ceil(std::clamp(high.x(), -1.0, camera.width_px - 1.0))), bottom = int(std::ceil(std::clamp(high.y(), -1.0, camera.height_px - 1.0)));
+  const int u = int(std::floor(std::clamp(low.x(), 0.0, double(camera.width_px)))),
+            v = int(std::floor(std::clamp(low.y(), 0.0, double(camera.height_px))));
+  const int right = int(std::ceil(std::clamp(high.x(), -1.0, camera.width_px - 1.0))),
+            bottom = int(std::ceil(std::clamp(high.y(), -1.0, camera.height_px - 1.0)));
   if (right < u || bottom < v) return {};
   return {double(u), double(v), 1, right - u + 1, bottom - v + 1};
 }

@@ -20,12 +20,13 @@ struct Rays {
 /// Throws Error for a camera that is none.
 Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid);
 
-/// The part [from, to] of a ray, in units of its direction and in front of the source, inside the box of all points that
-/// interpolation between voxels reaches: one voxel around what attenuates. Empty where from >= to.
+/// The part [from, to] of a ray, in units of its direction and in front of the source, inside the box of all points
+/// that interpolation between voxels reaches: one voxel around what attenuates. Empty where from >= to.
 struct Span {
   double from = 0, to = 0;
 };
-Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source, const Eigen::Vector3d& direction, double margin);
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
+                 const Eigen::Vector3d& direction, double margin);
 
 /// A projector that integrates ray by ray.
 class RayProjector : public Projector {

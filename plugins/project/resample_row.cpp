@@ -26,23 +26,29 @@ void add_plain(const float* row, float position, float step, int first, int coun
 
 #if defined(__x86_64__)
 
-__attribute__((target("avx2"))) void mix_avx2(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+__attribute__((target("avx2"))) void mix_avx2(const std::int16_t* a, const std::int16_t* b, float weight, int count,
+                                              float* mixed) {
   const __m256 w = _mm256_set1_ps(weight), v = _mm256_set1_ps(1 - weight);
   int i = 0;
   for (; i + 8 <= count; i += 8) {
-    const __m256 x = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + i))));
-    const __m256 y = _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(b + i))));
+    const __m256 x =
+        _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(a + i))));
+    const __m256 y =
+        _mm256_cvtepi32_ps(_mm256_cvtepi16_epi32(_mm_loadu_si128(reinterpret_cast<const __m128i*>(b + i))));
     _mm256_storeu_ps(mixed + i, _mm256_add_ps(_mm256_mul_ps(v, x), _mm256_mul_ps(w, y)));
   }
   mix_plain(a + i, b + i, weight, count - i, mixed + i);
 }
 
-__attribute__((target("avx512f"))) void mix_avx512(const std::int16_t* a, const std::int16_t* b, float weight, int count, float* mixed) {
+__attribute__((target("avx512f"))) void mix_avx512(const std::int16_t* a, const std::int16_t* b, float weight,
+                                                   int count, float* mixed) {
   const __m512 w = _mm512_set1_ps(weight), v = _mm512_set1_ps(1 - weight);
   int i = 0;
   for (; i + 16 <= count; i += 16) {
-    const __m512 x = _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(a + i))));
-    const __m512 y = _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(b + i))));
+    const __m512 x =
+        _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(a + i))));
+    const __m512 y =
+        _mm512_cvtepi32_ps(_mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i*>(b + i))));
     _mm512_storeu_ps(mixed + i, _mm512_add_ps(_mm512_mul_ps(v, x), _mm512_mul_ps(w, y)));
   }
   mix_avx2(a + i, b + i, weight, count - i, mixed + i);
@@ -54,7 +60,8 @@ __attribute__((target("avx2"))) int add_avx2(const float* row, float position, f
   const bool is_near = std::abs(step) <= 0.7f;
   int i = 0;
   for (; i + 8 <= count; i += 8) {
-    const __m256 x = _mm256_add_ps(_mm256_set1_ps(position), _mm256_mul_ps(steps, _mm256_add_ps(_mm256_set1_ps(float(i)), lanes)));
+    const __m256 x =
+        _mm256_add_ps(_mm256_set1_ps(position), _mm256_mul_ps(steps, _mm256_add_ps(_mm256_set1_ps(float(i)), lanes)));
     const __m256i n = _mm256_cvttps_epi32(x);
     const __m256 fraction = _mm256_sub_ps(x, _mm256_cvtepi32_ps(n));
     __m256 low, high;
@@ -75,12 +82,14 @@ __attribute__((target("avx2"))) int add_avx2(const float* row, float position, f
 }
 
 __attribute__((target("avx512f"))) int add_avx512(const float* row, float position, float step, int count, float* sum) {
-  const __m512 lanes = _mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15), steps = _mm512_set1_ps(step);
+  const __m512 lanes = _mm512_setr_ps(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15),
+               steps = _mm512_set1_ps(step);
   const bool is_near = std::abs(step) <= 1.9f;  // 15 steps and one neighbour lie within 32 floats
   const float back = step >= 0 ? 0 : 15 * step;
   int i = 0;
   for (; i + 16 <= count; i += 16) {
-    const __m512 x = _mm512_add_ps(_mm512_set1_ps(position), _mm512_mul_ps(steps, _mm512_add_ps(_mm512_set1_ps(float(i)), lanes)));
+    const __m512 x =
+        _mm512_add_ps(_mm512_set1_ps(position), _mm512_mul_ps(steps, _mm512_add_ps(_mm512_set1_ps(float(i)), lanes)));
     const __m512i n = _mm512_cvttps_epi32(x);
     const __m512 fraction = _mm512_sub_ps(x, _mm512_cvtepi32_ps(n));
     __m512 low, high;
@@ -124,8 +133,10 @@ void mix_rows(const std::int16_t* a, const std::int16_t* b, float weight, int co
 void add_resampled(const float* row, float position, float step, int count, float* sum) {
   int done = 0;
 #if defined(__x86_64__)
-  if (kHasAvx512) done = add_avx512(row, position, step, count, sum);
-  else if (kHasAvx2) done = add_avx2(row, position, step, count, sum);
+  if (kHasAvx512)
+    done = add_avx512(row, position, step, count, sum);
+  else if (kHasAvx2)
+    done = add_avx2(row, position, step, count, sum);
 #endif
   add_plain(row, position, step, done, count, sum);
 }

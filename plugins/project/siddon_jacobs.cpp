@@ -27,7 +27,8 @@ class SiddonProjector : public RayProjector {
     double next[3], step[3];
     std::ptrdiff_t move[3];
     for (int k = 0; k < 3; ++k) {
-      const int voxel = std::clamp(int(std::floor(entry[k] + 0.5)), attenuation_.first[std::size_t(k)], attenuation_.last[std::size_t(k)]);
+      const int voxel = std::clamp(int(std::floor(entry[k] + 0.5)), attenuation_.first[std::size_t(k)],
+                                   attenuation_.last[std::size_t(k)]);
       at += voxel * strides[k];
       const bool forward = direction[k] > 0;
       const bool crosses = std::abs(direction[k]) > 1e-12;
@@ -51,7 +52,8 @@ class SiddonProjector : public RayProjector {
   }
 };
 
-std::shared_ptr<const marrow::Projector> siddon_jacobs(const marrow::Volume& volume, const marrow::SignedField* field, const AttenuationOptions& options) {
+std::shared_ptr<const marrow::Projector> siddon_jacobs(const marrow::Volume& volume, const marrow::SignedField* field,
+                                                       const AttenuationOptions& options) {
   return std::make_shared<SiddonProjector>(attenuation_of(volume, field, options));
 }
 
@@ -59,5 +61,6 @@ std::shared_ptr<const marrow::Projector> siddon_jacobs(const marrow::Volume& vol
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.siddon_jacobs", siddon_jacobs);
-  marrow::rays::declare<AttenuationOptions>(node.summary("Radiographs by exact path lengths (Siddon, Med Phys 1985), voxel by voxel (Jacobs et al., 1998)"));
+  marrow::rays::declare<AttenuationOptions>(
+      node.summary("Radiographs by exact path lengths (Siddon, Med Phys 1985), voxel by voxel (Jacobs et al., 1998)"));
 }

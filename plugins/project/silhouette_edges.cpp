@@ -279,7 +279,8 @@ class OuterOutline {
 
 class SilhouetteEdges : public marrow::Projector {
  public:
-  SilhouetteEdges(SurfacePatches surface, SurfacePatches coarse) : surface_(std::move(surface)), coarse_(std::move(coarse)) {}
+  SilhouetteEdges(SurfacePatches surface, SurfacePatches coarse)
+      : surface_(std::move(surface)), coarse_(std::move(coarse)) {}
 
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
                                             const marrow::RigidTransform& world_from_model,

@@ -71,7 +71,8 @@ inline std::vector<Eigen::Vector3d> vertex_normals(const marrow::Mesh& mesh, con
 }
 
 /// Sorts triangles[first, last) into groups of at most `most` by halving along the feature that spreads most.
-inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>& features, std::size_t first, std::size_t last, std::size_t most) {
+inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>& features, std::size_t first,
+                  std::size_t last, std::size_t most) {
   if (last - first <= most) return;
   Feature low = features[order[first]], high = low;
   for (std::size_t i = first; i < last; ++i) {
@@ -102,7 +103,8 @@ inline void find_ends(std::size_t first, std::size_t last, std::size_t most, std
   find_ends((first + last) / 2, last, most, ends);
 }
 
-/// For each triangle a bit per edge k -> k+1 that no other triangle shares. Edges are sorted into bins by their lower vertex.
+/// For each triangle a bit per edge k -> k+1 that no other triangle shares. Edges are sorted into bins by their lower
+/// vertex.
 inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangles, std::size_t vertices) {
   struct Edge {
     std::uint32_t higher, at;  ///< vertex; 3 * triangle + k
@@ -156,7 +158,8 @@ inline SurfacePatches make_surface_patches(const marrow::Mesh& mesh, const std::
   constexpr float kNormalScale_mm = 15;  // a normal turned by 1 rad counts like this distance
   std::vector<Triangle> triangles = mesh.triangles;
   std::vector<std::uint8_t> rims = rim_edges(triangles, mesh.vertices_mm.size());
-  if (std::any_of(rims.begin(), rims.end(), [](std::uint8_t bits) { return bits; })) {  // a closed surface repeats no vertices
+  if (std::any_of(rims.begin(), rims.end(),
+                  [](std::uint8_t bits) { return bits; })) {  // a closed surface repeats no vertices
     triangles = weld(mesh);
     rims = rim_edges(triangles, mesh.vertices_mm.size());
   }

@@ -22,10 +22,12 @@ double largest_squared_radius(const Eigen::Matrix3d& inverse, int width_px, int 
   return largest;
 }
 
-/// Weights of the four samples about a place that lies `t` behind the second: Keys' cubic convolution with a = -1/2 (IEEE Trans.
-/// ASSP 1981), which is exact for parabolas. OpenCV's has a = -3/4, which is not, and rounds places to 1/32 pixel.
+/// Weights of the four samples about a place that lies `t` behind the second: Keys' cubic convolution with a = -1/2
+/// (IEEE Trans. ASSP 1981), which is exact for parabolas. OpenCV's has a = -3/4, which is not, and rounds places to
+/// 1/32 pixel.
 std::array<double, 4> cubic_weights(double t) {
-  return {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (-2.5 + 1.5 * t), t * (0.5 + t * (2 - 1.5 * t)), t * t * (-0.5 + 0.5 * t)};
+  return {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (-2.5 + 1.5 * t), t * (0.5 + t * (2 - 1.5 * t)),
+          t * t * (-0.5 + 0.5 * t)};
 }
 
 /// Grey value between the pixels; the border's pixels go on outside.
@@ -36,7 +38,8 @@ double sample_cubic(const cv::Mat1f& image, const Eigen::Vector2d& at) {
   for (int row = 0; row < 4; ++row) {
     const float* line = image[std::clamp(v - 1 + row, 0, image.rows - 1)];
     for (int column = 0; column < 4; ++column)
-      sum += wv[std::size_t(row)] * wu[std::size_t(column)] * double(line[std::clamp(u - 1 + column, 0, image.cols - 1)]);
+      sum +=
+          wv[std::size_t(row)] * wu[std::size_t(column)] * double(line[std::clamp(u - 1 + column, 0, image.cols - 1)]);
   }
   return sum;
 }
@@ -50,18 +53,19 @@ Eigen::Vector2d distorted_pixel(const Eigen::Matrix3d& intrinsics, const RadialD
   return (intrinsics * ideal).head<2>();
 }
 
-void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px, int height_px,
-                      const std::string& what) {
+void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px,
+                      int height_px, const std::string& what) {
   const double largest = largest_squared_radius(intrinsics.inverse(), width_px, height_px);
   constexpr int kSteps = 256;
   double before = 0;
   for (int i = 1; i <= kSteps; ++i) {
     const double radius = std::sqrt(largest) * i / kSteps, seen = radius * distortion.factor(radius * radius);
     if (!(seen > before) || !(seen < 2 * std::sqrt(largest)))
-      throw Error(what + ": the radial distortion folds the image or more than doubles it, " +
-                  std::to_string(int(100.0 * i / kSteps)) +
-                  " % of the way to its corner; check that its terms are of normalised coordinates (pixels from the principal "
-                  "point over the focal length), as OpenCV gives them");
+      throw Error(
+          what + ": the radial distortion folds the image or more than doubles it, " +
+          std::to_string(int(100.0 * i / kSteps)) +
+          " % of the way to its corner; check that its terms are of normalised coordinates (pixels from the principal "
+          "point over the focal length), as OpenCV gives them");
     before = seen;
   }
 }
@@ -77,7 +81,8 @@ void remove_distortion(View& view, const RadialDistortion& distortion) {
   tbb::parallel_for(0, camera.height_px, [&](int v) {
     for (int u = 0; u < camera.width_px; ++u) {
       const Eigen::Vector2d seen = distorted_pixel(camera.intrinsics, distortion, {u, v});
-      if (!(seen.x() >= 0 && seen.y() >= 0 && seen.x() <= camera.width_px - 1 && seen.y() <= camera.height_px - 1)) continue;
+      if (!(seen.x() >= 0 && seen.y() >= 0 && seen.x() <= camera.width_px - 1 && seen.y() <= camera.height_px - 1))
+        continue;
       straight(v, u) = float(sample_cubic(taken, seen));
       mask(v, u) = own_mask.empty() ? 255 : own_mask(int(std::lround(seen.y())), int(std::lround(seen.x())));
     }
@@ -90,9 +95,9 @@ void remove_distortion(View& view, const RadialDistortion& distortion) {
 
 Calibration read_calibration_file(const std::filesystem::path& path) {
   YamlFile file(path);
-  const YamlMap map(file, file.root(), "calibration",
-                    {"marrow-calibration", "width_px", "height_px", "intrinsics", "radial_distortion", "deviation",
-                     "residual_px"});
+  const YamlMap map(
+      file, file.root(), "calibration",
+      {"marrow-calibration", "width_px", "height_px", "intrinsics", "radial_distortion", "deviation", "residual_px"});
   check_version(map, "marrow-calibration");
   Calibration calibration;
   const auto width = map.integer("width_px"), height = map.integer("height_px");
@@ -100,7 +105,8 @@ Calibration read_calibration_file(const std::filesystem::path& path) {
   const auto distortion = map.vector3("radial_distortion");
   if (map.has("residual_px")) calibration.residual_px = map.number("residual_px").value_or(0);
   if (map.has("deviation")) {
-    const YamlMap deviation(file, map.node("deviation"), "deviation", {"focal_px", "principal_px", "radial_distortion"});
+    const YamlMap deviation(file, map.node("deviation"), "deviation",
+                            {"focal_px", "principal_px", "radial_distortion"});
     const auto pair = [&](const std::string& key) {
       const auto row = deviation.numbers(key, 2);
       return row ? Eigen::Vector2d((*row)[0], (*row)[1]) : Eigen::Vector2d(0, 0);

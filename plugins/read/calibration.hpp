@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a calibration knows of an imaging device. Nodes only ever see plain pinhole views: the distortion is removed once, when
-// a view is read, so that no projector, cost or edge detector needs to know of it, and none can forget it.
+// What a calibration knows of an imaging device. Nodes only ever see plain pinhole views: the distortion is removed
+// once, when a view is read, so that no projector, cost or edge detector needs to know of it, and none can forget it.
 #include <Eigen/Core>
 #include <array>
 #include <filesystem>
@@ -14,8 +14,8 @@
 
 namespace marrow::read {
 
-/// Radial distortion about the principal point, as OpenCV has it: an ideal point x, y (pixels from the principal point over the
-/// focal length) is seen at (1 + k_1 r^2 + k_2 r^4 + k_3 r^6) (x, y). Positive k_1: pincushion.
+/// Radial distortion about the principal point, as OpenCV has it: an ideal point x, y (pixels from the principal point
+/// over the focal length) is seen at (1 + k_1 r^2 + k_2 r^4 + k_3 r^6) (x, y). Positive k_1: pincushion.
 struct RadialDistortion {
   std::array<double, 3> k{0, 0, 0};
 
@@ -36,9 +36,10 @@ struct Calibration {
   double residual_px = 0;  ///< standard deviation of what is left, per coordinate; 0: not known
 
   static constexpr auto fields() {
-    return std::make_tuple(&Calibration::width_px, &Calibration::height_px, &Calibration::intrinsics, &Calibration::distortion,
-                           &Calibration::focal_deviation_px, &Calibration::principal_deviation_px,
-                           &Calibration::distortion_deviation, &Calibration::residual_px);
+    return std::make_tuple(&Calibration::width_px, &Calibration::height_px, &Calibration::intrinsics,
+                           &Calibration::distortion, &Calibration::focal_deviation_px,
+                           &Calibration::principal_deviation_px, &Calibration::distortion_deviation,
+                           &Calibration::residual_px);
   }
 };
 
@@ -53,17 +54,18 @@ Eigen::Vector2d distorted_pixel(const Eigen::Matrix3d& intrinsics, const RadialD
                                 const Eigen::Vector2d& pixel);
 
 /// Throws Error unless the distortion grows outwards all over the image, so that each pixel was seen at one place.
-void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px, int height_px,
-                      const std::string& what);
+void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px,
+                      int height_px, const std::string& what);
 
-/// Resamples image and mask as a pinhole with the same camera matrix would have seen them. Pixels that the image as taken does
-/// not show are masked out.
+/// Resamples image and mask as a pinhole with the same camera matrix would have seen them. Pixels that the image as
+/// taken does not show are masked out.
 void remove_distortion(View& view, const RadialDistortion& distortion);
 
 /// A calibration file, as the writer of calibrations makes it. Throws Error.
 Calibration read_calibration_file(const std::filesystem::path& path);
 
-/// Takes the camera matrix from the calibration and removes its distortion from the view. Throws Error where sizes disagree.
+/// Takes the camera matrix from the calibration and removes its distortion from the view. Throws Error where sizes
+/// disagree.
 void apply_calibration(View& view, const Calibration& calibration);
 
 }  // namespace marrow::read

@@ -12,9 +12,10 @@ struct Options {
 marrow::Camera camera(const Options& options, marrow::Context& context) {
   const marrow::read::DistortedCamera file = marrow::read::read_camera_file(options.path);
   if (!file.distortion.is_none())
-    context.warn(options.path.string() +
-                 ": the images of this camera are distorted, which only read.view, read.views and read.case remove, with the "
-                 "camera file as their option; the camera is that of the image without distortion");
+    context.warn(
+        options.path.string() +
+        ": the images of this camera are distorted, which only read.view, read.views and read.case remove, with the "
+        "camera file as their option; the camera is that of the image without distortion");
   return file.camera;
 }
 

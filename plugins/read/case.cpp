@@ -165,7 +165,8 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
   std::vector<std::string> registered, with_start, with_truth;
   const YamlMap by_name(map.file(), *fragments, "fragments", marrow::read::FreeKeys{});
   for (const std::string& name : by_name.keys()) {
-    const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'", {"seeds", "register", "start", "truth"});
+    const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'",
+                           {"seeds", "register", "start", "truth"});
     if (!fragment.valid()) continue;
     marrow::Seeds seeds = marrow::read::seeds_from(fragment, name);
     const bool wanted = seeds.wanted;

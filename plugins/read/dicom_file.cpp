@@ -252,9 +252,7 @@ class DicomWalk {
   std::uint64_t size_, at_ = 0, count_ = 0;
 };
 
-DicomFile::DicomFile(const std::filesystem::path& path) : file_(path) {
-  DicomWalk(*this).all();
-}
+DicomFile::DicomFile(const std::filesystem::path& path) : file_(path) { DicomWalk(*this).all(); }
 
 bool is_group_of_values(std::uint32_t tag) {
   return std::find(std::begin(kGroupsOfValues), std::end(kGroupsOfValues), tag) != std::end(kGroupsOfValues);

@@ -276,7 +276,8 @@ DicomPixels read_dicom_pixels(const DicomFile& file, int frame) {
   if (file.is_compressed() != should_be_compressed)
     damaged(pixels.path, "its pixels are not written as its transfer syntax says");
   if (pixels.big_endian && pixels.bits_allocated == 8 && file.pixels_are_words())
-    throw Error(pixels.path.string() + ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
+    throw Error(pixels.path.string() +
+                ": its pixels of 8 bits are written in pairs, the second one first (OW, big-endian), which is not "
                 "read; convert it: gdcmconv --raw IN OUT");
   pixels.frame_parts = file.pixel_parts();
   file.is_compressed() ? find_frames(file, pixels) : check_plain(file, pixels);

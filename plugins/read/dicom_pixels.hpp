@@ -26,8 +26,8 @@ struct DicomPixels {
   std::vector<std::size_t> first_part_of_frame;  ///< of compressed ones; one more than there are frames
 };
 
-/// With the values that the header gives for this frame (from 1). Throws Error where the header contradicts itself or the
-/// file.
+/// With the values that the header gives for this frame (from 1). Throws Error where the header contradicts itself or
+/// the file.
 DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame);
 DicomPixels read_dicom_pixels(const DicomFile& file, int frame);
 

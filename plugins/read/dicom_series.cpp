@@ -27,9 +27,7 @@ constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
 constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
 constexpr DicomTag kRescaleType{0x0028, 0x1054, "RescaleType"};
 
-double dot(const Vector& a, const Vector& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 Vector cross(const Vector& a, const Vector& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
@@ -94,15 +92,19 @@ Vector column(const Samples& samples, int k) {
 
 /// Origin and axes; these are made orthonormal, as a header gives them with few digits.
 void place(const DicomHeader& header, Slice& slice) {
-  const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6), spacing = header.numbers(kSpacing, 2);
+  const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6),
+             spacing = header.numbers(kSpacing, 2);
   slice.is_placed = position && orientation;
   if (!slice.is_placed) return;
-  if (!spacing) throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
+  if (!spacing)
+    throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
   slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // a row's distance is a pixel's height
   std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
-  const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]}, down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
+  const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]},
+      down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
   if (std::abs(dot(row, row) - 1) > 1e-2 || std::abs(dot(down, down) - 1) > 1e-2 || std::abs(dot(row, down)) > 1e-3)
-    throw Error(slice.path().string() + ": " + kOrientation.text() + " is no pair of axes at right angles; it is damaged");
+    throw Error(slice.path().string() + ": " + kOrientation.text() +
+                " is no pair of axes at right angles; it is damaged");
   const Vector z = normalized(cross(row, down)), x = normalized(cross(down, z)), y = cross(z, x);
   for (std::size_t k = 0; k < 3; ++k) {
     slice.samples.direction[3 * k] = x[k];
@@ -136,7 +138,8 @@ Slice read_slice(const std::filesystem::path& path) {
 std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
   std::set<std::filesystem::path> paths;
   std::error_code failure, none;
-  for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure; entry.increment(failure)) {
+  for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure;
+       entry.increment(failure)) {
     check_stays_inside(folder, entry->path());
     if (entry->is_regular_file(none) || entry->is_directory(none)) paths.insert(entry->path());
   }
@@ -244,7 +247,8 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
                 " (a tilted gantry); resample the series to a straight grid first");
   if (along_mm > kFarthestOff_mm)
     throw Error(folder.string() + ": the slices are unevenly spaced; some lie up to " + millimetres(along_mm) +
-                " from where even ones of " + millimetres(spacing_mm) + " would; resample the series to an even grid first");
+                " from where even ones of " + millimetres(spacing_mm) +
+                " would; resample the series to an even grid first");
 }
 
 /// That the slices belong to one grid: same size, same directions, evenly spaced along their normal.
@@ -285,7 +289,8 @@ void check_slices(const std::filesystem::path& folder, const std::vector<Slice>&
   std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
   const double usual = sorted[sorted.size() / 2];
   for (std::size_t i = 0; i < gaps.size(); ++i) {
-    const std::string between = slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
+    const std::string between =
+        slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
     if (gaps[i] < 1e-3)
       throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
     if (std::abs(gaps[i] - usual) > 0.01 * usual + 1e-3)

@@ -10,9 +10,7 @@ struct Options {
   int frame = 0;
 };
 
-marrow::Image image(const Options& options) {
-  return marrow::read::read_image_file(options.path, options.frame);
-}
+marrow::Image image(const Options& options) { return marrow::read::read_image_file(options.path, options.frame); }
 
 }  // namespace
 

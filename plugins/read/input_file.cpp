@@ -40,9 +40,7 @@ InputFile::InputFile(std::filesystem::path path, bool may_be_empty) : path_(std:
   throw Error(what + (is_known && S_ISREG(status.st_mode) ? ": the file is empty" : ": expected a file, this is none"));
 }
 
-InputFile::~InputFile() {
-  ::close(descriptor_);
-}
+InputFile::~InputFile() { ::close(descriptor_); }
 
 void InputFile::read(std::uint64_t at, void* to, std::size_t count) const {
   char* place = static_cast<char*>(to);
@@ -88,9 +86,7 @@ std::uint64_t FileWindow::number(std::uint64_t at, int width, bool big_endian) {
   return value;
 }
 
-std::string FileWindow::text(std::uint64_t at, std::size_t count) {
-  return {bytes(at, count), count};
-}
+std::string FileWindow::text(std::uint64_t at, std::size_t count) { return {bytes(at, count), count}; }
 
 void check_stays_inside(const std::filesystem::path& folder, const std::filesystem::path& file) {
   std::error_code failure;

@@ -12,8 +12,8 @@ namespace marrow::read {
 /// meanwhile, is an Error, not a signal.
 class InputFile {
  public:
-  /// Throws Error unless `path` is a regular file, and one with something in it unless it `may_be_empty`. A pipe is not waited for, a
-  /// device not read.
+  /// Throws Error unless `path` is a regular file, and one with something in it unless it `may_be_empty`. A pipe is not
+  /// waited for, a device not read.
   explicit InputFile(std::filesystem::path path, bool may_be_empty = false);
   ~InputFile();
   InputFile(const InputFile&) = delete;

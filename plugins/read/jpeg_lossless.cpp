@@ -140,8 +140,6 @@ class Decoder {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_lossless(const CodedImage& image) {
-  return Decoder(image).run();
-}
+std::vector<std::byte> decode_jpeg_lossless(const CodedImage& image) { return Decoder(image).run(); }
 
 }  // namespace marrow::read

@@ -235,8 +235,6 @@ class Decoder {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_ls(const CodedImage& image) {
-  return Decoder(image).run();
-}
+std::vector<std::byte> decode_jpeg_ls(const CodedImage& image) { return Decoder(image).run(); }
 
 }  // namespace marrow::read

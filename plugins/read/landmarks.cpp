@@ -16,7 +16,8 @@ struct Options {
 void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
   if (places.has(name)) return;
   const std::string near = map.file().is_full() ? "" : read::nearest(name, places.keys());
-  map.fault(name, "the points have no '" + name + "'; " + (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
+  map.fault(name, "the points have no '" + name + "'; " +
+                      (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
 }
 
 Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
@@ -28,14 +29,16 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
     const auto place = places.vector3(name);
     landmarks.points.push_back({name, place.value_or(Eigen::Vector3d::Zero())});
   }
-  if (places.valid() && landmarks.points.empty()) fragment.fault("points", "points: expected places [x, y, z] in mm by name, got none");
+  if (places.valid() && landmarks.points.empty())
+    fragment.fault("points", "points: expected places [x, y, z] in mm by name, got none");
   if (const YAML::Node seen = fragment.node("seen"); seen.IsDefined()) {
     const YamlMap views(file, seen, fragment.what() + ", seen", FreeKeys{});
     for (const std::string& view : views.keys()) {
       const YamlMap pixels(file, views.node(view), fragment.what() + ", seen, view '" + view + "'", FreeKeys{});
       for (const std::string& name : pixels.keys()) {
         check_known(places, pixels, name);
-        if (const auto pixel = pixels.numbers(name, 2)) landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
+        if (const auto pixel = pixels.numbers(name, 2))
+          landmarks.seen.push_back({name, view, {(*pixel)[0], (*pixel)[1]}});
       }
     }
   }
@@ -56,9 +59,12 @@ List<Landmarks> landmarks(const Options& options) {
   List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
-    if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name, got none");
+    if (by_name.valid() && by_name.keys().empty())
+      map.fault("fragments", "fragments: expected fragments by name, got none");
     for (const std::string& name : by_name.keys())
-      landmarks.add(name, landmarks_of(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"points", "seen", "tracked"}), file));
+      landmarks.add(
+          name, landmarks_of(
+                    YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"points", "seen", "tracked"}), file));
   }
   file.finish();
   return landmarks;
@@ -68,7 +74,9 @@ List<Landmarks> landmarks(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.landmarks", landmarks)
-      .summary("Landmarks or markers of each fragment: where the CT has them, the images show them and a tracker found them, from marrow's YAML")
+      .summary(
+          "Landmarks or markers of each fragment: where the CT has them, the images show them and a tracker found "
+          "them, from marrow's YAML")
       .out("landmarks", "points in CT coordinates, seen in pixels of views, tracked in the world", over("fragment"))
       .option("path", &Options::path, "file of landmarks", required());
 }

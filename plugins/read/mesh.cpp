@@ -33,6 +33,7 @@ MARROW_PLUGIN(plugin) {
       .out("mesh", "the surface in mm")
       .option("path", &Options::path, "STL or PLY file", marrow::required())
       .option("scale", &Options::scale, "factor to mm: 1000 for a file in metres", marrow::at_least(1e-6))
-      .option("frame", &Options::frame, "what its coordinates are: those of the CT, or of the world (a surface that was tracked)",
+      .option("frame", &Options::frame,
+              "what its coordinates are: those of the CT, or of the world (a surface that was tracked)",
               marrow::one_of({"ct", "world"}));
 }

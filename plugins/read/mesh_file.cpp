@@ -45,8 +45,9 @@ Mesh read_stl_text(const std::string& bytes, const std::string& what) {
   bool ended = false, in_facet = false;  // since the last endsolid; a file may hold several solids
   for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
     if (ended != (word == "solid"))
-      throw Error(what + (ended ? ": after 'endsolid' comes neither its end nor another 'solid'"
-                                : ": a 'solid' begins before the 'endsolid' of the one before") +
+      throw Error(what +
+                  (ended ? ": after 'endsolid' comes neither its end nor another 'solid'"
+                         : ": a 'solid' begins before the 'endsolid' of the one before") +
                   "; the file is cut off or damaged");
     if (ended) {
       words.skip_line();

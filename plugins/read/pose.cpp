@@ -9,9 +9,7 @@ struct Options {
   std::filesystem::path path;
 };
 
-marrow::Pose pose(const Options& options) {
-  return marrow::read::read_pose_file(options.path);
-}
+marrow::Pose pose(const Options& options) { return marrow::read::read_pose_file(options.path); }
 
 }  // namespace
 

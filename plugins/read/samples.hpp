@@ -23,7 +23,7 @@ struct Samples {
   std::string other_pages;    ///< of a TIFF whose pages are not the slices of one volume: what they are
   enum class Type { u8, i8, u16, i16, u32, i32, u64, i64, f32, f64 } type = Type::u8;
   double slope = 1, intercept = 0;  ///< value = slope * sample + intercept
-  std::vector<std::byte> bytes;  ///< x runs fastest, then y, then z
+  std::vector<std::byte> bytes;     ///< x runs fastest, then y, then z
 
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
 };
@@ -53,8 +53,9 @@ bool looks_like_dicom(const std::filesystem::path& path);
 Samples read_tiff(const std::filesystem::path& path);
 Samples read_png(const std::filesystem::path& path);
 
-/// Throws Error where a size of the header is none of a volume or image, or where a file of `stored_bytes` cannot hold so many samples:
-/// this comes before any memory is taken for them. No CT or image is packed more tightly than 500 samples a byte; zlib ends at 1032.
+/// Throws Error where a size of the header is none of a volume or image, or where a file of `stored_bytes` cannot hold
+/// so many samples: this comes before any memory is taken for them. No CT or image is packed more tightly than 500
+/// samples a byte; zlib ends at 1032.
 void check_size(const std::string& what, const std::array<long long, 3>& size, std::uint64_t stored_bytes,
                 double most_samples_per_byte = 500);
 

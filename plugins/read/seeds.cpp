@@ -9,9 +9,7 @@ struct Options {
   std::filesystem::path path;
 };
 
-marrow::List<marrow::Seeds> seeds(const Options& options) {
-  return marrow::read::read_seeds_file(options.path);
-}
+marrow::List<marrow::Seeds> seeds(const Options& options) { return marrow::read::read_seeds_file(options.path); }
 
 }  // namespace
 

@@ -38,11 +38,15 @@ class Census final : public YAML::EventHandler {
       throw Refusal(mark, "a text holds the character NUL (\\0); take it out");
     count(mark, anchor);
   }
-  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override {
+  void OnSequenceStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
     count(mark, anchor);
   }
   void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, YAML::EmitterStyle::value) override { count(mark, anchor); }
+  void OnMapStart(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    count(mark, anchor);
+  }
   void OnMapEnd() override {}
 
  private:
@@ -193,7 +197,8 @@ void YamlMap::take_keys(Check check) {
     const YAML::Mark mark = item.first.Mark();
     const auto [before, is_new] = line_of.emplace(key, mark.line + 1);
     if (!is_new) {
-      file_.fault(mark, what_ + ": key '" + key.substr(0, 100) + "' is already given in line " + std::to_string(before->second));
+      file_.fault(mark, what_ + ": key '" + key.substr(0, 100) + "' is already given in line " +
+                            std::to_string(before->second));
       continue;
     }
     keys_.push_back(key);
@@ -202,9 +207,7 @@ void YamlMap::take_keys(Check check) {
   }
 }
 
-bool YamlMap::has(const std::string& key) const {
-  return node(key).IsDefined();
-}
+bool YamlMap::has(const std::string& key) const { return node(key).IsDefined(); }
 
 YAML::Node YamlMap::node(const std::string& key) const {
   const auto found = values_.find(key);

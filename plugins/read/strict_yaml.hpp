@@ -16,8 +16,8 @@ namespace marrow::read {
 /// A parsed file and the faults found in it so far.
 class YamlFile {
  public:
-  /// Throws Error when the file cannot be opened or is not YAML, or refers from one place to another (aliases), by which a small file
-  /// could stand for a huge one.
+  /// Throws Error when the file cannot be opened or is not YAML, or refers from one place to another (aliases), by
+  /// which a small file could stand for a huge one.
   explicit YamlFile(std::filesystem::path path);
 
   const std::filesystem::path& path() const { return path_; }
@@ -27,8 +27,8 @@ class YamlFile {
   bool has_faults() const { return !faults_.empty(); }
   /// Whether so many faults are noted that more are only counted, so that they need no advice.
   bool is_full() const { return faults_.size() >= kMostFaults; }
-  /// Throws one Error that holds the faults, each as file:line:column with the source line; returns when there are none. Of more
-  /// than 50 the rest is counted.
+  /// Throws one Error that holds the faults, each as file:line:column with the source line; returns when there are
+  /// none. Of more than 50 the rest is counted.
   void finish() const;
 
  private:
@@ -93,8 +93,8 @@ class YamlMap {
   std::unordered_map<std::string, YAML::Node> values_;
 };
 
-/// The known word nearest to `word` by edit distance, or "" where none is near. Long words, and more than 1000 known ones, are not
-/// compared.
+/// The known word nearest to `word` by edit distance, or "" where none is near. Long words, and more than 1000 known
+/// ones, are not compared.
 std::string nearest(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace marrow::read

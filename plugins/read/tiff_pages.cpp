@@ -238,8 +238,6 @@ class Walk {
 
 }  // namespace
 
-TiffPages read_tiff_pages(const InputFile& file) {
-  return Walk(file).all();
-}
+TiffPages read_tiff_pages(const InputFile& file) { return Walk(file).all(); }
 
 }  // namespace marrow::read

@@ -17,7 +17,8 @@ marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (bool(camera) == !options.camera.empty())
     throw marrow::Error("view '" + options.name +
                         "': give its camera either as the option (a file) or as the input (a value)");
-  return marrow::read::read_view_files({options.name, options.image, camera, options.camera, options.calibration, options.frame});
+  return marrow::read::read_view_files(
+      {options.name, options.image, camera, options.camera, options.calibration, options.frame});
 }
 
 }  // namespace
@@ -32,5 +33,6 @@ MARROW_PLUGIN(plugin) {
       .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)")
       .option("calibration", &Options::calibration,
               "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              marrow::at_least(0));
 }

@@ -24,7 +24,8 @@ View read_view_files(const ViewSource& source) {
   if (!source.calibration.empty()) {
     if (!camera.distortion.is_none())
       throw Error("view '" + source.name + "': both " + source.camera_file.string() + " and " +
-                  source.calibration.string() + " tell of a distortion; it is removed only once: take it out of one of them");
+                  source.calibration.string() +
+                  " tell of a distortion; it is removed only once: take it out of one of them");
     apply_calibration(view, read_calibration_file(source.calibration));
   } else if (!camera.distortion.is_none()) {
     remove_distortion(view, camera.distortion);

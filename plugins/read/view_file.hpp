@@ -17,8 +17,8 @@ struct ViewSource {
   int frame = 0;                      ///< of the image file, from 1; 0 = there is only one
 };
 
-/// One view whose image is that of a plain pinhole: the distortion that its camera file or calibration tells of is removed
-/// here, once. Throws Error.
+/// One view whose image is that of a plain pinhole: the distortion that its camera file or calibration tells of is
+/// removed here, once. Throws Error.
 View read_view_files(const ViewSource& source);
 
 }  // namespace marrow::read

@@ -41,9 +41,9 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name, marrow::read::read_view_files({name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
-                                                   cameras ? std::filesystem::path() : options.cameras[i],
-                                                   options.calibration, options.frame}));
+    views.add(name, marrow::read::read_view_files(
+                        {name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
+                         cameras ? std::filesystem::path() : options.cameras[i], options.calibration, options.frame}));
   }
   return views;
 }
@@ -59,7 +59,9 @@ MARROW_PLUGIN(plugin) {
       .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
       .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view")
       .option("calibration", &Options::calibration,
-              "calibration file of the device that took all views: its camera matrix replaces the cameras', its distortion is "
+              "calibration file of the device that took all views: its camera matrix replaces the cameras', its "
+              "distortion is "
               "removed from the images")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one", marrow::at_least(0));
+      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              marrow::at_least(0));
 }

@@ -15,13 +15,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string lower_extension(const fs::path& path) {
-  return in_small_letters(path.extension().string());
-}
+std::string lower_extension(const fs::path& path) { return in_small_letters(path.extension().string()); }
 
-bool is_tiff(const std::string& extension) {
-  return extension == ".tif" || extension == ".tiff";
-}
+bool is_tiff(const std::string& extension) { return extension == ".tif" || extension == ".tiff"; }
 
 /// `folder_is_named`: the option names the folder that the file lies in, so what lies beside it counts too.
 VolumeSamples read_single(const fs::path& path, bool folder_is_named) {

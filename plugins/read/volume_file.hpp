@@ -21,9 +21,9 @@ struct VolumeReading {
 /// file that it names. Patient axes are LPS. Throws Error.
 Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& reading);
 
-/// One grey image from PNG or TIFF, with 8 or 16 bits or float, or from DICOM. That of an X-ray file (XA, RF) is turned to what the
-/// camera of its header sees: mirrored where it is stored as one facing the patient sees it, and bright = air. `frame` counts from
-/// 1; 0 = there must be only one. Throws Error.
+/// One grey image from PNG or TIFF, with 8 or 16 bits or float, or from DICOM. That of an X-ray file (XA, RF) is turned
+/// to what the camera of its header sees: mirrored where it is stored as one facing the patient sees it, and bright =
+/// air. `frame` counts from 1; 0 = there must be only one. Throws Error.
 Image read_image_file(const std::filesystem::path& path, int frame = 0);
 
 /// Whether read_image_file() mirrors this image, so that what was drawn on the file as it is stored must be mirrored

@@ -48,7 +48,8 @@ class Wanted {
     return value.value_or(0);
   }
   void finish() const {
-    if (!text_.empty()) throw Error(header_.path().string() + ": its header does not say how it was taken; missing: " + text_);
+    if (!text_.empty())
+      throw Error(header_.path().string() + ": its header does not say how it was taken; missing: " + text_);
   }
 
  private:
@@ -72,7 +73,8 @@ double source_to_isocentre(const DicomHeader& header, double source_to_detector_
   return 0;
 }
 
-/// Width and height of a pixel on the detector. Both spacings give the distance of rows first, which is a pixel's height.
+/// Width and height of a pixel on the detector. Both spacings give the distance of rows first, which is a pixel's
+/// height.
 Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnification, double given_mm, Wanted& wanted,
                                   std::vector<std::string>& warnings) {
   if (given_mm > 0) return Eigen::Vector2d::Constant(given_mm);
@@ -85,11 +87,13 @@ Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnificatio
   const Eigen::Vector2d pixel((*spacing)[1], (*spacing)[0]);
   const std::string what = header.path().string() + ": " + kImagerPixelSpacing.text() + " is missing; ";
   if (header.text(kSpacingCalibration)) {
-    warnings.push_back(what + kPixelSpacing.text() + " is calibrated to the patient, so it is multiplied by the magnification; check the "
+    warnings.push_back(what + kPixelSpacing.text() +
+                       " is calibrated to the patient, so it is multiplied by the magnification; check the "
                        "result with camera.check");
     return magnification * pixel;
   }
-  warnings.push_back(what + kPixelSpacing.text() + " is taken for it, but where it was calibrated to the patient the focal length is too long "
+  warnings.push_back(what + kPixelSpacing.text() +
+                     " is taken for it, but where it was calibrated to the patient the focal length is too long "
                      "by the magnification; check the result with camera.check, or give pixel_mm");
   return pixel;
 }
@@ -109,8 +113,8 @@ std::optional<Eigen::Vector3d> direction_of(const std::string& letters) {
   return direction.normalized();
 }
 
-/// Axes to the right and down of the image as stored, by PatientOrientation: of the eight ways to turn and mirror what the
-/// camera sees, the one that its letters fit best. None where the header does not say.
+/// Axes to the right and down of the image as stored, by PatientOrientation: of the eight ways to turn and mirror what
+/// the camera sees, the one that its letters fit best. None where the header does not say.
 struct Stored {
   Eigen::Vector3d right, down;
   bool mirrored = false;
@@ -170,16 +174,18 @@ void check_frame(const DicomHeader& header, int frame, int frames) {
 
 void check_angles(const DicomHeader& header, double primary_deg, double secondary_deg) {
   if (!(std::abs(primary_deg) <= 180))
-    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + std::to_string(primary_deg) + ", expected -180 to 180");
+    throw Error(header.path().string() + ": " + kPrimaryAngle.text() + " is " + std::to_string(primary_deg) +
+                ", expected -180 to 180");
   if (!(std::abs(secondary_deg) <= 90))
-    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + std::to_string(secondary_deg) + ", expected -90 to 90");
+    throw Error(header.path().string() + ": " + kSecondaryAngle.text() + " is " + std::to_string(secondary_deg) +
+                ", expected -90 to 90");
 }
 
 void check_lengths(const DicomHeader& header, const camera::CArm& arm) {
   const std::string what = header.path().string() + ": ";
   if (!(arm.source_to_isocentre_mm < arm.source_to_detector_mm))
-    throw Error(what + "the isocentre (" + std::to_string(arm.source_to_isocentre_mm) + " mm from the source) lies behind the detector (" +
-                std::to_string(arm.source_to_detector_mm) + " mm)");
+    throw Error(what + "the isocentre (" + std::to_string(arm.source_to_isocentre_mm) +
+                " mm from the source) lies behind the detector (" + std::to_string(arm.source_to_detector_mm) + " mm)");
   if (!(arm.source_to_detector_mm > 100 && arm.source_to_detector_mm < 5000))
     throw Error(what + kDistanceSourceToDetector.text() + " is " + std::to_string(arm.source_to_detector_mm) +
                 " mm, which no C-arm has; give source_to_detector_mm");
@@ -220,9 +226,10 @@ XrayGeometry geometry_of_frame(const DicomFile& file, int frame, const XrayOverr
   arm.source_to_detector_mm = overrides.source_to_detector_mm > 0
                                   ? overrides.source_to_detector_mm
                                   : wanted.number(kDistanceSourceToDetector, "or give source_to_detector_mm");
-  arm.source_to_isocentre_mm = source_to_isocentre(header, arm.source_to_detector_mm, overrides.source_to_isocentre_mm, wanted);
-  arm.pixel_mm = detector_pixel_mm(header, arm.source_to_detector_mm / arm.source_to_isocentre_mm, overrides.pixel_mm, wanted,
-                                   geometry.warnings);
+  arm.source_to_isocentre_mm =
+      source_to_isocentre(header, arm.source_to_detector_mm, overrides.source_to_isocentre_mm, wanted);
+  arm.pixel_mm = detector_pixel_mm(header, arm.source_to_detector_mm / arm.source_to_isocentre_mm, overrides.pixel_mm,
+                                   wanted, geometry.warnings);
   wanted.finish();
   check_angles(header, primary_deg, secondary_deg);
   check_lengths(header, arm);

@@ -137,7 +137,8 @@ List<Seeds> read_seeds_file(const std::filesystem::path& path) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name");
     for (const std::string& name : by_name.keys())
-      seeds.add(name, seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));
+      seeds.add(name,
+                seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));
   }
   file.finish();
   return seeds;

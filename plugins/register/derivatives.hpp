@@ -15,12 +15,14 @@ inline Eigen::Matrix3d rotation_derivative(const Eigen::Vector3d& r_rad) {
   Eigen::Matrix3d cross;
   cross << 0, -r_rad.z(), r_rad.y(), r_rad.z(), 0, -r_rad.x(), -r_rad.y(), r_rad.x(), 0;
   if (angle < 1e-6) return Eigen::Matrix3d::Identity() - 0.5 * cross;
-  return Eigen::Matrix3d::Identity() - (1 - std::cos(angle)) / (angle * angle) * cross + (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
+  return Eigen::Matrix3d::Identity() - (1 - std::cos(angle)) / (angle * angle) * cross +
+         (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
 }
 
-/// A cost's expansion about the pose that was moved by `deg_and_mm`, in the coordinates of that motion: degrees and mm along
-/// `axes`. Not a number where the cost has none there.
-inline MinimisationProblem::Expansion in_coordinates(const std::optional<Cost::Expansion>& about, const Vector6d& deg_and_mm, const std::vector<int>& axes) {
+/// A cost's expansion about the pose that was moved by `deg_and_mm`, in the coordinates of that motion: degrees and mm
+/// along `axes`. Not a number where the cost has none there.
+inline MinimisationProblem::Expansion in_coordinates(const std::optional<Cost::Expansion>& about,
+                                                     const Vector6d& deg_and_mm, const std::vector<int>& axes) {
   if (!about) return {std::numeric_limits<double>::quiet_NaN(), {}, {}};
   const Eigen::Vector3d r_rad = deg_and_mm.head<3>() * radians(1);
   Matrix6d motion_by_coordinates = Matrix6d::Zero();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Iterative closest points: Besl and McKay, A method for registration of 3-D shapes, IEEE PAMI 14, 1992, as PCL has it. The target
-// is a surface in the world: what a pointer touched, or another scan shows. The two may show more than they share.
+// Iterative closest points: Besl and McKay, A method for registration of 3-D shapes, IEEE PAMI 14, 1992, as PCL has it.
+// The target is a surface in the world: what a pointer touched, or another scan shows. The two may show more than they
+// share.
 #include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
@@ -29,11 +30,11 @@ void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
   check_mesh(model, "model");
   check_mesh(target, "target");
   if (model.frame != initial.world_from_model.source)
-    throw Error("the model is in the frame '" + model.frame + "', but the pose to start from takes points in '" + initial.world_from_model.source +
-                "'; give the model that the start is of");
+    throw Error("the model is in the frame '" + model.frame + "', but the pose to start from takes points in '" +
+                initial.world_from_model.source + "'; give the model that the start is of");
   if (target.frame != initial.world_from_model.target)
-    throw Error("the target is in the frame '" + target.frame + "', but the pose to start from leads to '" + initial.world_from_model.target +
-                "'; the target is a surface in the world");
+    throw Error("the target is in the frame '" + target.frame + "', but the pose to start from leads to '" +
+                initial.world_from_model.target + "'; the target is a surface in the world");
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
@@ -49,17 +50,20 @@ std::string percent(std::size_t part, std::size_t whole) {
 
 void add_warnings(const pcl_icp::Result& found, const Options& options, Pose& pose, const Context& context) {
   if (!found.converged)
-    pose.warnings.push_back("the pairs of points still changed after " + std::to_string(options.max_iterations) + " iterations; raise max_iterations");
+    pose.warnings.push_back("the pairs of points still changed after " + std::to_string(options.max_iterations) +
+                            " iterations; raise max_iterations");
   if (found.paired < std::size_t(options.points) / 2)
     pose.warnings.push_back("only " + percent(found.paired, std::size_t(options.points)) +
-                            " of the model's points have one of the target within reach_mm; is the start far off, or the target another part?");
+                            " of the model's points have one of the target within reach_mm; is the start far off, or "
+                            "the target another part?");
   for (const std::string& warning : pose.warnings) context.warn(warning);
 }
 
 Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Options& options, Context& context) {
   check_frames(initial, model, target);
   // About the target's middle, so that single precision is enough.
-  std::vector<Eigen::Vector3d> points = sample_surface(model, std::size_t(options.points)), goal = sample_surface(target, std::size_t(options.target_points));
+  std::vector<Eigen::Vector3d> points = sample_surface(model, std::size_t(options.points)),
+                               goal = sample_surface(target, std::size_t(options.target_points));
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3d& point : goal) middle += point / double(goal.size());
   for (Eigen::Vector3d& point : points) point = initial.world_from_model * point - middle;
@@ -67,8 +71,10 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
   context.check_cancelled();
   const pcl_icp::Result found = pcl_icp::align(points, goal, {options.max_iterations, options.reach_mm});
   if (found.paired < 3)
-    throw Error(std::to_string(found.paired) + " of " + std::to_string(points.size()) + " points of the model have one of the target within " +
-                std::to_string(int(std::lround(options.reach_mm))) + " mm, but three at least are needed; give a better start, or raise reach_mm");
+    throw Error(std::to_string(found.paired) + " of " + std::to_string(points.size()) +
+                " points of the model have one of the target within " +
+                std::to_string(int(std::lround(options.reach_mm))) +
+                " mm, but three at least are needed; give a better start, or raise reach_mm");
   Result result;
   Pose start = initial;
   start.covariance.reset();
@@ -94,10 +100,14 @@ MARROW_PLUGIN(plugin) {
       .in("initial", "pose to start from, and the fragment's axes")
       .in("model", "surface of the fragment")
       .in("target", "surface in the world, whole or a part")
-      .out("pose", &Result::pose, "pose of least distance; its cost is the root mean square of the pairs' distances in mm")
+      .out("pose", &Result::pose,
+           "pose of least distance; its cost is the root mean square of the pairs' distances in mm")
       .out("stages", &Result::stages, "poses on the way: start, final", over("stage"))
       .option("max_iterations", &Options::max_iterations, "most times that pairs are made", at_least(1))
-      .option("reach_mm", &Options::reach_mm, "points of the model with nothing of the target so near do not count", at_least(1e-3))
+      .option("reach_mm", &Options::reach_mm, "points of the model with nothing of the target so near do not count",
+              at_least(1e-3))
       .option("points", &Options::points, "points spread over the model", at_least(10), at_most(1e6))
-      .option("target_points", &Options::target_points, "points spread over the target: the closer they lie, the closer they are to its surface", at_least(10), at_most(1e7));
+      .option("target_points", &Options::target_points,
+              "points spread over the target: the closer they lie, the closer they are to its surface", at_least(10),
+              at_most(1e7));
 }

@@ -16,13 +16,15 @@ using Cloud = pcl::PointCloud<pcl::PointXYZ>;
 Cloud::Ptr cloud_of(const std::vector<Eigen::Vector3d>& points) {
   auto cloud = pcl::make_shared<Cloud>();
   cloud->reserve(points.size());
-  for (const Eigen::Vector3d& point : points) cloud->push_back(pcl::PointXYZ(float(point.x()), float(point.y()), float(point.z())));
+  for (const Eigen::Vector3d& point : points)
+    cloud->push_back(pcl::PointXYZ(float(point.x()), float(point.y()), float(point.z())));
   return cloud;
 }
 
 }  // namespace
 
-Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target, const Settings& settings) {
+Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target,
+             const Settings& settings) {
   pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what it has to say is in the result
   pcl::IterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ, double> icp;
   icp.setInputSource(cloud_of(points));
@@ -35,13 +37,15 @@ Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen
   using Criteria = pcl::registration::DefaultConvergenceCriteria<double>;
   Result result;
   result.motion = icp.getFinalTransformation();
-  result.converged = icp.hasConverged() && icp.getConvergeCriteria()->getConvergenceState() != Criteria::CONVERGENCE_CRITERIA_ITERATIONS;
+  result.converged = icp.hasConverged() &&
+                     icp.getConvergeCriteria()->getConvergenceState() != Criteria::CONVERGENCE_CRITERIA_ITERATIONS;
   pcl::Indices nearest(1);
   std::vector<float> squared(1);
   double sum = 0;
   for (const Eigen::Vector3d& point : points) {
     const Eigen::Vector3d there = (result.motion * point.homogeneous()).head<3>();
-    icp.getSearchMethodTarget()->nearestKSearch(pcl::PointXYZ(float(there.x()), float(there.y()), float(there.z())), 1, nearest, squared);
+    icp.getSearchMethodTarget()->nearestKSearch(pcl::PointXYZ(float(there.x()), float(there.y()), float(there.z())), 1,
+                                                nearest, squared);
     if (squared[0] > settings.reach * settings.reach) continue;
     ++result.paired;
     sum += squared[0];

@@ -19,6 +19,7 @@ struct Result {
 };
 
 /// Points and target in the same frame, both near the origin: PCL keeps them in single precision.
-Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target, const Settings& settings);
+Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target,
+             const Settings& settings);
 
 }  // namespace pcl_icp

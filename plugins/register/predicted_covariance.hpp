@@ -69,7 +69,9 @@ class PredictedCovariance {
   double rise(int axis, double step) {
     const marrow::Vector6d motion = step * marrow::Vector6d::Unit(axis);
     evaluations_ += 2;
-    return 0.5 * (cost_.value(moved_by_units(pose_, frame_, motion)) + cost_.value(moved_by_units(pose_, frame_, -motion))) - value_;
+    return 0.5 * (cost_.value(moved_by_units(pose_, frame_, motion)) +
+                  cost_.value(moved_by_units(pose_, frame_, -motion))) -
+           value_;
   }
 
   void choose_step(int axis) {
@@ -81,7 +83,8 @@ class PredictedCovariance {
     undetermined_[std::size_t(axis)] = height < kLeastRise_px;
   }
 
-  /// In units of the steps. Mixed second derivatives by the mean rise along both diagonal senses, less those of the two axes.
+  /// In units of the steps. Mixed second derivatives by the mean rise along both diagonal senses, less those of the two
+  /// axes.
   marrow::Matrix6d hessian() {
     std::vector<marrow::RigidTransform> poses;
     for (int i = 0; i < 6; ++i)
@@ -98,7 +101,8 @@ class PredictedCovariance {
     auto value = values.begin();
     for (int i = 0; i < 6; ++i) {
       h(i, i) = 2 * rises_[i];
-      for (int j = 0; j < i; ++j, value += 2) h(i, j) = h(j, i) = 0.5 * (value[0] + value[1]) - value_ - rises_[i] - rises_[j];
+      for (int j = 0; j < i; ++j, value += 2)
+        h(i, j) = h(j, i) = 0.5 * (value[0] + value[1]) - value_ - rises_[i] - rises_[j];
     }
     return h;
   }

@@ -12,16 +12,19 @@
 
 namespace marrow::registration {
 
-void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels, const std::string& like, const std::string& advice) {
+void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels,
+                      const std::string& like, const std::string& advice) {
   if (values.empty() || values.size() != levels)
-    throw Error(name + " has " + std::to_string(values.size()) + " numbers, but " + like + " has " + std::to_string(levels) + "; " + advice);
+    throw Error(name + " has " + std::to_string(values.size()) + " numbers, but " + like + " has " +
+                std::to_string(levels) + "; " + advice);
   for (const double value : values)
     if (!(value > 0)) throw Error(name + ": each number must be positive");
 }
 
 void check_options(const SearchOptions& options) {
   const auto check = [&](const std::vector<double>& values, const char* name) {
-    check_level_list(values, name, options.contour_spacing_px.size(), "contour_spacing_px", "give reach_px and the four options of steps as many, one for each level");
+    check_level_list(values, name, options.contour_spacing_px.size(), "contour_spacing_px",
+                     "give reach_px and the four options of steps as many, one for each level");
   };
   check(options.contour_spacing_px, "contour_spacing_px");
   check(options.reach_px, "reach_px");
@@ -35,12 +38,17 @@ void check_options(const SearchOptions& options) {
 Levels levels_of(const Cost& cost, const SearchOptions& options) {
   Levels levels;
   for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
-    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i], options.pixel_step.empty() ? 0 : int(options.pixel_step[i])}));
+    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i],
+                                    options.pixel_step.empty() ? 0 : int(options.pixel_step[i])}));
   return levels;
 }
 
 Search::Search(const Optimizer& optimizer, const Pose& initial, const SearchOptions& options, Context& context)
-    : optimizer_(optimizer), frame_(initial.frame), pose_(initial.world_from_model), options_(options), context_(context) {}
+    : optimizer_(optimizer),
+      frame_(initial.frame),
+      pose_(initial.world_from_model),
+      options_(options),
+      context_(context) {}
 
 std::vector<Pose::Progress> Search::convergence(const Cost& cost) const {
   std::vector<RigidTransform> poses;
@@ -144,7 +152,8 @@ void Search::note(int evaluations, const RigidTransform& pose) {
 }
 
 Steps Search::steps_of(std::size_t level) const {
-  return {options_.step_deg[level], options_.step_axial_deg[level], options_.step_mm[level], options_.step_tolerance[level]};
+  return {options_.step_deg[level], options_.step_axial_deg[level], options_.step_mm[level],
+          options_.step_tolerance[level]};
 }
 
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {
@@ -156,7 +165,8 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {
   return pose;
 }
 
-Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options, Context& context) {
+Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
+                   Context& context) {
   Pose pose = pose_of(search, initial, cost);
   pose.convergence = search.convergence(cost);
   if (const auto factor = cost.likelihood_factor(search.pose())) {

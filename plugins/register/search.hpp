@@ -34,8 +34,10 @@ struct SearchOptions {
 
 /// Throws Error unless all options that say something per level say it for as many levels.
 void check_options(const SearchOptions& options);
-/// Throws Error unless the list has as many numbers as there are levels, all positive. `like` names the list that says how many there are.
-void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels, const std::string& like, const std::string& advice);
+/// Throws Error unless the list has as many numbers as there are levels, all positive. `like` names the list that says
+/// how many there are.
+void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels,
+                      const std::string& like, const std::string& advice);
 
 using Levels = std::vector<std::shared_ptr<const Cost>>;
 Levels levels_of(const Cost& cost, const SearchOptions& options);
@@ -63,16 +65,17 @@ class Search {
   /// The least cost on the way so far; costs of different levels do not compare, so this asks one for all.
   std::vector<Pose::Progress> convergence(const Cost& cost) const;
 
-  /// Looks at poses about the one found so far, follows the best up, and returns where the best of them came to, at the last level.
+  /// Looks at poses about the one found so far, follows the best up, and returns where the best of them came to, at the
+  /// last level.
   Found find(const Levels& levels) { return best_of(scan(*levels.front()), levels); }
 
-  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the pose found so far, goes there and returns
-  /// the cost. `done` and `share` are for the progress.
+  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the pose found so far, goes there and
+  /// returns the cost. `done` and `share` are for the progress.
   double refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share);
 
  private:
-  /// Tries poses about the one found so far and returns the best that are no neighbours of a better one: the cost has other
-  /// minima within their range.
+  /// Tries poses about the one found so far and returns the best that are no neighbours of a better one: the cost has
+  /// other minima within their range.
   std::vector<RigidTransform> scan(const Cost& cost);
 
   /// Follows the candidates up. Each is judged after all six axes had their turn, because the start's errors in the
@@ -92,10 +95,11 @@ class Search {
   std::vector<std::pair<int, RigidTransform>> path_;  ///< after so many evaluations
 };
 
-/// The search's pose with its cost, and, where the cost has a noise model, its predicted covariance and warnings of what the
-/// images do not determine.
+/// The search's pose with its cost, and, where the cost has a noise model, its predicted covariance and warnings of
+/// what the images do not determine.
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
-Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options, Context& context);
+Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
+                   Context& context);
 
 inline const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
 
@@ -125,7 +129,8 @@ Node& declare(Node& node) {
               marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
-      .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared; none: as the cost says")
+      .option("pixel_step", &Options::pixel_step,
+              "per level, of grey values: every how many pixels are compared; none: as the cost says")
       .option("step_deg", &Options::step_deg,
               "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg,

@@ -24,10 +24,13 @@ struct Result {
 };
 
 void check_finer(const Options& options) {
-  for (const auto& [values, name] : {std::pair(&options.finer_pixel_step, "finer_pixel_step"), std::pair(&options.finer_step_deg, "finer_step_deg"),
-                                     std::pair(&options.finer_step_axial_deg, "finer_step_axial_deg"), std::pair(&options.finer_step_mm, "finer_step_mm"),
-                                     std::pair(&options.finer_step_tolerance, "finer_step_tolerance")})
-    marrow::registration::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step", "give all options that begin with finer_ as many, one for each level");
+  for (const auto& [values, name] :
+       {std::pair(&options.finer_pixel_step, "finer_pixel_step"), std::pair(&options.finer_step_deg, "finer_step_deg"),
+        std::pair(&options.finer_step_axial_deg, "finer_step_axial_deg"),
+        std::pair(&options.finer_step_mm, "finer_step_mm"),
+        std::pair(&options.finer_step_tolerance, "finer_step_tolerance")})
+    marrow::registration::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step",
+                                           "give all options that begin with finer_ as many, one for each level");
 }
 
 /// A sentence where the second cost leads far from what the first one found: then one of them is wrong.
@@ -36,12 +39,16 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
   const double apart_deg = marrow::degrees(motion.head<3>().norm()), apart_mm = motion.tail<3>().norm();
   if (apart_deg <= options.most_apart_deg && apart_mm <= options.most_apart_mm) return "";
   char text[160];
-  std::snprintf(text, sizeof text, "the two costs lead to poses %.3g degrees and %.3g mm apart: one of them is wrong; look at the overlays of both", apart_deg, apart_mm);
+  std::snprintf(
+      text, sizeof text,
+      "the two costs lead to poses %.3g degrees and %.3g mm apart: one of them is wrong; look at the overlays of both",
+      apart_deg, apart_mm);
   return text;
 }
 
-Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer, const marrow::Optimizer* finer_optimizer,
-                const marrow::Pose& initial, const Options& options, marrow::Context& context) {
+Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,
+                const marrow::Optimizer* finer_optimizer, const marrow::Pose& initial, const Options& options,
+                marrow::Context& context) {
   marrow::registration::check_options(options);
   check_finer(options);
   marrow::check_rigid(initial.world_from_model, "the pose to start from");
@@ -56,8 +63,10 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   std::shared_ptr<const marrow::Cost> level;
   const double share = 1.0 / double(options.finer_pixel_step.size());
   for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
-    const marrow::registration::Steps steps{options.finer_step_deg[i], options.finer_step_axial_deg[i], options.finer_step_mm[i], options.finer_step_tolerance[i]};
-    level = finer_cost.at_level({options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
+    const marrow::registration::Steps steps{options.finer_step_deg[i], options.finer_step_axial_deg[i],
+                                            options.finer_step_mm[i], options.finer_step_tolerance[i]};
+    level = finer_cost.at_level(
+        {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
     search.refine(*level, marrow::registration::kAllAxes, steps, double(i) * share, share);
   }
   result.pose = final_pose_of(search, first, *level, options, context);
@@ -83,11 +92,15 @@ MARROW_PLUGIN(plugin) {
       .out("pose", &Result::pose, "pose of least finer_cost near that of least cost")
       .out("stages", &Result::stages, "poses on the way: start, first, final", marrow::over("stage"));
   marrow::registration::declare<Options>(node);
-  node.option("finer_pixel_step", &Options::finer_pixel_step, "per level of the finer cost: every how many pixels are compared")
-      .option("finer_step_deg", &Options::finer_step_deg, "per level: first step of the rotations about the frontal and lateral axes")
+  node.option("finer_pixel_step", &Options::finer_pixel_step,
+              "per level of the finer cost: every how many pixels are compared")
+      .option("finer_step_deg", &Options::finer_step_deg,
+              "per level: first step of the rotations about the frontal and lateral axes")
       .option("finer_step_axial_deg", &Options::finer_step_axial_deg, "per level: first step of the axial rotation")
       .option("finer_step_mm", &Options::finer_step_mm, "per level: first step of the translations")
-      .option("finer_step_tolerance", &Options::finer_step_tolerance, "per level: it ends when steps fall below this part of its first step")
-      .option("most_apart_deg", &Options::most_apart_deg, "rotation between the results of the two costs that gives a warning", marrow::at_least(0))
+      .option("finer_step_tolerance", &Options::finer_step_tolerance,
+              "per level: it ends when steps fall below this part of its first step")
+      .option("most_apart_deg", &Options::most_apart_deg,
+              "rotation between the results of the two costs that gives a warning", marrow::at_least(0))
       .option("most_apart_mm", &Options::most_apart_mm, "shift between them that gives a warning", marrow::at_least(0));
 }

@@ -13,9 +13,7 @@ constexpr int kShift = 4;  // OpenCV draws at positions of 1/16 pixel
 constexpr int kRowHeight = 24;
 
 /// True when a position can be drawn: fixed-point coordinates overflow far outside.
-bool drawable(cv::Point2d p) {
-  return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5;
-}
+bool drawable(cv::Point2d p) { return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5; }
 cv::Point fixed_point(cv::Point2d p) {
   return {int(std::lround(p.x * (1 << kShift))), int(std::lround(p.y * (1 << kShift)))};
 }

@@ -37,9 +37,7 @@ struct Panel {
 /// A part of the view's image in grey, its longer side `size_px` long. A constant image becomes mid grey; pixels that
 /// are not finite are black.
 Panel make_panel(const View& view, const cv::Rect& part, int size_px, Contrast contrast);
-inline cv::Rect whole_image(const View& view) {
-  return {0, 0, view.image.width(), view.image.height()};
-}
+inline cv::Rect whole_image(const View& view) { return {0, 0, view.image.width(), view.image.height()}; }
 
 /// An antialiased line between sub-pixel positions; positions that are not finite or far outside draw nothing.
 void draw_line(cv::Mat& canvas, cv::Point2d from, cv::Point2d to, const cv::Scalar& colour, int thickness = 1);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a report shows in 3D (the interactive display of the chapter's Fig. 8): the models where the registration put them,
-// where it began and where they are in truth, to be looked at through each view's camera over its image.
+// What a report shows in 3D (the interactive display of the chapter's Fig. 8): the models where the registration put
+// them, where it began and where they are in truth, to be looked at through each view's camera over its image.
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -16,7 +16,8 @@ struct Options {
 };
 
 template <class T>
-void add(marrow::Scene& scene, const marrow::List<marrow::Mesh>& meshes, const marrow::List<T>* places, const std::string& name) {
+void add(marrow::Scene& scene, const marrow::List<marrow::Mesh>& meshes, const marrow::List<T>* places,
+         const std::string& name) {
   for (std::size_t i = 0; places && i < meshes.size(); ++i)
     if (const T* place = places->find(meshes.name(i))) {
       marrow::check_rigid(place->world_from_model, name + " of '" + meshes.name(i) + "'");
@@ -40,7 +41,8 @@ marrow::Scene interactive(const marrow::List<marrow::Mesh>& meshes, const marrow
     marrow::check_view(views[i]);
     const int size_px = std::min(options.size_px, std::max(views[i].image.width(), views[i].image.height()));
     marrow::Picture picture;
-    cv::cvtColor(make_panel(views[i], whole_image(views[i]), size_px, contrast_of(options.contrast)).pixels, picture.pixels, cv::COLOR_RGB2GRAY);
+    cv::cvtColor(make_panel(views[i], whole_image(views[i]), size_px, contrast_of(options.contrast)).pixels,
+                 picture.pixels, cv::COLOR_RGB2GRAY);
     scene.views.push_back({views[i].name, views[i].camera, picture});
   }
   return scene;
@@ -57,6 +59,8 @@ MARROW_PLUGIN(plugin) {
       .in("starts", "where the registration began", marrow::over("fragment"))
       .in("truths", "where they are, for simulated data", marrow::over("fragment"))
       .out("scene", "what `marrow show` and comparisons show")
-      .option("size_px", &Options::size_px, "longer side of the views' images at most", marrow::at_least(64), marrow::at_most(4096))
-      .option("contrast", &Options::contrast, "how grey values become brightness", marrow::one_of({"linear", "logarithmic", "local"}));
+      .option("size_px", &Options::size_px, "longer side of the views' images at most", marrow::at_least(64),
+              marrow::at_most(4096))
+      .option("contrast", &Options::contrast, "how grey values become brightness",
+              marrow::one_of({"linear", "logarithmic", "local"}));
 }

@@ -16,7 +16,8 @@ using Profile = marrow::Landscape::Profile;
 std::optional<cv::Point2d> least_of(const Profile& profile) {
   std::optional<cv::Point2d> least;
   for (std::size_t i = 0; i < profile.costs.size(); ++i)
-    if (std::isfinite(profile.costs[i]) && (!least || profile.costs[i] < least->y)) least = {profile.offsets[i], profile.costs[i]};
+    if (std::isfinite(profile.costs[i]) && (!least || profile.costs[i] < least->y))
+      least = {profile.offsets[i], profile.costs[i]};
   return least;
 }
 
@@ -35,7 +36,10 @@ marrow::Picture draw(const marrow::Landscape& landscape) {
   bool has_truth = false;
   for (int i = 0; i < count; ++i) {
     const Profile& profile = landscape.profiles[std::size_t(i)];
-    Plot plot{title(profile), "offset from the pose [" + profile.unit + "]", "cost", profile.offsets, profile.costs, {{0, kSkyBlue}}, least_of(profile)};
+    Plot plot{title(profile),   "offset from the pose [" + profile.unit + "]",
+              "cost",           profile.offsets,
+              profile.costs,    {{0, kSkyBlue}},
+              least_of(profile)};
     if (profile.truth) plot.marks.push_back({*profile.truth, kOrange});
     has_truth = has_truth || profile.truth;
     draw_plot(canvas, {i % kColumns * kWidth, i / kColumns * kHeight, kWidth, kHeight}, plot);

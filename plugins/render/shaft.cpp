@@ -19,8 +19,8 @@ struct Options {
 
 std::string describe(const marrow::ShaftLines& lines) {
   char text[80];
-  std::snprintf(text, sizeof text, "chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm, lines.width_deviation_mm,
-                lines.log_likelihood);
+  std::snprintf(text, sizeof text, "chosen: %.1f +- %.1f mm wide, log likelihood %.2f", lines.width_mm,
+                lines.width_deviation_mm, lines.log_likelihood);
   return text;
 }
 

@@ -33,9 +33,7 @@ struct Mask {
 Mask solid(const marrow::Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, int margin = 0);
 
 /// Voxels that leave `band_mm` in any direction.
-inline int margin(const marrow::Grid& grid, double band_mm) {
-  return int(band_mm / grid.spacing_mm.minCoeff()) + 2;
-}
+inline int margin(const marrow::Grid& grid, double band_mm) { return int(band_mm / grid.spacing_mm.minCoeff()) + 2; }
 
 /// The grid of a mask's box.
 marrow::Grid grid_of(const marrow::Grid& grid, const Mask& mask);

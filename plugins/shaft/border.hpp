@@ -31,9 +31,7 @@ struct Stretch {
 };
 
 /// The direction of a border, as its own `along`.
-inline Eigen::Vector2d along(const Border& border) {
-  return {-border.normal.y(), border.normal.x()};
-}
+inline Eigen::Vector2d along(const Border& border) { return {-border.normal.y(), border.normal.x()}; }
 
 /// Where the line stands at position s along a direction that is not across it.
 Eigen::Vector2d point_at(const Border& border, const Eigen::Vector2d& along, double s);

@@ -41,7 +41,7 @@ struct Residual {
 
 struct Matches {
   std::vector<Residual> residuals;
-  std::size_t points = 0;  ///< compared, with or without an edge
+  std::size_t points = 0;          ///< compared, with or without an edge
   std::vector<Residual> of_edges;  ///< of the edges near the outline to it; only where both ways count
 };
 
@@ -63,9 +63,10 @@ class ContourDistance : public marrow::Cost {
     return value_of(views, offset_of(views));
   }
 
-  /// By the motion of each point against its edge, along the normal, both held fast (Gauss-Newton with the weights of the loss). The
-  /// edge offset is one more unknown, eliminated.
-  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model, const marrow::FragmentFrame& frame) const override {
+  /// By the motion of each point against its edge, along the normal, both held fast (Gauss-Newton with the weights of
+  /// the loss). The edge offset is one more unknown, eliminated.
+  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model,
+                                     const marrow::FragmentFrame& frame) const override {
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
     Expansion about;
@@ -75,7 +76,8 @@ class ContourDistance : public marrow::Cost {
     for (std::size_t i = 0; i < views.size(); ++i) of_all += weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < views.size(); ++i) {
       const marrow::RigidTransform camera_from_model = scene_->views[i].camera.camera_from_world * world_from_model;
-      const double of_view = weight_of(scene_->options.weights, i) / of_all, points = std::max(double(views[i].points), least_points());
+      const double of_view = weight_of(scene_->options.weights, i) / of_all,
+                   points = std::max(double(views[i].points), least_points());
       const auto add = [&](const std::vector<Residual>& residuals, double of_each) {
         for (const Residual& r : residuals) {
           const double weight = of_each * loss_.weight(distance2(r, offset));
@@ -89,9 +91,11 @@ class ContourDistance : public marrow::Cost {
       };
       const double half = scene_->options.symmetric ? 0.5 : 1;
       add(views[i].residuals, half * of_view / points);
-      if (scene_->options.symmetric && backward(views[i], offset) > 0) add(views[i].of_edges, half * of_view / (points * level_.contour_spacing_px));
+      if (scene_->options.symmetric && backward(views[i], offset) > 0)
+        add(views[i].of_edges, half * of_view / (points * level_.contour_spacing_px));
     }
-    if (scene_->options.estimate_offset && weights > 0) about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(mixed, -1 / weights);
+    if (scene_->options.estimate_offset && weights > 0)
+      about.curvature.selfadjointView<Eigen::Lower>().rankUpdate(mixed, -1 / weights);
     about.curvature = about.curvature.selfadjointView<Eigen::Lower>();
     return about;
   }
@@ -143,16 +147,21 @@ class ContourDistance : public marrow::Cost {
 
   double value_of(const std::vector<Matches>& views, double offset) const {
     std::vector<double> of_view;
-    for (const Matches& view : views) of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset)) : forward(view, offset));
+    for (const Matches& view : views)
+      of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset))
+                                                  : forward(view, offset));
     return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
   }
 
   /// How far a point moves along its normal in the image, for each motion about the frame.
-  static marrow::Vector6d outward_motion_px(const Residual& r, const marrow::Camera& camera, const marrow::RigidTransform& camera_from_model,
+  static marrow::Vector6d outward_motion_px(const Residual& r, const marrow::Camera& camera,
+                                            const marrow::RigidTransform& camera_from_model,
                                             const marrow::FragmentFrame& frame) {
     const Eigen::Vector3d point = r.model_mm.cast<double>(), seen = camera_from_model * point;
-    const Eigen::RowVector3d by_camera = (double(r.normal_u) * (camera.intrinsics.row(0) - double(r.u) * camera.intrinsics.row(2)) +
-                                          double(r.normal_v) * (camera.intrinsics.row(1) - double(r.v) * camera.intrinsics.row(2))) / seen.z();
+    const Eigen::RowVector3d by_camera =
+        (double(r.normal_u) * (camera.intrinsics.row(0) - double(r.u) * camera.intrinsics.row(2)) +
+         double(r.normal_v) * (camera.intrinsics.row(1) - double(r.v) * camera.intrinsics.row(2))) /
+        seen.z();
     const Eigen::Vector3d by_point = (by_camera * camera_from_model.rotation).transpose();
     marrow::Vector6d motion;
     motion << frame.axes.transpose() * (point - frame.origin_mm).cross(by_point), frame.axes.transpose() * by_point;
@@ -168,8 +177,9 @@ class ContourDistance : public marrow::Cost {
     return (sum + (points - double(view.residuals.size())) * loss_.worst()) / points;
   }
 
-  /// The same from the edges back to the outline: what each edge near it takes off the worst, over the length of the outline in
-  /// pixels, for each of which an image has one edge. Edges further off belong to something else, and so count nothing.
+  /// The same from the edges back to the outline: what each edge near it takes off the worst, over the length of the
+  /// outline in pixels, for each of which an image has one edge. Edges further off belong to something else, and so
+  /// count nothing.
   double backward(const Matches& view, double offset) const {
     double gain = 0;
     for (const Residual& r : view.of_edges) gain += loss_.worst() - loss_(distance2(r, offset));
@@ -189,7 +199,7 @@ class ContourDistance : public marrow::Cost {
   }
 
   Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;        // edge detectors see nothing at the very border of an image
+    constexpr float kMargin_px = 3;  // edge detectors see nothing at the very border of an image
     const marrow::View& view = scene_->views[index];
     const float right = float(view.camera.width_px - 1) - kMargin_px,
                 bottom = float(view.camera.height_px - 1) - kMargin_px;
@@ -202,19 +212,23 @@ class ContourDistance : public marrow::Cost {
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
       ++matches.points;
       if (scene_->options.symmetric) compared.push_back(p);
-      if (const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v)) matches.residuals.push_back(residual(p, *edge));
+      if (const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v))
+        matches.residuals.push_back(residual(p, *edge));
     }
     if (scene_->options.symmetric) matches.of_edges = match_edges(index, compared);
     return matches;
   }
 
   std::vector<Residual> match_edges(std::size_t index, const std::vector<marrow::OutlinePoint>& outline) const {
-    const double reach_px = level_.reach_px + (scene_->options.estimate_offset ? kMostOffset_px : std::abs(scene_->options.edge_offset_px));
+    const double reach_px =
+        level_.reach_px + (scene_->options.estimate_offset ? kMostOffset_px : std::abs(scene_->options.edge_offset_px));
     const float least_cosine = float(std::cos(marrow::radians(scene_->options.direction_tolerance_deg)));
-    const NearestOutline nearest(outline, scene_->views[index].camera.width_px, scene_->views[index].camera.height_px, reach_px);
+    const NearestOutline nearest(outline, scene_->views[index].camera.width_px, scene_->views[index].camera.height_px,
+                                 reach_px);
     std::vector<Residual> residuals;
     for (const marrow::EdgePixel& edge : scene_->edges[index].all())
-      if (const int point = nearest.find(edge, reach_px, least_cosine); point >= 0) residuals.push_back(residual(outline[std::size_t(point)], edge));
+      if (const int point = nearest.find(edge, reach_px, least_cosine); point >= 0)
+        residuals.push_back(residual(outline[std::size_t(point)], edge));
     return residuals;
   }
 
@@ -222,7 +236,13 @@ class ContourDistance : public marrow::Cost {
     constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
     const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px;
     const float along = std::abs(dv * p.normal_u - du * p.normal_v);
-    return {du * p.normal_u + dv * p.normal_v, std::max(0.0f, along - kOwnLength_px), p.u_px, p.v_px, p.normal_u, p.normal_v, p.model_mm};
+    return {du * p.normal_u + dv * p.normal_v,
+            std::max(0.0f, along - kOwnLength_px),
+            p.u_px,
+            p.v_px,
+            p.normal_u,
+            p.normal_v,
+            p.model_mm};
   }
 
   /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie
@@ -255,13 +275,17 @@ class ContourDistance : public marrow::Cost {
   const EdgeLoss loss_;
 };
 
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
-                                                     const marrow::List<marrow::EdgeMap>& edges, const marrow::List<marrow::Pose>* others,
-                                                     const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
+                                                     const marrow::List<marrow::View>& views,
+                                                     const marrow::List<marrow::EdgeMap>& edges,
+                                                     const marrow::List<marrow::Pose>* others,
+                                                     const marrow::List<marrow::Projector>* other_projectors,
+                                                     const Options& options) {
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
   const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
+  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
+      views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;
@@ -269,9 +293,13 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& pr
   for (std::size_t i = 0; i < views.size(); ++i) {
     scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
     if (scene->edges.back().empty())
-      throw marrow::Error("view '" + views.name(i) + (other.empty() ? "': no edge lies inside the mask; widen the mask" : "': no edge lies inside the mask that is not another fragment's; widen the mask, or give a smaller others_reach_px"));
+      throw marrow::Error("view '" + views.name(i) +
+                          (other.empty() ? "': no edge lies inside the mask; widen the mask"
+                                         : "': no edge lies inside the mask that is not another fragment's; widen the "
+                                           "mask, or give a smaller others_reach_px"));
   }
-  return std::make_shared<ContourDistance>(std::move(scene), marrow::CostLevel{options.contour_spacing_px, options.reach_px});
+  return std::make_shared<ContourDistance>(std::move(scene),
+                                           marrow::CostLevel{options.contour_spacing_px, options.reach_px});
 }
 
 }  // namespace
@@ -302,8 +330,10 @@ MARROW_PLUGIN(plugin) {
       .option("model_error_px", &Options::model_error_px,
               "for the predicted deviation: how far model and edges may differ all along 32 px of outline",
               marrow::at_least(0))
-      .option("symmetric", &Options::symmetric, "half of the cost: distances from the edges near the outline back to it")
-      .option("others_reach_px", &Options::others_reach_px, "edges as near as this to another fragment's outline are its own",
-              marrow::at_least(0), marrow::at_most(50))
+      .option("symmetric", &Options::symmetric,
+              "half of the cost: distances from the edges near the outline back to it")
+      .option("others_reach_px", &Options::others_reach_px,
+              "edges as near as this to another fragment's outline are its own", marrow::at_least(0),
+              marrow::at_most(50))
       .option("weights", &Options::weights, "of each view; none: all the same");
 }

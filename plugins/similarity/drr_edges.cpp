@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges of the radiograph against edges of the image: both are gradient maxima of something blurred, so both lie inside the bone's
-// outline by about as much, where a surface's own outline does not (docs/method.md, Stage 2). Radiograph's edges against the
-// image's: Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med Imaging 1998) compare gradients; here
-// the truncated distance of the contour cost is taken.
+// Edges of the radiograph against edges of the image: both are gradient maxima of something blurred, so both lie inside
+// the bone's outline by about as much, where a surface's own outline does not (docs/method.md, Stage 2). Radiograph's
+// edges against the image's: Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med
+// Imaging 1998) compare gradients; here the truncated distance of the contour cost is taken.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -30,8 +30,8 @@ struct DrawnEdge {
   float u, v, direction_u, direction_v, weight;
 };
 
-/// Ridges of the gradient's magnitude, sub-pixel by a parabola across (Canny 1986; Devernay 1995). An edge counts the more
-/// the steeper it is, from nothing at the threshold to 1 at twice of it, so that none appears or vanishes at once.
+/// Ridges of the gradient's magnitude, sub-pixel by a parabola across (Canny 1986; Devernay 1995). An edge counts the
+/// more the steeper it is, from nothing at the threshold to 1 at twice of it, so that none appears or vanishes at once.
 std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGrid& grid, double threshold_percent) {
   cv::Mat du, dv, magnitude;
   cv::Sobel(radiograph, du, CV_32F, 1, 0, 3, 0.125);
@@ -59,9 +59,11 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
       };
       const float before = neighbour(-1), after = neighbour(1);
       if (here < before || here <= after) continue;
-      const float bend = before - 2 * here + after, off = bend < 0 ? std::clamp(0.5f * (before - after) / bend, -0.5f, 0.5f) : 0;
+      const float bend = before - 2 * here + after,
+                  off = bend < 0 ? std::clamp(0.5f * (before - after) / bend, -0.5f, 0.5f) : 0;
       const float moved_u = level ? off : off * slope, moved_v = level ? off * slope : off;
-      const Eigen::Vector2d at = grid.pixel(0, 0) + grid.step_px * Eigen::Vector2d(double(column) + double(moved_u), double(row) + double(moved_v));
+      const Eigen::Vector2d at = grid.pixel(0, 0) + grid.step_px * Eigen::Vector2d(double(column) + double(moved_u),
+                                                                                   double(row) + double(moved_v));
       // Bone is where the integral is large, and brighter means less of it.
       edges.push_back({float(at.x()), float(at.y()), -x / here, -y / here, std::min(here / threshold - 1, 1.0f)});
     }
@@ -83,7 +85,8 @@ class DrrEdges : public marrow::Cost {
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     std::vector<double> of_view(scene_->views.size());
-    tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
+    tbb::parallel_for(std::size_t(0), of_view.size(),
+                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
     return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
   }
 
@@ -99,15 +102,20 @@ class DrrEdges : public marrow::Cost {
     const marrow::PixelGrid region = scene_->projector->region(camera, world_from_model);
     if (region.count() == 0) return loss_.worst();
     const double margin = std::ceil(4 * scene_->options.blur_px / step_) * step_;
-    const marrow::PixelGrid grid{region.u_px - margin, region.v_px - margin, double(step_), int((region.columns + 2 * margin) / step_) + 1, int((region.rows + 2 * margin) / step_) + 1};
+    const marrow::PixelGrid grid{region.u_px - margin, region.v_px - margin, double(step_),
+                                 int((region.columns + 2 * margin) / step_) + 1,
+                                 int((region.rows + 2 * margin) / step_) + 1};
     std::vector<float> values = scene_->projector->radiograph(camera, world_from_model, grid);
     cv::Mat radiograph(grid.rows, grid.columns, CV_32F, values.data());
     // Steps and Sobel's operator smooth already.
     const double own2 = 0.5 * step_ * step_, blur2 = scene_->options.blur_px * scene_->options.blur_px - own2;
-    if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2) cv::GaussianBlur(radiograph, radiograph, {}, blur);
+    if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
+      cv::GaussianBlur(radiograph, radiograph, {}, blur);
     double sum = 0, weights = 0;
     for (const DrawnEdge& edge : edges_of(radiograph, grid, scene_->options.threshold_percent)) {
-      if (edge.u < kMargin_px || edge.v < kMargin_px || edge.u > float(camera.width_px - 1) - kMargin_px || edge.v > float(camera.height_px - 1) - kMargin_px) continue;
+      if (edge.u < kMargin_px || edge.v < kMargin_px || edge.u > float(camera.width_px - 1) - kMargin_px ||
+          edge.v > float(camera.height_px - 1) - kMargin_px)
+        continue;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(edge.v + 0.5f), int(edge.u + 0.5f))) continue;
       weights += double(edge.weight);
       sum += double(edge.weight) * loss_(distance2(index, edge));
@@ -123,7 +131,8 @@ class DrrEdges : public marrow::Cost {
     const marrow::EdgePixel* nearest = scene_->edges[view].find(edge.u, edge.v, edge.direction_u, edge.direction_v);
     if (!nearest) return 1e30;
     const float du = nearest->u_px - edge.u, dv = nearest->v_px - edge.v;
-    const float across = du * edge.direction_u + dv * edge.direction_v, along = std::abs(dv * edge.direction_u - du * edge.direction_v);
+    const float across = du * edge.direction_u + dv * edge.direction_v,
+                along = std::abs(dv * edge.direction_u - du * edge.direction_v);
     const float beyond = std::max(0.0f, along - kOwnLength_px);
     return double(across * across + beyond * beyond);
   }
@@ -133,17 +142,23 @@ class DrrEdges : public marrow::Cost {
   const EdgeLoss loss_;
 };
 
-std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
-                                              const marrow::List<marrow::Pose>* others, const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector,
+                                              const marrow::List<marrow::View>& views,
+                                              const marrow::List<marrow::EdgeMap>& edges,
+                                              const marrow::List<marrow::Pose>* others,
+                                              const marrow::List<marrow::Projector>* other_projectors,
+                                              const Options& options) {
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
   const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(views, edges, other, marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
+  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
+      views, edges, other, marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;
   scene->options = options;
-  for (std::size_t i = 0; i < views.size(); ++i) scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
+  for (std::size_t i = 0; i < views.size(); ++i)
+    scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
   return std::make_shared<DrrEdges>(std::move(scene), options.pixel_step, options.reach_px);
 }
 
@@ -151,21 +166,27 @@ std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector
 
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.drr_edges", drr_edges)
-      .summary("Mean distance from the radiograph's edges to the image's nearest edges of like direction, both displaced alike by blur")
+      .summary(
+          "Mean distance from the radiograph's edges to the image's nearest edges of like direction, both displaced "
+          "alike by blur")
       .in("projector", "makes radiographs of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
       .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
       .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
       .out("cost", "mean distance [px]")
-      .option("pixel_step", &Options::pixel_step, "every how many pixels the radiograph is drawn", marrow::at_least(1), marrow::at_most(16))
-      .option("blur_px", &Options::blur_px, "of the radiograph, as the edges' detector and the device blur the image: standard deviation",
+      .option("pixel_step", &Options::pixel_step, "every how many pixels the radiograph is drawn", marrow::at_least(1),
+              marrow::at_most(16))
+      .option("blur_px", &Options::blur_px,
+              "of the radiograph, as the edges' detector and the device blur the image: standard deviation",
               marrow::at_least(0), marrow::at_most(10))
-      .option("threshold_percent", &Options::threshold_percent, "of the radiograph's steepest gradient, from which on there is an edge",
-              marrow::at_least(0.1), marrow::at_most(90), marrow::unit("%"))
-      .option("reach_px", &Options::reach_px, "distance from which on an edge counts as unmatched", marrow::at_least(0.5))
+      .option("threshold_percent", &Options::threshold_percent,
+              "of the radiograph's steepest gradient, from which on there is an edge", marrow::at_least(0.1),
+              marrow::at_most(90), marrow::unit("%"))
+      .option("reach_px", &Options::reach_px, "distance from which on an edge counts as unmatched",
+              marrow::at_least(0.5))
       .option("scale_px", &Options::scale_px, "distances below this count by their squares", marrow::at_least(0.01))
-      .option("direction_tolerance_deg", &Options::direction_tolerance_deg, "by how much the directions of the edges may differ",
-              marrow::at_least(10), marrow::at_most(180))
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
+              "by how much the directions of the edges may differ", marrow::at_least(10), marrow::at_most(180))
       .option("weights", &Options::weights, "of each view; none: all the same");
 }

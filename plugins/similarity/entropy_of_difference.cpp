@@ -12,8 +12,8 @@ struct Options : marrow::similarity::IntensityOptions {
   int bins = 64;
 };
 
-/// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part of the image's own range, and
-/// go as far below it, where the difference may lie.
+/// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part
+/// of the image's own range, and go as far below it, where the difference may lie.
 marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
   marrow::similarity::Bins within = bins_of(whole.seen, whole.counts, bins);
   if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
@@ -37,16 +37,24 @@ marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
   };
 }
 
-std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
+std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector,
+                                                          const marrow::List<marrow::View>& views,
+                                                          const marrow::List<marrow::Pose>* others,
+                                                          const marrow::List<marrow::Projector>* other_projectors,
+                                                          const Options& options) {
+  return marrow::similarity::intensity_cost(
+      projector, views, others, other_projectors, options, 2,
+      [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.entropy_of_difference", entropy_of_difference);
-  node.summary("Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med Imaging 1998)");
+  node.summary(
+      "Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med "
+      "Imaging 1998)");
   marrow::similarity::declare<decltype(node), Options>(node);
-  node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4), marrow::at_most(1024));
+  node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4),
+              marrow::at_most(1024));
 }

@@ -10,13 +10,16 @@ namespace {
 using marrow::similarity::IntensityOptions;
 using marrow::similarity::Patch;
 
-/// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference of gradients and A the
-/// variance of the image's, over the same sums without the model. That is Penney's sum over a fixed region, the image, but for constants.
+/// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference
+/// of gradients and A the variance of the image's, over the same sums without the model. That is Penney's sum over a
+/// fixed region, the image, but for constants.
 marrow::similarity::Measure measure_of(const Patch& whole) {
   Patch unseen = whole;
   unseen.rendered.assign(whole.seen.size(), 0.0f);
   const marrow::similarity::Gradients image = marrow::similarity::gradients_of(unseen);
-  const auto variance = [&](const std::vector<float>& gradients) { return std::max(1e-14, std::pow(marrow::similarity::deviation(gradients, image.counts), 2)); };
+  const auto variance = [&](const std::vector<float>& gradients) {
+    return std::max(1e-14, std::pow(marrow::similarity::deviation(gradients, image.counts), 2));
+  };
   const double u2 = variance(image.seen_u), v2 = variance(image.seen_v);
   const auto structure = [](double d, double variance) { return d * d / (variance + d * d); };
   double all = 0;
@@ -36,8 +39,11 @@ marrow::similarity::Measure measure_of(const Patch& whole) {
   };
 }
 
-std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const IntensityOptions& options) {
+std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector,
+                                                        const marrow::List<marrow::View>& views,
+                                                        const marrow::List<marrow::Pose>* others,
+                                                        const marrow::List<marrow::Projector>* other_projectors,
+                                                        const IntensityOptions& options) {
   return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, measure_of);
 }
 
@@ -45,6 +51,8 @@ std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector&
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_difference", gradient_difference);
-  node.summary("Gradients that the difference image has left of the image's (gradient difference), which thin bright lines hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
+  node.summary(
+      "Gradients that the difference image has left of the image's (gradient difference), which thin bright lines "
+      "hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
   marrow::similarity::declare<decltype(node), IntensityOptions>(node);
 }

@@ -19,10 +19,12 @@ double median_length(const std::vector<float>& u, const std::vector<float>& v, c
   return lengths[lengths.size() / 2];
 }
 
-/// Mean of (1 - cos of the angle) / 2 where both gradients are longer than the median of theirs; over a tenth of the pixels at least.
+/// Mean of (1 - cos of the angle) / 2 where both gradients are longer than the median of theirs; over a tenth of the
+/// pixels at least.
 double value(const Patch& patch) {
   const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
-  const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts), least_seen = median_length(g.seen_u, g.seen_v, g.counts);
+  const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts),
+               least_seen = median_length(g.seen_u, g.seen_v, g.counts);
   double used = 0, sum = 0, all = 0;
   for (std::size_t i = 0; i < g.counts.size(); ++i) {
     if (!g.counts[i]) continue;
@@ -35,8 +37,11 @@ double value(const Patch& patch) {
   return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
 }
 
-std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const marrow::similarity::IntensityOptions& options) {
+std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector,
+                                                         const marrow::List<marrow::View>& views,
+                                                         const marrow::List<marrow::Pose>* others,
+                                                         const marrow::List<marrow::Projector>* other_projectors,
+                                                         const marrow::similarity::IntensityOptions& options) {
   return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, value);
 }
 
@@ -44,6 +49,8 @@ std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_orientation", gradient_orientation);
-  node.summary("How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for its logarithm)");
+  node.summary(
+      "How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for its "
+      "logarithm)");
   marrow::similarity::declare<decltype(node), marrow::similarity::IntensityOptions>(node);
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of the images, projected back to the surface, against those of the CT: Tomazevic, Likar, Slivnik and Pernus (IEEE Trans
-// Med Imaging 22(11), 2003), only where rays touch the surface as Livyatan, Yaniv and Joskowicz do (same issue). Needs no
-// radiograph and no edges.
+// Gradients of the images, projected back to the surface, against those of the CT: Tomazevic, Likar, Slivnik and Pernus
+// (IEEE Trans Med Imaging 22(11), 2003), only where rays touch the surface as Livyatan, Yaniv and Joskowicz do (same
+// issue). Needs no radiograph and no edges.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -37,7 +37,10 @@ Eigen::Vector3d gradient_at(const marrow::Volume& volume, const Eigen::Vector3d&
   Eigen::Vector3d slope;
   for (int k = 0; k < 3; ++k) {
     const Eigen::Vector3d step = Eigen::Vector3d::Unit(k);
-    slope[k] = 0.5 * double(marrow::sample_trilinear(volume.grid, volume.values, index + step) - marrow::sample_trilinear(volume.grid, volume.values, index - step)) / volume.grid.spacing_mm[k];
+    slope[k] = 0.5 *
+               double(marrow::sample_trilinear(volume.grid, volume.values, index + step) -
+                      marrow::sample_trilinear(volume.grid, volume.values, index - step)) /
+               volume.grid.spacing_mm[k];
   }
   return volume.grid.direction * slope;
 }
@@ -48,13 +51,15 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
   for (const Eigen::Vector3d& at : marrow::sample_surface(mesh, std::size_t(count))) {
     const Eigen::Vector3d index = volume.grid.index_from_point(at);
     bool is_inside = true;
-    for (int k = 0; k < 3; ++k) is_inside = is_inside && index[k] >= 2 && index[k] <= volume.grid.size[std::size_t(k)] - 3;
+    for (int k = 0; k < 3; ++k)
+      is_inside = is_inside && index[k] >= 2 && index[k] <= volume.grid.size[std::size_t(k)] - 3;
     if (!is_inside) continue;
     const Eigen::Vector3d slope = gradient_at(volume, at);
     // The CT's own gradient is the normal as well: less rough than the triangles'.
     if (slope.norm() > 1e-6) points.push_back({at, -slope.normalized(), slope.normalized(), slope.norm()});
   }
-  if (points.empty()) throw marrow::Error("the volume has no gradient on the mesh: wire the volume that the mesh was made from");
+  if (points.empty())
+    throw marrow::Error("the volume has no gradient on the mesh: wire the volume that the mesh was made from");
   // One bright spot shall not outweigh the rest.
   std::vector<double> strengths;
   for (const SurfacePoint& point : points) strengths.push_back(point.strength);
@@ -101,13 +106,15 @@ class GradientProjection : public marrow::Cost {
     std::vector<SurfacePoint> points;
     Options options;
   };
-  GradientProjection(std::shared_ptr<const Scene> scene, double blur_px, std::size_t point_step) : scene_(std::move(scene)), point_step_(point_step) {
+  GradientProjection(std::shared_ptr<const Scene> scene, double blur_px, std::size_t point_step)
+      : scene_(std::move(scene)), point_step_(point_step) {
     for (const marrow::View& view : scene_->views) images_.push_back(gradients_of(view, blur_px));
   }
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     std::vector<double> of_view(images_.size());
-    tbb::parallel_for(std::size_t(0), of_view.size(), [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
+    tbb::parallel_for(std::size_t(0), of_view.size(),
+                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
     return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
   }
 
@@ -118,9 +125,10 @@ class GradientProjection : public marrow::Cost {
   }
 
  private:
-  /// Of Tomazevic's criterion, the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle: over the sum of |a|,
-  /// with |b| in units of the image's own steep gradients and no more than 1, so that a few steep ones do not decide. Each point
-  /// counts by exp(-s^2/2): s = sine of the angle between ray and surface, over that of touch_deg.
+  /// Of Tomazevic's criterion, the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle: over
+  /// the sum of |a|, with |b| in units of the image's own steep gradients and no more than 1, so that a few steep ones
+  /// do not decide. Each point counts by exp(-s^2/2): s = sine of the angle between ray and surface, over that of
+  /// touch_deg.
   double value_in(std::size_t view, const marrow::RigidTransform& world_from_model) const {
     constexpr double kLeastShare = 0.1;  // of the weight of all, that must lie inside of image and mask
     const marrow::Camera& camera = scene_->views[view].camera;
@@ -145,9 +153,10 @@ class GradientProjection : public marrow::Cost {
     return inside > 0 ? 1 - sum / inside : 1;
   }
 
-  /// min(|b|, 1) cos^4 of the angle between the CT's gradient and the image's, projected back: what the image's value at the point's
-  /// pixel would change by as the point moved, so at right angles to the ray.
-  static double likeness(const marrow::Camera& camera, const Eigen::Vector3d& at, const Eigen::Vector3d& direction, const Eigen::Vector2d& g) {
+  /// min(|b|, 1) cos^4 of the angle between the CT's gradient and the image's, projected back: what the image's value
+  /// at the point's pixel would change by as the point moved, so at right angles to the ray.
+  static double likeness(const marrow::Camera& camera, const Eigen::Vector3d& at, const Eigen::Vector3d& direction,
+                         const Eigen::Vector2d& g) {
     const double strength = g.norm();
     if (!(strength > 0)) return 0;
     const Eigen::Matrix3d& k = camera.intrinsics;
@@ -159,7 +168,8 @@ class GradientProjection : public marrow::Cost {
 
   /// Bilinear; false where a pixel is out or does not count.
   static bool sample(const GradientImage& image, const Eigen::Vector2d& pixel, Eigen::Vector2d& g) {
-    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.u.cols - 1 && pixel.y() < image.u.rows - 1)) return false;
+    if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.u.cols - 1 && pixel.y() < image.u.rows - 1))
+      return false;
     const int u = int(pixel.x()), v = int(pixel.y());
     const float x = float(pixel.x() - u), y = float(pixel.y() - v);
     const auto* near = image.counts.ptr<std::uint8_t>(v) + u;
@@ -179,16 +189,23 @@ class GradientProjection : public marrow::Cost {
   std::vector<GradientImage> images_;
 };
 
-std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::List<marrow::View>& views, const marrow::Projector* projector,
-                                                        const marrow::List<marrow::Pose>* others, const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh, const marrow::Volume& volume,
+                                                        const marrow::List<marrow::View>& views,
+                                                        const marrow::Projector* projector,
+                                                        const marrow::List<marrow::Pose>* others,
+                                                        const marrow::List<marrow::Projector>* other_projectors,
+                                                        const Options& options) {
   marrow::check_mesh(mesh, "the mesh of the bone");
   marrow::check_volume(volume, "the volume that the mesh was made from");
   if (volume.grid.frame != mesh.frame)
-    throw marrow::Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + volume.grid.frame + "'; give the volume that the mesh was made from");
+    throw marrow::Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + volume.grid.frame +
+                        "'; give the volume that the mesh was made from");
   marrow::similarity::check_views(views);
   marrow::similarity::check_weights(options.weights, views.size());
-  const marrow::List<marrow::View> own = marrow::similarity::without_shadows(views, marrow::similarity::others_of(projector, others, other_projectors));
-  const auto scene = std::make_shared<GradientProjection::Scene>(GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
+  const marrow::List<marrow::View> own =
+      marrow::similarity::without_shadows(views, marrow::similarity::others_of(projector, others, other_projectors));
+  const auto scene = std::make_shared<GradientProjection::Scene>(
+      GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
   return std::make_shared<GradientProjection>(scene, options.blur_px, 1);
 }
 
@@ -196,7 +213,9 @@ std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh
 
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.gradient_projection", gradient_projection)
-      .summary("1 - likeness of the images' gradients, projected back, and the CT's where rays touch the bone (Tomazevic et al.; Livyatan et al., IEEE TMI 2003)")
+      .summary(
+          "1 - likeness of the images' gradients, projected back, and the CT's where rays touch the bone (Tomazevic et "
+          "al.; Livyatan et al., IEEE TMI 2003)")
       .in("mesh", "surface of the bone")
       .in("volume", "CT that the surface was made from")
       .in("views", "views with their cameras and masks", marrow::over("view"))
@@ -204,8 +223,11 @@ MARROW_PLUGIN(plugin) {
       .in("others", "where other fragments are, whose shadows are left out", marrow::over("fragment"))
       .in("other_projectors", "draw them, and maybe this one", marrow::over("fragment"))
       .out("cost", "how badly the gradients agree, 0 to 1; unmoved by gain and offset of the line integrals")
-      .option("points", &Options::points, "spread over the surface, of which those near its outlines count", marrow::at_least(100), marrow::at_most(1000000))
-      .option("blur_px", &Options::blur_px, "smoothing of the images: standard deviation of a Gaussian", marrow::at_least(0.5), marrow::at_most(20))
-      .option("touch_deg", &Options::touch_deg, "angle between ray and surface by which a point counts less", marrow::at_least(1), marrow::at_most(45))
+      .option("points", &Options::points, "spread over the surface, of which those near its outlines count",
+              marrow::at_least(100), marrow::at_most(1000000))
+      .option("blur_px", &Options::blur_px, "smoothing of the images: standard deviation of a Gaussian",
+              marrow::at_least(0.5), marrow::at_most(20))
+      .option("touch_deg", &Options::touch_deg, "angle between ray and surface by which a point counts less",
+              marrow::at_least(1), marrow::at_most(45))
       .option("weights", &Options::weights, "of each view; none: all the same");
 }

@@ -17,19 +17,24 @@ void fill_line(std::vector<std::pair<float, bool>>& ends, int size, const std::f
   std::sort(ends.begin(), ends.end());
   for (std::size_t i = 0; i + 1 < ends.size(); ++i)
     if (!ends[i].second && ends[i + 1].second)  // the bone begins here and ends there
-      for (int at = std::max(0, int(std::ceil(ends[i].first))); at <= std::min(size - 1, int(ends[i + 1].first)); ++at) mark(at);
+      for (int at = std::max(0, int(std::ceil(ends[i].first))); at <= std::min(size - 1, int(ends[i + 1].first)); ++at)
+        mark(at);
 }
 
-/// Marks what lies inside an outline: in a row or in a column between two of its points. It may be open where the CT ends.
+/// Marks what lies inside an outline: in a row or in a column between two of its points. It may be open where the CT
+/// ends.
 void fill_outline(const std::vector<OutlinePoint>& outline, cv::Mat& mask) {
   std::vector<std::vector<std::pair<float, bool>>> rows(std::size_t(mask.rows)), columns(std::size_t(mask.cols));
   for (const OutlinePoint& p : outline) {
-    const int u = std::clamp(int(std::lround(p.u_px)), 0, mask.cols - 1), v = std::clamp(int(std::lround(p.v_px)), 0, mask.rows - 1);
+    const int u = std::clamp(int(std::lround(p.u_px)), 0, mask.cols - 1),
+              v = std::clamp(int(std::lround(p.v_px)), 0, mask.rows - 1);
     if (std::abs(p.normal_u) > 0.5f) rows[std::size_t(v)].emplace_back(p.u_px, p.normal_u > 0);
     if (std::abs(p.normal_v) > 0.5f) columns[std::size_t(u)].emplace_back(p.v_px, p.normal_v > 0);
   }
-  for (int v = 0; v < mask.rows; ++v) fill_line(rows[std::size_t(v)], mask.cols, [&](int u) { mask.at<std::uint8_t>(v, u) = 1; });
-  for (int u = 0; u < mask.cols; ++u) fill_line(columns[std::size_t(u)], mask.rows, [&](int v) { mask.at<std::uint8_t>(v, u) = 1; });
+  for (int v = 0; v < mask.rows; ++v)
+    fill_line(rows[std::size_t(v)], mask.cols, [&](int u) { mask.at<std::uint8_t>(v, u) = 1; });
+  for (int u = 0; u < mask.cols; ++u)
+    fill_line(columns[std::size_t(u)], mask.rows, [&](int v) { mask.at<std::uint8_t>(v, u) = 1; });
 }
 
 /// The region of a fragment's radiograph; nothing for one that is drawn as an outline.
@@ -63,7 +68,8 @@ void check_views(const List<View>& views) {
 
 void check_weights(const std::vector<double>& weights, std::size_t views) {
   if (!weights.empty() && weights.size() != views)
-    throw Error("weights has " + std::to_string(weights.size()) + " numbers, but there are " + std::to_string(views) + " views; give one for each");
+    throw Error("weights has " + std::to_string(weights.size()) + " numbers, but there are " + std::to_string(views) +
+                " views; give one for each");
   double sum = 0;
   for (const double weight : weights) {
     if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + std::to_string(weight));
@@ -75,16 +81,20 @@ void check_weights(const std::vector<double>& weights, std::size_t views) {
 void check_edges(const List<View>& views, const List<EdgeMap>& edges) {
   if (views.size() == 0) throw Error("there is no view to compare the model with");
   if (views.size() != edges.size())
-    throw Error("there are " + std::to_string(views.size()) + " views, but edge maps of " + std::to_string(edges.size()) + "; give the edges of each view");
+    throw Error("there are " + std::to_string(views.size()) + " views, but edge maps of " +
+                std::to_string(edges.size()) + "; give the edges of each view");
   const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
   for (std::size_t i = 0; i < views.size(); ++i) {
     check_camera(views[i].camera, "view '" + views.name(i) + "'");
     if (edges[i].pixels.empty())
-      throw Error("view '" + views.name(i) + "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, or check that the image shows the bone");
+      throw Error("view '" + views.name(i) +
+                  "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, or "
+                  "check that the image shows the bone");
     const Camera& camera = views[i].camera;
     if (edges[i].width_px != camera.width_px || edges[i].height_px != camera.height_px)
-      throw Error("view '" + views.name(i) + "': the edge map has " + size(edges[i].width_px, edges[i].height_px) + " pixels, but the camera " +
-                  size(camera.width_px, camera.height_px) + "; give the edges of this view's own image");
+      throw Error("view '" + views.name(i) + "': the edge map has " + size(edges[i].width_px, edges[i].height_px) +
+                  " pixels, but the camera " + size(camera.width_px, camera.height_px) +
+                  "; give the edges of this view's own image");
   }
 }
 
@@ -99,13 +109,21 @@ double weighted_mean(const std::vector<double>& of_view, const std::vector<doubl
 
 std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors) {
   std::vector<Other> others;
-  if (!projectors != !poses) throw Error(std::string("there are ") + (poses ? "poses of other fragments, but nothing draws them; wire 'other_projectors'" : "projectors of other fragments, but no poses; wire 'others'"));
+  if (!projectors != !poses)
+    throw Error(std::string("there are ") +
+                (poses ? "poses of other fragments, but nothing draws them; wire 'other_projectors'"
+                       : "projectors of other fragments, but no poses; wire 'others'"));
   if (!projectors) return others;
-  if (!own) throw Error("there are other fragments, but it is not known which of them is this one; wire 'projector', the one that draws this fragment");
+  if (!own)
+    throw Error(
+        "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that "
+        "draws this fragment");
   for (std::size_t i = 0; i < projectors->size(); ++i) {
     if (&(*projectors)[i] == own) continue;
     const Pose* pose = poses->find(projectors->name(i));
-    if (!pose) throw Error("other_projectors has the fragment '" + projectors->name(i) + "', but others has no pose of it; give the poses of the same fragments");
+    if (!pose)
+      throw Error("other_projectors has the fragment '" + projectors->name(i) +
+                  "', but others has no pose of it; give the poses of the same fragments");
     others.push_back({&(*projectors)[i], pose->world_from_model});
   }
   return others;
@@ -126,7 +144,8 @@ List<View> without_shadows(const List<View>& views, const std::vector<Other>& ot
   return left;
 }
 
-List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others, double reach_px, double tolerance_deg) {
+List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others,
+                               double reach_px, double tolerance_deg) {
   if (others.empty()) return edges;
   List<EdgeMap> left;
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -136,7 +155,8 @@ List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edg
       const std::vector<OutlinePoint> outline = other.projector->outline(camera, other.world_from_model, 1);
       const NearestOutline nearest(outline, camera.width_px, camera.height_px, reach_px);
       const float least_cosine = float(std::cos(radians(tolerance_deg)));
-      std::erase_if(kept.pixels, [&](const EdgePixel& edge) { return nearest.find(edge, reach_px, least_cosine) >= 0; });
+      std::erase_if(kept.pixels,
+                    [&](const EdgePixel& edge) { return nearest.find(edge, reach_px, least_cosine) >= 0; });
     }
     left.add(edges.name(i), std::move(kept));
   }

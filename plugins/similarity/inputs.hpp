@@ -16,22 +16,25 @@ void check_edges(const List<View>& views, const List<EdgeMap>& edges);
 
 /// The mean over views by their weights; without weights, of all the same.
 double weighted_mean(const std::vector<double>& of_view, const std::vector<double>& weights);
-inline double weight_of(const std::vector<double>& weights, std::size_t view) { return weights.empty() ? 1 : weights[view]; }
+inline double weight_of(const std::vector<double>& weights, std::size_t view) {
+  return weights.empty() ? 1 : weights[view];
+}
 
 /// Other fragments where they are known to be.
 struct Other {
   const Projector* projector;
   RigidTransform world_from_model;
 };
-/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment without a pose, and
-/// for others without `own`.
+/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment
+/// without a pose, and for others without `own`.
 std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors);
 
-/// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines where they
-/// are drawn as outlines only.
+/// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines where
+/// they are drawn as outlines only.
 List<View> without_shadows(const List<View>& views, const std::vector<Other>& others);
 constexpr double kOthersReach_px = 3;  ///< edges as near as this to another fragment's outline are its own
 /// The edges but for those within `reach_px` of another's outline that have its direction, up to the tolerance.
-List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others, double reach_px, double tolerance_deg);
+List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others,
+                               double reach_px, double tolerance_deg);
 
 }  // namespace marrow::similarity

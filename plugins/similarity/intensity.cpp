@@ -14,7 +14,8 @@ namespace {
 
 class IntensityCost : public Cost {
  public:
-  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst, MeasureOf measure_of)
+  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst,
+                MeasureOf measure_of)
       : projector_(projector), views_(views), options_(options), worst_(worst), measure_of_(std::move(measure_of)) {
     for (const View& view : views) {
       images_.push_back(image_of(view));
@@ -24,7 +25,8 @@ class IntensityCost : public Cost {
 
   double value(const RigidTransform& world_from_model) const override {
     std::vector<double> of_view(views_.size());
-    tbb::parallel_for(std::size_t(0), views_.size(), [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
+    tbb::parallel_for(std::size_t(0), views_.size(),
+                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
     for (double& value : of_view)
       if (!std::isfinite(value)) value = worst_;
     return weighted_mean(of_view, options_.weights);
@@ -42,12 +44,14 @@ class IntensityCost : public Cost {
   Patch image_of(const View& view) const {
     const int step = options_.pixel_step;
     cv::Mat smooth = line_integrals(view.image.pixels);
-    if (const double sigma = options_.blur_px * step; sigma > 0.1) cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
+    if (const double sigma = options_.blur_px * step; sigma > 0.1)
+      cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
     Patch image{(smooth.cols + step - 1) / step, (smooth.rows + step - 1) / step, 0, 0, {}, {}, {}};
     for (int row = 0; row < image.rows; ++row)
       for (int column = 0; column < image.columns; ++column) {
         const float value = smooth.at<float>(row * step, column * step);
-        const bool is_out = !std::isfinite(value) || (!view.mask.empty() && !view.mask.at<std::uint8_t>(row * step, column * step));
+        const bool is_out =
+            !std::isfinite(value) || (!view.mask.empty() && !view.mask.at<std::uint8_t>(row * step, column * step));
         image.seen.push_back(value);
         image.counts.push_back(!is_out);
       }
@@ -60,12 +64,15 @@ class IntensityCost : public Cost {
     const PixelGrid region = projector_.region(camera, world_from_model);
     if (region.count() == 0) return worst_;
     const int step = options_.pixel_step, margin = options_.margin_px;
-    const int left = std::max(0, (int(region.u_px) - margin) / step), top = std::max(0, (int(region.v_px) - margin) / step);
+    const int left = std::max(0, (int(region.u_px) - margin) / step),
+              top = std::max(0, (int(region.v_px) - margin) / step);
     const int right = std::min(image.columns - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
               bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
     if (right - left < 3 || bottom - top < 3) return worst_;
     Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
-    patch.rendered = projector_.radiograph(camera, world_from_model, PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
+    patch.rendered = projector_.radiograph(
+        camera, world_from_model,
+        PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
     patch.seen.resize(patch.rendered.size());
     patch.counts.resize(patch.rendered.size());
     for (int row = 0; row < patch.rows; ++row) {
@@ -87,7 +94,8 @@ class IntensityCost : public Cost {
 
 }  // namespace
 
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of) {
   check_views(views);
   check_weights(options.weights, views.size());
@@ -95,9 +103,11 @@ std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const Lis
   return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
 }
 
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, Measure measure) {
-  return intensity_cost(projector, views, others, other_projectors, options, worst, [measure = std::move(measure)](const Patch&) { return measure; });
+  return intensity_cost(projector, views, others, other_projectors, options, worst,
+                        [measure = std::move(measure)](const Patch&) { return measure; });
 }
 
 cv::Mat line_integrals(const cv::Mat& image) {
@@ -125,9 +135,11 @@ Gradients gradients_of(const Patch& patch) {
     for (int column = 1; column + 1 < patch.columns; ++column) {
       const std::size_t i = patch.at(column, row);
       const char* c = patch.counts.data() + i;
-      g.counts[i] = c[-down - 1] && c[-down] && c[-down + 1] && c[-1] && c[0] && c[1] && c[down - 1] && c[down] && c[down + 1];
+      g.counts[i] =
+          c[-down - 1] && c[-down] && c[-down + 1] && c[-1] && c[0] && c[1] && c[down - 1] && c[down] && c[down + 1];
       const auto sobel = [&](const float* p, float& du, float& dv) {
-        const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down], m = p[down + 1];
+        const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down],
+                    m = p[down + 1];
         du = 0.125f * (d - a + 2 * (f - e) + m - h);
         dv = 0.125f * (h - a + 2 * (k - b) + m - d);
       };

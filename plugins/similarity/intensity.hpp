@@ -10,8 +10,8 @@
 
 namespace marrow::similarity {
 
-/// The same pixels as they are rendered and as they are seen, row by row; both are line integrals. Where `counts` is 0, a
-/// pixel is not to be compared.
+/// The same pixels as they are rendered and as they are seen, row by row; both are line integrals. Where `counts` is 0,
+/// a pixel is not to be compared.
 struct Patch {
   int columns = 0, rows = 0;
   int left = 0, top = 0;  ///< where it lies in the image, in pixels that are compared
@@ -33,28 +33,31 @@ struct IntensityOptions {
   std::vector<double> weights;
 };
 
-/// The mean of a measure over the views, by their weights. Each view is compared where the model may be seen, and margin_px
-/// around it; a view that does not show the model counts as `worst`. At a level of pixel_step, every so many pixels are
-/// compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments do not count. Throws
-/// Error for views that are none.
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+/// The mean of a measure over the views, by their weights. Each view is compared where the model may be seen, and
+/// margin_px around it; a view that does not show the model counts as `worst`. At a level of pixel_step, every so many
+/// pixels are compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments
+/// do not count. Throws Error for views that are none.
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
 /// The same, of a measure that asks of the image only what is compared.
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views, const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, Measure measure);
 
-/// -log of the part of the brightest that is left, in arbitrary units: bright = air. Values of 0 or less count as one step of grey.
+/// -log of the part of the brightest that is left, in arbitrary units: bright = air. Values of 0 or less count as one
+/// step of grey.
 cv::Mat line_integrals(const cv::Mat& image);
 
-/// Half the differences between right and left neighbours, and between those below and above, smoothed across as Sobel's; 0 at the
-/// border. A gradient counts where all nine pixels do.
+/// Half the differences between right and left neighbours, and between those below and above, smoothed across as
+/// Sobel's; 0 at the border. A gradient counts where all nine pixels do.
 struct Gradients {
   std::vector<float> rendered_u, rendered_v, seen_u, seen_v;
   std::vector<char> counts;
 };
 Gradients gradients_of(const Patch& patch);
-/// The factor that makes the rendered gradients most like the seen ones by least squares; 0 where there are none. Soft tissue, which the
-/// radiograph of a bone lacks, has little part in it.
+/// The factor that makes the rendered gradients most like the seen ones by least squares; 0 where there are none. Soft
+/// tissue, which the radiograph of a bone lacks, has little part in it.
 double scale_of(const Gradients& gradients);
 
 /// Pearson's correlation over the pixels that count; 0 where one of the two is constant or fewer than 16 count.
@@ -73,7 +76,8 @@ void declare(Node& node) {
       .out("cost", "how badly radiograph and image agree; unmoved by gain and offset of the line integrals")
       .option("pixel_step", &Options::pixel_step, "every how many pixels are compared", at_least(1), at_most(64))
       .option("margin_px", &Options::margin_px, "how far around the model the images are compared", at_least(0))
-      .option("blur_px", &Options::blur_px, "smoothing, in steps: standard deviation of a Gaussian", at_least(0), at_most(10), unit("steps"))
+      .option("blur_px", &Options::blur_px, "smoothing, in steps: standard deviation of a Gaussian", at_least(0),
+              at_most(10), unit("steps"))
       .option("weights", &Options::weights, "of each view; none: all the same");
 }
 

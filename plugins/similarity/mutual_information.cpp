@@ -16,7 +16,8 @@ struct Options : marrow::similarity::IntensityOptions {
 /// 2 - (H(a) + H(b)) / H(a, b): 0 where one tells the other, 1 where neither tells anything of the other.
 double value(const Patch& patch, int bins) {
   const auto a = bins_of(patch.rendered, patch.counts, bins), b = bins_of(patch.seen, patch.counts, bins);
-  std::vector<double> joint(std::size_t(bins) * std::size_t(bins)), of_a(static_cast<std::size_t>(bins)), of_b(static_cast<std::size_t>(bins));
+  std::vector<double> joint(std::size_t(bins) * std::size_t(bins)), of_a(static_cast<std::size_t>(bins)),
+      of_b(static_cast<std::size_t>(bins));
   double n = 0;
   for (std::size_t i = 0; i < patch.seen.size(); ++i) {
     if (!patch.counts[i]) continue;
@@ -24,20 +25,27 @@ double value(const Patch& patch, int bins) {
     joint[x * std::size_t(bins) + y] += 1, of_a[x] += 1, of_b[y] += 1, n += 1;
   }
   if (n < 16) return 1;
-  const double together = marrow::similarity::entropy(joint, n), rendered = marrow::similarity::entropy(of_a, n), seen = marrow::similarity::entropy(of_b, n);
+  const double together = marrow::similarity::entropy(joint, n), rendered = marrow::similarity::entropy(of_a, n),
+               seen = marrow::similarity::entropy(of_b, n);
   return rendered > 0 && seen > 0 ? 2 - (rendered + seen) / together : 1;
 }
 
-std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, [bins = options.bins](const Patch& patch) { return value(patch, bins); });
+std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& projector,
+                                                       const marrow::List<marrow::View>& views,
+                                                       const marrow::List<marrow::Pose>* others,
+                                                       const marrow::List<marrow::Projector>* other_projectors,
+                                                       const Options& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1,
+                                            [bins = options.bins](const Patch& patch) { return value(patch, bins); });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.mutual_information", mutual_information);
-  node.summary("2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et al. 1998)");
+  node.summary(
+      "2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et al. "
+      "1998)");
   marrow::similarity::declare<decltype(node), Options>(node);
   node.option("bins", &Options::bins, "of the histograms", marrow::at_least(4), marrow::at_most(256));
 }

@@ -6,12 +6,15 @@
 #include <marrow/domain/functions.hpp>
 #include <vector>
 
-/// For any edge pixel the nearest point of an outline that has about its direction, up to a distance: points are kept by the
-/// square cell of that width in which they lie.
+/// For any edge pixel the nearest point of an outline that has about its direction, up to a distance: points are kept
+/// by the square cell of that width in which they lie.
 class NearestOutline {
  public:
   NearestOutline(const std::vector<marrow::OutlinePoint>& points, int width_px, int height_px, double reach_px)
-      : points_(points), cell_px_(float(std::max(reach_px, 1.0))), columns_(int(float(width_px) / cell_px_) + 1), rows_(int(float(height_px) / cell_px_) + 1) {
+      : points_(points),
+        cell_px_(float(std::max(reach_px, 1.0))),
+        columns_(int(float(width_px) / cell_px_) + 1),
+        rows_(int(float(height_px) / cell_px_) + 1) {
     first_.assign(std::size_t(columns_) * std::size_t(rows_) + 1, 0);
     std::vector<std::size_t> cells;
     for (const marrow::OutlinePoint& p : points_) cells.push_back(cell(column(p.u_px), row(p.v_px)));
@@ -32,7 +35,8 @@ class NearestOutline {
         for (std::uint32_t k = first_[cell(x, y)]; k < first_[cell(x, y) + 1]; ++k) {
           const marrow::OutlinePoint& p = points_[order_[k]];
           const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px, distance2 = du * du + dv * dv;
-          if (distance2 >= least || edge.direction_u * p.normal_u + edge.direction_v * p.normal_v < least_cosine) continue;
+          if (distance2 >= least || edge.direction_u * p.normal_u + edge.direction_v * p.normal_v < least_cosine)
+            continue;
           least = distance2;
           nearest = int(order_[k]);
         }

@@ -8,9 +8,13 @@ namespace {
 using marrow::similarity::IntensityOptions;
 using marrow::similarity::Patch;
 
-std::shared_ptr<const marrow::Cost> normalised_cross_correlation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [](const Patch& patch) { return 1 - marrow::similarity::correlation(patch.rendered, patch.seen, patch.counts); });
+std::shared_ptr<const marrow::Cost> normalised_cross_correlation(
+    const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+    const marrow::List<marrow::Pose>* others, const marrow::List<marrow::Projector>* other_projectors,
+    const IntensityOptions& options) {
+  return marrow::similarity::intensity_cost(
+      projector, views, others, other_projectors, options, 2,
+      [](const Patch& patch) { return 1 - marrow::similarity::correlation(patch.rendered, patch.seen, patch.counts); });
 }
 
 }  // namespace

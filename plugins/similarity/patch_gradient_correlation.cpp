@@ -7,18 +7,25 @@ using marrow::similarity::mean_patch_correlation;
 using marrow::similarity::Patch;
 using marrow::similarity::PatchOptions;
 
-std::shared_ptr<const marrow::Cost> patch_gradient_correlation(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const PatchOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [side = options.patch_pixels](const Patch& patch) {
-    const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
-    return 1 - 0.5 * (mean_patch_correlation(patch, g.rendered_u, g.seen_u, g.counts, side) + mean_patch_correlation(patch, g.rendered_v, g.seen_v, g.counts, side));
-  });
+std::shared_ptr<const marrow::Cost> patch_gradient_correlation(const marrow::Projector& projector,
+                                                               const marrow::List<marrow::View>& views,
+                                                               const marrow::List<marrow::Pose>* others,
+                                                               const marrow::List<marrow::Projector>* other_projectors,
+                                                               const PatchOptions& options) {
+  return marrow::similarity::intensity_cost(
+      projector, views, others, other_projectors, options, 2, [side = options.patch_pixels](const Patch& patch) {
+        const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
+        return 1 - 0.5 * (mean_patch_correlation(patch, g.rendered_u, g.seen_u, g.counts, side) +
+                          mean_patch_correlation(patch, g.rendered_v, g.seen_v, g.counts, side));
+      });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.patch_gradient_correlation", patch_gradient_correlation);
-  node.summary("1 - correlation of gradients within small squares, weighted by the radiograph's (Grupp et al., IEEE Trans Biomed Eng 2020)");
+  node.summary(
+      "1 - correlation of gradients within small squares, weighted by the radiograph's (Grupp et al., IEEE Trans "
+      "Biomed Eng 2020)");
   marrow::similarity::declare_patches(node);
 }

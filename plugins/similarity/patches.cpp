@@ -11,7 +11,8 @@ struct Correlation {
   double weight = 0, value = 0;
 };
 
-Correlation correlation_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts, int left, int top, int side) {
+Correlation correlation_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                           const std::vector<char>& counts, int left, int top, int side) {
   constexpr double kLeastPixels = 16;
   double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
   for (int row = top; row < top + side; ++row)
@@ -28,11 +29,12 @@ Correlation correlation_in(const Patch& patch, const std::vector<float>& a, cons
 
 }  // namespace
 
-double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts, int side) {
+double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                              const std::vector<char>& counts, int side) {
   double sum = 0, weights = 0;
   const int step = std::max(1, side / 2);
-  // The squares lie where they lie in the image, wherever the compared part begins: else each pixel that a pose moves that part by would
-  // change them all, and with them the cost.
+  // The squares lie where they lie in the image, wherever the compared part begins: else each pixel that a pose moves
+  // that part by would change them all, and with them the cost.
   const auto first = [step](int origin) { return (step - origin % step) % step; };
   for (int top = first(patch.top); top + side <= patch.rows; top += step)
     for (int left = first(patch.left); left + side <= patch.columns; left += step) {

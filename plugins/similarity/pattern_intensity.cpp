@@ -27,15 +27,18 @@ void each_pair(const Patch& patch, int radius, const Of& of) {
       }
 }
 
-/// Structure left: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), D = seen - scale * rendered and s the given part of the
-/// deviation of the image, over the same sum without the model. That is Weese's and Penney's sum over a fixed region, the image, but for
-/// constants; a mean over the model's surroundings would be best where the image is even.
+/// Structure left: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), D = seen - scale * rendered
+/// and s the given part of the deviation of the image, over the same sum without the model. That is Weese's and
+/// Penney's sum over a fixed region, the image, but for constants; a mean over the model's surroundings would be best
+/// where the image is even.
 marrow::similarity::Measure measure_of(const Patch& whole, const Options& options) {
-  const double deviation = marrow::similarity::deviation(whole.seen, whole.counts), s2 = std::pow(options.sigma * deviation, 2);
+  const double deviation = marrow::similarity::deviation(whole.seen, whole.counts),
+               s2 = std::pow(options.sigma * deviation, 2);
   if (!(s2 > 1e-14)) return [](const Patch&) { return 1.0; };
   const auto structure = [s2](double d) { return d * d / (s2 + d * d); };
   double all = 0;
-  each_pair(whole, options.radius_pixels, [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
+  each_pair(whole, options.radius_pixels,
+            [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
   return [=, radius = options.radius_pixels](const Patch& patch) {
     const float scale = float(marrow::similarity::scale_of(marrow::similarity::gradients_of(patch)));
     if (!(scale > 0) || !(all > 0)) return 1.0;
@@ -48,17 +51,25 @@ marrow::similarity::Measure measure_of(const Patch& whole, const Options& option
   };
 }
 
-std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, [options](const Patch& whole) { return measure_of(whole, options); });
+std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector,
+                                                      const marrow::List<marrow::View>& views,
+                                                      const marrow::List<marrow::Pose>* others,
+                                                      const marrow::List<marrow::Projector>* other_projectors,
+                                                      const Options& options) {
+  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2,
+                                            [options](const Patch& whole) { return measure_of(whole, options); });
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.pattern_intensity", pattern_intensity);
-  node.summary("Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)");
+  node.summary(
+      "Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans Inf "
+      "Technol Biomed 1997; Penney et al. 1998)");
   marrow::similarity::declare<decltype(node), Options>(node);
-  node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1), marrow::at_most(20))
-      .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image", marrow::at_least(1e-3), marrow::unit("1"));
+  node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1),
+              marrow::at_most(20))
+      .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image",
+              marrow::at_least(1e-3), marrow::unit("1"));
 }

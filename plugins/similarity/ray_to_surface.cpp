@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): where the pose is right, the ray from the source through
-// an edge of the image touches the surface, so the signed distance has a minimum of 0 along it (their section 3). Needs no outline.
+// Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): where the pose is right, the ray from the
+// source through an edge of the image touches the surface, so the signed distance has a minimum of 0 along it (their
+// section 3). Needs no outline.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -30,7 +31,8 @@ class Distance {
         for (int x = 0; x < field.grid.size[0]; ++x) {
           if (field.at(x, y, z) >= most_) continue;
           const std::array<int, 3> at{x, y, z};
-          for (std::size_t k = 0; k < 3; ++k) first_[k] = std::min(first_[k], at[k]), last[k] = std::max(last[k], at[k]);
+          for (std::size_t k = 0; k < 3; ++k)
+            first_[k] = std::min(first_[k], at[k]), last[k] = std::max(last[k], at[k]);
         }
     for (std::size_t k = 0; k < 3; ++k) {
       low_[int(k)] = std::max(0, first_[k] - 1);
@@ -68,7 +70,8 @@ class Distance {
     return mix(near, far, w);
   }
 
-  /// The gradient over a voxel to each side, in the model's frame: without the steps of a trilinear one from cell to cell.
+  /// The gradient over a voxel to each side, in the model's frame: without the steps of a trilinear one from cell to
+  /// cell.
   Eigen::Vector3d gradient(const Eigen::Vector3d& index) const {
     Eigen::Vector3d slope;
     for (int k = 0; k < 3; ++k) {
@@ -106,8 +109,8 @@ struct Loss {
 /// What one ray tells of a pose.
 struct Touch {
   double distance_mm = 0;
-  double like = 0;               ///< from 0 to 1: how well the edge's direction suits the surface there
-  Eigen::Vector3d point, normal; ///< in the model's frame
+  double like = 0;                ///< from 0 to 1: how well the edge's direction suits the surface there
+  Eigen::Vector3d point, normal;  ///< in the model's frame
 };
 
 class RayToSurface : public marrow::Cost {
@@ -119,7 +122,9 @@ class RayToSurface : public marrow::Cost {
     Options options;
   };
   RayToSurface(std::shared_ptr<const Scene> scene, int step, double reach_mm)
-      : scene_(std::move(scene)), step_(std::size_t(step)), loss_{std::min(reach_mm, double(scene_->distance.most_mm()))} {}
+      : scene_(std::move(scene)),
+        step_(std::size_t(step)),
+        loss_{std::min(reach_mm, double(scene_->distance.most_mm()))} {}
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     std::vector<double> of_view;
@@ -132,12 +137,14 @@ class RayToSurface : public marrow::Cost {
     return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
   }
 
-  /// Where the least distance along a ray changes, the point where it lies need not be followed: its own motion along the ray
-  /// changes nothing to first order. How the direction's fit changes with the pose is left out.
-  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model, const marrow::FragmentFrame& frame) const override {
+  /// Where the least distance along a ray changes, the point where it lies need not be followed: its own motion along
+  /// the ray changes nothing to first order. How the direction's fit changes with the pose is left out.
+  std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model,
+                                     const marrow::FragmentFrame& frame) const override {
     Expansion about;
     double weights = 0;
-    for (std::size_t i = 0; i < scene_->views.size(); ++i) weights += marrow::similarity::weight_of(scene_->options.weights, i);
+    for (std::size_t i = 0; i < scene_->views.size(); ++i)
+      weights += marrow::similarity::weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < scene_->views.size(); ++i) {
       const auto touches = touches_of(i, world_from_model);
       const double share = marrow::similarity::weight_of(scene_->options.weights, i) / weights;
@@ -146,7 +153,8 @@ class RayToSurface : public marrow::Cost {
         if (!touch) continue;
         const double one = share / double(touches.size()) * touch->like;
         // A small motion of the model by (r, t) moves the ray against it by -(r x (p - o) + t), in the fragment's axes.
-        const Eigen::Vector3d normal = frame.axes.transpose() * touch->normal, arm = frame.axes.transpose() * (touch->point - frame.origin_mm);
+        const Eigen::Vector3d normal = frame.axes.transpose() * touch->normal,
+                              arm = frame.axes.transpose() * (touch->point - frame.origin_mm);
         marrow::Vector6d slope;
         slope << -arm.cross(normal), -normal;
         const double weight = loss_.weight(touch->distance_mm);
@@ -171,17 +179,23 @@ class RayToSurface : public marrow::Cost {
   std::vector<std::optional<Touch>> touches_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
     const std::vector<Ray>& rays = scene_->rays[view];
     std::vector<std::optional<Touch>> touches((rays.size() + step_ - 1) / step_);
-    const marrow::RigidTransform model_from_camera = inverse(world_from_model) * inverse(scene_->views[view].camera.camera_from_world);
-    const Eigen::Matrix3d line_from_normal = scene_->views[view].camera.intrinsics.inverse().transpose() * model_from_camera.rotation.transpose();
-    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, touches.size(), 64), [&](const tbb::blocked_range<std::size_t>& range) {
-      for (std::size_t i = range.begin(); i < range.end(); ++i) touches[i] = touch_of(rays[i * step_], model_from_camera, line_from_normal);
-    });
+    const marrow::RigidTransform model_from_camera =
+        inverse(world_from_model) * inverse(scene_->views[view].camera.camera_from_world);
+    const Eigen::Matrix3d line_from_normal =
+        scene_->views[view].camera.intrinsics.inverse().transpose() * model_from_camera.rotation.transpose();
+    tbb::parallel_for(tbb::blocked_range<std::size_t>(0, touches.size(), 64),
+                      [&](const tbb::blocked_range<std::size_t>& range) {
+                        for (std::size_t i = range.begin(); i < range.end(); ++i)
+                          touches[i] = touch_of(rays[i * step_], model_from_camera, line_from_normal);
+                      });
     return touches;
   }
 
-  /// Of all places where the distance along the ray is least around, the one that explains the edge best: X-rays show a bone's inner
-  /// outlines as well, where rays touch it that run through it elsewhere. Nothing where the ray passes too far off.
-  std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera, const Eigen::Matrix3d& line_from_normal) const {
+  /// Of all places where the distance along the ray is least around, the one that explains the edge best: X-rays show a
+  /// bone's inner outlines as well, where rays touch it that run through it elsewhere. Nothing where the ray passes too
+  /// far off.
+  std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera,
+                                const Eigen::Matrix3d& line_from_normal) const {
     const Distance& distance = scene_->distance;
     const marrow::Grid& grid = distance.grid();
     const Eigen::Vector3d start = grid.index_from_point(model_from_camera.translation_mm);
@@ -195,8 +209,11 @@ class RayToSurface : public marrow::Cost {
     for (double t = from; t < to;) {
       const double after = distance.at(start + t * direction);
       if (here < before && here <= after && std::abs(here - offset) < loss_.reach) {
-        const Touch touch = touch_at(ray, start, direction, std::clamp(at + vertex(before, here, after) * finest_mm, from, to - 1e-9), line_from_normal);
-        if (const double cost = loss_.worst() + touch.like * (loss_(touch.distance_mm) - loss_.worst()); cost < least) least = cost, best = touch;
+        const Touch touch =
+            touch_at(ray, start, direction, std::clamp(at + vertex(before, here, after) * finest_mm, from, to - 1e-9),
+                     line_from_normal);
+        if (const double cost = loss_.worst() + touch.like * (loss_(touch.distance_mm) - loss_.worst()); cost < least)
+          least = cost, best = touch;
       }
       before = here, here = after, at = t;
       t += std::max(finest_mm, std::abs(after - offset) - loss_.reach);
@@ -204,7 +221,8 @@ class RayToSurface : public marrow::Cost {
     return best;
   }
 
-  Touch touch_at(const Ray& ray, const Eigen::Vector3d& start, const Eigen::Vector3d& direction, double at, const Eigen::Matrix3d& line_from_normal) const {
+  Touch touch_at(const Ray& ray, const Eigen::Vector3d& start, const Eigen::Vector3d& direction, double at,
+                 const Eigen::Matrix3d& line_from_normal) const {
     const Eigen::Vector3d index = start + at * direction;
     Touch touch;
     touch.distance_mm = double(scene_->distance.at(index)) - scene_->options.edge_offset_mm;
@@ -225,7 +243,8 @@ class RayToSurface : public marrow::Cost {
     const double length = line.head<2>().norm();
     if (!(length > 0)) return 0;
     const double least = std::cos(marrow::radians(scene_->options.direction_tolerance_deg));
-    const double share = std::clamp((line.head<2>().dot(ray.towards_brighter) / length - least) / (0.5 * (1 - least)), 0.0, 1.0);
+    const double share =
+        std::clamp((line.head<2>().dot(ray.towards_brighter) / length - least) / (0.5 * (1 - least)), 0.0, 1.0);
     return share * share * (3 - 2 * share);
   }
 
@@ -241,21 +260,31 @@ std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges)
     const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
     const bool is_inside = u >= 0 && v >= 0 && u < edges.width_px && v < edges.height_px;
     if (!is_inside || (!view.mask.empty() && !view.mask.at<std::uint8_t>(v, u))) continue;
-    rays.push_back({(ray_from_pixel * Eigen::Vector3d(edge.u_px, edge.v_px, 1)).normalized(), {edge.direction_u, edge.direction_v}});
+    rays.push_back({(ray_from_pixel * Eigen::Vector3d(edge.u_px, edge.v_px, 1)).normalized(),
+                    {edge.direction_u, edge.direction_v}});
   }
   return rays;
 }
 
-std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field, const marrow::List<marrow::View>& views,
-                                                   const marrow::List<marrow::EdgeMap>& edges, const marrow::Projector* projector, const marrow::List<marrow::Pose>* others,
-                                                   const marrow::List<marrow::Projector>* other_projectors, const Options& options) {
+std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field,
+                                                   const marrow::List<marrow::View>& views,
+                                                   const marrow::List<marrow::EdgeMap>& edges,
+                                                   const marrow::Projector* projector,
+                                                   const marrow::List<marrow::Pose>* others,
+                                                   const marrow::List<marrow::Projector>* other_projectors,
+                                                   const Options& options) {
   marrow::similarity::check_edges(views, edges);
   marrow::similarity::check_weights(options.weights, views.size());
-  if (field.values_mm.size() != field.grid.count() || *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
-    throw marrow::Error("the field is empty or broken: it needs 2 x 2 x 2 voxels at least and a value for each; wire that of a segmented fragment");
-  if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0) throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
-  const marrow::List<marrow::EdgeMap> own =
-      marrow::similarity::without_outlines(views, edges, marrow::similarity::others_of(projector, others, other_projectors), marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
+  if (field.values_mm.size() != field.grid.count() ||
+      *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
+    throw marrow::Error(
+        "the field is empty or broken: it needs 2 x 2 x 2 voxels at least and a value for each; wire that of a "
+        "segmented fragment");
+  if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0)
+    throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
+  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
+      views, edges, marrow::similarity::others_of(projector, others, other_projectors),
+      marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<RayToSurface::Scene>(RayToSurface::Scene{views, {}, Distance(field), options});
   for (std::size_t i = 0; i < views.size(); ++i) scene->rays.push_back(rays_of(views[i], own[i]));
   return std::make_shared<RayToSurface>(std::move(scene), options.ray_step, options.reach_mm);
@@ -265,7 +294,9 @@ std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& fi
 
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.ray_to_surface", ray_to_surface)
-      .summary("How far the rays through the images' edges pass the surface (Lavallee and Szeliski, IEEE PAMI 1995), with derivatives")
+      .summary(
+          "How far the rays through the images' edges pass the surface (Lavallee and Szeliski, IEEE PAMI 1995), with "
+          "derivatives")
       .in("field", "signed distance to the surface")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
@@ -273,10 +304,13 @@ MARROW_PLUGIN(plugin) {
       .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
       .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
       .out("cost", "mean of Tukey's biweight of the distances [mm^2]")
-      .option("reach_mm", &Options::reach_mm, "rays further off belong to something else; no more than the field's largest value", marrow::at_least(0.1))
-      .option("direction_tolerance_deg", &Options::direction_tolerance_deg, "by how much the directions of edge and surface may differ",
-              marrow::at_least(10), marrow::at_most(180))
+      .option("reach_mm", &Options::reach_mm,
+              "rays further off belong to something else; no more than the field's largest value",
+              marrow::at_least(0.1))
+      .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
+              "by how much the directions of edge and surface may differ", marrow::at_least(10), marrow::at_most(180))
       .option("edge_offset_mm", &Options::edge_offset_mm, "how far edges lie outside the surface; below 0: inside")
-      .option("ray_step", &Options::ray_step, "every how many edge pixels are used", marrow::at_least(1), marrow::at_most(100))
+      .option("ray_step", &Options::ray_step, "every how many edge pixels are used", marrow::at_least(1),
+              marrow::at_most(100))
       .option("weights", &Options::weights, "of each view; none: all the same");
 }

@@ -22,8 +22,8 @@ Simulated bead_board(const Options& options, Context& context) {
   const camera::Board board = camera::read_board_file(options.board);
   Simulated simulated;
   simulated.calibration = simulate::make_device(options);
-  read::check_distortion(simulated.calibration.intrinsics, simulated.calibration.distortion, options.width_px, options.height_px,
-                         "pincushion_percent");
+  read::check_distortion(simulated.calibration.intrinsics, simulated.calibration.distortion, options.width_px,
+                         options.height_px, "pincushion_percent");
   const auto poses = simulate::draw_board_poses(board, options, context.seed());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::string name = "view" + std::to_string(i + 1);
@@ -50,16 +50,20 @@ MARROW_PLUGIN(plugin) {
       .option("height_px", &Options::height_px, "image height", at_least(64), at_most(4096))
       .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector", at_least(0.01))
       .option("source_to_detector_mm", &Options::source_to_detector_mm, "source to detector", at_least(100))
-      .option("principal_offset_px", &Options::principal_offset_px, "principal point from the middle of the image, to the right and down")
-      .option("pincushion_percent", &Options::pincushion_percent, "how much farther out the middle of the right edge is seen",
-              at_least(0), at_most(40), unit("%"))
-      .option("pincushion_share_r4", &Options::pincushion_share_r4, "part of it that grows with the fourth power of the radius",
-              at_least(0), at_most(1), unit("1"))
+      .option("principal_offset_px", &Options::principal_offset_px,
+              "principal point from the middle of the image, to the right and down")
+      .option("pincushion_percent", &Options::pincushion_percent,
+              "how much farther out the middle of the right edge is seen", at_least(0), at_most(40), unit("%"))
+      .option("pincushion_share_r4", &Options::pincushion_share_r4,
+              "part of it that grows with the fourth power of the radius", at_least(0), at_most(1), unit("1"))
       .option("distance_mm", &Options::distance_mm, "source to the middle of the board", at_least(50))
       .option("tilt_deg", &Options::tilt_deg, "largest tilt of the board", at_least(0), at_most(60))
       .option("shift_mm", &Options::shift_mm, "largest shift of the board across the beam", at_least(0))
-      .option("attenuation_per_mm", &Options::attenuation_per_mm, "of the beads (steel at 60 keV: 0.9)", at_least(0), unit("1/mm"))
-      .option("photons", &Options::photons, "photons per pixel beside the beads; 0 = no noise", at_least(0), unit("1/px"))
+      .option("attenuation_per_mm", &Options::attenuation_per_mm, "of the beads (steel at 60 keV: 0.9)", at_least(0),
+              unit("1/mm"))
+      .option("photons", &Options::photons, "photons per pixel beside the beads; 0 = no noise", at_least(0),
+              unit("1/px"))
       .option("blur_px", &Options::blur_px, "standard deviation of the detector's blur", at_least(0), at_most(10))
-      .option("vignetting", &Options::vignetting, "how much darker the corners are", at_least(0), at_most(0.95), unit("1"));
+      .option("vignetting", &Options::vignetting, "how much darker the corners are", at_least(0), at_most(0.95),
+              unit("1"));
 }

@@ -27,7 +27,8 @@ Eigen::Vector3d middle_of(const camera::Board& board) {
   return 0.5 * (low + high);
 }
 
-/// The ray through a place of the image as taken, at depth 1: the radius that the distortion moves there, by Newton's method.
+/// The ray through a place of the image as taken, at depth 1: the radius that the distortion moves there, by Newton's
+/// method.
 Eigen::Vector3d ray_of(const read::Calibration& device, double u, double v) {
   const Eigen::Vector2d seen((u - device.intrinsics(0, 2)) / device.intrinsics(0, 0),
                              (v - device.intrinsics(1, 2)) / device.intrinsics(1, 1));
@@ -86,7 +87,8 @@ std::vector<RigidTransform> draw_board_poses(const camera::Board& board, const B
   return all;
 }
 
-Eigen::Vector2d image_of(const read::Calibration& device, const RigidTransform& camera_from_board, const Eigen::Vector3d& board_mm) {
+Eigen::Vector2d image_of(const read::Calibration& device, const RigidTransform& camera_from_board,
+                         const Eigen::Vector3d& board_mm) {
   const Eigen::Vector3d x = camera_from_board * board_mm;
   const Eigen::Vector2d ideal(x.x() / x.z(), x.y() / x.z());
   const double s = ideal.squaredNorm();
@@ -104,7 +106,8 @@ Image expose_board(const camera::Board& board, const read::Calibration& device, 
   std::vector<Eigen::Vector3d> places;  // where each bead is seen, and how far from there it can darken
   for (const auto& bead : board.beads) {
     centres.push_back(camera_from_board * bead.centre_mm);
-    if (!(centres.back().z() > bead.diameter_mm)) throw Error("the board reaches to the X-ray source; check its distance");
+    if (!(centres.back().z() > bead.diameter_mm))
+      throw Error("the board reaches to the X-ray source; check its distance");
     const Eigen::Vector2d at = image_of(device, camera_from_board, bead.centre_mm);
     places.emplace_back(at.x(), at.y(), 4 + device.intrinsics(0, 0) * bead.diameter_mm / centres.back().z());
   }
@@ -114,7 +117,8 @@ Image expose_board(const camera::Board& board, const read::Calibration& device, 
     for (int u = 0; u < width; ++u) {
       near.clear();
       for (std::size_t i = 0; i < places.size(); ++i)
-        if (std::abs(u - places[i].x()) < places[i].z() && std::abs(v - places[i].y()) < places[i].z()) near.push_back(i);
+        if (std::abs(u - places[i].x()) < places[i].z() && std::abs(v - places[i].y()) < places[i].z())
+          near.push_back(i);
       double passed = near.empty() ? 1 : 0;
       for (int a = 0; a < kSubsamples && !near.empty(); ++a)
         for (int b = 0; b < kSubsamples; ++b) {
@@ -136,7 +140,8 @@ Image expose_board(const camera::Board& board, const read::Calibration& device, 
         value = double(std::poisson_distribution<std::int64_t>(exposure.photons * value)(random)) / exposure.photons;
       }
     });
-  if (exposure.blur_px > 0) cv::GaussianBlur(signal, signal, {0, 0}, exposure.blur_px, exposure.blur_px, cv::BORDER_REPLICATE);
+  if (exposure.blur_px > 0)
+    cv::GaussianBlur(signal, signal, {0, 0}, exposure.blur_px, exposure.blur_px, cv::BORDER_REPLICATE);
   Image image;
   signal.convertTo(image.pixels, CV_16U, kGrey);
   return image;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// An X-ray device with distortion that sees a calibration board: the exact truth for tests of calibrations. Nothing here is shared
-// with the calibration but the board and the meaning of its parameters.
+// An X-ray device with distortion that sees a calibration board: the exact truth for tests of calibrations. Nothing
+// here is shared with the calibration but the board and the meaning of its parameters.
 #include <cstdint>
 #include <vector>
 
@@ -31,13 +31,14 @@ struct BoardPoses {
 std::vector<RigidTransform> draw_board_poses(const camera::Board& board, const BoardPoses& poses, std::uint64_t seed);
 
 /// Where a point of the board is seen in the image as taken.
-Eigen::Vector2d image_of(const read::Calibration& device, const RigidTransform& camera_from_board, const Eigen::Vector3d& board_mm);
+Eigen::Vector2d image_of(const read::Calibration& device, const RigidTransform& camera_from_board,
+                         const Eigen::Vector3d& board_mm);
 
 struct Exposure {
   double attenuation_per_mm = 0.9;  ///< of the beads: steel at 60 keV
   double photons = 2000;            ///< per pixel in the middle; 0 = no noise
   double blur_px = 1.0;
-  double vignetting = 0.25;         ///< how much darker the image's corner is
+  double vignetting = 0.25;  ///< how much darker the image's corner is
 };
 /// An image of 16 bits, bright = air: exact chords through the beads, along the rays that the distortion bends.
 Image expose_board(const camera::Board& board, const read::Calibration& device, const RigidTransform& camera_from_board,

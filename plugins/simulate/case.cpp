@@ -43,7 +43,8 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
       found = found || fragment.name == name;
       known += (known.empty() ? "" : ", ") + fragment.name;
     }
-    if (!found) throw Error("simulate.case: the option 'register' names the fragment '" + name + "', but there are: " + known);
+    if (!found)
+      throw Error("simulate.case: the option 'register' names the fragment '" + name + "', but there are: " + known);
   }
   for (const Fragment& fragment : phantom.fragments) {
     Seeds seeds{fragment.name, within(ct.grid, fragment.seeds_mm),
@@ -73,7 +74,8 @@ MARROW_PLUGIN(plugin) {
       .in("views", "X-ray images of the phantom", over("view"))
       .in("phantom", "fragments with their seeds and truth")
       .out("case", "CT, views, seeds and truth")
-      .option("register", &CaseOptions::wanted, "fragments whose pose is wanted; the others are only kept apart in the CT")
+      .option("register", &CaseOptions::wanted,
+              "fragments whose pose is wanted; the others are only kept apart in the CT")
       .option("start", &CaseOptions::start,
               "none: the case has no pose to start from; exact: it starts at the truth, for experiments that displace "
               "the start themselves",

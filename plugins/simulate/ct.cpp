@@ -67,8 +67,8 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   }
   grid.origin_mm = low;
   if (!(high.z() > low.z()) || grid.size[2] < 2)
-    throw Error("simulate.ct: range_mm " + std::to_string(options.range_mm[0]) + " to " + std::to_string(options.range_mm[1]) +
-                " (from the distal end) holds no part of the bone");
+    throw Error("simulate.ct: range_mm " + std::to_string(options.range_mm[0]) + " to " +
+                std::to_string(options.range_mm[1]) + " (from the distal end) holds no part of the bone");
   return grid;
 }
 
@@ -101,7 +101,11 @@ std::vector<double> point_spread(double blur_mm, double spacing_mm, int halo) {
 class Scanner {
  public:
   Scanner(const Phantom& phantom, const Grid& grid, const CtOptions& options)
-      : phantom_(phantom), grid_(grid), options_(options), raster_(raster_under(grid, options.blur_mm)), fill_(phantom.bone),
+      : phantom_(phantom),
+        grid_(grid),
+        options_(options),
+        raster_(raster_under(grid, options.blur_mm)),
+        fill_(phantom.bone),
         rays_(phantom, raster_.size[1], raster_.size[2], [this](const simulate::Fragment& fragment) {
           return [this, ct_from_bone = fragment.ct_from_bone](const Eigen::Vector3d& point) {
             const Eigen::Vector3d fine = (ct_from_bone * point - raster_.origin_mm).cwiseQuotient(raster_.spacing_mm);
@@ -118,13 +122,15 @@ class Scanner {
   /// Slices first to last - 1 without noise.
   void scan(int first, int last, std::vector<float>& values) const {
     const std::size_t slice = background_.size();
-    const int fine_first = first * raster_.steps[2], fine_last = (last - 1) * raster_.steps[2] + 2 * raster_.halo[2] + 1;
+    const int fine_first = first * raster_.steps[2],
+              fine_last = (last - 1) * raster_.steps[2] + 2 * raster_.halo[2] + 1;
     std::vector<double> sums;
     for (int z = first; z < last; ++z) sums.insert(sums.end(), background_.begin(), background_.end());
     const auto crossings = rays_.bundle().crossings(fine_first, fine_last);
     std::vector<double> plane(background_fine_.size(), 0.0), blurred(slice, 0.0);
     for (auto at = crossings.begin(); at != crossings.end();) {
-      const auto row_end = std::find_if(at, crossings.end(), [&](const auto& crossing) { return crossing.row != at->row; });
+      const auto row_end =
+          std::find_if(at, crossings.end(), [&](const auto& crossing) { return crossing.row != at->row; });
       const int row = int(at->row);
       const Rectangle bone = draw({at, row_end}, row, plane);
       const Rectangle seen = blur(plane, bone, blurred);
@@ -162,8 +168,8 @@ class Scanner {
     return plane;
   }
 
-  /// Adds what bone changes in one fine row of rays to the plane, in each bin by the length that the bone takes of it. Returns
-  /// where.
+  /// Adds what bone changes in one fine row of rays to the plane, in each bin by the length that the bone takes of it.
+  /// Returns where.
   Rectangle draw(std::span<const simulate::Crossing> crossings, int row, std::vector<double>& plane) const {
     Rectangle touched{raster_.size[0], 0, raster_.size[1], 0};
     const double z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
@@ -176,12 +182,14 @@ class Scanner {
       for (const Interval& interval : intervals) {
         const auto bone_from_ct = inverse(phantom_.fragments[std::size_t(interval.fragment)].ct_from_bone);
         const double x_ct = raster_.origin_mm.x() + 0.5 * (interval.from + interval.to) * raster_.spacing_mm.x();
-        const Eigen::Vector3d middle = bone_from_ct * Eigen::Vector3d(x_ct, raster_.origin_mm.y() + y * raster_.spacing_mm.y(), z_ct);
+        const Eigen::Vector3d middle =
+            bone_from_ct * Eigen::Vector3d(x_ct, raster_.origin_mm.y() + y * raster_.spacing_mm.y(), z_ct);
         const double fraction = interval.cortical ? 1 : fill_.at(middle.z());
         const double hu = fraction * options_.cortical_hu + (1 - fraction) * options_.marrow_hu;
         const int first = std::max(0, int(std::floor(interval.from + 0.5)));
         const int last = std::min(raster_.size[0] - 1, int(std::floor(interval.to + 0.5)));
-        touched = {std::min(touched.x0, first), std::max(touched.x1, last + 1), std::min(touched.y0, y), std::max(touched.y1, y + 1)};
+        touched = {std::min(touched.x0, first), std::max(touched.x1, last + 1), std::min(touched.y0, y),
+                   std::max(touched.y1, y + 1)};
         for (int x = first; x <= last; ++x) {
           const double share = std::min(interval.to, x + 0.5) - std::max(interval.from, x - 0.5);
           bins[x] += std::max(0.0, share) * (hu - empty[x]);
@@ -191,7 +199,8 @@ class Scanner {
     return touched;
   }
 
-  /// A fine plane that is zero outside `bone`, blurred in x and y, at the grid's positions. Returns where the result is set.
+  /// A fine plane that is zero outside `bone`, blurred in x and y, at the grid's positions. Returns where the result is
+  /// set.
   Rectangle blur(const std::vector<double>& plane, const Rectangle& bone, std::vector<double>& blurred) const {
     const int nx = grid_.size[0], ny = grid_.size[1], sx = raster_.steps[0], sy = raster_.steps[1];
     const int hx = raster_.halo[0], hy = raster_.halo[1];
@@ -266,7 +275,8 @@ MARROW_PLUGIN(plugin) {
       .option("margin_mm", &CtOptions::margin_mm, "space around the bone", at_least(0))
       .option("range_mm", &CtOptions::range_mm,
               "only the slices between these heights above the bone's distal end; [0, 0] = the whole bone")
-      .option("blur_mm", &CtOptions::blur_mm, "standard deviation of the Gaussian point-spread function", at_least(0), at_most(3))
+      .option("blur_mm", &CtOptions::blur_mm, "standard deviation of the Gaussian point-spread function", at_least(0),
+              at_most(3))
       .option("noise_hu", &CtOptions::noise_hu, "standard deviation of the noise", at_least(0), unit("HU"))
       .option("cortical_hu", &CtOptions::cortical_hu, "compact bone", unit("HU"))
       .option("marrow_hu", &CtOptions::marrow_hu, "marrow", unit("HU"))

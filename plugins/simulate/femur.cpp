@@ -63,19 +63,20 @@ simulate::FemurShape drawn(const FemurOptions& options) {
 
 Bone femur(const FemurOptions& options, Context& context) {
   if (options.canal_diameter_mm + 4 > std::min(options.shaft_ml_mm, options.shaft_ap_mm))
-    throw Error("simulate.femur: a canal of " + std::to_string(options.canal_diameter_mm) + " mm leaves less than 2 mm of cortex in a shaft of " +
+    throw Error("simulate.femur: a canal of " + std::to_string(options.canal_diameter_mm) +
+                " mm leaves less than 2 mm of cortex in a shaft of " +
                 std::to_string(std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
   const simulate::FemurShape shape = drawn(options);
   const simulate::FemurField field(shape);
   constexpr double kSteepest = 2;
   Bone bone;
   context.progress(0, "outer surface");
-  bone.outer = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.outer(p); }, field.low_mm(), field.high_mm(),
-                                    options.resolution_mm, kSteepest);
+  bone.outer = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.outer(p); }, field.low_mm(),
+                                    field.high_mm(), options.resolution_mm, kSteepest);
   context.check_cancelled();
   context.progress(0.6, "inner surface");
-  bone.inner = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.inner(p); }, field.low_mm(), field.high_mm(),
-                                    options.resolution_mm, kSteepest);
+  bone.inner = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.inner(p); }, field.low_mm(),
+                                    field.high_mm(), options.resolution_mm, kSteepest);
   bone.outer.frame = bone.inner.frame = "bone";
   // Cancellous bone of 200-500 HU at both ends, marrow alone in the canal.
   const double length = shape.length_mm;
@@ -95,25 +96,36 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.femur", femur)
       .summary("femur made from published measures: condyles, trochanters, bow, linea aspera, cortex and canal")
       .out("bone", "closed outer and inner surface")
-      .option("length_mm", &FemurOptions::length_mm, "from the condyles to the top of the head", at_least(250), at_most(600))
+      .option("length_mm", &FemurOptions::length_mm, "from the condyles to the top of the head", at_least(250),
+              at_most(600))
       .option("head_diameter_mm", &FemurOptions::head_diameter_mm, "of the femoral head", at_least(30), at_most(65))
-      .option("neck_shaft_deg", &FemurOptions::neck_shaft_deg, "angle between neck and shaft", at_least(100), at_most(150))
-      .option("anteversion_deg", &FemurOptions::anteversion_deg, "turn of the neck to the front", at_least(-20), at_most(50))
-      .option("bow_radius_mm", &FemurOptions::bow_radius_mm, "radius of the shaft's bow, convex to the front", at_least(400))
-      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "across both condyles", at_least(55), at_most(110))
-      .option("shaft_ml_mm", &FemurOptions::shaft_ml_mm, "mid-shaft diameter, medial to lateral", at_least(18), at_most(45))
-      .option("shaft_ap_mm", &FemurOptions::shaft_ap_mm, "mid-shaft diameter, front to back, linea aspera included", at_least(18), at_most(45))
-      .option("canal_diameter_mm", &FemurOptions::canal_diameter_mm, "of the marrow canal at its narrowest", at_least(4), at_most(30))
-      .option("linea_aspera_mm", &FemurOptions::linea_aspera_mm, "height of the ridge behind the shaft", at_least(0), at_most(8))
+      .option("neck_shaft_deg", &FemurOptions::neck_shaft_deg, "angle between neck and shaft", at_least(100),
+              at_most(150))
+      .option("anteversion_deg", &FemurOptions::anteversion_deg, "turn of the neck to the front", at_least(-20),
+              at_most(50))
+      .option("bow_radius_mm", &FemurOptions::bow_radius_mm, "radius of the shaft's bow, convex to the front",
+              at_least(400))
+      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "across both condyles", at_least(55),
+              at_most(110))
+      .option("shaft_ml_mm", &FemurOptions::shaft_ml_mm, "mid-shaft diameter, medial to lateral", at_least(18),
+              at_most(45))
+      .option("shaft_ap_mm", &FemurOptions::shaft_ap_mm, "mid-shaft diameter, front to back, linea aspera included",
+              at_least(18), at_most(45))
+      .option("canal_diameter_mm", &FemurOptions::canal_diameter_mm, "of the marrow canal at its narrowest",
+              at_least(4), at_most(30))
+      .option("linea_aspera_mm", &FemurOptions::linea_aspera_mm, "height of the ridge behind the shaft", at_least(0),
+              at_most(8))
       .option("side", &FemurOptions::side, "left or right femur", one_of({"left", "right"}))
       .option("shape_seed", &FemurOptions::shape_seed, "draws the variation and the irregularities", at_least(0))
-      .option("variation", &FemurOptions::variation, "0: exactly these measures; 1: drawn around them with the spread among people",
-              at_least(0), at_most(1))
-      .option("ripple_mm", &FemurOptions::ripple_mm, "amplitude of smooth irregularities of the surface", at_least(0), at_most(2))
-      .option("resolution_mm", &FemurOptions::resolution_mm, "edge of the cubes in which the surface is cut into triangles",
-              at_least(0.3), at_most(4))
+      .option("variation", &FemurOptions::variation,
+              "0: exactly these measures; 1: drawn around them with the spread among people", at_least(0), at_most(1))
+      .option("ripple_mm", &FemurOptions::ripple_mm, "amplitude of smooth irregularities of the surface", at_least(0),
+              at_most(2))
+      .option("resolution_mm", &FemurOptions::resolution_mm,
+              "edge of the cubes in which the surface is cut into triangles", at_least(0.3), at_most(4))
       .option("isocentre_from_distal_end_mm", &FemurOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
-      .option("thigh_radius_mm", &FemurOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none", at_least(0))
+      .option("thigh_radius_mm", &FemurOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none",
+              at_least(0))
       .option("fat_mm", &FemurOptions::fat_mm, "thickness of the layer of fat", at_least(0));
 }

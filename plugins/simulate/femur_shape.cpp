@@ -58,21 +58,50 @@ double capsule(const Vector3d& p, const Vector3d& a, const Vector3d& b, double r
 }
 
 // Relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured femora, FACTS).
-constexpr std::array<Node, 13> kWidth{{{0.05, 2.2}, {0.09, 2.05}, {0.13, 1.68}, {0.20, 1.31}, {0.25, 1.186}, {0.30, 1.096},
-                                       {0.35, 1.04}, {0.45, 1.0}, {0.55, 1.007}, {0.65, 1.04}, {0.75, 1.12}, {0.83, 1.32}, {0.88, 1.50}}};
-constexpr std::array<Node, 12> kDepth{{{0.05, 1.40}, {0.09, 1.35}, {0.13, 1.22}, {0.20, 1.07}, {0.25, 1.033}, {0.30, 1.007},
-                                       {0.35, 0.993}, {0.50, 1.0}, {0.60, 0.993}, {0.75, 1.033}, {0.83, 1.08}, {0.88, 1.12}}};
+constexpr std::array<Node, 13> kWidth{{{0.05, 2.2},
+                                       {0.09, 2.05},
+                                       {0.13, 1.68},
+                                       {0.20, 1.31},
+                                       {0.25, 1.186},
+                                       {0.30, 1.096},
+                                       {0.35, 1.04},
+                                       {0.45, 1.0},
+                                       {0.55, 1.007},
+                                       {0.65, 1.04},
+                                       {0.75, 1.12},
+                                       {0.83, 1.32},
+                                       {0.88, 1.50}}};
+constexpr std::array<Node, 12> kDepth{{{0.05, 1.40},
+                                       {0.09, 1.35},
+                                       {0.13, 1.22},
+                                       {0.20, 1.07},
+                                       {0.25, 1.033},
+                                       {0.30, 1.007},
+                                       {0.35, 0.993},
+                                       {0.50, 1.0},
+                                       {0.60, 0.993},
+                                       {0.75, 1.033},
+                                       {0.83, 1.08},
+                                       {0.88, 1.12}}};
 // Height of the linea aspera, relative to its greatest.
 constexpr std::array<Node, 6> kLinea{{{0.22, 0.0}, {0.32, 0.6}, {0.42, 1.0}, {0.62, 1.0}, {0.72, 0.7}, {0.82, 0.0}}};
 // Half the canal's width relative to the isthmus: canal flare index about 3.7 (Noble et al., CORR 1988).
-constexpr std::array<Node, 9> kCanal{{{0.06, 12.0}, {0.12, 4.5}, {0.20, 2.35}, {0.30, 1.45}, {0.42, 1.0}, {0.60, 1.0}, {0.75, 1.5},
-                                      {0.83, 2.6}, {0.90, 12.0}}};
+constexpr std::array<Node, 9> kCanal{{{0.06, 12.0},
+                                      {0.12, 4.5},
+                                      {0.20, 2.35},
+                                      {0.30, 1.45},
+                                      {0.42, 1.0},
+                                      {0.60, 1.0},
+                                      {0.75, 1.5},
+                                      {0.83, 2.6},
+                                      {0.90, 12.0}}};
 
 }  // namespace
 
 FemurField::FemurField(const FemurShape& shape) : shape_(shape), scale_(shape.bicondylar_width_mm / 82) {
   const double head_radius = 0.5 * shape.head_diameter_mm;
-  const double out = shape.neck_length_mm * std::sin(shape.neck_shaft_rad), up = -shape.neck_length_mm * std::cos(shape.neck_shaft_rad);
+  const double out = shape.neck_length_mm * std::sin(shape.neck_shaft_rad),
+               up = -shape.neck_length_mm * std::cos(shape.neck_shaft_rad);
   const double z = shape.length_mm - head_radius;
   neck_base_ = {0, bow(z - up), z - up};
   head_ = neck_base_ + Vector3d(out * std::cos(shape.anteversion_rad), -out * std::sin(shape.anteversion_rad), up);
@@ -90,7 +119,9 @@ double FemurField::bow(double z) const {
   return ((z - middle) * (z - middle) - (reference - middle) * (reference - middle)) / (2 * shape_.bow_radius_mm);
 }
 
-Vector3d FemurField::anatomical(const Vector3d& point) const { return {shape_.medial_x * point.x(), point.y(), point.z()}; }
+Vector3d FemurField::anatomical(const Vector3d& point) const {
+  return {shape_.medial_x * point.x(), point.y(), point.z()};
+}
 
 double FemurField::shaft(const Vector3d& p) const {
   const double at = p.z() / shape_.length_mm;
@@ -109,7 +140,8 @@ double FemurField::distal(const Vector3d& p) const {
   const double s = scale_, half = 0.5 * shape_.bicondylar_width_mm;
   const double axis = bow(0.06 * shape_.length_mm) - 4;
   const Vector3d q(p.x(), p.y() - axis, p.z());
-  // Each condyle is two discs, a small one behind and a large one before it: the radius of curvature grows to the front.
+  // Each condyle is two discs, a small one behind and a large one before it: the radius of curvature grows to the
+  // front.
   const double medial_x = half - 16 * s, lateral_x = -half + 17 * s;
   const double medial = join(disc(q - Vector3d(medial_x, 17 * s, 21 * s), 20.5 * s, 14 * s, 9 * s),
                              disc(q - Vector3d(medial_x - 2 * s, -2 * s, 26 * s), 26 * s, 14 * s, 10 * s), 8 * s);
@@ -121,7 +153,8 @@ double FemurField::distal(const Vector3d& p) const {
   double all = join(join(medial, lateral, 4 * s), join(trochlea, epicondyles, 4 * s), 9 * s);
   const double notch = ellipsoid(q - Vector3d(0, 20 * s, 8 * s), Vector3d(11, 26, 25) * s);
   all = cut(all, -notch, 5 * s);
-  const double groove = capsule(q, Vector3d(-2 * s, -42 * s, 20 * s), Vector3d(-2 * s, -45 * s, 60 * s), 11 * s, 11 * s);
+  const double groove =
+      capsule(q, Vector3d(-2 * s, -42 * s, 20 * s), Vector3d(-2 * s, -45 * s, 60 * s), 11 * s, 11 * s);
   return cut(all, -groove, 6 * s);
 }
 
@@ -130,7 +163,8 @@ double FemurField::proximal(const Vector3d& p) const {
   const double head = (p - head_).norm() - 0.5 * shape_.head_diameter_mm;
   const double neck = capsule(p, neck_base_, head_, 17 * s, 14 * s);
   const Vector3d foot(0, bow(neck_base_.z()), 0);
-  const double greater = ellipsoid(p - foot - Vector3d(-19 * s, 7 * s, neck_base_.z() + 6 * s), Vector3d(14, 18, 27) * s);
+  const double greater =
+      ellipsoid(p - foot - Vector3d(-19 * s, 7 * s, neck_base_.z() + 6 * s), Vector3d(14, 18, 27) * s);
   const double lesser = ellipsoid(p - foot - Vector3d(13 * s, 15 * s, head_.z() - 54 * s), Vector3d(9, 9, 13) * s);
   const double crest = capsule(p, foot + Vector3d(-16 * s, 20 * s, neck_base_.z() + 14 * s),
                                foot + Vector3d(11 * s, 17 * s, head_.z() - 50 * s), 5 * s, 5 * s);

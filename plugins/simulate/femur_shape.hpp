@@ -25,8 +25,8 @@ struct FemurShape {
   std::uint64_t seed = 1;
 };
 
-/// The femur as two continuous fields, negative inside; about the distance in mm near the surface. Frame "bone" with the distal
-/// end at z = 0 and the shaft's axis near x = y = 0.
+/// The femur as two continuous fields, negative inside; about the distance in mm near the surface. Frame "bone" with
+/// the distal end at z = 0 and the shaft's axis near x = y = 0.
 class FemurField {
  public:
   explicit FemurField(const FemurShape& shape);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// X-ray images of the phantom: exact path lengths through its continuous surfaces, several energies, quantum noise, scatter and
-// the detector's blur.
+// X-ray images of the phantom: exact path lengths through its continuous surfaces, several energies, quantum noise,
+// scatter and the detector's blur.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
@@ -26,13 +26,13 @@ struct FluoroscopyOptions {
   double scatter_px = 70;
 };
 
-constexpr int kSubsamples = 2;  // rays per pixel in each direction
-constexpr int kBandRows = 8;    // image rows that one task renders
+constexpr int kSubsamples = 2;         // rays per pixel in each direction
+constexpr int kBandRows = 8;           // image rows that one task renders
 constexpr double kTissueGrey = 12000;  // where the image behind soft tissue alone lies, of 65535
 constexpr double kNearestMm = 10;
 
-/// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables) and the share of the detected
-/// signal that each energy carries: a 70 kV beam behind 3.5 mm of aluminium, mean 49 keV.
+/// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables) and the share of the
+/// detected signal that each energy carries: a 70 kV beam behind 3.5 mm of aluminium, mean 49 keV.
 constexpr std::array<double, 4> kShare{0.40, 0.33, 0.20, 0.07};
 constexpr std::array<double, 4> kBone{0.1235, 0.07937, 0.05934, 0.04871};
 constexpr std::array<double, 4> kMarrow{0.02649, 0.02277, 0.02082, 0.01959};
@@ -52,7 +52,8 @@ double transmission(const Lengths& mm) {
   return sum;
 }
 
-/// The straight line from the source through a place of the detector, scaled so that its parameter is the camera's depth.
+/// The straight line from the source through a place of the detector, scaled so that its parameter is the camera's
+/// depth.
 struct Ray {
   Eigen::Vector3d source, direction;
   double mm_per_depth;
@@ -61,7 +62,10 @@ struct Ray {
 class XRay {
  public:
   XRay(const Phantom& phantom, const Camera& camera)
-      : phantom_(phantom), camera_(camera), fill_(phantom.bone), detector_to_ray_(camera.intrinsics.inverse()),
+      : phantom_(phantom),
+        camera_(camera),
+        fill_(phantom.bone),
+        detector_to_ray_(camera.intrinsics.inverse()),
         rays_(phantom, camera.width_px * kSubsamples, camera.height_px * kSubsamples,
               [&](const simulate::Fragment& fragment) { return map(fragment); }) {
     for (const auto& fragment : phantom.fragments) bone_from_world_.push_back(inverse(fragment.world_from_bone()));
@@ -115,7 +119,8 @@ class XRay {
         const Ray line = ray(column, row);
         Lengths lengths = soft_tissue(line);
         const std::size_t begin = next;
-        while (next < crossings.size() && int(crossings[next].row) == row && int(crossings[next].column) == column) ++next;
+        while (next < crossings.size() && int(crossings[next].row) == row && int(crossings[next].column) == column)
+          ++next;
         if (next > begin) {
           rays_.intervals({crossings.data() + begin, next - begin}, intervals);
           add_bone(line, intervals, lengths);
@@ -130,11 +135,13 @@ class XRay {
     return [this, camera_from_bone, name = fragment.name](const Eigen::Vector3d& point) {
       const Eigen::Vector3d x = camera_from_bone * point;
       if (!(x.z() >= kNearestMm))
-        throw Error("simulate.fluoroscopy: fragment '" + name + "' reaches to " + std::to_string(x.z()) +
-                    " mm from the X-ray source; it must lie in front of the source, so check the camera's distances and the "
-                    "fragment's translation");
+        throw Error(
+            "simulate.fluoroscopy: fragment '" + name + "' reaches to " + std::to_string(x.z()) +
+            " mm from the X-ray source; it must lie in front of the source, so check the camera's distances and the "
+            "fragment's translation");
       const Eigen::Vector2d pixel = (camera_.intrinsics * x).hnormalized();
-      return simulate::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5, -1 / x.z()};
+      return simulate::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5,
+                                 -1 / x.z()};
     };
   }
 
@@ -156,14 +163,16 @@ cv::Mat1d primary_image(const XRay& xray, const Camera& camera, Context& context
   return primary;
 }
 
-/// Scatter as a blurred image of its source, T ln(1 / T) for a transmission T: none in air, little behind much tissue (Ohnesorge,
-/// Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). Scaled so that wide soft tissue gets the wanted ratio to the primary radiation.
+/// Scatter as a blurred image of its source, T ln(1 / T) for a transmission T: none in air, little behind much tissue
+/// (Ohnesorge, Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). Scaled so that wide soft tissue gets the wanted ratio to
+/// the primary radiation.
 cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& options, double behind_tissue) {
   if (options.scatter_to_primary == 0 || !(behind_tissue < 1)) return cv::Mat1d(primary.size(), 0.0);
   constexpr int kShrink = 8;  // made at an eighth of the size, where the blur is still many pixels wide
   cv::Mat1d source = primary.clone(), small, scatter;
   for (double& t : source) t *= std::log(1 / t);
-  cv::resize(source, small, {std::max(1, primary.cols / kShrink), std::max(1, primary.rows / kShrink)}, 0, 0, cv::INTER_AREA);
+  cv::resize(source, small, {std::max(1, primary.cols / kShrink), std::max(1, primary.rows / kShrink)}, 0, 0,
+             cv::INTER_AREA);
   const double sigma_px = options.scatter_px / kShrink;
   cv::GaussianBlur(small, small, {0, 0}, sigma_px, sigma_px, cv::BORDER_REPLICATE);
   cv::resize(small, scatter, primary.size(), 0, 0, cv::INTER_LINEAR);
@@ -198,7 +207,8 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   } else {
     signal *= 1 / behind_tissue;
   }
-  if (options.blur_px > 0) cv::GaussianBlur(signal, signal, {0, 0}, options.blur_px, options.blur_px, cv::BORDER_REPLICATE);
+  if (options.blur_px > 0)
+    cv::GaussianBlur(signal, signal, {0, 0}, options.blur_px, options.blur_px, cv::BORDER_REPLICATE);
   View view;
   view.name = name;
   view.camera = camera;
@@ -206,7 +216,8 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   return view;
 }
 
-List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options, Context& context) {
+List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options,
+                       Context& context) {
   simulate::check_phantom(phantom, "simulate.fluoroscopy");
   List<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -221,15 +232,17 @@ List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, cons
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.fluoroscopy", fluoroscopy)
-      .summary("X-ray images of a simulated bone, by exact path lengths at several energies, with noise, scatter and blur")
+      .summary(
+          "X-ray images of a simulated bone, by exact path lengths at several energies, with noise, scatter and blur")
       .random()
       .in("phantom", "bone, fracture and fragments")
       .in("cameras", "geometry of each view", over("view"))
       .out("views", "16-bit images, bright = air", over("view"))
-      .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0 = no noise", at_least(0),
-              unit("1/px"))
-      .option("blur_px", &FluoroscopyOptions::blur_px, "standard deviation of the detector's blur", at_least(0), at_most(10))
-      .option("scatter_to_primary", &FluoroscopyOptions::scatter_to_primary, "scattered by primary radiation", at_least(0),
-              at_most(5))
+      .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0 = no noise",
+              at_least(0), unit("1/px"))
+      .option("blur_px", &FluoroscopyOptions::blur_px, "standard deviation of the detector's blur", at_least(0),
+              at_most(10))
+      .option("scatter_to_primary", &FluoroscopyOptions::scatter_to_primary, "scattered by primary radiation",
+              at_least(0), at_most(5))
       .option("scatter_px", &FluoroscopyOptions::scatter_px, "standard deviation of the scatter's spread", at_least(8));
 }

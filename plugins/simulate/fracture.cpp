@@ -62,8 +62,8 @@ Eigen::Vector2d centre_at(const Mesh& mesh, double z) {
   return length > 0 ? Eigen::Vector2d(sum / length) : Eigen::Vector2d::Zero();
 }
 
-/// Height of the fracture over (x, y): a plane with a self-affine relief on it, a sum of waves whose amplitude falls with their
-/// length to the power 0.8 (Hurst exponent of fracture surfaces: Bouchaud, J. Phys. Condens. Matter 1997).
+/// Height of the fracture over (x, y): a plane with a self-affine relief on it, a sum of waves whose amplitude falls
+/// with their length to the power 0.8 (Hurst exponent of fracture surfaces: Bouchaud, J. Phys. Condens. Matter 1997).
 class Relief {
  public:
   Relief(const FractureOptions& options, const Eigen::Vector3d& centre) : centre_(centre) {
@@ -100,7 +100,8 @@ class Relief {
 /// The closed block below the relief that holds the distal side of the bone.
 Mesh block_below(const Relief& relief, const Box& box) {
   constexpr double kMarginMm = 5;
-  const Eigen::Vector2d low = box.low.head<2>().array() - kMarginMm, extent = (box.high - box.low).head<2>().array() + 2 * kMarginMm;
+  const Eigen::Vector2d low = box.low.head<2>().array() - kMarginMm,
+                        extent = (box.high - box.low).head<2>().array() + 2 * kMarginMm;
   const std::uint32_t nx = std::uint32_t(extent.x() / kRasterMm) + 2, ny = std::uint32_t(extent.y() / kRasterMm) + 2;
   Mesh mesh;
   mesh.frame = "bone";
@@ -143,7 +144,8 @@ Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   Mesh mesh;
   for (const auto& vertex : bone.outer.vertices_mm) mesh.vertices_mm.push_back(fragment.ct_from_bone * vertex);
   for (const auto& t : bone.outer.triangles) {
-    const Eigen::Vector3d middle = (bone.outer.vertices_mm[t[0]] + bone.outer.vertices_mm[t[1]] + bone.outer.vertices_mm[t[2]]) / 3;
+    const Eigen::Vector3d middle =
+        (bone.outer.vertices_mm[t[0]] + bone.outer.vertices_mm[t[1]] + bone.outer.vertices_mm[t[2]]) / 3;
     if ((middle.z() < relief(middle.head<2>())) == (fragment.side < 0)) mesh.triangles.push_back(t);
   }
   if (mesh.triangles.empty())
@@ -152,30 +154,33 @@ Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   return mesh;
 }
 
-/// The middle of every stretch of bone along lines in x (`along` 0) or y (1) through the bone's centre, at several heights: in
-/// thick cortex, and in cancellous bone where it is dense enough to be told from marrow.
+/// The middle of every stretch of bone along lines in x (`along` 0) or y (1) through the bone's centre, at several
+/// heights: in thick cortex, and in cancellous bone where it is dense enough to be told from marrow.
 void add_seeds(const Phantom& phantom, const Fragment& fragment, int along, std::vector<Eigen::Vector3d>& seeds) {
   constexpr int kHeights = 14;
   constexpr double kThickMm = 3, kDense = 0.12;
   const int across = 1 - along;
   const Box box = bounds(phantom.bone.outer);
-  const double low = box.low[across], step = (box.high.z() - box.low.z()) / kHeights, first_z = box.low.z() + 0.5 * step;
+  const double low = box.low[across], step = (box.high.z() - box.low.z()) / kHeights,
+               first_z = box.low.z() + 0.5 * step;
   const int lines = int(box.high[across] - low) + 1;  // 1 mm apart
   // (y, z, x) and (z, x, y) are right-handed.
-  const simulate::SolidRays rays({phantom.bone, phantom.fracture, {fragment}}, along == 0 ? lines : kHeights,
-                                 along == 0 ? kHeights : lines, [&](const Fragment&) {
-    return [=](const Eigen::Vector3d& p) {
-      const double side = p[across] - low, up = (p.z() - first_z) / step;
-      return along == 0 ? simulate::RayVertex{side, up, p.x()} : simulate::RayVertex{up, side, p.y()};
-    };
-  });
+  const simulate::SolidRays rays(
+      {phantom.bone, phantom.fracture, {fragment}}, along == 0 ? lines : kHeights, along == 0 ? kHeights : lines,
+      [&](const Fragment&) {
+        return [=](const Eigen::Vector3d& p) {
+          const double side = p[across] - low, up = (p.z() - first_z) / step;
+          return along == 0 ? simulate::RayVertex{side, up, p.x()} : simulate::RayVertex{up, side, p.y()};
+        };
+      });
   std::vector<Eigen::Vector2d> centres;
   for (int i = 0; i < kHeights; ++i) centres.push_back(centre_at(phantom.bone.outer, first_z + i * step));
   const simulate::Fill fill(phantom.bone);
   std::vector<simulate::Interval> intervals;
   const auto crossings = rays.bundle().crossings(0, rays.bundle().rows());
   simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
-    const std::uint32_t line = along == 0 ? ray[0].column : ray[0].row, height = along == 0 ? ray[0].row : ray[0].column;
+    const std::uint32_t line = along == 0 ? ray[0].column : ray[0].row,
+                        height = along == 0 ? ray[0].row : ray[0].column;
     if (line != std::uint32_t(std::lround(centres[height][across] - low))) return;
     Eigen::Vector3d point;
     point[across] = low + line;
@@ -201,7 +206,8 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
   simulate::check_bone(bone, "simulate.fracture");
   if (!(options.level >= 0.1 && options.level <= 0.9))
-    throw Error("simulate.fracture: the level " + std::to_string(options.level) + " must lie in 0.1 to 0.9 of the bone's length");
+    throw Error("simulate.fracture: the level " + std::to_string(options.level) +
+                " must lie in 0.1 to 0.9 of the bone's length");
   const Box box = bounds(bone.outer);
   const double z = box.low.z() + options.level * (box.high.z() - box.low.z());
   const Eigen::Vector2d at = centre_at(bone.outer, z);
@@ -234,16 +240,22 @@ MARROW_PLUGIN(plugin) {
       .summary("breaks a shaft by an oblique, rough surface and moves the fragments by known transforms")
       .in("bone", "whole bone")
       .out("phantom", "two fragments, proximal and distal, in the CT and in the images")
-      .option("level", &FractureOptions::level, "height of the fracture, as a fraction of the length from the distal end", at_least(0.1),
-              at_most(0.9), unit(""))
-      .option("obliquity_deg", &FractureOptions::obliquity_deg, "tilt of the fracture; 0 = transverse", at_least(0), at_most(65))
-      .option("direction_deg", &FractureOptions::direction_deg, "where the fracture rises: 0 to the patient's left, 90 to the back")
-      .option("roughness_mm", &FractureOptions::roughness_mm, "root mean square of the fracture's relief", at_least(0), at_most(4))
+      .option("level", &FractureOptions::level,
+              "height of the fracture, as a fraction of the length from the distal end", at_least(0.1), at_most(0.9),
+              unit(""))
+      .option("obliquity_deg", &FractureOptions::obliquity_deg, "tilt of the fracture; 0 = transverse", at_least(0),
+              at_most(65))
+      .option("direction_deg", &FractureOptions::direction_deg,
+              "where the fracture rises: 0 to the patient's left, 90 to the back")
+      .option("roughness_mm", &FractureOptions::roughness_mm, "root mean square of the fracture's relief", at_least(0),
+              at_most(4))
       .option("fracture_seed", &FractureOptions::fracture_seed, "draws the relief", at_least(0))
       .option("ct_gap_mm", &FractureOptions::ct_gap_mm, "displacement of the distal fragment in the CT")
       .option("rotation_deg", &FractureOptions::rotation_deg,
-              "motion of the distal fragment between CT and images: rotation vector about its frontal, lateral and long axis")
+              "motion of the distal fragment between CT and images: rotation vector about its frontal, lateral and "
+              "long axis")
       .option("translation_mm", &FractureOptions::translation_mm, "and its displacement along these axes")
       .option("proximal_rotation_deg", &FractureOptions::proximal_rotation_deg, "the same for the proximal fragment")
-      .option("proximal_translation_mm", &FractureOptions::proximal_translation_mm, "the same for the proximal fragment");
+      .option("proximal_translation_mm", &FractureOptions::proximal_translation_mm,
+              "the same for the proximal fragment");
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks of a phantom's fragments as a person or a tracker would find them: with noise, so that a method never sees the truth.
+// Landmarks of a phantom's fragments as a person or a tracker would find them: with noise, so that a method never sees
+// the truth.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -19,11 +20,12 @@ struct Options {
 
 bool is_seen(const Camera& camera, const Eigen::Vector3d& world_mm) {
   const Eigen::Vector2d pixel = project(camera, world_mm);
-  return pixel.allFinite() && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width_px - 1 && pixel.y() <= camera.height_px - 1;
+  return pixel.allFinite() && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width_px - 1 &&
+         pixel.y() <= camera.height_px - 1;
 }
 
-/// Points of the surface that all views show, each as far as can be from those before it; the first is the farthest from the
-/// centroid. None where too little is seen.
+/// Points of the surface that all views show, each as far as can be from those before it; the first is the farthest
+/// from the centroid. None where too little is seen.
 std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<Camera>& cameras, int count) {
   constexpr std::size_t kCandidates = 4000;
   std::vector<Eigen::Vector3d> candidates;
@@ -34,7 +36,8 @@ std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<
   }
   if (int(candidates.size()) < count) return {};
   std::vector<double> distances;
-  for (const Eigen::Vector3d& candidate : candidates) distances.push_back((candidate - fragment.frame.origin_mm).norm());
+  for (const Eigen::Vector3d& candidate : candidates)
+    distances.push_back((candidate - fragment.frame.origin_mm).norm());
   std::vector<Eigen::Vector3d> points;
   for (int i = 0; i < count; ++i) {
     const std::size_t farthest = std::size_t(std::max_element(distances.begin(), distances.end()) - distances.begin());
@@ -47,18 +50,20 @@ std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<
   return points;
 }
 
-List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* cameras, const Options& options, Context& context) {
+List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* cameras, const Options& options,
+                          Context& context) {
   simulate::check_phantom(phantom, "simulate.landmarks");
   const List<Camera> views = cameras ? *cameras : List<Camera>();
   List<Landmarks> all;
   for (std::size_t f = 0; f < phantom.fragments.size(); ++f) {
     const Fragment& fragment = phantom.fragments[f];
     if (fragment.outer.triangles.empty())
-      throw Error("simulate.landmarks: fragment '" + fragment.name + "' has no surface of its own; make it with simulate.fracture");
+      throw Error("simulate.landmarks: fragment '" + fragment.name +
+                  "' has no surface of its own; make it with simulate.fracture");
     const std::vector<Eigen::Vector3d> points = spread_points(fragment, views, options.count);
     if (points.empty()) {
-      context.warn("of fragment '" + fragment.name + "' the views show too little for " + std::to_string(options.count) +
-                   " landmarks in all of them; it is left out");
+      context.warn("of fragment '" + fragment.name + "' the views show too little for " +
+                   std::to_string(options.count) + " landmarks in all of them; it is left out");
       continue;
     }
     simulate::Random random(context.seed(), f);
@@ -80,8 +85,8 @@ List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* 
     all.add(fragment.name, std::move(found));
   }
   if (all.empty())
-    throw Error("simulate.landmarks: all views together show too little of every fragment for " + std::to_string(options.count) +
-                " landmarks; choose fewer, or turn the cameras to a fragment");
+    throw Error("simulate.landmarks: all views together show too little of every fragment for " +
+                std::to_string(options.count) + " landmarks; choose fewer, or turn the cameras to a fragment");
   return all;
 }
 
@@ -94,7 +99,8 @@ MARROW_PLUGIN(plugin) {
       .in("cameras", "where they are seen from; only points that all of them show are taken", over("view"))
       .out("landmarks", "points in CT coordinates, seen in pixels of the views, tracked in the world", over("fragment"))
       .random()
-      .option("count", &Options::count, "landmarks of each fragment, spread over its outer surface", at_least(1), at_most(200))
+      .option("count", &Options::count, "landmarks of each fragment, spread over its outer surface", at_least(1),
+              at_most(200))
       .option("noise_px", &Options::noise_px, "standard deviation of each coordinate of what is seen", at_least(0))
       .option("noise_mm", &Options::noise_mm, "standard deviation of each coordinate of what is tracked", at_least(0));
 }

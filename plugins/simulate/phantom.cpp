@@ -12,8 +12,9 @@ namespace {
 void check_surface(const Mesh& mesh, const std::string& what) {
   check_mesh(mesh, what);
   if (!is_closed(mesh))
-    throw Error(what + ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
-                       "must be shared by exactly two triangles)");
+    throw Error(what +
+                ": the surface is open or not consistently oriented, so it has no inside; close its holes (each edge "
+                "must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(mesh) > 0))
     throw Error(what + ": the triangles face inward (enclosed volume " + std::to_string(enclosed_volume_mm3(mesh)) +
                 " mm3); reverse their order");
@@ -29,8 +30,8 @@ void check_bone(const Bone& bone, const std::string& what) {
   check_surface(bone.outer, what + ", outer surface");
   if (!bone.inner.triangles.empty()) check_surface(bone.inner, what + ", inner surface");
   if (bone.fill_z_mm.empty() || bone.fill_z_mm.size() != bone.fill_fraction.size())
-    throw Error(what + ": the bone share needs as many positions as values, got " + std::to_string(bone.fill_z_mm.size()) +
-                " and " + std::to_string(bone.fill_fraction.size()));
+    throw Error(what + ": the bone share needs as many positions as values, got " +
+                std::to_string(bone.fill_z_mm.size()) + " and " + std::to_string(bone.fill_fraction.size()));
   for (std::size_t i = 0; i < bone.fill_z_mm.size(); ++i) {
     if (!std::isfinite(bone.fill_z_mm[i]) || (i > 0 && bone.fill_z_mm[i] <= bone.fill_z_mm[i - 1]))
       throw Error(what + ": the positions of the bone share must grow");
@@ -47,7 +48,8 @@ void check_phantom(const Phantom& phantom, const std::string& what) {
     check_rigid(fragment.ct_from_bone, what + ", fragment '" + fragment.name + "' in the CT");
     check_rigid(fragment.world_from_ct, what + ", fragment '" + fragment.name + "' in the images");
     if (fragment.side != 0 && phantom.fracture.triangles.empty())
-      throw Error(what + ": fragment '" + fragment.name + "' lies on one side of a fracture, but there is no fracture surface");
+      throw Error(what + ": fragment '" + fragment.name +
+                  "' lies on one side of a fracture, but there is no fracture surface");
   }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the simulation nodes hand to each other: a bone as closed surfaces and the fragments that a fracture makes of it.
+// What the simulation nodes hand to each other: a bone as closed surfaces and the fragments that a fracture makes of
+// it.
 #include <Eigen/Core>
 #include <string>
 #include <tuple>
@@ -12,8 +13,9 @@
 
 namespace marrow::simulate {
 
-/// A bone in its own frame "bone": +x to the patient's left, +y to the back, +z to the head, the long axis along z with the
-/// distal end low. Cortical bone lies between the two closed surfaces; inside the inner one, bone and marrow are mixed.
+/// A bone in its own frame "bone": +x to the patient's left, +y to the back, +z to the head, the long axis along z with
+/// the distal end low. Cortical bone lies between the two closed surfaces; inside the inner one, bone and marrow are
+/// mixed.
 struct Bone {
   Mesh outer;
   Mesh inner;  ///< endosteal surface; without triangles, the bone is solid cortical bone
@@ -31,7 +33,8 @@ struct Bone {
   }
 };
 
-/// One piece of a bone, and where it is in the CT and in the images. The world frame of the soft tissue is the bone's own.
+/// One piece of a bone, and where it is in the CT and in the images. The world frame of the soft tissue is the bone's
+/// own.
 struct Fragment {
   std::string name;
   int side = 0;  ///< -1: inside Phantom::fracture (distal), +1: outside it (proximal), 0: the whole bone
@@ -39,7 +42,7 @@ struct Fragment {
   RigidTransform world_from_ct{"world", "ct"};  ///< the exact truth
   FragmentFrame frame;                          ///< the axes of its motion, in CT coordinates
   std::vector<Eigen::Vector3d> seeds_mm;        ///< points inside its bone, in CT coordinates
-  Mesh outer;                                   ///< its part of the bone's outer surface, in CT coordinates; open where it broke
+  Mesh outer;  ///< its part of the bone's outer surface, in CT coordinates; open where it broke
 
   RigidTransform world_from_bone() const { return world_from_ct * ct_from_bone; }
   static constexpr auto fields() {

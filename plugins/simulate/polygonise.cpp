@@ -11,8 +11,8 @@ namespace marrow::simulate {
 namespace {
 
 constexpr int kBlock = 8;
-// The six tetrahedra around the diagonal from corner 0 to corner 7 of a cube (corner bits: x 1, y 2, z 4), all of positive
-// volume: neighbouring cubes cut their common face along the same diagonal.
+// The six tetrahedra around the diagonal from corner 0 to corner 7 of a cube (corner bits: x 1, y 2, z 4), all of
+// positive volume: neighbouring cubes cut their common face along the same diagonal.
 constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
 
 struct Lattice {
@@ -59,13 +59,18 @@ class Builder {
         }
     const auto [a, b, c, d] = corner;
     switch (inside(a) + inside(b) + inside(c) + inside(d)) {
-      case 1: triangle(vertex(a, b), vertex(a, c), vertex(a, d), flip); break;
+      case 1:
+        triangle(vertex(a, b), vertex(a, c), vertex(a, d), flip);
+        break;
       case 2:
         triangle(vertex(a, c), vertex(a, d), vertex(b, d), flip);
         triangle(vertex(a, c), vertex(b, d), vertex(b, c), flip);
         break;
-      case 3: triangle(vertex(a, d), vertex(b, d), vertex(c, d), flip); break;
-      default: break;
+      case 3:
+        triangle(vertex(a, d), vertex(b, d), vertex(c, d), flip);
+        break;
+      default:
+        break;
     }
   }
   Mesh mesh;
@@ -82,7 +87,8 @@ class Builder {
     const std::size_t nx = std::size_t(lattice_.size[0]), plane = nx * std::size_t(lattice_.size[1]);
     const std::size_t step = b - a;
     const std::size_t z = step >= plane, y = step - z * plane >= nx, x = step - z * plane - y * nx;
-    const auto [at, is_new] = vertices_.try_emplace(a * 8 + (x + 2 * y + 4 * z), std::uint32_t(mesh.vertices_mm.size()));
+    const auto [at, is_new] =
+        vertices_.try_emplace(a * 8 + (x + 2 * y + 4 * z), std::uint32_t(mesh.vertices_mm.size()));
     if (is_new) {
       const double va = lattice_.values[a], vb = lattice_.values[b];
       mesh.vertices_mm.push_back(lattice_.point(a) + va / (va - vb) * (lattice_.point(b) - lattice_.point(a)));
@@ -118,7 +124,8 @@ Mesh polygonise(const std::function<double(const Eigen::Vector3d&)>& field, cons
         }
         if (inside == 0 || inside == 8) continue;
         for (const auto& t : kTetrahedra)
-          builder.add({corner[std::size_t(t[0])], corner[std::size_t(t[1])], corner[std::size_t(t[2])], corner[std::size_t(t[3])]});
+          builder.add({corner[std::size_t(t[0])], corner[std::size_t(t[1])], corner[std::size_t(t[2])],
+                       corner[std::size_t(t[3])]});
       }
   return std::move(builder.mesh);
 }

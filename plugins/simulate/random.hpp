@@ -5,8 +5,8 @@
 
 namespace marrow::simulate {
 
-/// Random numbers that depend on (seed, stream) alone: one stream for each pixel or voxel gives the same noise whichever
-/// thread draws it. SplitMix64 (Steele, Lea, Flood, OOPSLA 2014), started from a mix of both.
+/// Random numbers that depend on (seed, stream) alone: one stream for each pixel or voxel gives the same noise
+/// whichever thread draws it. SplitMix64 (Steele, Lea, Flood, OOPSLA 2014), started from a mix of both.
 class Random {
  public:
   using result_type = std::uint64_t;

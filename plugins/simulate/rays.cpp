@@ -13,11 +13,13 @@ constexpr int kBandRows = 16;
 constexpr std::int64_t kOne = 4096;
 constexpr double kFar = 131072;
 
-std::int64_t fixed_point(double position) { return std::int64_t(std::llround(std::clamp(position, -kFar, kFar) * kOne)); }
+std::int64_t fixed_point(double position) {
+  return std::int64_t(std::llround(std::clamp(position, -kFar, kFar) * kOne));
+}
 
-/// Whether a point lies left of the edge a -> b, in the sense of a positive area. A point on the edge counts as moved by an
-/// infinitesimal step along u and a still smaller one along v (Edelsbrunner and Muecke, ACM TOG 1990), so of two triangles
-/// that share the edge exactly one has it.
+/// Whether a point lies left of the edge a -> b, in the sense of a positive area. A point on the edge counts as moved
+/// by an infinitesimal step along u and a still smaller one along v (Edelsbrunner and Muecke, ACM TOG 1990), so of two
+/// triangles that share the edge exactly one has it.
 bool is_left(std::int64_t au, std::int64_t av, std::int64_t bu, std::int64_t bv, std::int64_t u, std::int64_t v) {
   const std::int64_t area = (bu - au) * (v - av) - (bv - av) * (u - au);
   if (area != 0) return area > 0;
@@ -85,10 +87,12 @@ void RayBundle::draw(const Triangle& t, int first, int last, std::vector<Crossin
       if (!is_left(t.u[0], t.v[0], t.u[1], t.v[1], u, v) || !is_left(t.u[1], t.v[1], t.u[2], t.v[2], u, v) ||
           !is_left(t.u[2], t.v[2], t.u[0], t.v[0], u, v))
         continue;
-      // Rounding to fixed point may place a ray just outside a triangle that is seen edge-on; its depth stays within it.
-      const double depth = t.depth + t.depth_per_u * (double(column) - t.origin_u) + t.depth_per_v * (double(row) - t.origin_v);
-      crossings.push_back({std::uint32_t(column), std::uint32_t(row), t.surface, t.sense,
-                           std::clamp(depth, t.nearest, t.farthest)});
+      // Rounding to fixed point may place a ray just outside a triangle that is seen edge-on; its depth stays within
+      // it.
+      const double depth =
+          t.depth + t.depth_per_u * (double(column) - t.origin_u) + t.depth_per_v * (double(row) - t.origin_v);
+      crossings.push_back(
+          {std::uint32_t(column), std::uint32_t(row), t.surface, t.sense, std::clamp(depth, t.nearest, t.farthest)});
     }
 }
 
@@ -100,7 +104,8 @@ std::vector<Crossing> RayBundle::crossings(int first, int last) const {
     for (std::uint32_t index : bands_[std::size_t(band)])
       draw(triangles_[index], std::max(first, band * kBandRows), std::min(last, (band + 1) * kBandRows), found);
   std::sort(found.begin(), found.end(), [](const Crossing& a, const Crossing& b) {
-    return std::tie(a.row, a.column, a.depth, a.surface, a.sense) < std::tie(b.row, b.column, b.depth, b.surface, b.sense);
+    return std::tie(a.row, a.column, a.depth, a.surface, a.sense) <
+           std::tie(b.row, b.column, b.depth, b.surface, b.sense);
   });
   return found;
 }

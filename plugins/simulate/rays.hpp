@@ -7,8 +7,8 @@
 
 namespace marrow::simulate {
 
-/// A vertex as a bundle of rays sees it: rays stand at whole (u, v), and along a ray `depth` grows. (u, v, depth) must be
-/// right-handed and map planes to planes: (y, z, x) for rays along x, or (u, v, -1/z) for a pinhole camera.
+/// A vertex as a bundle of rays sees it: rays stand at whole (u, v), and along a ray `depth` grows. (u, v, depth) must
+/// be right-handed and map planes to planes: (y, z, x) for rays along x, or (u, v, -1/z) for a pinhole camera.
 struct RayVertex {
   double u, v, depth;
 };
@@ -22,8 +22,8 @@ struct Crossing {
   double depth;
 };
 
-/// A grid of rays through closed surfaces. Each ray meets each closed surface an even number of times: coverage is decided in
-/// integers, and a ray through an edge or a corner belongs to exactly one of the triangles there.
+/// A grid of rays through closed surfaces. Each ray meets each closed surface an even number of times: coverage is
+/// decided in integers, and a ray through an edge or a corner belongs to exactly one of the triangles there.
 class RayBundle {
  public:
   RayBundle(int columns, int rows);

@@ -35,7 +35,8 @@ void SolidRays::intervals(std::span<const Crossing> ray, std::vector<Interval>& 
     double from = 0;
     for (const Crossing& crossing : ray) {
       if (crossing.surface / kSurfaces != fragment) continue;
-      const bool on_side = sides_[std::size_t(fragment)] == 0 || (sides_[std::size_t(fragment)] < 0) == (winding[2] > 0);
+      const bool on_side =
+          sides_[std::size_t(fragment)] == 0 || (sides_[std::size_t(fragment)] < 0) == (winding[2] > 0);
       if (winding[0] > 0 && on_side && crossing.depth > from)
         found.push_back({fragment, winding[1] <= 0, from, crossing.depth});
       winding[std::size_t(crossing.surface % kSurfaces)] += crossing.sense;

@@ -24,8 +24,8 @@ class SolidRays {
   SolidRays(const Phantom& phantom, int columns, int rows, const std::function<Map(const Fragment&)>& place);
 
   const RayBundle& bundle() const { return bundle_; }
-  /// Constructive solid geometry on the crossings of one ray: (outer without inner) on the fragment's side of the fracture is
-  /// cortical, (inner within outer) on that side is inner. Fragments are independent of each other.
+  /// Constructive solid geometry on the crossings of one ray: (outer without inner) on the fragment's side of the
+  /// fracture is cortical, (inner within outer) on that side is inner. Fragments are independent of each other.
   void intervals(std::span<const Crossing> ray, std::vector<Interval>& found) const;
 
  private:
@@ -34,7 +34,7 @@ class SolidRays {
 };
 
 /// The lengths of a straight line inside a cylinder along z: [from, to] in units of `direction`; empty when from >= to.
-std::pair<double, double> through_cylinder(const Eigen::Vector2d& centre_mm, double radius_mm, const Eigen::Vector3d& origin_mm,
-                                           const Eigen::Vector3d& direction);
+std::pair<double, double> through_cylinder(const Eigen::Vector2d& centre_mm, double radius_mm,
+                                           const Eigen::Vector3d& origin_mm, const Eigen::Vector3d& direction);
 
 }  // namespace marrow::simulate

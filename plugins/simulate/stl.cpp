@@ -24,7 +24,8 @@ class Welder {
       if (is_new) mesh.vertices_mm.emplace_back(corners[k][0], corners[k][1], corners[k][2]);
       triangle[k] = at->second;
     }
-    if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0]) mesh.triangles.push_back(triangle);
+    if (triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0])
+      mesh.triangles.push_back(triangle);
   }
   Mesh mesh;
 
@@ -39,7 +40,8 @@ void read_ascii(const std::string& content, const std::string& name, Welder& wel
   for (std::string word; words >> word;) {
     if (word != "vertex") continue;
     auto& place = corners[corner];
-    if (!(words >> place[0] >> place[1] >> place[2])) throw Error(name + ": a 'vertex' is not followed by three numbers");
+    if (!(words >> place[0] >> place[1] >> place[2]))
+      throw Error(name + ": a 'vertex' is not followed by three numbers");
     if (!std::isfinite(place[0]) || !std::isfinite(place[1]) || !std::isfinite(place[2]))
       throw Error(name + ": a 'vertex' is not followed by three finite numbers");
     if (++corner == 3) {
@@ -72,8 +74,9 @@ Mesh read_stl(const std::filesystem::path& path) {
   } else if (content.starts_with("solid")) {
     read_ascii(content, name, welder);
   } else {
-    throw Error(name + ": neither a binary STL (" + std::to_string(content.size()) + " bytes, but its header promises " +
-                std::to_string(count) + " triangles, which take " + std::to_string(kHeader + kTriangle * std::size_t(count)) +
+    throw Error(name + ": neither a binary STL (" + std::to_string(content.size()) +
+                " bytes, but its header promises " + std::to_string(count) + " triangles, which take " +
+                std::to_string(kHeader + kTriangle * std::size_t(count)) +
                 ") nor an ASCII one; the file may be truncated");
   }
   check_mesh(welder.mesh, name);

@@ -39,8 +39,9 @@ Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
 
 Bone surface(const SurfaceOptions& options) {
   if (options.fill_at.size() != options.fill_fraction.size() || options.fill_at.empty())
-    throw Error("simulate.surface: fill_at has " + std::to_string(options.fill_at.size()) + " positions, but fill_fraction has " +
-                std::to_string(options.fill_fraction.size()) + " values; give as many of each");
+    throw Error("simulate.surface: fill_at has " + std::to_string(options.fill_at.size()) +
+                " positions, but fill_fraction has " + std::to_string(options.fill_fraction.size()) +
+                " values; give as many of each");
   Bone bone;
   bone.outer = placed(options.outer, options);
   if (!options.inner.empty()) bone.inner = placed(options.inner, options);
@@ -75,12 +76,15 @@ MARROW_PLUGIN(plugin) {
       .option("inner", &SurfaceOptions::inner, "STL file of the endosteal surface; empty = solid cortical bone")
       .option("scale", &SurfaceOptions::scale, "factor to mm: 1000 for a file in metres", at_least(1e-6), unit(""))
       .option("rotation_deg", &SurfaceOptions::rotation_deg,
-              "turns about x, then y, then z that bring the long axis to z, distal end low, +x to the patient's left, +y to the back")
-      .option("fill_at", &SurfaceOptions::fill_at, "heights, as fractions of the length, where the bone share is given", unit(""))
-      .option("fill_fraction", &SurfaceOptions::fill_fraction, "share of bone inside the inner surface at these heights; the rest is marrow",
+              "turns about x, then y, then z that bring the long axis to z, distal end low, +x to the patient's left, "
+              "+y to the back")
+      .option("fill_at", &SurfaceOptions::fill_at, "heights, as fractions of the length, where the bone share is given",
               unit(""))
+      .option("fill_fraction", &SurfaceOptions::fill_fraction,
+              "share of bone inside the inner surface at these heights; the rest is marrow", unit(""))
       .option("isocentre_from_distal_end_mm", &SurfaceOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
-      .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none", at_least(0))
+      .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none",
+              at_least(0))
       .option("fat_mm", &SurfaceOptions::fat_mm, "thickness of the layer of fat", at_least(0));
 }

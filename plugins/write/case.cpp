@@ -16,9 +16,7 @@ namespace fs = std::filesystem;
 using marrow::write::quoted;
 
 /// PNG for 8 and 16 bits, TIFF for float.
-std::string image_name(const marrow::Image& image) {
-  return image.pixels.depth() == CV_32F ? ".tif" : ".png";
-}
+std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
 
 /// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png, or with an empty stem image.png, camera.yaml and
 /// mask.png.
@@ -45,9 +43,8 @@ void view(const marrow::View& view, const std::string& path) {
 }
 
 bool is_plain(const std::string& name) {
-  return !name.empty() && name.size() <= 100 && std::all_of(name.begin(), name.end(), [](unsigned char c) {
-    return std::isalnum(c) || c == '_' || c == '-';
-  });
+  return !name.empty() && name.size() <= 100 &&
+         std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
 }
 
 /// Names that differ by capital letters alone are one file to some file systems.
@@ -63,7 +60,8 @@ std::vector<std::string> file_stems(const std::vector<std::string>& names) {
   for (const std::string& name : names) taken.push_back(in_small_letters(name));
   for (std::size_t i = 0; i < names.size(); ++i) {
     std::string stem = names[i];
-    for (std::size_t number = i + 1; !is_plain(names[i]) && (stem == names[i] || std::count(taken.begin(), taken.end(), stem)); ++number)
+    for (std::size_t number = i + 1;
+         !is_plain(names[i]) && (stem == names[i] || std::count(taken.begin(), taken.end(), stem)); ++number)
       stem = "view-" + std::to_string(number);
     taken.push_back(stem);
     stems.push_back(stem);

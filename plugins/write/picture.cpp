@@ -22,9 +22,7 @@ void image(const marrow::Image& image, const std::string& path) {
   write_png(path, scaled);
 }
 
-void picture(const marrow::Picture& picture, const std::string& path) {
-  write_png(path, picture.pixels);
-}
+void picture(const marrow::Picture& picture, const std::string& path) { write_png(path, picture.pixels); }
 
 void edge_map(const marrow::EdgeMap& edges, const std::string& path) {
   cv::Mat pixels = cv::Mat::zeros(edges.height_px, edges.width_px, CV_8U);

@@ -48,7 +48,8 @@ ordered_json json_of(const marrow::Scene::Backdrop& view) {
   const cv::Mat pixels = view.picture.pixels.isContinuous() ? view.picture.pixels : view.picture.pixels.clone();
   if (pixels.depth() != CV_8U || (pixels.channels() != 1 && pixels.channels() != 3))
     throw marrow::Error("view '" + view.name + "' of a scene: expected a picture of 8 bits in one or three channels");
-  const std::string png = marrow::write::png_of(pixels.cols, pixels.rows, pixels.channels(), marrow::write::Sample::u8, pixels.data);
+  const std::string png =
+      marrow::write::png_of(pixels.cols, pixels.rows, pixels.channels(), marrow::write::Sample::u8, pixels.data);
   return {{"name", view.name},
           {"width_px", view.camera.width_px},
           {"height_px", view.camera.height_px},
@@ -58,12 +59,16 @@ ordered_json json_of(const marrow::Scene::Backdrop& view) {
 }
 
 void scene(const marrow::Scene& scene, const std::string& path) {
-  ordered_json json = {{"marrow-scene", 1}, {"meshes", ordered_json::array()}, {"poses", ordered_json::array()}, {"views", ordered_json::array()}};
+  ordered_json json = {{"marrow-scene", 1},
+                       {"meshes", ordered_json::array()},
+                       {"poses", ordered_json::array()},
+                       {"views", ordered_json::array()}};
   for (const auto& model : scene.models) json["meshes"].push_back(json_of(model));
   for (const auto& placement : scene.placements)
     for (std::size_t i = 0; i < scene.models.size(); ++i)
       if (scene.models[i].name == placement.model)
-        json["poses"].push_back({{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
+        json["poses"].push_back(
+            {{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
   for (const auto& view : scene.views) json["views"].push_back(json_of(view));
   marrow::write::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
@@ -71,8 +76,10 @@ void scene(const marrow::Scene& scene, const std::string& path) {
 void landscape(const marrow::Landscape& landscape, const std::string& path) {
   ordered_json json = {{"marrow-landscape", 1}, {"profiles", ordered_json::array()}};
   for (const auto& profile : landscape.profiles) {
-    ordered_json one = {{"axis", profile.axis}, {"unit", profile.unit}, {"offsets", profile.offsets}, {"costs", ordered_json::array()}};
-    for (const double cost : profile.costs) one["costs"].push_back(std::isfinite(cost) ? ordered_json(cost) : ordered_json());
+    ordered_json one = {
+        {"axis", profile.axis}, {"unit", profile.unit}, {"offsets", profile.offsets}, {"costs", ordered_json::array()}};
+    for (const double cost : profile.costs)
+      one["costs"].push_back(std::isfinite(cost) ? ordered_json(cost) : ordered_json());
     if (profile.truth) one["truth"] = *profile.truth;
     json["profiles"].push_back(one);
   }

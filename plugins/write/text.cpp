@@ -9,17 +9,11 @@ namespace {
 
 using marrow::write::write_text;
 
-void pose(const marrow::Pose& pose, const std::string& path) {
-  write_text(path, marrow::write::pose(pose));
-}
+void pose(const marrow::Pose& pose, const std::string& path) { write_text(path, marrow::write::pose(pose)); }
 
-void truth(const marrow::Truth& truth, const std::string& path) {
-  write_text(path, marrow::write::truth(truth));
-}
+void truth(const marrow::Truth& truth, const std::string& path) { write_text(path, marrow::write::truth(truth)); }
 
-void camera(const marrow::Camera& camera, const std::string& path) {
-  write_text(path, marrow::write::camera(camera));
-}
+void camera(const marrow::Camera& camera, const std::string& path) { write_text(path, marrow::write::camera(camera)); }
 
 void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
   write_text(path, marrow::write::shaft_lines(lines));

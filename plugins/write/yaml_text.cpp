@@ -114,13 +114,13 @@ std::string pose(const Pose& pose) {
   return text;
 }
 
-std::string truth(const Truth& truth) {
-  return "marrow-truth: 1\n" + transform(truth.world_from_model, "");
-}
+std::string truth(const Truth& truth) { return "marrow-truth: 1\n" + transform(truth.world_from_model, ""); }
 
 std::string shaft_lines(const ShaftLines& lines) {
   std::string text = "marrow-shaft-lines: 1\nleft: " + segment(lines.left) + "\nright: " + segment(lines.right) +
-                     "\nwidth_mm: " + number(lines.width_mm) + "\nwidth_deviation_mm: " + number(lines.width_deviation_mm) + "\nlog_likelihood: " + number(lines.log_likelihood) +
+                     "\nwidth_mm: " + number(lines.width_mm) +
+                     "\nwidth_deviation_mm: " + number(lines.width_deviation_mm) +
+                     "\nlog_likelihood: " + number(lines.log_likelihood) +
                      "\nrejected:" + (lines.rejected.empty() ? " []" : "") + "\n";
   for (const ShaftLines::Rejected& pair : lines.rejected)
     text += "  - left: " + segment(pair.left) + "\n    right: " + segment(pair.right) +

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// drr_benchmark [FOLDER]: how long a radiograph takes, and how far it is from one by fine steps. With a folder, the volume, the
-// geometry and the images are written there, for drr_peers to compare with other programs.
+// drr_benchmark [FOLDER]: how long a radiograph takes, and how far it is from one by fine steps. With a folder, the
+// volume, the geometry and the images are written there, for drr_peers to compare with other programs.
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 
@@ -34,7 +34,8 @@ Volume thigh(bool bone_only) {
       for (int x = 0; x < 256; ++x) {
         const Eigen::Vector3d p = volume.grid.point_from_index({double(x), double(y), double(z)});
         const double flare = 14 + 22 / (1 + std::exp((p.z() + 140) / 12));
-        const double radius = std::hypot(p.x() - 0.0004 * p.z() * p.z(), p.y()), noise = 60.0 * (double(random()) / 4294967296.0 - 0.5);
+        const double radius = std::hypot(p.x() - 0.0004 * p.z() * p.z(), p.y()),
+                     noise = 60.0 * (double(random()) / 4294967296.0 - 0.5);
         double hu = radius < flare ? (radius < flare - 6 ? (p.z() < -130 ? 250 : -20) : 1250) : 40;
         hu = bone_only && radius >= flare ? -1000 : hu + noise;
         volume.values[volume.grid.offset(x, y, z)] = float(std::round(hu));
@@ -49,7 +50,8 @@ Camera camera_of(int pixels) {
   return camera::carm_camera(arm, camera::world_from_camera_rotation(0, 0));
 }
 
-std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std::string& name, const Volume& volume, double step_mm = 0) {
+std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std::string& name, const Volume& volume,
+                                           double step_mm = 0) {
   const NodeDefinition& node = catalogue.load(name);
   std::vector<Value> inputs;
   for (const PortInfo& port : node.info.inputs) {
@@ -65,7 +67,9 @@ std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std
   }
   const std::shared_ptr<void> options = node.make_options();
   for (std::size_t i = 0; i < node.info.options.size(); ++i)
-    node.set_option[i](options.get(), node.info.options[i].name == "step_mm" && step_mm > 0 ? OptionValue(step_mm) : node.info.options[i].default_value);
+    node.set_option[i](options.get(), node.info.options[i].name == "step_mm" && step_mm > 0
+                                          ? OptionValue(step_mm)
+                                          : node.info.options[i].default_value);
   Context::Hooks hooks;
   hooks.log = [](std::string_view message, bool) { std::printf("%.*s\n", int(message.size()), message.data()); };
   Context context(std::move(hooks));
@@ -83,12 +87,16 @@ double median_ms(const std::function<void()>& work) {
   return times[4];
 }
 
-void write(const std::filesystem::path& path, const void* data, std::size_t bytes) { std::ofstream(path, std::ios::binary).write(static_cast<const char*>(data), std::streamsize(bytes)); }
+void write(const std::filesystem::path& path, const void* data, std::size_t bytes) {
+  std::ofstream(path, std::ios::binary).write(static_cast<const char*>(data), std::streamsize(bytes));
+}
 
 void write_volume(const std::filesystem::path& path, const Volume& volume) {
   const std::vector<std::int16_t> values(volume.values.begin(), volume.values.end());
   std::ofstream stream(path, std::ios::binary);
-  stream << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = " << volume.grid.origin_mm.transpose()
+  stream << "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nTransformMatrix = 1 0 0 "
+            "0 1 0 0 0 1\nOffset = "
+         << volume.grid.origin_mm.transpose()
          << "\nElementSpacing = 0.8 0.8 1\nDimSize = 256 256 384\nElementType = MET_SHORT\nElementDataFile = LOCAL\n";
   stream.write(reinterpret_cast<const char*>(values.data()), std::streamsize(2 * values.size()));
 }
@@ -108,7 +116,8 @@ double rms(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 /// Looked up, of a bone that is turned by a few degrees against what was kept; `fine` draws the truth.
-void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const Projector& fine, const char* folder) {
+void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const Projector& fine,
+            const char* folder) {
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t processor = std::clock();
   const auto one = projector(catalogue, "project.lightfield", volume);
@@ -129,8 +138,11 @@ void lookup(const Catalogue& catalogue, const Volume& volume, const std::string&
     other.rotation = rotation_from_vector({0.011, 0.013, -0.017}) * other.rotation;
     one->radiograph(camera, other, sparse);
   });
-  std::printf("%-6s lightfield     made in %.1f s, %.1f s of processors; 512 x 512: %.2f ms; 2000 pixels: %.3f ms; root mean square error %.4f mm of water\n", what.c_str(), made_s, processor_s, ms, sparse_ms,
-              rms(one->radiograph(camera, turned, some), fine.radiograph(camera, turned, some)));
+  std::printf(
+      "%-6s lightfield     made in %.1f s, %.1f s of processors; 512 x 512: %.2f ms; 2000 pixels: %.3f ms; root mean "
+      "square error %.4f mm of water\n",
+      what.c_str(), made_s, processor_s, ms, sparse_ms,
+      rms(one->radiograph(camera, turned, some), fine.radiograph(camera, turned, some)));
 }
 
 }  // namespace
@@ -151,17 +163,23 @@ int main(int argc, char** argv) {
         const PixelGrid grid{0, 0, 1, pixels, pixels};
         std::vector<float> values;
         const double ms = median_ms([&] { values = one->radiograph(camera, world_from_model, grid); });
-        if (argc > 1) write(std::filesystem::path(argv[1]) / (what + "_" + name + "_" + std::to_string(pixels) + ".f32"), values.data(), 4 * values.size());
+        if (argc > 1)
+          write(std::filesystem::path(argv[1]) / (what + "_" + name + "_" + std::to_string(pixels) + ".f32"),
+                values.data(), 4 * values.size());
         double error = NAN;
         if (pixels == 256) {
           const auto reference = fine->radiograph(camera, world_from_model, grid);
           error = rms(values, reference);
-          if (argc > 1) write(std::filesystem::path(argv[1]) / (what + "_reference_256.f32"), reference.data(), 4 * reference.size());
+          if (argc > 1)
+            write(std::filesystem::path(argv[1]) / (what + "_reference_256.f32"), reference.data(),
+                  4 * reference.size());
         }
-        std::printf("%-6s %-14s %d x %d: %7.2f ms, root mean square error %.4f mm of water\n", what.c_str(), name.c_str(), pixels, pixels, ms, error);
+        std::printf("%-6s %-14s %d x %d: %7.2f ms, root mean square error %.4f mm of water\n", what.c_str(),
+                    name.c_str(), pixels, pixels, ms, error);
       }
       const auto sparse = pixels();
-      std::printf("%-6s %-14s 2000 pixels: %.3f ms\n", what.c_str(), name.c_str(), median_ms([&] { one->radiograph(camera_of(512), world_from_model, sparse); }));
+      std::printf("%-6s %-14s 2000 pixels: %.3f ms\n", what.c_str(), name.c_str(),
+                  median_ms([&] { one->radiograph(camera_of(512), world_from_model, sparse); }));
     }
     lookup(catalogue, volume, what, *fine, argc > 1 ? argv[1] : nullptr);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// edges.adaptive_relaxation on 16 bits against OpenCV's Canny with its blur on 8 bits: the same 1024 x 1024 radiograph, the
-// same threads, in turns. The extractor measures noise, percentiles of a moving window and sub-pixel positions besides; it
-// may take ten times as long. Exit code 1 when it takes longer.
+// edges.adaptive_relaxation on 16 bits against OpenCV's Canny with its blur on 8 bits: the same 1024 x 1024 radiograph,
+// the same threads, in turns. The extractor measures noise, percentiles of a moving window and sub-pixel positions
+// besides; it may take ten times as long. Exit code 1 when it takes longer.
 #include <tbb/global_control.h>
 
 #include <algorithm>
@@ -38,8 +38,8 @@ double median(std::vector<double> values) {
 int run(const std::string& name, int threads) {
   const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
   cv::setNumThreads(threads);
-  const marrow::View view =
-      radiograph::image("frontal", radiograph::camera(0, kSize_px), radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 2000, 7);
+  const marrow::View view = radiograph::image("frontal", radiograph::camera(0, kSize_px),
+                                              radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 2000, 7);
   cv::Mat eight_bits;  // exposed for the limb; air saturates
   view.image.pixels.convertTo(eight_bits, CV_8U, 255.0 / 8000);
 
@@ -52,7 +52,8 @@ int run(const std::string& name, int threads) {
   int canny_edges = 0;
   std::vector<double> ours_ms, canny_ms;
   for (int round = 0; round < kRounds; ++round) {
-    ours_ms.push_back(time_ms([&] { edges = node.call(inputs, options.get(), context)[0].as<marrow::EdgeMap>().pixels.size(); }));
+    ours_ms.push_back(
+        time_ms([&] { edges = node.call(inputs, options.get(), context)[0].as<marrow::EdgeMap>().pixels.size(); }));
     cv::Mat blurred, found;
     canny_ms.push_back(time_ms([&] {
       cv::GaussianBlur(eight_bits, blurred, {0, 0}, kSigma_px);
@@ -61,8 +62,11 @@ int run(const std::string& name, int threads) {
     canny_edges = cv::countNonZero(found);
   }
   const double ratio = median(ours_ms) / median(canny_ms);
-  std::printf("%-28s %d thread%s: %.1f ms, %zu edges; OpenCV's Canny with blur, 8 bit: %.1f ms, %d edges; ratio %.1f, limit %.0f\n",
-              name.c_str(), threads, threads > 1 ? "s" : "", median(ours_ms), edges, median(canny_ms), canny_edges, ratio, kLimit);
+  std::printf(
+      "%-28s %d thread%s: %.1f ms, %zu edges; OpenCV's Canny with blur, 8 bit: %.1f ms, %d edges; ratio %.1f, limit "
+      "%.0f\n",
+      name.c_str(), threads, threads > 1 ? "s" : "", median(ours_ms), edges, median(canny_ms), canny_edges, ratio,
+      kLimit);
   return ratio > kLimit;
 }
 

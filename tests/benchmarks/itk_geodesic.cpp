@@ -84,9 +84,7 @@ Result contour(const Image::Pointer& ct, const Image::Pointer& speed, const std:
 
 }  // namespace
 
-std::string version() {
-  return itk::Version::GetITKVersion();
-}
+std::string version() { return itk::Version::GetITKVersion(); }
 
 std::vector<Result> geodesic_active_contours(const std::vector<float>& hu, const std::array<int, 3>& size,
                                              const std::array<double, 3>& spacing_mm,

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// mesh.marching_cubes against VTK's vtkFlyingEdges3D on a bone of about 500,000 triangles in 256 x 256 x 384 samples, both on
-// 2 threads, from the same floats in memory to their own surface. They take turns, so that a busy machine slows both down.
+// mesh.marching_cubes against VTK's vtkFlyingEdges3D on a bone of about 500,000 triangles in 256 x 256 x 384 samples,
+// both on 2 threads, from the same floats in memory to their own surface. They take turns, so that a busy machine slows
+// both down.
 #include <benchmark/benchmark.h>
 #include <oneapi/tbb/global_control.h>
 #include <vtkFloatArray.h>
@@ -90,9 +91,11 @@ void against_vtk(benchmark::State& state, bool largest_only) {
   state.counters["marrow_ms"] = median(marrow_ms);
   state.counters["vtk_ms"] = median(vtk_ms);
   state.counters["ratio"] = ratio;
-  std::printf("mesh.marching_cubes%s: %zu triangles in %.1f ms; vtkFlyingEdges3D of VTK %s on %s: %zu in %.1f ms; ratio %.2f, limit %.1f\n",
-              largest_only ? ", largest part" : "", marrow_triangles, median(marrow_ms), vtkVersion::GetVTKVersion(),
-              use_vtk_threads(kThreads).c_str(), vtk_triangles, median(vtk_ms), ratio, kLimit);
+  std::printf(
+      "mesh.marching_cubes%s: %zu triangles in %.1f ms; vtkFlyingEdges3D of VTK %s on %s: %zu in %.1f ms; ratio %.2f, "
+      "limit %.1f\n",
+      largest_only ? ", largest part" : "", marrow_triangles, median(marrow_ms), vtkVersion::GetVTKVersion(),
+      use_vtk_threads(kThreads).c_str(), vtk_triangles, median(vtk_ms), ratio, kLimit);
   within_limit &= ratio <= kLimit;
 }
 BENCHMARK_CAPTURE(against_vtk, all_parts, false)->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(25);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// How long a registration takes, in one process, with the model and two 512 x 512 images in memory, on a simulated case.
-// What is made of the CT alone, before any image is taken, counts as the model: the surface, and projectors of it.
-// both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur.yaml. Then 100 starts of up to 5
-// degrees and 5 mm about the truth: by grey values alone, coarse to fine, and by contour and then grey values
+// How long a registration takes, in one process, with the model and two 512 x 512 images in memory, on a simulated
+// case. What is made of the CT alone, before any image is taken, counts as the model: the surface, and projectors of
+// it. both_stages: edges, shaft borders, first stage, cost and registration of pipelines/femur.yaml. Then 100 starts of
+// up to 5 degrees and 5 mm about the truth: by grey values alone, coarse to fine, and by contour and then grey values
 // (pipelines/femur-intensity.yaml), with how far from the truth they end.
 #include <benchmark/benchmark.h>
 
@@ -22,7 +22,8 @@ namespace {
 using marrow::Value;
 
 marrow::Pipeline read(const marrow::Catalogue& catalogue, const std::string& file, const std::string& output,
-                      const std::vector<marrow::InputValue>& inputs, const std::vector<marrow::Override>& overrides = {}) {
+                      const std::vector<marrow::InputValue>& inputs,
+                      const std::vector<marrow::Override>& overrides = {}) {
   marrow::Diagnostics diagnostics;
   marrow::PipelineArguments arguments;
   arguments.inputs = inputs;
@@ -49,8 +50,8 @@ struct Prepared {
   marrow::Pipeline pipeline;
   marrow::RunSettings settings;
 
-  Prepared(const marrow::Catalogue& all, const marrow::Case& data, const std::string& file, const std::set<std::string>& of_ct,
-           const std::vector<marrow::Override>& overrides = {})
+  Prepared(const marrow::Catalogue& all, const marrow::Case& data, const std::string& file,
+           const std::set<std::string>& of_ct, const std::vector<marrow::Override>& overrides = {})
       : catalogue(all), pipeline(read(all, file, "pose", {{"case", "in memory"}}, overrides)) {
     settings.threads = 2;
     settings.given["case"] = {Value::of(std::make_shared<const marrow::Volume>(data.ct)),
@@ -63,7 +64,9 @@ struct Prepared {
   marrow::RunResult result() const { return run(pipeline, catalogue, settings); }
   /// The first item of a value that was given.
   template <class T>
-  const T& given(const std::string& id) const { return settings.given.at(id)[0].items.at(0).template as<T>(); }
+  const T& given(const std::string& id) const {
+    return settings.given.at(id)[0].items.at(0).template as<T>();
+  }
 };
 
 const marrow::Catalogue& catalogue() {
@@ -87,7 +90,8 @@ void both_stages(benchmark::State& state) {
   for (auto _ : state) {
     const marrow::RunResult result = contour.result();
     for (std::size_t i = 0; i < result.nodes.size(); ++i)
-      if (result.nodes[i].status == marrow::NodeRecord::Status::done && !contour.settings.given.count(contour.pipeline.nodes[i].id))
+      if (result.nodes[i].status == marrow::NodeRecord::Status::done &&
+          !contour.settings.given.count(contour.pipeline.nodes[i].id))
         seconds[contour.pipeline.nodes[i].id] += result.nodes[i].seconds;
   }
   for (const auto& [id, sum] : seconds)
@@ -133,7 +137,8 @@ void from_random_starts(const std::string& title, Prepared prepared) {
     const auto began = std::chrono::steady_clock::now();
     const marrow::RunResult result = prepared.result();
     seconds.push_back(std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count());
-    const auto& found = marrow::value_of(result, prepared.pipeline.outputs[0].source).items.at(0).as<marrow::Pose>().world_from_model;
+    const auto& found =
+        marrow::value_of(result, prepared.pipeline.outputs[0].source).items.at(0).as<marrow::Pose>().world_from_model;
     double sum = 0;
     for (const Eigen::Vector3d& target : targets) sum += (found * target - exact * target).norm();
     mtre_mm.push_back(sum / double(targets.size()));
@@ -149,7 +154,8 @@ void from_random_starts(const std::string& title, Prepared prepared) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  const bool is_filtered = std::any_of(argv, argv + argc, [](const char* argument) { return std::string(argument).starts_with("--benchmark_filter"); });
+  const bool is_filtered = std::any_of(
+      argv, argv + argc, [](const char* argument) { return std::string(argument).starts_with("--benchmark_filter"); });
   benchmark::Initialize(&argc, argv);
   try {
     benchmark::RunSpecifiedBenchmarks();

@@ -25,7 +25,8 @@ class Fixture : public benchmark::Fixture {
   void save(int name, T item) {
     Value value = Value::of<T>(std::make_shared<const T>(std::move(item)));
     value.key = value.type.content->hash(value.data.get());
-    const std::string fault = store.save(hash_of(name), {value}, Provenance{.node = "evaluate.pose_error", .options = {{"points", "1000"}}});
+    const std::string fault =
+        store.save(hash_of(name), {value}, Provenance{.node = "evaluate.pose_error", .options = {{"points", "1000"}}});
     if (!fault.empty()) throw Error(fault);
   }
 
@@ -35,7 +36,8 @@ class Fixture : public benchmark::Fixture {
 
 BENCHMARK_F(Fixture, LookUpASmallValue)(benchmark::State& state) {
   int name = 0;
-  for (auto _ : state) benchmark::DoNotOptimize(store.find(hash_of(name++ % 2000))->outputs[0].as<Metrics>().items[0].value);
+  for (auto _ : state)
+    benchmark::DoNotOptimize(store.find(hash_of(name++ % 2000))->outputs[0].as<Metrics>().items[0].value);
 }
 
 BENCHMARK_F(Fixture, LookUpWhatIsNotThere)(benchmark::State& state) {
@@ -55,7 +57,8 @@ BENCHMARK_F(Fixture, KeepALargeVolume)(benchmark::State& state) {
   value.key = value.type.content->hash(value.data.get());
   for (auto _ : state)
     if (!store.save(hash_of(-1), {value}, {}).empty()) state.SkipWithError("not kept");
-  state.SetBytesProcessed(std::int64_t(state.iterations()) * std::int64_t(value.as<Volume>().values.size() * sizeof(float)));
+  state.SetBytesProcessed(std::int64_t(state.iterations()) *
+                          std::int64_t(value.as<Volume>().values.size() * sizeof(float)));
 }
 
 BENCHMARK_F(Fixture, ReadALargeVolume)(benchmark::State& state) {

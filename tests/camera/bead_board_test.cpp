@@ -25,15 +25,17 @@ struct Exposed {
   List<Image> images;
 };
 
-Exposed expose(std::uint64_t seed, int views, const simulate::DeviceOptions& device = {}, const simulate::Exposure& exposure = {}) {
+Exposed expose(std::uint64_t seed, int views, const simulate::DeviceOptions& device = {},
+               const simulate::Exposure& exposure = {}) {
   Exposed exposed;
   exposed.device = simulate::make_device(device);
   simulate::BoardPoses poses;
   poses.views = views;
   exposed.poses = simulate::draw_board_poses(exposed.board, poses, seed);
   for (std::size_t i = 0; i < exposed.poses.size(); ++i)
-    exposed.images.add("view" + std::to_string(i + 1),
-                       simulate::expose_board(exposed.board, exposed.device, exposed.poses[i], exposure, seed * 100 + i));
+    exposed.images.add(
+        "view" + std::to_string(i + 1),
+        simulate::expose_board(exposed.board, exposed.device, exposed.poses[i], exposure, seed * 100 + i));
   return exposed;
 }
 
@@ -65,12 +67,12 @@ TEST(FindBeads, CentreIsRightToAHundredthOfAPixel) {
 TEST(FindBeads, LeavesOutWhatIsNoDisc) {
   cv::Mat1f grey(200, 200, 1000.f);
   cv::circle(grey, {60, 60}, 6, 300.f, cv::FILLED, cv::LINE_AA);
-  cv::rectangle(grey, {100, 40}, {140, 46}, 300.f, cv::FILLED);   // a bar
+  cv::rectangle(grey, {100, 40}, {140, 46}, 300.f, cv::FILLED);    // a bar
   cv::circle(grey, {60, 120}, 6, 300.f, cv::FILLED, cv::LINE_AA);  // two that merge
   cv::circle(grey, {68, 124}, 6, 300.f, cv::FILLED, cv::LINE_AA);
-  cv::circle(grey, {2, 150}, 6, 300.f, cv::FILLED, cv::LINE_AA);   // cut by the border
+  cv::circle(grey, {2, 150}, 6, 300.f, cv::FILLED, cv::LINE_AA);     // cut by the border
   cv::circle(grey, {150, 150}, 40, 300.f, cv::FILLED, cv::LINE_AA);  // too large
-  cv::circle(grey, {40, 180}, 6, 300.f, 2, cv::LINE_AA);           // a ring
+  cv::circle(grey, {40, 180}, 6, 300.f, 2, cv::LINE_AA);             // a ring
   const auto found = camera::find_beads({grey}, {20, 0.2});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT((found[0].centre_px - Eigen::Vector2d(60, 60)).norm(), 0.05);
@@ -85,12 +87,14 @@ TEST(FindBeads, CentresInRenderedImages) {
     for (const auto& found : camera::find_beads(exposed.images[n], {})) {
       double nearest = 1e9;
       for (const auto& bead : exposed.board.beads)
-        nearest = std::min(nearest, (simulate::image_of(exposed.device, exposed.poses[n], bead.centre_mm) - found.centre_px).norm());
+        nearest = std::min(
+            nearest, (simulate::image_of(exposed.device, exposed.poses[n], bead.centre_mm) - found.centre_px).norm());
       squares += nearest * nearest;
       worst = std::max(worst, nearest);
       ++count;
     }
-  std::printf("%d beads found, rms %.4f px per coordinate, worst %.3f px\n", count, std::sqrt(squares / count / 2), worst);
+  std::printf("%d beads found, rms %.4f px per coordinate, worst %.3f px\n", count, std::sqrt(squares / count / 2),
+              worst);
   EXPECT_GT(count, 90);
   EXPECT_LT(std::sqrt(squares / count / 2), 0.1);
 }
@@ -100,7 +104,8 @@ TEST(MatchBoard, EveryMatchIsRightAndFewAreMissing) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Exposed exposed = expose(seed, 4);
     for (std::size_t n = 0; n < exposed.images.size(); ++n) {
-      const auto match = camera::match_board(exposed.board, camera::find_beads(exposed.images[n], {}), 1024, 1024, "view");
+      const auto match =
+          camera::match_board(exposed.board, camera::find_beads(exposed.images[n], {}), 1024, 1024, "view");
       for (std::size_t i = 0; i < match.beads.size(); ++i)
         wrong += (simulate::image_of(exposed.device, exposed.poses[n], match.board_mm[i]) - match.pixels[i]).norm() > 2;
       found += int(match.beads.size());
@@ -137,7 +142,8 @@ TEST(BeadBoard, DeviceFromRenderedImages) {
     for (std::size_t n = 0; n < 8; ++n)
       EXPECT_LT((result.cameras[n].camera_from_world.translation_mm - exposed.poses[n].translation_mm).norm(), 2);
   }
-  std::printf("worst of 3 devices: focal length %.4f %%, principal point %.3f px, residual %.3f px\n", focal, principal, worst_residual);
+  std::printf("worst of 3 devices: focal length %.4f %%, principal point %.3f px, residual %.3f px\n", focal, principal,
+              worst_residual);
   EXPECT_LT(focal, 0.15);
   EXPECT_LT(principal, 0.5);
   EXPECT_LT(worst_residual, 0.1);
@@ -169,7 +175,8 @@ TEST(BeadBoard, NoisyFaintAndBlurredBeads) {
   exposure.blur_px = 1.5;
   const Exposed exposed = expose(21, 6, {}, exposure);
   const BeadBoardResult result = calibrated(exposed.images);
-  std::printf("60 photons, faint and blurred: residual %.3f px, focal length off %.4f %%, principal point %.3f px\n", result.calibration.residual_px,
+  std::printf("60 photons, faint and blurred: residual %.3f px, focal length off %.4f %%, principal point %.3f px\n",
+              result.calibration.residual_px,
               100 * std::abs(result.calibration.intrinsics(0, 0) / exposed.device.intrinsics(0, 0) - 1),
               (result.calibration.intrinsics - exposed.device.intrinsics).topRightCorner<2, 1>().norm());
   EXPECT_LT(result.calibration.residual_px, 0.3);
@@ -236,15 +243,19 @@ TEST(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
   EXPECT_EQ(board.of_side(1, true).size(), 4u);
   EXPECT_TRUE(board.beads[0].landmark);
   EXPECT_EQ(board.beads[17].centre_mm, Eigen::Vector3d(25, 55, 40));
-  EXPECT_SAYS(read(with(kPlain, "[60, 40, 0], [10, 50, 0]]", "[60, 40, 0]]")), "side 'a': has 3 landmarks; a side is found in an image by at least 4");
-  EXPECT_SAYS(read(with(kPlain, "diameter_mm: 1.5", "diameter_mm: 2.5")), "landmarks of 3 mm are not told apart from beads of 2.5 mm");
+  EXPECT_SAYS(read(with(kPlain, "[60, 40, 0], [10, 50, 0]]", "[60, 40, 0]]")),
+              "side 'a': has 3 landmarks; a side is found in an image by at least 4");
+  EXPECT_SAYS(read(with(kPlain, "diameter_mm: 1.5", "diameter_mm: 2.5")),
+              "landmarks of 3 mm are not told apart from beads of 2.5 mm");
   std::string small = kPlain;
   for (int side = 0; side < 2; ++side)
     small = with(with(small, "diameter_mm: 1.5", "diameter_mm: 0.8"), "diameter_mm: 3", "diameter_mm: 1.1");
   EXPECT_EQ(read(small).beads[0].diameter_mm, 1.1);
   EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30, 8]")), "out of the side's plane, at most 1 mm expected");
-  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30]")), "board.yaml:5:65: side 'a': beads: at_mm: expected a point [x, y, z] in mm, got a list of 2");
-  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[20, 10.2, 0]")), "beads 5 and 7 (counted as the file lists them) overlap");
+  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[12, 30]")),
+              "board.yaml:5:65: side 'a': beads: at_mm: expected a point [x, y, z] in mm, got a list of 2");
+  EXPECT_SAYS(read(with(kPlain, "[12, 30, 0]", "[20, 10.2, 0]")),
+              "beads 5 and 7 (counted as the file lists them) overlap");
   EXPECT_SAYS(read(with(kPlain, "sides:", "side:")), "board: unknown key 'side'; did you mean 'sides'?");
   std::string flat = kPlain;
   for (std::size_t at; (at = flat.find(", 40]")) != std::string::npos;) flat.replace(at, 5, ", 5]");
@@ -261,13 +272,15 @@ TEST(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
     text += "]}\n    beads: {diameter_mm: 1.5, at_mm: [";
     for (int x : {-20, 0, 20})
       for (int y : {-20, 0, 20})
-        text += std::string(text.back() == '[' ? "" : ", ") + "[" + std::to_string(x) + ", " + std::to_string(y) + ", " + std::to_string(z) + "]";
+        text += std::string(text.back() == '[' ? "" : ", ") + "[" + std::to_string(x) + ", " + std::to_string(y) +
+                ", " + std::to_string(z) + "]";
     text += "]}\n";
   }
   put(folder / "board.yaml", text);
   EXPECT_SAYS(camera::read_board_file(folder / "board.yaml"), "side 'a' looks the same when it is turned or mirrored");
   std::string alike = kPlain;
-  alike = alike.substr(0, alike.find("  b:")) + with(alike.substr(alike.find("  a:"), alike.find("  b:") - alike.find("  a:")), "  a:", "  b:");
+  alike = alike.substr(0, alike.find("  b:")) +
+          with(alike.substr(alike.find("  a:"), alike.find("  b:") - alike.find("  a:")), "  a:", "  b:");
   const std::size_t second = alike.find("  b:");
   for (std::size_t at; (at = alike.find(", 0]", second)) != std::string::npos;) alike.replace(at, 4, ", 40]");
   put(folder / "board.yaml", alike);

@@ -8,11 +8,14 @@
 
 namespace marrow::test {
 
-inline const std::filesystem::path kBoardFile = std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/calibration/board.yaml";
+inline const std::filesystem::path kBoardFile =
+    std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/calibration/board.yaml";
 
-/// Where the beads of a board are seen in each pose, with normal noise on each coordinate. Beads outside the image are left out.
+/// Where the beads of a board are seen in each pose, with normal noise on each coordinate. Beads outside the image are
+/// left out.
 inline std::vector<camera::ViewPoints> see_board(const camera::Board& board, const read::Calibration& device,
-                                                 const std::vector<RigidTransform>& poses, double noise_px, unsigned seed) {
+                                                 const std::vector<RigidTransform>& poses, double noise_px,
+                                                 unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, 1);
   std::vector<camera::ViewPoints> views;

@@ -59,7 +59,8 @@ TEST(Calibrate, TellsAMirroredImage) {
   auto views = test::see_board(board, device, simulate::draw_board_poses(board, {}, 3), 0.1, 1);
   for (auto& view : views)
     for (auto& pixel : view.pixels) pixel.x() = 1023 - pixel.x();
-  EXPECT_SAYS(camera::calibrate(views, 1024, 1024, {}), "view 'view1': only a mirrored image explains where the beads are seen");
+  EXPECT_SAYS(camera::calibrate(views, 1024, 1024, {}),
+              "view 'view1': only a mirrored image explains where the beads are seen");
 }
 
 TEST(Calibrate, OneSideAloneDoesNotDetermineACamera) {
@@ -92,13 +93,14 @@ struct Spread {
     return sum / double(values.size());
   }
   double share_below(double limit) const {
-    return double(std::count_if(values.begin(), values.end(), [&](double v) { return v <= limit; })) / double(values.size());
+    return double(std::count_if(values.begin(), values.end(), [&](double v) { return v <= limit; })) /
+           double(values.size());
   }
 };
 
-// 8 views, at most 60 beads, 7 % pincushion, 0.2 px of noise on each coordinate. The limits hold for the mean (focal length
-// 0.15 %, principal point 0.5 px, residual within 5 % of the noise); what a single run can reach is bounded by the noise itself, so
-// the worst run is held against what that predicts.
+// 8 views, at most 60 beads, 7 % pincushion, 0.2 px of noise on each coordinate. The limits hold for the mean (focal
+// length 0.15 %, principal point 0.5 px, residual within 5 % of the noise); what a single run can reach is bounded by
+// the noise itself, so the worst run is held against what that predicts.
 TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
   const camera::Board board = camera::read_board_file(test::kBoardFile);
   ASSERT_LE(board.beads.size(), 60u);
@@ -111,7 +113,8 @@ TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
     options.principal_offset_px = {offset(random), offset(random)};
     const read::Calibration device = simulate::make_device(options);
     const auto poses = simulate::draw_board_poses(board, {}, std::uint64_t(seed));
-    const auto fit = camera::calibrate(test::see_board(board, device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
+    const auto fit =
+        camera::calibrate(test::see_board(board, device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
     const auto& found = fit.calibration;
     for (int i : {0, 1}) {
       focal.add(100 * std::abs(found.intrinsics(i, i) / device.intrinsics(i, i) - 1));
@@ -126,7 +129,8 @@ TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
   std::printf("focal length: rms %.4f %%, worst %.4f %%, predicted deviation %.4f %%, within 0.15 %%: %.1f %%\n",
               focal.root_mean_square(), focal.worst(), focal_predicted.mean(), 100 * focal.share_below(0.15));
   std::printf("principal point: rms %.3f px, worst %.3f px, predicted deviation %.3f px, within 0.5 px: %.1f %%\n",
-              principal.root_mean_square(), principal.worst(), principal_predicted.mean(), 100 * principal.share_below(0.5));
+              principal.root_mean_square(), principal.worst(), principal_predicted.mean(),
+              100 * principal.share_below(0.5));
   std::printf("residual against the noise: mean off %.2f %%, worst %.2f %%, within 5 %%: %.1f %%\n", residual.mean(),
               residual.worst(), 100 * residual.share_below(5));
   std::printf("error over predicted deviation: rms %.3f\n", ratio.root_mean_square());
@@ -160,8 +164,10 @@ TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
 
 TEST(Calibrate, SquarePixelsHaveOneFocalLengthAndOneDeviation) {
   const camera::Board board = camera::read_board_file(test::kBoardFile);
-  const auto views = test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 4), 0.2, 1);
-  const auto fit = camera::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
+  const auto views =
+      test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 4), 0.2, 1);
+  const auto fit =
+      camera::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
   EXPECT_DOUBLE_EQ(fit.calibration.intrinsics(0, 0), fit.calibration.intrinsics(1, 1));
   EXPECT_GT(fit.calibration.focal_deviation_px[0], 0);
   EXPECT_EQ(fit.calibration.focal_deviation_px[1], fit.calibration.focal_deviation_px[0]);

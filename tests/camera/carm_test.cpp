@@ -16,9 +16,7 @@ marrow::Camera view(double alpha_deg, double beta_deg, Options options = {}) {
   return carm(options)[0];
 }
 
-Vector3d towards_detector(const marrow::Camera& camera) {
-  return camera.camera_from_world.rotation.row(2);
-}
+Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
 
 TEST(CarmCamera, FrontalHasDetectorInFrontHeadUpAndLooksFromTheSource) {
   const marrow::Camera frontal = view(0, 0);

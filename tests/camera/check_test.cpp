@@ -87,7 +87,8 @@ TEST(Explanation, FlippedAxesAndUnits) {
   SeenPoints points = points_of(camera);
   for (auto& p : points.world_mm) p = Vector3d(-p.x(), -p.y(), p.z());
   expect_explained(camera, points, "RAS in place of LPS");
-  for (const auto& [unit, factor] : std::map<std::string, double>{{"metres", 0.001}, {"centimetres", 0.1}, {"inches", 1 / 25.4}}) {
+  for (const auto& [unit, factor] :
+       std::map<std::string, double>{{"metres", 0.001}, {"centimetres", 0.1}, {"inches", 1 / 25.4}}) {
     points = points_of(camera);
     for (auto& p : points.world_mm) p *= factor;
     expect_explained(camera, points, "the points are in " + unit + ", not mm");
@@ -141,7 +142,8 @@ TEST(ImplausibleNumbers, AreNamed) {
   const auto says = [&](const Camera& camera, const std::string& said, const camera::Device& device = {},
                         std::vector<Vector3d> points = {}) {
     std::string all;
-    for (const auto& sentence : camera::implausible_numbers(camera, device, points.empty() ? object : points)) all += sentence + "\n";
+    for (const auto& sentence : camera::implausible_numbers(camera, device, points.empty() ? object : points))
+      all += sentence + "\n";
     EXPECT_NE(all.find(said), std::string::npos) << "it said: " << all;
   };
   const Camera right = camera_at(0, 0);
@@ -160,10 +162,13 @@ TEST(ImplausibleNumbers, AreNamed) {
   says(camera, "lies in the middle of an image of 320 x 256 pixels, but this one has 640 x 512");
   camera.intrinsics.topRightCorner<2, 1>() = Vector2d(-30, 256);
   says(camera, "the principal point (-30, 256) lies outside the image");
-  says(right, "the focal length is 2000 px, but 1000 mm from source to detector and pixels of 0.3 mm make 3333", {1000, 0.3, 0});
-  says(right, "the detector is 200 mm wide, smaller than the image says: 320 x 256 mm at 0.5 mm per pixel", {0, 0.5, 200});
+  says(right, "the focal length is 2000 px, but 1000 mm from source to detector and pixels of 0.3 mm make 3333",
+       {1000, 0.3, 0});
+  says(right, "the detector is 200 mm wide, smaller than the image says: 320 x 256 mm at 0.5 mm per pixel",
+       {0, 0.5, 200});
   says(right, "the detector is 200 mm wide, smaller than the image says", {1000, 0, 200});
-  says(right, "the object is 0.1386 mm large; are its coordinates in metres", {}, {{-0.04, -0.04, -0.04}, {0.04, 0.04, 0.04}});
+  says(right, "the object is 0.1386 mm large; are its coordinates in metres", {},
+       {{-0.04, -0.04, -0.04}, {0.04, 0.04, 0.04}});
   camera = right;
   camera.camera_from_world.translation_mm *= 0.001;
   says(camera, "the object is 0.6 mm from the X-ray source");
@@ -254,7 +259,9 @@ TEST(CheckNode, WarnsInWords) {
   Ran ran = run(views, options);
   ASSERT_EQ(ran.warnings.size(), 1u);
   EXPECT_NE(ran.warnings[0].find("view 'two': the points are"), std::string::npos);
-  EXPECT_NE(ran.warnings[0].find("its inner parameters are right, its pose is not, or the object has moved"), std::string::npos) << ran.warnings[0];
+  EXPECT_NE(ran.warnings[0].find("its inner parameters are right, its pose is not, or the object has moved"),
+            std::string::npos)
+      << ran.warnings[0];
   EXPECT_NEAR(ran.value("two.mean_at_object"), 5, 0.4);
   EXPECT_LT(ran.value("two.error_with_free_pose"), 1e-3);
   Camera longer = right[1].camera;
@@ -264,8 +271,10 @@ TEST(CheckNode, WarnsInWords) {
   stretched.add("two", view_of("two", longer));
   ran = run(stretched, options);
   ASSERT_EQ(ran.warnings.size(), 1u);
-  EXPECT_NE(ran.warnings[0].find("with the best pose: focal length, principal point, distortion or the points themselves are wrong"),
-            std::string::npos) << ran.warnings[0];
+  EXPECT_NE(ran.warnings[0].find(
+                "with the best pose: focal length, principal point, distortion or the points themselves are wrong"),
+            std::string::npos)
+      << ran.warnings[0];
   List<View> twice;
   twice.add("one", right[0]);
   twice.add("two", view_of("two", right[0].camera));
@@ -290,9 +299,11 @@ TEST(CheckNode, DrawsTheOutlineOfAMesh) {
   EXPECT_EQ(outline_edges(cube, views[0].camera).size(), 4u) << "of the face towards the source";
   const Ran ran = run(views, {}, &cube);
   EXPECT_TRUE(ran.warnings.empty());
-  // The nearer face is 30 mm behind the isocentre, towards the source: its edge lies at 30 * 2000 / 570 px from the middle.
+  // The nearer face is 30 mm behind the isocentre, towards the source: its edge lies at 30 * 2000 / 570 px from the
+  // middle.
   const double u = 319.5 + 9 + 30 * 2000 / 570.0, v = 255.5 - 6, scale = 1000 / 640.0;
-  const cv::Vec3b pixel = ran.checked.pictures[0].pixels.at<cv::Vec3b>(int((v + 0.5) * scale), int(std::lround((u + 0.5) * scale - 0.5)));
+  const cv::Vec3b pixel =
+      ran.checked.pictures[0].pixels.at<cv::Vec3b>(int((v + 0.5) * scale), int(std::lround((u + 0.5) * scale - 0.5)));
   EXPECT_GT(pixel[2], pixel[0] + 40) << "blue";
 }
 
@@ -304,7 +315,8 @@ TEST(PointsFile, Faults) {
     return camera::read_points_file(folder / "p.yaml");
   };
   EXPECT_EQ(read(good)[0].seen_px.at("one"), Vector2d(4, 5));
-  EXPECT_SAYS(read(with(good, "at_mm: [1, 2, 3], ", "")), "p.yaml:3:24: point 1: a point without at_mm needs to be seen in two views");
+  EXPECT_SAYS(read(with(good, "at_mm: [1, 2, 3], ", "")),
+              "p.yaml:3:24: point 1: a point without at_mm needs to be seen in two views");
   EXPECT_SAYS(read(with(good, "[4, 5]", "[4]")), "point 1: seen_px: one: expected 2 numbers, got a list of 1");
   EXPECT_SAYS(read(with(good, "{one: [4, 5]}", "[4, 5]")), "expected the point's place per view");
   EXPECT_SAYS(read("marrow-points: 1\npoints: []\n"), "expected a list of points");
@@ -325,8 +337,10 @@ TEST(CheckNode, RealWristCameras) {
     for (const char* number : {"01", "02"}) {
       View view;
       view.name = std::string("cam") + number;
-      view.image = read::read_image_file(data / "images" / ("xr_rad_uln_cam" + std::string(number) + "_UND." + frame + ".tif"));
-      view.camera = read::read_camera_file(data / "cameras" / ("xr_calib_wrist_cam" + std::string(number) + ".txt")).camera;
+      view.image =
+          read::read_image_file(data / "images" / ("xr_rad_uln_cam" + std::string(number) + "_UND." + frame + ".tif"));
+      view.camera =
+          read::read_camera_file(data / "cameras" / ("xr_calib_wrist_cam" + std::string(number) + ".txt")).camera;
       views.add(view.name, view);
     }
     std::string text = "marrow-points: 1\npoints:\n";
@@ -338,8 +352,8 @@ TEST(CheckNode, RealWristCameras) {
           out << YAML::Flow << node;
           return std::string(out.c_str());
         };
-        text += "  - {at_mm: " + list(bead["xyz_mm"]) + ", seen_px: {cam01: " + list(bead["uv_cam01"]) + ", cam02: " +
-                list(bead["uv_cam02"]) + "}}\n";
+        text += "  - {at_mm: " + list(bead["xyz_mm"]) + ", seen_px: {cam01: " + list(bead["uv_cam01"]) +
+                ", cam02: " + list(bead["uv_cam02"]) + "}}\n";
       }
     put(folder / "beads.yaml", text);
     Options options;
@@ -347,8 +361,8 @@ TEST(CheckNode, RealWristCameras) {
     const Ran ran = run(views, options);
     for (const char* name : {"cam01", "cam02"})
       std::printf("frame %s, %s: %g beads, rms %.3f px, worst %.3f px, %.3f mm at the beads\n", frame, name,
-                  ran.value(name + std::string(".points")), ran.value(name + std::string(".error")), ran.value(name + std::string(".worst")),
-                  ran.value(name + std::string(".mean_at_object")));
+                  ran.value(name + std::string(".points")), ran.value(name + std::string(".error")),
+                  ran.value(name + std::string(".worst")), ran.value(name + std::string(".mean_at_object")));
     EXPECT_TRUE(ran.warnings.empty()) << ran.warnings[0];
     EXPECT_LT(ran.value("error"), 0.4);
     // As if the images were mirrored, the same cameras are found out.
@@ -367,7 +381,8 @@ TEST(CheckNode, RealWristCameras) {
     put(folder / "beads.yaml", "marrow-points: 1\npoints:\n" + mirrored);
     const Ran found = run(views, options);
     ASSERT_EQ(found.warnings.size(), 2u);
-    for (const auto& warning : found.warnings) EXPECT_NE(warning.find("if the image is mirrored left to right"), std::string::npos) << warning;
+    for (const auto& warning : found.warnings)
+      EXPECT_NE(warning.find("if the image is mirrored left to right"), std::string::npos) << warning;
   }
 }
 

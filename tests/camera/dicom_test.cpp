@@ -50,13 +50,13 @@ Elements without(Elements elements, std::initializer_list<std::uint32_t> tags) {
   return elements;
 }
 
-Vector3d towards_detector(const marrow::Camera& camera) {
-  return camera.camera_from_world.rotation.row(2);
-}
+Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
 
 /// Without PatientOrientation the angles alone decide.
 marrow::Camera at(const std::string& primary, const std::string& secondary) {
-  return read(with(with(without(fluoroscopy(), {kOrientation}), kPrimary, "DS:" + primary), kSecondary, "DS:" + secondary)).camera;
+  return read(with(with(without(fluoroscopy(), {kOrientation}), kPrimary, "DS:" + primary), kSecondary,
+                   "DS:" + secondary))
+      .camera;
 }
 
 TEST(DicomCamera, LeftAnteriorObliqueIsPositive) {
@@ -78,7 +78,8 @@ TEST(DicomCamera, BothAnglesTogether) {
   const Vector3d expected(std::sin(p) * std::cos(s), -std::cos(p) * std::cos(s), std::sin(s));
   const marrow::Camera camera = at(" -30.0 ", "+20");
   EXPECT_TRUE(towards_detector(camera).isApprox(expected, 1e-12));
-  EXPECT_LT((source_position_mm(camera) + 600 * expected).norm(), 1e-9) << "the source lies opposite, SOD from the isocentre";
+  EXPECT_LT((source_position_mm(camera) + 600 * expected).norm(), 1e-9)
+      << "the source lies opposite, SOD from the isocentre";
 }
 
 TEST(DicomCamera, DistancesAndPixels) {
@@ -98,10 +99,14 @@ TEST(DicomCamera, ImagerPixelSpacingComesFirst) {
   const Read alone = read(without(both, {0x00181164}));
   EXPECT_NEAR(alone.camera.intrinsics(0, 0), 1000 / 0.18, 1e-9);
   ASSERT_EQ(alone.warnings.size(), 1u);
-  EXPECT_NE(alone.warnings[0].find("ImagerPixelSpacing (0018,1164) is missing; PixelSpacing (0028,0030) is taken for it"), std::string::npos);
+  EXPECT_NE(
+      alone.warnings[0].find("ImagerPixelSpacing (0018,1164) is missing; PixelSpacing (0028,0030) is taken for it"),
+      std::string::npos);
   const Read calibrated = read(with(without(both, {0x00181164}), 0x00280a02, "CS:GEOMETRY"));
-  EXPECT_NEAR(calibrated.camera.intrinsics(0, 0), 1000 / 0.3, 1e-9) << "at the isocentre a pixel is smaller by SOD / SID";
-  EXPECT_NE(calibrated.warnings.at(0).find("is calibrated to the patient, so it is multiplied by the magnification"), std::string::npos);
+  EXPECT_NEAR(calibrated.camera.intrinsics(0, 0), 1000 / 0.3, 1e-9)
+      << "at the isocentre a pixel is smaller by SOD / SID";
+  EXPECT_NE(calibrated.warnings.at(0).find("is calibrated to the patient, so it is multiplied by the magnification"),
+            std::string::npos);
 }
 
 TEST(DicomCamera, IsocentreDistanceFromTheMagnification) {
@@ -110,11 +115,14 @@ TEST(DicomCamera, IsocentreDistanceFromTheMagnification) {
 }
 
 TEST(DicomCamera, NamesAllThatIsMissing) {
-  EXPECT_SAYS(read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164, kPrimary, kSecondary})),
-              "x.dcm: its header does not say how it was taken; missing: PositionerPrimaryAngle (0018,1510) (or use camera.carm); "
-              "PositionerSecondaryAngle (0018,1511) (or use camera.carm); DistanceSourceToDetector (0018,1110) (or give "
-              "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor (0018,1114) (or "
-              "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
+  EXPECT_SAYS(
+      read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164, kPrimary, kSecondary})),
+      "x.dcm: its header does not say how it was taken; missing: PositionerPrimaryAngle (0018,1510) (or use "
+      "camera.carm); "
+      "PositionerSecondaryAngle (0018,1511) (or use camera.carm); DistanceSourceToDetector (0018,1110) (or give "
+      "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor "
+      "(0018,1114) (or "
+      "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
   Options given;
   given.source_to_detector_mm = 1100;
   given.source_to_isocentre_mm = 700;
@@ -124,8 +132,8 @@ TEST(DicomCamera, NamesAllThatIsMissing) {
   EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 700, 1e-9);
 }
 
-// What PatientOrientation says is what the image shows to its right and downwards. Whatever it is, the patient's left must come out
-// where the image as read shows it.
+// What PatientOrientation says is what the image shows to its right and downwards. Whatever it is, the patient's left
+// must come out where the image as read shows it.
 TEST(DicomCamera, OrientationOfTheStoredImage) {
   const Vector3d left(20, 0, 0), head(0, 0, 20), back(0, 20, 0);
   const auto moved = [](const marrow::Camera& camera, const Vector3d& to) {
@@ -152,22 +160,30 @@ TEST(DicomCamera, OrientationOfTheStoredImage) {
   EXPECT_TRUE(towards_detector(camera).isApprox(Vector3d::UnitX()));
   EXPECT_LT(moved(camera, head).y(), 0);
   for (const char* letters : {"A\\F", "P\\F"})
-    EXPECT_GT(moved(read(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, std::string("CS:") + letters)).camera, back).x() *
-                  moved(camera, back).x(), 0) << "mirrored or not, the image as read is the one that the source sees";
+    EXPECT_GT(
+        moved(read(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, std::string("CS:") + letters)).camera,
+              back)
+                .x() *
+            moved(camera, back).x(),
+        0)
+        << "mirrored or not, the image as read is the one that the source sees";
   // Oblique, with two letters each.
   EXPECT_TRUE(read(with(with(fluoroscopy(), kPrimary, "DS:40"), kOrientation, "CS:RP\\F")).warnings.empty());
 }
 
 TEST(DicomCamera, OrientationThatTheAnglesCannotShow) {
-  EXPECT_SAYS(read(with(fluoroscopy(), kOrientation, "CS:A\\F")),
-              "PatientOrientation (0020,0020) says 'A\\F', which no view from these angles shows; one of them is wrong");
+  EXPECT_SAYS(
+      read(with(fluoroscopy(), kOrientation, "CS:A\\F")),
+      "PatientOrientation (0020,0020) says 'A\\F', which no view from these angles shows; one of them is wrong");
 }
 
 TEST(DicomCamera, WarnsWhereTheHeaderIsSilent) {
   const Read silent = read(without(fluoroscopy(), {kOrientation}));
   ASSERT_EQ(silent.warnings.size(), 1u);
-  EXPECT_NE(silent.warnings[0].find("PatientOrientation (0020,0020) is missing, so the image is taken to have the head up and to be seen "
-                                    "from the source"), std::string::npos);
+  EXPECT_NE(silent.warnings[0].find(
+                "PatientOrientation (0020,0020) is missing, so the image is taken to have the head up and to be seen "
+                "from the source"),
+            std::string::npos);
   const Read prone = read(with(fluoroscopy(), 0x00185100, "CS:HFP"));
   ASSERT_EQ(prone.warnings.size(), 1u);
   EXPECT_NE(prone.warnings[0].find("PatientPosition (0018,5100) is HFP"), std::string::npos);
@@ -191,11 +207,15 @@ TEST(DicomCamera, WarnsOfTheCentreOnce) {
 
 TEST(DicomCamera, RefusesWhatCannotBe) {
   EXPECT_SAYS(read(with(fluoroscopy(), 0x00080060, "CS:CT")), "is of modality 'CT'; expected XA or RF");
-  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181110, "DS:500")), "the isocentre (600.000000 mm from the source) lies behind the detector");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181110, "DS:500")),
+              "the isocentre (600.000000 mm from the source) lies behind the detector");
   EXPECT_SAYS(read(with(with(fluoroscopy(), 0x00181110, "DS:1.0"), 0x00181111, "DS:0.6")), "mm, which no C-arm has");
-  EXPECT_SAYS(read(with(fluoroscopy(), kSecondary, "DS:120")), "PositionerSecondaryAngle (0018,1511) is 120.000000, expected -90 to 90");
-  EXPECT_SAYS(read(with(fluoroscopy(), kPrimary, "DS:left")), "PositionerPrimaryAngle (0018,1510): expected 1 number, got 'left'");
-  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181164, "DS:0.3")), "ImagerPixelSpacing (0018,1164): expected 2 numbers, got '0.3'");
+  EXPECT_SAYS(read(with(fluoroscopy(), kSecondary, "DS:120")),
+              "PositionerSecondaryAngle (0018,1511) is 120.000000, expected -90 to 90");
+  EXPECT_SAYS(read(with(fluoroscopy(), kPrimary, "DS:left")),
+              "PositionerPrimaryAngle (0018,1510): expected 1 number, got 'left'");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181164, "DS:0.3")),
+              "ImagerPixelSpacing (0018,1164): expected 2 numbers, got '0.3'");
   Options second;
   second.frame = 2;
   EXPECT_SAYS(read(with(fluoroscopy(), 0x00181500, "CS:DYNAMIC"), second), "the arm moves during this run");

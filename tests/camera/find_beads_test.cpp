@@ -18,15 +18,19 @@ struct Ellipse {
   double u, v, across_px, down_px, dark = 400;
 };
 
-cv::Mat1f image_of(const std::vector<Ellipse>& ellipses, int width = 300, int height = 260, double noise = 0, double slope = 0) {
+cv::Mat1f image_of(const std::vector<Ellipse>& ellipses, int width = 300, int height = 260, double noise = 0,
+                   double slope = 0) {
   cv::Mat1f grey(height, width);
   std::mt19937 random(5);
   for (int v = 0; v < height; ++v)
     for (int u = 0; u < width; ++u) {
       double value = 1000 + slope * u + 0.5 * slope * v;
       for (const Ellipse& e : ellipses) {
-        const double across = 2 * (u - e.u) / e.across_px, down = 2 * (v - e.v) / e.down_px, radius = std::hypot(across, down);
-        const double edge = radius > 0 ? (1 - radius) * std::hypot(across, down) / std::hypot(2 * across / e.across_px, 2 * down / e.down_px) : 10;
+        const double across = 2 * (u - e.u) / e.across_px, down = 2 * (v - e.v) / e.down_px,
+                     radius = std::hypot(across, down);
+        const double edge = radius > 0 ? (1 - radius) * std::hypot(across, down) /
+                                             std::hypot(2 * across / e.across_px, 2 * down / e.down_px)
+                                       : 10;
         value -= e.dark * std::clamp(edge + 0.5, 0.0, 1.0);
       }
       grey(v, u) = float(value + noise * (double(random()) / 2147483648.0 - 1));
@@ -48,7 +52,8 @@ TEST(FindBeads, RoundMeansFourFifths) {
 }
 
 TEST(FindBeads, OfAtLeastTwelvePixelsAndAtMostTheLargest) {
-  // A disc of 12 pixels has a diameter of 3.9; smoothing makes small ones a little larger. The large one sets the scale of the contrasts.
+  // A disc of 12 pixels has a diameter of 3.9; smoothing makes small ones a little larger. The large one sets the scale
+  // of the contrasts.
   const Ellipse large{60, 60, 16, 16};
   EXPECT_EQ(count({large, {150, 120, 4.8, 4.8}}), 2u);
   EXPECT_EQ(count({large, {150, 120, 2.2, 2.2}}), 1u);
@@ -93,14 +98,19 @@ TEST(FindBeads, AllFourBordersAreAlike) {
 
 TEST(FindBeads, CentresOnSlopesAndBesideOthers) {
   // Largest first. The neighbour's darkness would pull a centre by tenths of a pixel.
-  const std::vector<Ellipse> beads{{60.3, 70.8, 16, 16}, {84.1, 70.2, 12, 12}, {150.5, 120.25, 9, 9, 250}, {166.2, 131.7, 8.6, 8.6, 300}, {240.4, 200.6, 14, 14, 350}};
+  const std::vector<Ellipse> beads{{60.3, 70.8, 16, 16},
+                                   {84.1, 70.2, 12, 12},
+                                   {150.5, 120.25, 9, 9, 250},
+                                   {166.2, 131.7, 8.6, 8.6, 300},
+                                   {240.4, 200.6, 14, 14, 350}};
   for (const double slope : {0.0, 1.5}) {
     auto found = find_beads({image_of(beads, 300, 260, 0, slope)}, {24, 0.2});
     ASSERT_EQ(found.size(), beads.size());
     for (std::size_t i = 0; i + 1 < found.size(); ++i) EXPECT_GE(found[i].diameter_px, found[i + 1].diameter_px);
     for (const Ellipse& bead : beads) {
       const auto nearest = std::min_element(found.begin(), found.end(), [&](const BeadImage& a, const BeadImage& b) {
-        return std::hypot(a.centre_px.x() - bead.u, a.centre_px.y() - bead.v) < std::hypot(b.centre_px.x() - bead.u, b.centre_px.y() - bead.v);
+        return std::hypot(a.centre_px.x() - bead.u, a.centre_px.y() - bead.v) <
+               std::hypot(b.centre_px.x() - bead.u, b.centre_px.y() - bead.v);
       });
       EXPECT_NEAR(nearest->centre_px.x(), bead.u, 0.04) << slope;
       EXPECT_NEAR(nearest->centre_px.y(), bead.v, 0.04) << slope;

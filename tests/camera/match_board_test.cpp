@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which disc is which bead, from lists of discs: with beads missing, with discs that are none, and without enough of them.
+// Which disc is which bead, from lists of discs: with beads missing, with discs that are none, and without enough of
+// them.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -22,8 +23,10 @@ const camera::Board& board() {
   return board;
 }
 
-/// The discs of a view, the landmarks first, without so many of the other beads of each side, and with discs that are no beads.
-Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_upper, int others, double pincushion_percent, double noise_px = 0.1) {
+/// The discs of a view, the landmarks first, without so many of the other beads of each side, and with discs that are
+/// no beads.
+Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_upper, int others,
+         double pincushion_percent, double noise_px = 0.1) {
   simulate::DeviceOptions options;
   options.pincushion_percent = pincushion_percent;
   const read::Calibration device = simulate::make_device(options);
@@ -42,7 +45,8 @@ Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_uppe
         --left[bead.side];
         continue;
       }
-      const Eigen::Vector2d at = simulate::image_of(device, pose, bead.centre_mm) + noise_px * Eigen::Vector2d(2 * part() - 1, 2 * part() - 1);
+      const Eigen::Vector2d at =
+          simulate::image_of(device, pose, bead.centre_mm) + noise_px * Eigen::Vector2d(2 * part() - 1, 2 * part() - 1);
       if (at.x() < 5 || at.y() < 5 || at.x() > 1018 || at.y() > 1018) continue;
       seen.discs.push_back({at, landmark ? 17.0 : 8.5, 100});
       seen.beads.push_back(int(i));
@@ -62,7 +66,8 @@ Matched match(const Seen& seen) {
   Matched matched;
   const camera::ViewPoints points = camera::match_board(board(), seen.discs, 1024, 1024, "view");
   for (std::size_t i = 0; i < points.beads.size(); ++i) {
-    const auto disc = std::find_if(seen.discs.begin(), seen.discs.end(), [&](const camera::BeadImage& one) { return one.centre_px == points.pixels[i]; });
+    const auto disc = std::find_if(seen.discs.begin(), seen.discs.end(),
+                                   [&](const camera::BeadImage& one) { return one.centre_px == points.pixels[i]; });
     const bool is_right = seen.beads[std::size_t(disc - seen.discs.begin())] == points.beads[i];
     (is_right ? matched.right : matched.wrong) += 1;
     EXPECT_EQ(points.board_mm[i], board().beads[std::size_t(points.beads[i])].centre_mm);
@@ -92,6 +97,8 @@ TEST(MatchBoard, ASideIsFoundBySixTenthsOfItsBeads) {
     const auto of = [&](std::size_t missing) { return see(2, lower ? missing : 0, lower ? 0 : missing, 0, 0, 0); };
     EXPECT_EQ(match(of(9)).wrong, 0);
     const std::string message = test::message_of([&] { match(of(12)); });
-    EXPECT_NE(message.find(std::string("side '") + (lower ? "lower" : "upper") + "' of the board is not found"), std::string::npos) << message;
+    EXPECT_NE(message.find(std::string("side '") + (lower ? "lower" : "upper") + "' of the board is not found"),
+              std::string::npos)
+        << message;
   }
 }

@@ -26,11 +26,14 @@ Camera right_camera() {
 std::vector<Vector3d> object_seen_by(const Camera& camera) {
   const Vector3d source = source_position_mm(camera);
   const Vector2d middle(0.5 * camera.width_px, 0.5 * camera.height_px);
-  return {source + 590 * ray_direction(camera, middle - Vector2d(20, 20)), source + 610 * ray_direction(camera, middle + Vector2d(20, 20))};
+  return {source + 590 * ray_direction(camera, middle - Vector2d(20, 20)),
+          source + 610 * ray_direction(camera, middle + Vector2d(20, 20))};
 }
 
-/// Whether a sentence with these words is said, and no other. Without an object of its own: of one that the camera sees.
-bool says(const std::string& words, const Camera& camera, const Device& device = {}, std::vector<Vector3d> object = {}) {
+/// Whether a sentence with these words is said, and no other. Without an object of its own: of one that the camera
+/// sees.
+bool says(const std::string& words, const Camera& camera, const Device& device = {},
+          std::vector<Vector3d> object = {}) {
   if (object.empty()) object = object_seen_by(camera);
   const auto sentences = camera::implausible_numbers(camera, device, object);
   for (const std::string& sentence : sentences) EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
@@ -77,7 +80,8 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
 
 TEST(Plausibility, AnglesOfTheImage) {
   for (const auto& [angle, said] : {std::pair(59.9, false), {60.1, true}, {2.02, false}, {1.98, true}})
-    EXPECT_EQ(says("opens an image of 640 px", with_focal(focal_of_angle(angle), focal_of_angle(angle))), said) << angle;
+    EXPECT_EQ(says("opens an image of 640 px", with_focal(focal_of_angle(angle), focal_of_angle(angle))), said)
+        << angle;
 }
 
 TEST(Plausibility, PixelsAreSquareToATenth) {
@@ -87,7 +91,8 @@ TEST(Plausibility, PixelsAreSquareToATenth) {
 
 TEST(Plausibility, FocalLengthIsThatOfTheDeviceToATwentieth) {
   for (const auto& [ratio, said] : {std::pair(1.049, false), {1.051, true}, {0.951, false}, {0.949, true}})
-    EXPECT_EQ(says("the pixels are scaled to the patient, or binned?", right_camera(), {1000, 0.5 * ratio, 0}), said) << ratio;
+    EXPECT_EQ(says("the pixels are scaled to the patient, or binned?", right_camera(), {1000, 0.5 * ratio, 0}), said)
+        << ratio;
   EXPECT_FALSE(says("", right_camera(), {2000, 0, 0})) << "without the pixels' size nothing is known";
   EXPECT_FALSE(says("", right_camera(), {0, 5, 0}));
 }
@@ -95,7 +100,8 @@ TEST(Plausibility, FocalLengthIsThatOfTheDeviceToATwentieth) {
 TEST(Plausibility, TheImageFitsOnTheDetectorToAFiftieth) {
   // 640 x 512 pixels of 0.5 mm.
   const auto of = [](double detector_mm, double pixel_mm, double source_to_detector_mm) {
-    return says("the size of a pixel is too large, or the image was enlarged", right_camera(), {source_to_detector_mm, pixel_mm, detector_mm});
+    return says("the size of a pixel is too large, or the image was enlarged", right_camera(),
+                {source_to_detector_mm, pixel_mm, detector_mm});
   };
   EXPECT_FALSE(of(320 / 1.019, 0.5, 0));
   EXPECT_TRUE(of(320 / 1.021, 0.5, 0));
@@ -111,10 +117,16 @@ TEST(Plausibility, TheImageFitsOnTheDetectorToAFiftieth) {
 TEST(Plausibility, PrincipalPoints) {
   for (const double factor : {0.25, 0.5, 2.0, 4.0}) {
     const std::string size = std::to_string(int(640 * factor)) + " x " + std::to_string(int(512 * factor));
-    EXPECT_TRUE(says("lies in the middle of an image of " + size, with_principal(320 * factor + 0.029 * factor * 640, 256 * factor))) << factor;
-    EXPECT_TRUE(says("lies in the middle of an image of " + size, with_principal(320 * factor, 256 * factor - 0.029 * factor * 512))) << factor;
-    const auto beyond = camera::implausible_numbers(with_principal(320 * factor + 0.031 * factor * 640, 256 * factor), {}, object_seen_by(right_camera()));
-    for (const std::string& sentence : beyond) EXPECT_EQ(sentence.find("in the middle of an image of"), std::string::npos) << sentence;
+    EXPECT_TRUE(says("lies in the middle of an image of " + size,
+                     with_principal(320 * factor + 0.029 * factor * 640, 256 * factor)))
+        << factor;
+    EXPECT_TRUE(says("lies in the middle of an image of " + size,
+                     with_principal(320 * factor, 256 * factor - 0.029 * factor * 512)))
+        << factor;
+    const auto beyond = camera::implausible_numbers(with_principal(320 * factor + 0.031 * factor * 640, 256 * factor),
+                                                    {}, object_seen_by(right_camera()));
+    for (const std::string& sentence : beyond)
+      EXPECT_EQ(sentence.find("in the middle of an image of"), std::string::npos) << sentence;
   }
   EXPECT_FALSE(says("", with_principal(0.74 * 640, 0.26 * 512)));
   EXPECT_TRUE(says("lies far from the middle", with_principal(0.76 * 640, 0.5 * 512)));
@@ -126,24 +138,34 @@ TEST(Plausibility, PrincipalPoints) {
 
 TEST(Plausibility, SizesAndDistancesOfTheObject) {
   for (const auto& [extent, said] : {std::pair(3.1, false), {2.9, true}})
-    EXPECT_EQ(says("are its coordinates in metres or centimetres?", right_camera(), {}, object_at(600, extent)), said) << extent;
+    EXPECT_EQ(says("are its coordinates in metres or centimetres?", right_camera(), {}, object_at(600, extent)), said)
+        << extent;
   for (const auto& [extent, said] : {std::pair(2490.0, false), {2510.0, true}})
-    EXPECT_EQ(says("are its coordinates in a smaller unit than mm?", right_camera(), {}, object_at(1600, extent)), said) << extent;
+    EXPECT_EQ(says("are its coordinates in a smaller unit than mm?", right_camera(), {}, object_at(1600, extent)), said)
+        << extent;
   for (const auto& [distance, said] : {std::pair(151.0, false), {149.0, true}, {4990.0, false}, {5010.0, true}})
-    EXPECT_EQ(says("mm from the X-ray source, where C-arms have 300 to 1500", right_camera(), {}, object_at(distance, 50)), said) << distance;
+    EXPECT_EQ(
+        says("mm from the X-ray source, where C-arms have 300 to 1500", right_camera(), {}, object_at(distance, 50)),
+        said)
+        << distance;
   EXPECT_FALSE(says("", right_camera(), {}, {object_at(600, 0)[0]})) << "one point has no extent";
 }
 
 TEST(Plausibility, ObjectsBehindTheSourceOrBesideTheImage) {
   const std::vector<Vector3d> behind = object_at(-600, 50);
   std::vector<Vector3d> one = object_seen_by(right_camera());
-  one.push_back(source_position_mm(right_camera()) - 10 * Vector3d(right_camera().camera_from_world.rotation.row(2).transpose()));
+  one.push_back(source_position_mm(right_camera()) -
+                10 * Vector3d(right_camera().camera_from_world.rotation.row(2).transpose()));
   EXPECT_TRUE(says("1 of 3 points of the object lie behind the X-ray source", right_camera(), {}, one));
   EXPECT_TRUE(says("2 of 2 points of the object lie behind the X-ray source", right_camera(), {}, behind));
   // Beside the image: where a pixel more would be in it.
   const Camera camera = right_camera();
-  const auto at = [&](double u, double v) { return Vector3d(source_position_mm(camera) + 600 * ray_direction(camera, {u, v})); };
-  const auto is_said = [&](const std::vector<Vector3d>& object) { return says("the object is projected wholly outside the image", camera, {}, object); };
+  const auto at = [&](double u, double v) {
+    return Vector3d(source_position_mm(camera) + 600 * ray_direction(camera, {u, v}));
+  };
+  const auto is_said = [&](const std::vector<Vector3d>& object) {
+    return says("the object is projected wholly outside the image", camera, {}, object);
+  };
   for (const auto& [u, v] : {std::pair(-1.5, 200.0), {640.5, 200.0}, {300.0, -1.5}, {300.0, 512.5}}) {
     EXPECT_TRUE(is_said({at(u, v), at(u, v) + 5 * (at(u, v) - at(320, 256)).normalized()})) << u << ", " << v;
     EXPECT_FALSE(is_said({at(u, v), at(320, 256)})) << "a part is seen";
@@ -166,7 +188,8 @@ TEST(Reprojection, IsTheRootMeanSquareOfDistances) {
 
 TEST(Explanation, OfEveryUnit) {
   const Camera right = right_camera();
-  for (const auto& [unit, factor] : std::vector<std::pair<std::string, double>>{{"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}}) {
+  for (const auto& [unit, factor] : std::vector<std::pair<std::string, double>>{
+           {"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}}) {
     SeenPoints points = points_of(right);
     for (auto& point : points.world_mm) point /= factor;
     auto sentence = camera::explanation(right, points);
@@ -180,7 +203,9 @@ TEST(Explanation, OfEveryUnit) {
   }
   Camera twice = right;
   twice.intrinsics.topRows<2>() *= 2;
-  EXPECT_TRUE(camera::explanation(twice, points_of(right))->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5"));
+  EXPECT_TRUE(
+      camera::explanation(twice, points_of(right))
+          ->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5"));
 }
 
 TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
@@ -188,7 +213,8 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
   // Mirrored, and on top of that off by so many pixels each: 6.4 px are a hundredth of the image, 12.8 px two.
   const auto mirrored = [&](double noise_px, int count = 20) {
     SeenPoints points = points_of(right, count);
-    for (std::size_t i = 0; i < points.pixels.size(); ++i) points.pixels[i] = Vector2d(639 - points.pixels[i].x(), points.pixels[i].y() + (i % 2 ? noise_px : -noise_px));
+    for (std::size_t i = 0; i < points.pixels.size(); ++i)
+      points.pixels[i] = Vector2d(639 - points.pixels[i].x(), points.pixels[i].y() + (i % 2 ? noise_px : -noise_px));
     return points;
   };
   EXPECT_TRUE(camera::explanation(right, mirrored(0)));
@@ -201,7 +227,8 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
     SeenPoints points = points_of(right);
     for (std::size_t i = 0; i < points.pixels.size(); ++i) {
       const double side = i % 2 ? 1 : -1;
-      points.world_mm[i] = source_position_mm(right) + 600 * ray_direction(right, {319.5 - 0.5 * off_px * side, points.pixels[i].y()});
+      points.world_mm[i] =
+          source_position_mm(right) + 600 * ray_direction(right, {319.5 - 0.5 * off_px * side, points.pixels[i].y()});
       points.pixels[i] = Vector2d(319.5 + 0.5 * off_px * side, points.pixels[i].y() + (i % 4 < 2 ? rest_px : -rest_px));
     }
     return points;

@@ -61,7 +61,13 @@ class BadData(Case):
         (self.scratch / "ct.tif").write_bytes(tiff(16, 12, [[number * 100] * 192 for number in range(6)]))
         (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), [1.5] * 64))
         for name in ("series", "ct.tif, voxel_size_mm: [1, 1, 1]", "ct.mha"):
-            result = marrow("run", self.write("p.yaml", READ_VOLUME % name), "--out", self.scratch / ("out-" + name.split(",")[0]), "--quiet")
+            result = marrow(
+                "run",
+                self.write("p.yaml", READ_VOLUME % name),
+                "--out",
+                self.scratch / ("out-" + name.split(",")[0]),
+                "--quiet",
+            )
             self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_dicom_slice_cut_off(self):
@@ -84,15 +90,19 @@ class BadData(Case):
             self.write_dicom(case / "series")
             first = (case / "series" / "0.dcm").read_bytes()
             replace(case / "series" / "0.dcm", first[:-384])
+
         error, out = self.failed_case(lambda description: description.update(ct="series"), damage)
         self.assertIn("node 'case' (read.case) failed: ", error)
-        self.assertRegex(error, r"case.yaml:2:5: case: ct: .*series/0.dcm: is cut off: 384 bytes of pixels expected, got 0; copy or "
-                                r"export it again")
+        self.assertRegex(
+            error,
+            r"case.yaml:2:5: case: ct: .*series/0.dcm: is cut off: 384 bytes of pixels expected, got 0; copy or "
+            r"export it again",
+        )
         self.assert_nothing_made(out)
 
     def test_tiff_stack_cut_off(self):
         whole = tiff(16, 12, [[number * 100] * 192 for number in range(6)])
-        (self.scratch / "ct.tif").write_bytes(whole[:len(whole) // 2])
+        (self.scratch / "ct.tif").write_bytes(whole[: len(whole) // 2])
         error, out = self.failed(self.write("p.yaml", READ_VOLUME % "ct.tif, voxel_size_mm: [1, 1, 1]"))
         self.assertIn("node 'ct' (read.volume) failed: ", error)
         self.assertIn("ct.tif: is cut off or damaged: only 2 pages are whole; copy or export it again", error)
@@ -104,37 +114,66 @@ class BadData(Case):
         self.assertIn("ct.tif: is cut off or damaged: only 5 pages are whole; copy or export it again", error)
 
     def test_tiff_image_cut_off(self):
-        error, out = self.failed_case(lambda description: description["views"][1].update(image="lateral.tif"),
-                                      lambda case: replace(case / "lateral.tif", tiff(SIZE, SIZE, [[1000] * SIZE * SIZE])[:-SIZE]))
+        error, out = self.failed_case(
+            lambda description: description["views"][1].update(image="lateral.tif"),
+            lambda case: replace(case / "lateral.tif", tiff(SIZE, SIZE, [[1000] * SIZE * SIZE])[:-SIZE]),
+        )
         self.assertIn("node 'case' (read.case) failed: ", error)
-        self.assertRegex(error, r"case.yaml:8:10: a view: image: .*lateral.tif: is cut off or damaged: only 0 pages are whole")
+        self.assertRegex(
+            error, r"case.yaml:8:10: a view: image: .*lateral.tif: is cut off or damaged: only 0 pages are whole"
+        )
         self.assert_nothing_made(out)
 
     def test_image_and_camera_of_different_size(self):
-        error, out = self.failed_case(damage=lambda case: replace(case / "lateral.png", png(256, 300, lambda u, v: 1000)))
-        self.assertRegex(error, r"case.yaml:8:10: a view: view 'lateral': the image has 256 x 300 pixels, but its camera is for 512 x 512; "
-                                "give the camera that belongs to this image")
+        error, out = self.failed_case(
+            damage=lambda case: replace(case / "lateral.png", png(256, 300, lambda u, v: 1000))
+        )
+        self.assertRegex(
+            error,
+            r"case.yaml:8:10: a view: view 'lateral': the image has 256 x 300 pixels, but its camera is for 512 x 512; "
+            "give the camera that belongs to this image",
+        )
         self.assert_nothing_made(out)
 
     def test_image_without_contrast(self):
-        error, out = self.failed_case(damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000)))
-        self.assertIn("node 'edges' (edges.adaptive_relaxation) for lateral failed: view 'lateral': all pixels have the same value 20000, so "
-                      "there is no edge; check the image file (its inputs: view = case.views)", error)
+        error, out = self.failed_case(
+            damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000))
+        )
+        self.assertIn(
+            (
+                "node 'edges' (edges.adaptive_relaxation) for lateral failed: view 'lateral': all pixels have the same"
+                " value 20000, so there is no edge; check the image file (its inputs: view = case.views)"
+            ),
+            error,
+        )
         self.assert_kept(out, "edges")
 
     def test_empty_edge_map(self):
-        error, out = self.failed_case(settings=["--set", "edges.uses=edges.canny"],
-                                      damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000 + 10 * u)))
-        self.assertIn("node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': the edge map is empty, so there is no shaft in it; "
-                      "look at the image, and lower the thresholds of the edge detector (its inputs: edges = edges, view = case.views)", error)
+        error, out = self.failed_case(
+            settings=["--set", "edges.uses=edges.canny"],
+            damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, lambda u, v: 20000 + 10 * u)),
+        )
+        self.assertIn(
+            (
+                "node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': the edge map is empty, so there"
+                " is no shaft in it; look at the image, and lower the thresholds of the edge detector (its inputs:"
+                " edges = edges, view = case.views)"
+            ),
+            error,
+        )
         self.assert_kept(out, "shaft")
 
     def test_no_shaft_pair(self):
         def disc(u, v):
             return 10000 if math.hypot(u - 256, v - 256) < 150 else 40000
+
         error, out = self.failed_case(damage=lambda case: replace(case / "lateral.png", png(SIZE, SIZE, disc)))
-        self.assertIn("node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': no shaft pair found: ", error)
-        self.assertIn("; look at the edges, and set the edge detector's thresholds or this bone's width_mm (its inputs: ", error)
+        self.assertIn(
+            "node 'shaft' (shaft.hough_pairs) for lateral failed: view 'lateral': no shaft pair found: ", error
+        )
+        self.assertIn(
+            "; look at the edges, and set the edge detector's thresholds or this bone's width_mm (its inputs: ", error
+        )
         self.assert_kept(out, "shaft")
 
     def assert_kept(self, out, failed):
@@ -147,7 +186,13 @@ class BadData(Case):
         self.assertEqual([status[name] for name in ("model", failed, "pose")], ["done", "failed", "not run"])
 
     def test_seed_outside_the_bone(self):
-        self.check_seed([35, 0, 20], r"is not in bone: the CT shows -?\d+ HU there, at least 150 HU expected; move it into cortical or spongy bone")
+        self.check_seed(
+            [35, 0, 20],
+            (
+                r"is not in bone: the CT shows -?\d+ HU there, at least 150 HU expected; move it into cortical or"
+                r" spongy bone"
+            ),
+        )
 
     def test_seed_outside_the_volume(self):
         self.check_seed([500, 0, 20], "lies outside the volume; seeds are points of the CT's frame 'ct' in mm")
@@ -155,10 +200,15 @@ class BadData(Case):
     def check_seed(self, point, fault):
         for uses in ("segment.level_set", "segment.threshold"):
             with self.subTest(uses):
-                error, out = self.failed_case(lambda description: description["fragments"]["distal"]["seeds"].insert(2, point),
-                                              settings=["--set", "bone.uses=" + uses])
-                self.assertRegex(error, r"node 'bone' \(%s\) failed: seeds of fragment 'distal': point 3 at \(%.1f, 0.0, 20.0\) mm %s" % (
-                    uses, point[0], fault))
+                error, out = self.failed_case(
+                    lambda description: description["fragments"]["distal"]["seeds"].insert(2, point),
+                    settings=["--set", "bone.uses=" + uses],
+                )
+                self.assertRegex(
+                    error,
+                    r"node 'bone' \(%s\) failed: seeds of fragment 'distal': point 3 at \(%.1f, 0.0, 20.0\) mm %s"
+                    % (uses, point[0], fault),
+                )
                 self.assertIn("(its inputs: volume = case.ct, seeds = case.seeds)", error)
                 kept = contents(out / "outputs")
                 self.assertIn("edges/frontal.png", kept)
@@ -173,7 +223,9 @@ class BadData(Case):
         (self.scratch / "ct.mha").write_bytes(mha((4, 4, 4), values))
         error, out = self.failed(self.write("p.yaml", READ_VOLUME % "ct.mha"))
         self.assertIn("node 'ct' (read.volume) failed: ", error)
-        self.assertIn("ct.mha: voxel (1, 2, 3) is not a finite number; replace NaN and infinities (with -1000 HU for air)", error)
+        self.assertIn(
+            "ct.mha: voxel (1, 2, 3) is not a finite number; replace NaN and infinities (with -1000 HU for air)", error
+        )
         self.assert_nothing_made(out)
 
     def test_unwritable_output_folder(self):

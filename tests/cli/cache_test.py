@@ -21,7 +21,12 @@ class Cache(Case):
         self.runs = 0
 
     def marrow(self, *arguments, **environment):
-        return marrow(*arguments, plugins=[TEST_PLUGINS], cwd=self.scratch, extra_environment={"MARROW_CACHE": str(self.cache), **environment})
+        return marrow(
+            *arguments,
+            plugins=[TEST_PLUGINS],
+            cwd=self.scratch,
+            extra_environment={"MARROW_CACHE": str(self.cache), **environment}
+        )
 
     def run_pipeline(self, **environment):
         self.runs += 1
@@ -42,18 +47,28 @@ class Cache(Case):
             result = self.marrow("cache", "gc", "--keep-gb=" + wrong)
             self.assertEqual(result.returncode, 2, wrong)
             if wrong:
-                self.assertIn("--keep-gb is '%s', but must be a number of gigabytes from 0 to 1000000; nothing is removed" % wrong, result.stderr)
+                self.assertIn(
+                    "--keep-gb is '%s', but must be a number of gigabytes from 0 to 1000000; nothing is removed"
+                    % wrong,
+                    result.stderr,
+                )
             self.assertEqual(self.kept(), 1, wrong)
         self.assertIn("0 results removed", self.marrow("cache", "gc", "--keep-gb", "1e6").stdout)
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
 
     def test_why_tells_of_one_key(self):
         for value in range(9):
-            self.assertEqual(self.marrow("run", self.pipeline, "--out", "of-%d" % value, "--set", "c.value=%d" % value).returncode, 0)
+            self.assertEqual(
+                self.marrow("run", self.pipeline, "--out", "of-%d" % value, "--set", "c.value=%d" % value).returncode, 0
+            )
         text = self.marrow("cache", "why", "")
         self.assertEqual((text.returncode, text.stdout), (2, ""))
-        self.assertIn("the key is empty; give that of a result or of one of its outputs, or its first digits", text.stderr)
-        entries = sorted(path.name for path in self.cache.rglob("*") if len(path.name) == 32 and path.parent.name == path.name[:2])
+        self.assertIn(
+            "the key is empty; give that of a result or of one of its outputs, or its first digits", text.stderr
+        )
+        entries = sorted(
+            path.name for path in self.cache.rglob("*") if len(path.name) == 32 and path.parent.name == path.name[:2]
+        )
         keys = set(entries)
         for entry in entries:
             told = self.marrow("cache", "why", entry)
@@ -61,17 +76,27 @@ class Cache(Case):
             self.assertTrue(told.stdout.startswith(entry + ": test.constant"), told.stdout)
             keys.update(re.findall(r"^  output (\w+)$", told.stdout, re.M))
         self.assertEqual(len(keys), 18)
-        digit = max("0123456789abcdef", key=lambda one: sum(key.startswith(one) for key in keys))  # of 18 keys, some share one
+        digit = max(
+            "0123456789abcdef", key=lambda one: sum(key.startswith(one) for key in keys)
+        )  # of 18 keys, some share one
         several = sorted(key for key in keys if key.startswith(digit))
         told = self.marrow("cache", "why", digit)
         self.assertEqual((told.returncode, told.stdout), (2, ""))
-        self.assertEqual(told.stderr, "marrow: error: %d keys begin with '%s'; give more digits of one of them:\n" % (len(several), digit)
-                         + "".join("  %s\n" % key for key in several[:5]) + ("  ...\n" if len(several) > 5 else ""))
+        self.assertEqual(
+            told.stderr,
+            "marrow: error: %d keys begin with '%s'; give more digits of one of them:\n" % (len(several), digit)
+            + "".join("  %s\n" % key for key in several[:5])
+            + ("  ...\n" if len(several) > 5 else ""),
+        )
         damaged = next(self.cache.rglob(entries[0]))
         damaged.write_bytes(damaged.read_bytes()[:-1])
         told = self.marrow("cache", "why", entries[0])
         self.assertEqual((told.returncode, told.stdout), (2, ""))
-        self.assertEqual(told.stderr, "marrow: error: the result %s is damaged or of another version; it is made anew when it is needed\n" % entries[0])
+        self.assertEqual(
+            told.stderr,
+            "marrow: error: the result %s is damaged or of another version; it is made anew when it is needed\n"
+            % entries[0],
+        )
 
     def test_what_is_mounted_in_the_store_is_left(self):
         self.assertEqual(self.run_pipeline().returncode, 0)
@@ -84,9 +109,13 @@ class Cache(Case):
         command = ["unshare", "-m", "sh", "-c", script, "sh", self.scratch / "precious", inner, MARROW]
         if subprocess.run(["unshare", "-m", "true"], capture_output=True).returncode != 0:
             self.skipTest("only root can mount")
-        result = subprocess.run(list(map(str, command)), capture_output=True, text=True, env={**os.environ, "MARROW_CACHE": str(self.cache)})
+        result = subprocess.run(
+            list(map(str, command)), capture_output=True, text=True, env={**os.environ, "MARROW_CACHE": str(self.cache)}
+        )
         self.assertEqual(result.returncode, 2, result.stderr)
-        self.assertIn("%s is left, because something is mounted there; unmount that first" % inner.parent, result.stderr)
+        self.assertIn(
+            "%s is left, because something is mounted there; unmount that first" % inner.parent, result.stderr
+        )
         self.assertEqual((self.scratch / "precious" / "data").read_text(), "mine")
         self.assertTrue(inner.is_dir())
         self.assertIn("1 results removed", result.stdout, "all else is")
@@ -104,7 +133,10 @@ class Cache(Case):
             (self.cache / name).parent.mkdir(parents=True, exist_ok=True)
             (self.cache / name).write_text("mine")
         before = self.files(self.cache)
-        sentence = "the folder %s holds other things and is no store of marrow; set MARROW_CACHE to a new or empty folder" % self.cache
+        sentence = (
+            "the folder %s holds other things and is no store of marrow; set MARROW_CACHE to a new or empty folder"
+            % self.cache
+        )
         result = self.run_pipeline()
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(result.stderr.count("results are not kept: " + sentence), 1, result.stderr)
@@ -135,18 +167,30 @@ class Cache(Case):
         self.assertIn("1 results removed", self.marrow("cache", "gc", "--keep-gb", "0").stdout)
         out, said = self.scratch / "waits", "c: waits for another run that is making the same result"
         with open(self.cache / "claims", "r+b") as claims:
-            fcntl.fcntl(claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0))  # F_OFD_SETLK: another run makes all there is
+            fcntl.fcntl(
+                claims, 37, struct.pack("hhqqi", fcntl.F_WRLCK, os.SEEK_SET, 0, 0, 0)
+            )  # F_OFD_SETLK: another run makes all there is
             environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.cache))
-            process = subprocess.Popen([str(MARROW), "run", str(self.pipeline), "--out", str(out)], env=environment, text=True,
-                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            process = subprocess.Popen(
+                [str(MARROW), "run", str(self.pipeline), "--out", str(out)],
+                env=environment,
+                text=True,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+            )
             self.addCleanup(process.kill)
             log = out / "log.txt"
-            wait_until(lambda: process.poll() is not None or log.exists() and said in log.read_text(),
-                       "it does not say that it waits")
+            wait_until(
+                lambda: process.poll() is not None or log.exists() and said in log.read_text(),
+                "it does not say that it waits",
+            )
             self.assertIsNone(process.poll(), "it does not wait")
         self.assertEqual(process.wait(timeout=120), 0)
         lines = [" ".join(line.split()) for line in process.stderr.read().splitlines()]
-        self.assertEqual(lines[:2], ["c waits for another run that is making the same result", "c goes on after waiting for another run"])
+        self.assertEqual(
+            lines[:2],
+            ["c waits for another run that is making the same result", "c goes on after waiting for another run"],
+        )
         self.assertIn(said, (out / "log.txt").read_text())
 
 

@@ -42,23 +42,63 @@ class Commands(Case):
         (case / "inner").mkdir(parents=True)
         self.write("case/data", "1")
         os.symlink("case", self.scratch / "link")
-        self.write("p.yaml", "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\noutputs: {number: c}\n")
-        run = lambda *arguments, cache="", cwd=self.scratch: marrow("run", self.scratch / "p.yaml", "--quiet", *arguments, plugins=[TEST_PLUGINS], cwd=cwd,
-                                                                   extra_environment={"MARROW_CACHE": str(cache or self.scratch / "cache")})
-        sentence = "marrow: error: %%s %%s lies in %s, a folder that node 'c' reads, which would change while it is read; %%s\n" % case
-        for out, arguments, cwd in (("runs", ["x=."], case), ("case/out", ["x=case"], self.scratch), ("link/inner", ["x=case/"], self.scratch), ("case/new/out", ["x=link"], self.scratch)):
+        self.write(
+            "p.yaml",
+            (
+                "marrow: 1\ninputs: {x: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $x}}\noutputs:"
+                " {number: c}\n"
+            ),
+        )
+        run = lambda *arguments, cache="", cwd=self.scratch: marrow(
+            "run",
+            self.scratch / "p.yaml",
+            "--quiet",
+            *arguments,
+            plugins=[TEST_PLUGINS],
+            cwd=cwd,
+            extra_environment={"MARROW_CACHE": str(cache or self.scratch / "cache")}
+        )
+        sentence = (
+            "marrow: error: %%s %%s lies in %s, a folder that node 'c' reads, which would change while it is read;"
+            " %%s\n" % case
+        )
+        for out, arguments, cwd in (
+            ("runs", ["x=."], case),
+            ("case/out", ["x=case"], self.scratch),
+            ("link/inner", ["x=case/"], self.scratch),
+            ("case/new/out", ["x=link"], self.scratch),
+        ):
             result = run(*arguments, *([] if out == "runs" else ["--out", out]), cwd=cwd)
-            self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the output folder", out, "choose another with --out")))
+            self.assertEqual(
+                (result.returncode, result.stderr),
+                (2, sentence % ("the output folder", out, "choose another with --out")),
+            )
         result = run("x=case", "--out", "out", cache=case / "cache")
-        self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the store of results", case / "cache", "set MARROW_CACHE to another folder, or give --no-cache")))
-        self.assertEqual(sorted(path.name for path in self.scratch.rglob("*")), ["case", "data", "inner", "link", "p.yaml"], "nothing is made")
+        self.assertEqual(
+            (result.returncode, result.stderr),
+            (
+                2,
+                sentence
+                % ("the store of results", case / "cache", "set MARROW_CACHE to another folder, or give --no-cache"),
+            ),
+        )
+        self.assertEqual(
+            sorted(path.name for path in self.scratch.rglob("*")),
+            ["case", "data", "inner", "link", "p.yaml"],
+            "nothing is made",
+        )
         self.assertEqual(run("x=case", "--out", "case-out").returncode, 0)
-        self.assertEqual(run("x=case/data", "--out", "case/out").returncode, 0, "a file does not change by what is beside it")
+        self.assertEqual(
+            run("x=case/data", "--out", "case/out").returncode, 0, "a file does not change by what is beside it"
+        )
         self.assertEqual(run("x=case", "--out", "again", "--no-cache", cache=case / "cache").returncode, 0)
         (self.scratch / "runs" / "p").mkdir(parents=True)
         self.assertEqual(run("x=runs/p").returncode, 0, "the results go to another folder beside it")
         result = marrow("rerun", "case-out", "--out", "case/again", plugins=[TEST_PLUGINS], cwd=self.scratch)
-        self.assertEqual((result.returncode, result.stderr), (2, sentence % ("the output folder", "case/again", "choose another with --out")))
+        self.assertEqual(
+            (result.returncode, result.stderr),
+            (2, sentence % ("the output folder", "case/again", "choose another with --out")),
+        )
 
     def test_list_check_inspect_load_no_plugin_and_are_quick(self):
         for command in (["list"], ["check", SOURCE / "pipelines" / "femur.yaml"], ["inspect", "mesh.marching_cubes"]):
@@ -74,21 +114,45 @@ class Commands(Case):
 
     def test_inspect_yaml_can_be_pasted(self):
         snippet = marrow("inspect", "mesh.marching_cubes", "--yaml").stdout.replace("NODE", "bone")
-        text = "marrow: 1\nnodes:\n  bone: {uses: segment.threshold, in: {volume: ct}}\n  ct: {uses: read.volume, with: {path: x}}\n" + snippet
+        text = (
+            "marrow: 1\nnodes:\n  bone: {uses: segment.threshold, in: {volume: ct}}\n  ct: {uses: read.volume, with:"
+            " {path: x}}\n" + snippet
+        )
         result = marrow("check", self.write("p.yaml", text + "outputs: {mesh: marching_cubes}\n"))
         self.assertEqual(result.returncode, 0, result.stderr)
 
     def test_overrides_hold_in_any_order(self):
-        for settings in (["cost.sigma=0.1", "cost.uses=similarity.pattern_intensity"], ["cost.uses=similarity.pattern_intensity", "cost.sigma=0.1"]):
+        for settings in (
+            ["cost.sigma=0.1", "cost.uses=similarity.pattern_intensity"],
+            ["cost.uses=similarity.pattern_intensity", "cost.sigma=0.1"],
+        ):
             out = self.scratch / settings[0]
-            marrow("run", SOURCE / "pipelines" / "femur-grey-values.yaml", "case=/nowhere", "--out", out, *[part for one in settings for part in ("--set", one)])
+            marrow(
+                "run",
+                SOURCE / "pipelines" / "femur-grey-values.yaml",
+                "case=/nowhere",
+                "--out",
+                out,
+                *[part for one in settings for part in ("--set", one)]
+            )
             self.assertIn("sigma: 0.1", (out / "pipeline.yaml").read_text())
-        wrong = marrow("check", SOURCE / "pipelines" / "femur-grey-values.yaml", "--set", "cost.sigma=0.1", "--set", "cost.uses=similarity.mutual_information")
-        self.assertIn("--set cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr)
+        wrong = marrow(
+            "check",
+            SOURCE / "pipelines" / "femur-grey-values.yaml",
+            "--set",
+            "cost.sigma=0.1",
+            "--set",
+            "cost.uses=similarity.mutual_information",
+        )
+        self.assertIn(
+            "--set cost.sigma=0.1: error: 'similarity.mutual_information' has no option 'sigma'", wrong.stderr
+        )
 
     def test_run_writes_its_record(self):
         out = self.scratch / "out"
-        result = marrow("run", self.write("p.yaml", NUMBER), "--out", out, "--seed", 5, "--set", "c.value=4", plugins=[TEST_PLUGINS])
+        result = marrow(
+            "run", self.write("p.yaml", NUMBER), "--out", out, "--seed", 5, "--set", "c.value=4", plugins=[TEST_PLUGINS]
+        )
         self.assertEqual(result.returncode, 0, result.stderr)
         record = json.loads((out / "run.json").read_text())
         self.assertEqual(record["seed"], 5)
@@ -111,7 +175,9 @@ class Commands(Case):
         self.assertEqual([event["event"] for event in events("--out", self.scratch / "read")], ["cached", "ended"])
 
     def test_quiet_prints_nothing(self):
-        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "out", "--quiet", plugins=[TEST_PLUGINS])
+        result = marrow(
+            "run", self.write("p.yaml", NUMBER), "--out", self.scratch / "out", "--quiet", plugins=[TEST_PLUGINS]
+        )
         self.assertEqual((result.stdout, result.stderr), ("", ""))
 
     def test_nothing_is_overwritten(self):
@@ -124,15 +190,22 @@ class Commands(Case):
 
     def test_unwritable_folder(self):
         self.write("file", "")
-        result = marrow("run", self.write("p.yaml", NUMBER), "--out", self.scratch / "file" / "out", plugins=[TEST_PLUGINS])
+        result = marrow(
+            "run", self.write("p.yaml", NUMBER), "--out", self.scratch / "file" / "out", plugins=[TEST_PLUGINS]
+        )
         self.assertEqual(result.returncode, 2)
         self.assertIn("cannot make the output folder", result.stderr)
 
     def test_a_failed_node_is_code_1_and_the_others_results_stay(self):
-        text = NUMBER.replace("outputs:", "  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\noutputs:").replace("number: c", "number: c, f: f")
+        text = NUMBER.replace(
+            "outputs:", "  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\noutputs:"
+        ).replace("number: c", "number: c, f: f")
         result = marrow("run", self.write("p.yaml", text), "--out", self.scratch / "out", plugins=[TEST_PLUGINS])
         self.assertEqual(result.returncode, 1)
-        self.assertIn("node 'f' (test.fail_above) failed: the number is too large; give a smaller one (its inputs: a = c)", result.stderr)
+        self.assertIn(
+            "node 'f' (test.fail_above) failed: the number is too large; give a smaller one (its inputs: a = c)",
+            result.stderr,
+        )
         self.assertTrue((self.scratch / "out" / "outputs" / "number.json").exists())
 
     def test_two_slow_nodes_overlap(self):
@@ -140,8 +213,14 @@ class Commands(Case):
         # A busy machine, or the one that it is a guest of, may put both threads on one core, or let one of them wait.
         for attempt in range(5):
             out = self.scratch / str(attempt)
-            busy_before, before, start = busy_seconds(), resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
-            self.assertEqual(marrow("run", path, "--out", out, "--threads", 2, "--no-cache", plugins=[TEST_PLUGINS]).returncode, 0)
+            busy_before, before, start = (
+                busy_seconds(),
+                resource.getrusage(resource.RUSAGE_CHILDREN),
+                time.perf_counter(),
+            )
+            self.assertEqual(
+                marrow("run", path, "--out", out, "--threads", 2, "--no-cache", plugins=[TEST_PLUGINS]).returncode, 0
+            )
             wall, after = time.perf_counter() - start, resource.getrusage(resource.RUSAGE_CHILDREN)
             cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
             others = max(0, busy_seconds() - busy_before - cpu)
@@ -151,13 +230,23 @@ class Commands(Case):
             is_apart = abs(record["nodes"][0]["start_s"] - record["nodes"][1]["start_s"]) >= 2
             if not is_apart and (cpu / wall > 1.5 or os.cpu_count() - others / wall < 1.9):
                 return
-        self.fail("two nodes never overlapped, or never used more than 150 % of a core on a machine with nothing else to do")
+        self.fail(
+            "two nodes never overlapped, or never used more than 150 % of a core on a machine with nothing else to do"
+        )
 
     def test_control_c_ends_cleanly(self):
-        path = self.write("p.yaml", WORK.replace("2.000001", "60").replace("outputs: {", "  c: {uses: test.constant}\noutputs: {c: c, "))
+        path = self.write(
+            "p.yaml",
+            WORK.replace("2.000001", "60").replace("outputs: {", "  c: {uses: test.constant}\noutputs: {c: c, "),
+        )
         environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
-        process = subprocess.Popen([str(MARROW), "run", str(path), "--out", str(self.scratch / "out")], env=environment, stdout=subprocess.DEVNULL,
-                                   stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [str(MARROW), "run", str(path), "--out", str(self.scratch / "out")],
+            env=environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(process.kill)
         log = self.scratch / "out" / "log.txt"
         wait_until(lambda: log.exists() and "c: " in log.read_text(), "the first node did not end")

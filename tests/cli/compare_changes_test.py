@@ -29,15 +29,25 @@ class Changes(Case):
         self.write("other.txt", "one")
         self.add_case("1")
         self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}}\n")
-        self.environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
+        self.environment = dict(
+            os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache")
+        )
 
     def add_case(self, name):
         (self.scratch / "cases" / name).mkdir(parents=True)
         self.write("cases/%s/data" % name, "case " + name)
 
     def compare(self, out, *arguments, code=0):
-        result = marrow("compare", self.file, "--out", out, *arguments, plugins=[TEST_PLUGINS], cwd=self.scratch,
-                        extra_environment={"MARROW_CACHE": str(self.scratch / "cache")})
+        result = marrow(
+            "compare",
+            self.file,
+            "--out",
+            out,
+            *arguments,
+            plugins=[TEST_PLUGINS],
+            cwd=self.scratch,
+            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")}
+        )
         self.assertEqual(result.returncode, code, result.stdout + result.stderr)
         return result
 
@@ -49,12 +59,21 @@ class Changes(Case):
         """Every figure is that of its own cell, as it is by now."""
         self.compare("fresh", "--no-cache")
         fresh = self.figures("fresh")
-        self.assertEqual({cell: figure for cell, figure in self.figures(out).items() if figure}, {cell: figure for cell, figure in fresh.items() if figure})
+        self.assertEqual(
+            {cell: figure for cell, figure in self.figures(out).items() if figure},
+            {cell: figure for cell, figure in fresh.items() if figure},
+        )
 
     def changed_meanwhile(self, change, *arguments, code=2):
         """What a comparison says when something changes once its first cell is there."""
-        process = subprocess.Popen([str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments], env=self.environment,
-                                   cwd=self.scratch, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            [str(MARROW), "compare", str(self.file), "--out", "out", "--jobs", "1", *arguments],
+            env=self.environment,
+            cwd=self.scratch,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)  # where the test ends before
         wait_until((self.scratch / "out" / "cells" / "a" / "1" / "0" / "cell.json").exists, "no cell came")
@@ -98,10 +117,18 @@ class Changes(Case):
         self.assertFalse(key.exists())
 
     def test_a_file_that_a_case_is_simulated_from(self):
-        self.write("s.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
-                             "  sum: {uses: test.add, in: {a: s.both, b: r}}\noutputs: {case: sum}\n")
+        self.write(
+            "s.yaml",
+            (
+                "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
+                "  sum: {uses: test.add, in: {a: s.both, b: r}}\noutputs: {case: sum}\n"
+            ),
+        )
         self.write("p.yaml", PIPELINE.replace("other.txt", "$case/a.json"))
-        self.write("e.yaml", HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: [1]}") + "variants: {a: {}}\n")
+        self.write(
+            "e.yaml",
+            HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: [1]}") + "variants: {a: {}}\n",
+        )
         cases = {}
         for content in ("old", "new", "old"):
             self.write("bone", content)
@@ -113,12 +140,23 @@ class Changes(Case):
         self.assertNotEqual(old, new)
 
     def test_which_values_are_better(self):
-        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: -3, path: $case}}\noutputs: {number: m}\n")
-        head = HEAD.replace("metrics: [number.value, work.value]", "success: {number.value: 2}\nmetrics: [{figure: number.value, better: %s}]")
+        self.write(
+            "p.yaml",
+            (
+                "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: -3, path:"
+                " $case}}\noutputs: {number: m}\n"
+            ),
+        )
+        head = HEAD.replace(
+            "metrics: [number.value, work.value]",
+            "success: {number.value: 2}\nmetrics: [{figure: number.value, better: %s}]",
+        )
         for better, figure, success in (("lower", "-3", "1"), ("nearest_zero", "3", "0"), ("lower", "-3", "1")):
             self.write("e.yaml", head % better + "variants: {a: {}}\n")
             self.compare("out")
-            self.assertEqual((self.figures("out"), self.figures("out", "success")), ({"a/1/0": figure}, {"a/1/0": success}), better)
+            self.assertEqual(
+                (self.figures("out"), self.figures("out", "success")), ({"a/1/0": figure}, {"a/1/0": success}), better
+            )
         self.write("e.yaml", head % "higher" + "variants: {a: {}}\n")
         self.assertIn("1 were there already", self.compare("out").stdout)
 
@@ -134,7 +172,10 @@ class Changes(Case):
                 self.write("other.txt", content)
 
         self.changed_meanwhile(change, code=0)
-        self.assertEqual(self.figures("out", "reason"), {"a/1/0": "", "b/1/0": "a file that the cell needs was changed while it ran; run it again"})
+        self.assertEqual(
+            self.figures("out", "reason"),
+            {"a/1/0": "", "b/1/0": "a file that the cell needs was changed while it ran; run it again"},
+        )
 
     def test_a_case_that_changes_meanwhile(self):
         self.write("p.yaml", PIPELINE.replace("other.txt", "$case/data"))
@@ -147,7 +188,13 @@ class Changes(Case):
         """After it another process goes on, which looks at everything for itself."""
         self.add_case("2")
         self.add_case("3")
-        self.write("p.yaml", PIPELINE.replace("other.txt", "$case/data").replace("outputs: {number: r, work: s}", "  m: {uses: test.misbehave, in: {a: s}}\noutputs: {number: r, work: m}"))
+        self.write(
+            "p.yaml",
+            PIPELINE.replace("other.txt", "$case/data").replace(
+                "outputs: {number: r, work: s}",
+                "  m: {uses: test.misbehave, in: {a: s}}\noutputs: {number: r, work: m}",
+            ),
+        )
         self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}, crash: {m.how: crash}}\n")
 
     def test_a_case_that_comes_meanwhile(self):
@@ -155,7 +202,9 @@ class Changes(Case):
         said = self.changed_meanwhile(lambda: self.add_case("0"), "--no-cache")
         self.assertIn("the list of cases ('0' is new) was changed while the comparison ran", said)
         old = self.figures("out")
-        self.assertEqual([cell for cell, figure in old.items() if figure], ["a/1/0", "b/1/0", "a/2/0", "b/2/0", "a/3/0", "b/3/0"])
+        self.assertEqual(
+            [cell for cell, figure in old.items() if figure], ["a/1/0", "b/1/0", "a/2/0", "b/2/0", "a/3/0", "b/3/0"]
+        )
         self.compare("out")
         self.expect_fresh("out")
         self.assertLessEqual(old.items(), self.figures("out").items(), "none was booked on another case")
@@ -175,7 +224,9 @@ class Changes(Case):
         said = self.changed_meanwhile(rebuild)
         self.assertIn("the plugin of read.test_number was changed while the comparison ran", said)
         self.assertEqual({row for cell, row in self.figures("out", "status").items() if "/1/" not in cell}, {"failed"})
-        self.assertIn("depends on changed while the comparison ran; run it again", self.figures("out", "reason")["a/2/0"])
+        self.assertIn(
+            "depends on changed while the comparison ran; run it again", self.figures("out", "reason")["a/2/0"]
+        )
 
     def test_nothing_is_removed_from_what_is_mounted_in_a_cell(self):
         if subprocess.run(["unshare", "-m", "true"], stderr=subprocess.DEVNULL).returncode:
@@ -186,10 +237,24 @@ class Changes(Case):
         self.write("mine/file", "keep")
         self.write("other.txt", "two")
         mounted = "out/cells/a/1/0/outputs"
-        command = ["unshare", "-m", "sh", "-c", 'mount --bind mine "$0" && exec "$@"', mounted, str(MARROW), "compare", str(self.file), "--out", "out"]
+        command = [
+            "unshare",
+            "-m",
+            "sh",
+            "-c",
+            'mount --bind mine "$0" && exec "$@"',
+            mounted,
+            str(MARROW),
+            "compare",
+            str(self.file),
+            "--out",
+            "out",
+        ]
         result = subprocess.run(command, env=self.environment, cwd=self.scratch, capture_output=True, text=True)
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertIn("a/1/0: something is mounted at %s, where nothing is removed; unmount it" % mounted, result.stdout)
+        self.assertIn(
+            "a/1/0: something is mounted at %s, where nothing is removed; unmount it" % mounted, result.stdout
+        )
         self.assertEqual((self.scratch / "mine" / "file").read_text(), "keep")
         self.compare("out")
         self.expect_fresh("out")

@@ -35,7 +35,13 @@ class Compare(Case):
         return self.write("e.yaml", HEAD + "variants:\n" + "".join("  %s: %s\n" % item for item in variants.items()))
 
     def compare(self, *arguments, cache="cache", **more):
-        return marrow("compare", *arguments, plugins=[TEST_PLUGINS], extra_environment={"MARROW_CACHE": str(self.scratch / cache)}, **more)
+        return marrow(
+            "compare",
+            *arguments,
+            plugins=[TEST_PLUGINS],
+            extra_environment={"MARROW_CACHE": str(self.scratch / cache)},
+            **more
+        )
 
     def rows(self, out):
         with open(self.scratch / out / "cells.csv", newline="") as stream:
@@ -43,48 +49,101 @@ class Compare(Case):
 
     def results(self, out):
         """Of each cell all but times and how often it was tried."""
-        return {name: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for name, row in self.rows(out).items()}
+        return {
+            name: {key: value for key, value in row.items() if key not in ("seconds", "tries")}
+            for name, row in self.rows(out).items()
+        }
 
     def test_capture_range(self):
-        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
+        self.write(
+            "p.yaml",
+            (
+                "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path:"
+                " $case}}\noutputs: {number: m}\n"
+            ),
+        )
         for i in range(3):
             (self.scratch / "cases" / str(i)).mkdir(parents=True)
-        experiment = self.write("e.yaml", HEAD.replace("value: 10", "value: 2") + "initial_error: number.value\nvariants: {near: {m.value: 1.5}, far: {m.value: 4}}\n")
+        experiment = self.write(
+            "e.yaml",
+            HEAD.replace("value: 10", "value: 2")
+            + "initial_error: number.value\nvariants: {near: {m.value: 1.5}, far: {m.value: 4}}\n",
+        )
         result = self.compare(experiment, "--out", self.scratch / "out")
         self.assertEqual(result.returncode, 0, result.stderr)
         # 3 of 3: Wilson's interval begins at 3 / (3 + 1.96^2) = 0.438
-        rows = [line.split() for line in result.stdout[result.stdout.index("Capture range"):].splitlines()]
-        self.assertEqual(rows[:6], ["Capture range: success over number.value, with 95 % intervals".split(), ["start", "near", "far"], "0 to 2 3/3 (44 to 100 %) -".split(),
-                                    "2 to 4 - -".split(), "4 to 6 - 0/3 (0 to 56 %)".split(), "95 % or more to at least 1.5 0.0".split()])
-        near, far = (variant["capture"] for variant in json.loads((self.scratch / "out" / "comparison.json").read_text())["variants"])
+        rows = [line.split() for line in result.stdout[result.stdout.index("Capture range") :].splitlines()]
+        self.assertEqual(
+            rows[:6],
+            [
+                "Capture range: success over number.value, with 95 % intervals".split(),
+                ["start", "near", "far"],
+                "0 to 2 3/3 (44 to 100 %) -".split(),
+                "2 to 4 - -".split(),
+                "4 to 6 - 0/3 (0 to 56 %)".split(),
+                "95 % or more to at least 1.5 0.0".split(),
+            ],
+        )
+        near, far = (
+            variant["capture"]
+            for variant in json.loads((self.scratch / "out" / "comparison.json").read_text())["variants"]
+        )
         self.assertEqual((near["range"], near["is_open"], far["range"], far["is_open"]), (1.5, True, 0, False))
         self.assertEqual([bin["of"] for bin in far["bins"]], [0, 0, 3])
 
     def test_which_values_are_better(self):
-        self.write("p.yaml", "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path: $case}}\noutputs: {number: m}\n")
+        self.write(
+            "p.yaml",
+            (
+                "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  m: {uses: test.constant, with: {value: 1, path:"
+                " $case}}\noutputs: {number: m}\n"
+            ),
+        )
         for i in range(8):
             (self.scratch / "cases" / str(i)).mkdir(parents=True)
         variants = "variants: {one: {m.value: -1}, four: {m.value: 4}}\n"
-        better = {"lower": ("5.0 worse", "1", "0"), "higher": ("5.0 better", "0", "1"), "nearest_zero": ("3.0 worse", "1", "0")}
+        better = {
+            "lower": ("5.0 worse", "1", "0"),
+            "higher": ("5.0 better", "0", "1"),
+            "nearest_zero": ("3.0 worse", "1", "0"),
+        }
         for name, (sentence, one, four) in better.items():
             with self.subTest(name):
-                head = "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [{figure: number.value, label: sum, better: %s}]\nsuccess: {number.value: 2}\n" % name
+                head = (
+                    "experiment: 1\npipeline: p.yaml\ncases: {folders: [cases/*]}\nmetrics: [{figure: number.value,"
+                    " label: sum, better: %s}]\nsuccess: {number.value: 2}\n" % name
+                )
                 result = self.compare(self.write("e.yaml", head + variants), "--out", self.scratch / name)
                 self.assertIn("four, sum: %s" % sentence, result.stdout)
                 rows = self.rows(name)
                 self.assertEqual((rows["one/0/0"]["success"], rows["four/0/0"]["success"]), (one, four))
 
     def test_what_goes_wrong_in_a_cell_stays_there(self):
-        path = self.experiment({"good": "{}", "crash": "{m.how: crash}", "hang": "{m.how: hang}", "memory": "{m.how: memory}", "nan": "{m.how: nan}",
-                                "error": "{m.how: error}", "exit": "{m.how: exit}"}, cases=2)
+        path = self.experiment(
+            {
+                "good": "{}",
+                "crash": "{m.how: crash}",
+                "hang": "{m.how: hang}",
+                "memory": "{m.how: memory}",
+                "nan": "{m.how: nan}",
+                "error": "{m.how: error}",
+                "exit": "{m.how: exit}",
+            },
+            cases=2,
+        )
         limit = 40 if IS_SANITIZED else 15  # far more than a good cell takes on a busy machine
         result = self.compare(path, "--out", self.scratch / "out", "--time-limit", limit, "--memory-limit", 1000)
         self.assertEqual(result.returncode, 0, result.stderr)
         rows = self.rows("out")
         self.assertEqual(len(rows), 14)
-        reasons = {"crash": "crashed in node 'm': Segmentation fault", "hang": "its process in node 'm' took longer than %d s" % limit,
-                   "memory": "its process in node 'm' used more than 1000 MB of memory", "nan": "'number.value' is nan, not a finite number",
-                   "error": "node 'm' (test.misbehave) failed: it will not do", "exit": "ended in node 'm' with exit code 3"}
+        reasons = {
+            "crash": "crashed in node 'm': Segmentation fault",
+            "hang": "its process in node 'm' took longer than %d s" % limit,
+            "memory": "its process in node 'm' used more than 1000 MB of memory",
+            "nan": "'number.value' is nan, not a finite number",
+            "error": "node 'm' (test.misbehave) failed: it will not do",
+            "exit": "ended in node 'm' with exit code 3",
+        }
         for name, row in rows.items():
             variant = name.split("/")[0]
             self.assertEqual(row["status"], "done" if variant == "good" else "failed", row)
@@ -117,8 +176,12 @@ class Compare(Case):
         environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
         killed = 0
         for _ in range(20):
-            process = subprocess.Popen([str(MARROW), "compare", str(path), "--out", str(self.scratch / "out"), "--quiet"], env=environment,
-                                       stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            process = subprocess.Popen(
+                [str(MARROW), "compare", str(path), "--out", str(self.scratch / "out"), "--quiet"],
+                env=environment,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+            )
             time.sleep(chance.uniform(0.01, 0.3))
             process.send_signal(signal.SIGKILL)
             process.communicate()  # to the end of what its workers could say: none of them writes any more
@@ -134,8 +197,14 @@ class Compare(Case):
     def test_two_at_once_on_one_cache(self):
         path = self.experiment({name: "{m.value: %d}" % i for i, name in enumerate("abc")}, cases=5)
         environment = dict(os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache"))
-        both = [subprocess.Popen([str(MARROW), "compare", str(path), "--out", str(self.scratch / name), "--quiet"], env=environment,
-                                 stdout=subprocess.DEVNULL) for name in ("one", "two")]
+        both = [
+            subprocess.Popen(
+                [str(MARROW), "compare", str(path), "--out", str(self.scratch / name), "--quiet"],
+                env=environment,
+                stdout=subprocess.DEVNULL,
+            )
+            for name in ("one", "two")
+        ]
         self.assertEqual([process.wait() for process in both], [0, 0])
         self.assertEqual(self.results("one"), self.results("two"))
 
@@ -158,7 +227,10 @@ class Compare(Case):
     def test_a_simulated_case_that_is_not_whole_is_made_again(self):
         self.write("p.yaml", PIPELINE.replace("0.05", "0"))
         self.write("s.yaml", "marrow: 1\nnodes:\n  s: {uses: test.sides}\noutputs: {case: s.both}\n")
-        path = self.write("e.yaml", HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: 1..3}") + "variants: {a: {}}\n")
+        path = self.write(
+            "e.yaml",
+            HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: 1..3}") + "variants: {a: {}}\n",
+        )
         self.assertEqual(self.compare(path, "--out", self.scratch / "one").returncode, 0)
         files = sorted((self.scratch / "cache" / "cases").glob("*/outputs/case/a.json"))
         self.assertEqual(len(files), 3)
@@ -178,24 +250,42 @@ class Compare(Case):
         self.write("cache/mine", "")
         result = self.compare(path, "--out", self.scratch / "out")
         self.assertEqual(result.returncode, 0, result.stderr)
-        self.assertEqual(result.stderr.count("marrow: note: results are not kept: the folder %s holds other things" % (self.scratch / "cache")), 1, result.stderr)
+        self.assertEqual(
+            result.stderr.count(
+                "marrow: note: results are not kept: the folder %s holds other things" % (self.scratch / "cache")
+            ),
+            1,
+            result.stderr,
+        )
         self.assertEqual(os.listdir(self.scratch / "cache"), ["mine"])
 
     def test_limits_of_reading_come_to_the_workers_as_they_are(self):
-        result = self.compare(self.experiment({"a": "{}"}, cases=1), "--out", self.scratch / "out", "--file-seconds", "0.001", "--file-memory", "1e9")
+        result = self.compare(
+            self.experiment({"a": "{}"}, cases=1),
+            "--out",
+            self.scratch / "out",
+            "--file-seconds",
+            "0.001",
+            "--file-memory",
+            "1e9",
+        )
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(self.rows("out")["a/0/0"]["reason"], "")
 
     def test_one_cell_by_itself(self):
         path = self.experiment({"a": "{}", "b": "{m.value: 5}"})
         environment = {"MARROW_CACHE": str(self.scratch / "cache")}
-        result = marrow("cell", path, "b/1/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment)
+        result = marrow(
+            "cell", path, "b/1/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment
+        )
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertEqual(json.loads(result.stdout)["values"], [6])
         self.assertTrue((self.scratch / "out" / "cells" / "b" / "1" / "0" / "run.json").exists())
         whole = self.compare(path, "--out", self.scratch / "out")
         self.assertIn("1 were there already", whole.stdout)
-        wrong = marrow("cell", path, "b/l/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment)
+        wrong = marrow(
+            "cell", path, "b/l/0", "--out", self.scratch / "out", plugins=[TEST_PLUGINS], extra_environment=environment
+        )
         self.assertEqual(wrong.returncode, 2)
         self.assertIn("the experiment has no cell 'b/l/0': there is no case 'l'; did you mean", wrong.stderr)
 

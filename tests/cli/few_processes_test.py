@@ -34,7 +34,10 @@ nodes:
   d: {uses: evaluate.surface_distance, in: {mesh: a, reference: b}, with: {points: 200}}
 outputs: {d: d}
 """
-EXPERIMENT = "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nvariants: {one: {}, two: {d.points: 300}}\nmetrics: [d.mean_mm]\n"
+EXPERIMENT = (
+    "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nvariants: {one: {}, two: {d.points: 300}}\nmetrics:"
+    " [d.mean_mm]\n"
+)
 
 
 @unittest.skipIf(os.getuid() != 0, "only root can become a user without other processes")
@@ -55,9 +58,21 @@ class FewProcesses(Case):
             os.setgid(USER)
             os.setuid(USER)
 
-        environment = dict(os.environ, HOME=str(self.scratch), MARROW_CACHE=str(self.scratch / "cache"), XDG_CACHE_HOME=str(self.scratch))
-        return subprocess.run([str(MARROW), *arguments, "--no-cache"], capture_output=True, text=True, cwd=self.scratch, timeout=300,
-                              env=environment, preexec_fn=become_user)
+        environment = dict(
+            os.environ,
+            HOME=str(self.scratch),
+            MARROW_CACHE=str(self.scratch / "cache"),
+            XDG_CACHE_HOME=str(self.scratch),
+        )
+        return subprocess.run(
+            [str(MARROW), *arguments, "--no-cache"],
+            capture_output=True,
+            text=True,
+            cwd=self.scratch,
+            timeout=300,
+            env=environment,
+            preexec_fn=become_user,
+        )
 
     def test_a_run_waits_for_one_reader_to_start_the_other(self):
         for most in (3, 4, 5):

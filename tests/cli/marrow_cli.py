@@ -25,8 +25,15 @@ def marrow(*arguments, plugins=(), cwd=None, timeout=300, extra_environment=None
     environment = dict(os.environ)
     environment["MARROW_PLUGIN_PATH"] = ":".join(str(folder) for folder in plugins)
     environment.update(extra_environment or {})
-    return subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=cwd, timeout=timeout,
-                          env=environment, errors="replace")
+    return subprocess.run(
+        [str(MARROW), *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        cwd=cwd,
+        timeout=timeout,
+        env=environment,
+        errors="replace",
+    )
 
 
 def wait_until(condition, what, seconds=120):

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""200 random mutations of the shipped pipelines: each is either still good or diagnosed, and none crashes the program."""
+"""200 random mutations of the shipped pipelines: each is either still good or diagnosed, and none crashes the
+program."""
 import json
 import random
 
@@ -17,9 +18,9 @@ def mutated(text, chance):
     if kind == 0:
         line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column:]
     elif kind == 1:
-        line = line[:column] + line[column + 1:]
+        line = line[:column] + line[column + 1 :]
     elif kind == 2:
-        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column + 1:]
+        line = line[:column] + chance.choice("abcxyz019.:{}[],\"'$&*!%@ ") + line[column + 1 :]
     elif kind == 3:
         line = line[:column] + line[column:][::-1]
     else:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files that other programs wrote (pydicom's test files, GDCM, nibabel, tifffile, Pillow, VTK) are read as those programs read them, and
-damaged copies of them are refused by name, without a crash and in bounded memory. What is not installed is skipped, and said so."""
+"""Files that other programs wrote (pydicom's test files, GDCM, nibabel, tifffile, Pillow, VTK) are read as those
+programs read them, and damaged copies of them are refused by name, without a crash and in bounded memory. What is not
+installed is skipped, and said so."""
 import functools
 import os
 import pathlib
@@ -25,7 +26,9 @@ def module(name):
         return None
 
 
-numpy, pydicom, nibabel, tifffile, PIL, vtk = map(module, ("numpy", "pydicom", "nibabel", "tifffile", "PIL.Image", "vtkmodules.all"))
+numpy, pydicom, nibabel, tifffile, PIL, vtk = map(
+    module, ("numpy", "pydicom", "nibabel", "tifffile", "PIL.Image", "vtkmodules.all")
+)
 DICOM = pathlib.Path(pydicom.__file__).parent / "data" / "test_files" if pydicom else None
 
 
@@ -60,14 +63,27 @@ def run_limited(pipeline_text, folder, limit):
     def restrict():
         resource.setrlimit(resource.RLIMIT_AS, (limit, limit))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
     # One thread: how many there are at the same moment, each with a stack, would be a matter of chance.
     command = [str(marrow_cli.MARROW), "run", "p.yaml", "--out", "out", "--quiet", "--threads", "1"]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, errors="replace", timeout=240, preexec_fn=restrict, env=dict(os.environ, MARROW_PLUGIN_PATH=""))
+    return subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        timeout=240,
+        preexec_fn=restrict,
+        env=dict(os.environ, MARROW_PLUGIN_PATH=""),
+    )
 
 
 class Reading(Case):
     def run_node(self, node, options, file):
-        pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n" % (node, file, options))
+        pipeline = self.write(
+            "p.yaml",
+            "marrow: 1\nnodes:\n  it: {uses: %s, with: {path: '%s'%s}}\noutputs: {it: it}\n" % (node, file, options),
+        )
         out = self.scratch / "out"
         shutil.rmtree(out, ignore_errors=True)
         return marrow("run", pipeline, "--out", out, "--quiet"), out / "outputs"
@@ -104,8 +120,15 @@ class Dicom(Reading):
 
     def test_every_way_to_store_the_same_image(self):
         expected = self.values("MR_small.dcm")
-        for name in ("MR_small", "MR_small_bigendian", "MR_small_expb", "MR_small_implicit", "MR_small_padded", "MR_small_RLE",
-                     "MR_small_jpeg_ls_lossless"):
+        for name in (
+            "MR_small",
+            "MR_small_bigendian",
+            "MR_small_expb",
+            "MR_small_implicit",
+            "MR_small_padded",
+            "MR_small_RLE",
+            "MR_small_jpeg_ls_lossless",
+        ):
             with self.subTest(name):
                 self.assert_scaled(self.image(DICOM / (name + ".dcm")), expected)
 
@@ -119,7 +142,9 @@ class Dicom(Reading):
         for option in ("--raw", "--jpeg", "--jpegls", "--rle", "--implicit", "--explicit"):
             with self.subTest(option):
                 file = self.scratch / ("x%s.dcm" % option)
-                made = subprocess.run(["gdcmconv", option, str(DICOM / "MR_small.dcm"), str(file)], capture_output=True, text=True)
+                made = subprocess.run(
+                    ["gdcmconv", option, str(DICOM / "MR_small.dcm"), str(file)], capture_output=True, text=True
+                )
                 if made.returncode != 0 or not file.exists():
                     self.skipTest("gdcmconv %s: %s" % (option, made.stderr))
                 self.assert_scaled(self.image(file), expected)
@@ -130,24 +155,44 @@ class Dicom(Reading):
         if not shutil.which("gdcmconv"):
             self.skipTest("not installed here: gdcmconv (libgdcm-tools)")
         raw = self.scratch / "raw.dcm"
-        subprocess.run(["gdcmconv", "--raw", str(DICOM / "MR_small_jp2klossless.dcm"), str(raw)], check=True, capture_output=True)
+        subprocess.run(
+            ["gdcmconv", "--raw", str(DICOM / "MR_small_jp2klossless.dcm"), str(raw)], check=True, capture_output=True
+        )
         self.assert_scaled(self.image(raw), self.values("MR_small.dcm"))
 
     def test_a_series(self):
         for folder in ("98892001/CT5N", "77654033/CT2"):
             with self.subTest(folder):
                 slices = [pydicom.dcmread(path) for path in (DICOM / "dicomdirtests" / folder).iterdir()]
-                slices.sort(key=lambda s: numpy.dot(s.ImagePositionPatient, numpy.cross(s.ImageOrientationPatient[:3], s.ImageOrientationPatient[3:])))
-                expected = numpy.stack([s.pixel_array * float(s.RescaleSlope) + float(s.RescaleIntercept) for s in slices])
+                slices.sort(
+                    key=lambda s: numpy.dot(
+                        s.ImagePositionPatient,
+                        numpy.cross(s.ImageOrientationPatient[:3], s.ImageOrientationPatient[3:]),
+                    )
+                )
+                expected = numpy.stack(
+                    [s.pixel_array * float(s.RescaleSlope) + float(s.RescaleIntercept) for s in slices]
+                )
                 result, out = self.run_node("read.volume", "", DICOM / "dicomdirtests" / folder)
                 print("\n   ", folder, result.stderr.strip().replace(str(DICOM), ""))
                 if result.returncode == 0:
                     values, keys = read_mha(out / "it.mha")
                     self.assertLess(float(numpy.abs(values - expected).max()), 1e-3)
-                    self.assertEqual([float(x) for x in keys["ElementSpacing"].split()[:2]], [float(x) for x in slices[0].PixelSpacing[::-1]])
-                    self.assertLess(max(abs(float(a) - float(b)) for a, b in zip(keys["Offset"].split(), slices[0].ImagePositionPatient)), 1e-4)
+                    self.assertEqual(
+                        [float(x) for x in keys["ElementSpacing"].split()[:2]],
+                        [float(x) for x in slices[0].PixelSpacing[::-1]],
+                    )
+                    self.assertLess(
+                        max(
+                            abs(float(a) - float(b))
+                            for a, b in zip(keys["Offset"].split(), slices[0].ImagePositionPatient)
+                        ),
+                        1e-4,
+                    )
                 else:
-                    self.assertRegex(result.stderr, "a slice is missing or the series is unevenly spaced|lie at the same place")
+                    self.assertRegex(
+                        result.stderr, "a slice is missing or the series is unevenly spaced|lie at the same place"
+                    )
 
     def test_every_other_file_is_read_or_refused_by_name(self):
         read, refused = [], []
@@ -210,8 +255,13 @@ class Nifti(Reading):
 class Tiff(Reading):
     def test_stacks(self):
         values = numpy.random.default_rng(2).integers(0, 4096, (5, 24, 32)).astype("uint16")
-        for name, options in (("plain", {}), ("zlib", {"compression": "zlib"}), ("big", {"bigtiff": True}), ("motorola", {"byteorder": ">"}),
-                              ("strips", {"rowsperstrip": 5})):
+        for name, options in (
+            ("plain", {}),
+            ("zlib", {"compression": "zlib"}),
+            ("big", {"bigtiff": True}),
+            ("motorola", {"byteorder": ">"}),
+            ("strips", {"rowsperstrip": 5}),
+        ):
             for kind in ("uint16", "float32", "uint8"):
                 with self.subTest("%s %s" % (name, kind)):
                     file = self.scratch / "a.tif"
@@ -223,16 +273,26 @@ class Tiff(Reading):
 
     def test_tiles_are_refused_in_words(self):
         file = self.scratch / "tiles.tif"
-        tifffile.imwrite(file, numpy.zeros((5, 24, 32), "uint16"), photometric="minisblack", metadata=None, tile=(16, 16))
-        self.assertIn("is stored in tiles; expected strips", self.refused("read.volume", file, ", voxel_size_mm: [1, 2, 3]"))
+        tifffile.imwrite(
+            file, numpy.zeros((5, 24, 32), "uint16"), photometric="minisblack", metadata=None, tile=(16, 16)
+        )
+        self.assertIn(
+            "is stored in tiles; expected strips", self.refused("read.volume", file, ", voxel_size_mm: [1, 2, 3]")
+        )
 
 
 @needs("PIL", "numpy")
 class Images(Reading):
     def test_pillow(self):
         values = numpy.random.default_rng(3).integers(0, 65536, (20, 30)).astype("uint16")
-        for name, options in (("a.png", {}), ("b.png", {"optimize": True}), ("a.tif", {}), ("lzw.tif", {"compression": "tiff_lzw"}),
-                              ("deflate.tif", {"compression": "tiff_adobe_deflate"}), ("packbits.tif", {"compression": "packbits"})):
+        for name, options in (
+            ("a.png", {}),
+            ("b.png", {"optimize": True}),
+            ("a.tif", {}),
+            ("lzw.tif", {"compression": "tiff_lzw"}),
+            ("deflate.tif", {"compression": "tiff_adobe_deflate"}),
+            ("packbits.tif", {"compression": "packbits"}),
+        ):
             for kind in ("uint16", "uint8"):
                 with self.subTest("%s %s" % (name, kind)):
                     pixels = values if kind == "uint16" else (values >> 8).astype("uint8")
@@ -256,6 +316,7 @@ class Vtk(Reading):
         image.SetOrigin(3, -4, 5)
         image.AllocateScalars(kind, 1)
         from vtkmodules.util.numpy_support import vtk_to_numpy
+
         values = vtk_to_numpy(image.GetPointData().GetScalars())
         values[:] = numpy.arange(values.size) * 37 % 251
         return image, values.reshape(dimensions[::-1])
@@ -295,7 +356,12 @@ class Vtk(Reading):
         sphere.SetRadius(20)
         sphere.Update()
         source = sphere.GetOutput()
-        for writer, name in ((vtk.vtkSTLWriter(), "a.stl"), (vtk.vtkSTLWriter(), "text.stl"), (vtk.vtkPLYWriter(), "a.ply"), (vtk.vtkPLYWriter(), "text.ply")):
+        for writer, name in (
+            (vtk.vtkSTLWriter(), "a.stl"),
+            (vtk.vtkSTLWriter(), "text.stl"),
+            (vtk.vtkPLYWriter(), "a.ply"),
+            (vtk.vtkPLYWriter(), "text.ply"),
+        ):
             with self.subTest(name):
                 (writer.SetFileTypeToASCII if name.startswith("text") else writer.SetFileTypeToBinary)()
                 self.save(writer, self.scratch / name, source)
@@ -306,7 +372,9 @@ class Vtk(Reading):
                 reader.Update()
                 self.assertEqual(reader.GetOutput().GetNumberOfCells(), source.GetNumberOfCells())
                 self.assertEqual(reader.GetOutput().GetNumberOfPoints(), source.GetNumberOfPoints())
-                self.assertLess(max(abs(a - b) for a, b in zip(reader.GetOutput().GetBounds(), source.GetBounds())), 1e-4)
+                self.assertLess(
+                    max(abs(a - b) for a, b in zip(reader.GetOutput().GetBounds(), source.GetBounds())), 1e-4
+                )
 
 
 class Damaged(Reading):
@@ -323,9 +391,9 @@ class Damaged(Reading):
         read = 0
         for number in range(DAMAGED):
             if number % 3 == 0:
-                copy = data[:source.randrange(len(data) - 1)]
+                copy = data[: source.randrange(len(data) - 1)]
             elif number % 3 == 1:
-                copy = data[:source.randrange(header)]
+                copy = data[: source.randrange(header)]
             else:
                 copy = bytearray(data)
                 for _ in range(3):
@@ -344,7 +412,11 @@ class Damaged(Reading):
     @needs("PIL", "numpy")
     def test_images(self):
         values = numpy.random.default_rng(5).integers(0, 65536, (40, 50)).astype("uint16")
-        for name, options in (("a.png", {}), ("lzw.tif", {"compression": "tiff_lzw"}), ("packbits.tif", {"compression": "packbits"})):
+        for name, options in (
+            ("a.png", {}),
+            ("lzw.tif", {"compression": "tiff_lzw"}),
+            ("packbits.tif", {"compression": "packbits"}),
+        ):
             PIL.fromarray(values).save(self.scratch / name, **options)
             self.check("read.image", "", self.scratch / name)
 
@@ -357,14 +429,22 @@ class Damaged(Reading):
 
     @needs("nibabel", "numpy")
     def test_nifti(self):
-        image = nibabel.Nifti1Image(numpy.random.default_rng(7).integers(0, 3000, (9, 8, 7)).astype("int16"), numpy.eye(4))
+        image = nibabel.Nifti1Image(
+            numpy.random.default_rng(7).integers(0, 3000, (9, 8, 7)).astype("int16"), numpy.eye(4)
+        )
         for name in ("a.nii", "a.nii.gz"):
             nibabel.save(image, self.scratch / name)
             self.check("read.volume", "", self.scratch / name)
 
     @needs("pydicom")
     def test_dicom(self):
-        for name in ("MR_small.dcm", "MR_small_implicit.dcm", "MR_small_bigendian.dcm", "MR_small_RLE.dcm", "MR_small_jpeg_ls_lossless.dcm"):
+        for name in (
+            "MR_small.dcm",
+            "MR_small_implicit.dcm",
+            "MR_small_bigendian.dcm",
+            "MR_small_RLE.dcm",
+            "MR_small_jpeg_ls_lossless.dcm",
+        ):
             shutil.copy(DICOM / name, self.scratch / name)
             self.check("read.image", "", self.scratch / name)
 
@@ -376,8 +456,11 @@ class Damaged(Reading):
         image.GetPointData().GetScalars().FillComponent(0, 7)
         sphere = vtk.vtkSphereSource()
         sphere.Update()
-        for writer, name, node, source in ((vtk.vtkMetaImageWriter(), "a.mha", "read.volume", image), (vtk.vtkSTLWriter(), "a.stl", "read.mesh", sphere.GetOutput()),
-                                           (vtk.vtkPLYWriter(), "a.ply", "read.mesh", sphere.GetOutput())):
+        for writer, name, node, source in (
+            (vtk.vtkMetaImageWriter(), "a.mha", "read.volume", image),
+            (vtk.vtkSTLWriter(), "a.stl", "read.mesh", sphere.GetOutput()),
+            (vtk.vtkPLYWriter(), "a.ply", "read.mesh", sphere.GetOutput()),
+        ):
             writer.SetFileName(str(self.scratch / name))
             writer.SetInputData(source)
             if hasattr(writer, "SetFileTypeToBinary"):

@@ -14,16 +14,28 @@ BAD = BUILD / "tests" / "bad_plugins"
 
 
 class Plugins(Case):
-    @unittest.skipIf(IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse")
+    @unittest.skipIf(
+        IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse"
+    )
     def test_smallest_plugin_outside_the_tree(self):
         folder = self.scratch / "mine"
         shutil.copytree(SOURCE / "docs" / "example-plugin", folder)
         self.assertLessEqual(sum(len(path.read_text().splitlines()) for path in folder.iterdir()), 40)
-        subprocess.run(["cmake", "-S", folder, "-B", folder / "build", "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD], check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            ["cmake", "-S", folder, "-B", folder / "build", "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD],
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
         subprocess.run(["cmake", "--build", folder / "build"], check=True, stdout=subprocess.DEVNULL)
         self.assertTrue((folder / "build" / "marrow_steepest.json").exists())
         self.assertIn("edges.steepest", marrow("list", "edges", plugins=[folder / "build"]).stdout)
-        checked = marrow("check", SOURCE / "pipelines" / "femur.yaml", "--set", "edges.uses=edges.steepest", plugins=[folder / "build"])
+        checked = marrow(
+            "check",
+            SOURCE / "pipelines" / "femur.yaml",
+            "--set",
+            "edges.uses=edges.steepest",
+            plugins=[folder / "build"],
+        )
         self.assertEqual(checked.returncode, 0, checked.stderr)
 
     def refused(self, name, make):
@@ -41,15 +53,24 @@ class Plugins(Case):
         return lines[0]
 
     def test_other_api_version(self):
-        self.assertIn("was built for plugin interface 7.2, this marrow has 1.0", self.refused("a.so", lambda path: shutil.copy(BAD / "other_api.so", path)))
+        self.assertIn(
+            "was built for plugin interface 7.2, this marrow has 1.0",
+            self.refused("a.so", lambda path: shutil.copy(BAD / "other_api.so", path)),
+        )
 
     def test_debug_mode(self):
-        self.assertIn("_GLIBCXX_DEBUG (debug mode) on", self.refused("a.so", lambda path: shutil.copy(BAD / "debug_mode.so", path)))
+        self.assertIn(
+            "_GLIBCXX_DEBUG (debug mode) on",
+            self.refused("a.so", lambda path: shutil.copy(BAD / "debug_mode.so", path)),
+        )
 
     def test_other_eigen_alignment(self):
         if not (BAD / "other_alignment.so").exists():
             self.skipTest("only where -mavx changes the alignment")
-        self.assertIn("EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16", self.refused("a.so", lambda path: shutil.copy(BAD / "other_alignment.so", path)))
+        self.assertIn(
+            "EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16",
+            self.refused("a.so", lambda path: shutil.copy(BAD / "other_alignment.so", path)),
+        )
 
     def test_truncated(self):
         whole = (BUILD / "lib" / "marrow" / "marrow_mesh_marching_cubes.so").read_bytes()
@@ -59,7 +80,9 @@ class Plugins(Case):
         self.assertIn("is not a shared library", self.refused("a.so", lambda path: path.write_text("hello\n")))
 
     def test_crash_while_loading(self):
-        self.assertIn("crashed while being loaded", self.refused("a.so", lambda path: shutil.copy(BAD / "crashes.so", path)))
+        self.assertIn(
+            "crashed while being loaded", self.refused("a.so", lambda path: shutil.copy(BAD / "crashes.so", path))
+        )
 
     def own(self, **more):
         return {"XDG_CACHE_HOME": str(self.scratch / "cache"), **more}
@@ -78,31 +101,58 @@ class Plugins(Case):
         os.symlink("/dev/tty", folder / "terminal.so")
         with socket.socket(socket.AF_UNIX) as end:
             end.bind(str(folder / "socket.so"))
-            for command in (["list"], ["inspect", "test.add"], ["schema"], ["check", SOURCE / "pipelines" / "femur.yaml"]):
+            for command in (
+                ["list"],
+                ["inspect", "test.add"],
+                ["schema"],
+                ["check", SOURCE / "pipelines" / "femur.yaml"],
+            ):
                 result = marrow(*command, plugins=[folder], extra_environment=self.own(), timeout=240)
                 self.assertEqual(result.returncode, 0, result.stderr)
             text = marrow("doctor", plugins=[folder], extra_environment=self.own(), timeout=240).stdout
         self.assertIn("REFUSED  %s/pipe.so: it is a named pipe, not a regular file" % folder, text)
         self.assertIn("REFUSED  %s/socket.so: it is a socket, not a regular file" % folder, text)
-        self.assertIn("note: its manifest is not used (it is a named pipe, not a regular file), so it was described anew", text)
+        self.assertIn(
+            "note: its manifest is not used (it is a named pipe, not a regular file), so it was described anew", text
+        )
         self.assertIn("test.add", text, "the others still work")
         result = marrow("describe", folder / "pipe.so", timeout=240)
-        self.assertEqual((result.returncode, result.stderr), (1, "marrow: error: %s/pipe.so is a named pipe, not a regular file\n" % folder))
+        self.assertEqual(
+            (result.returncode, result.stderr),
+            (1, "marrow: error: %s/pipe.so is a named pipe, not a regular file\n" % folder),
+        )
 
     def test_an_unknown_library_is_only_loaded_in_a_process_of_its_own(self):
         folder = self.unknown_library()
         pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {number: c}\n")
-        for command in (["list"], ["check", pipeline], ["inspect", "test.add"], ["graph", pipeline], ["plan", pipeline], ["schema"], ["doctor"], ["conformance", "test.add"]):
+        for command in (
+            ["list"],
+            ["check", pipeline],
+            ["inspect", "test.add"],
+            ["graph", pipeline],
+            ["plan", pipeline],
+            ["schema"],
+            ["doctor"],
+            ["conformance", "test.add"],
+        ):
             shutil.rmtree(self.scratch / "cache", ignore_errors=True)
             environment = dict(os.environ, MARROW_PLUGIN_PATH=str(folder), LD_DEBUG="files", **self.own())
-            with subprocess.Popen([MARROW, *command], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as program:
+            with subprocess.Popen(
+                [MARROW, *command], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            ) as program:
                 _, messages = program.communicate(timeout=240)
             self.assertEqual(program.returncode, 0, messages[-300:])
-            loads = [int(line.split(":")[0]) for line in messages.splitlines() if "calling init: %s/marrow_test" % folder in line]
+            loads = [
+                int(line.split(":")[0])
+                for line in messages.splitlines()
+                if "calling init: %s/marrow_test" % folder in line
+            ]
             self.assertEqual(len(loads), 1, command)
             self.assertNotIn(program.pid, loads, command)
             told = " ".join(marrow(command[0], "--help").stdout.split())
-            self.assertIn("A plugin library that is not known yet is loaded once, in a process of its own, to be described", told)
+            self.assertIn(
+                "A plugin library that is not known yet is loaded once, in a process of its own, to be described", told
+            )
 
     def test_a_folder_that_others_may_write_is_refused(self):
         folder = self.unknown_library()
@@ -111,9 +161,16 @@ class Plugins(Case):
         self.assertIn("it is not trusted, because others may write to '%s' (owner " % folder, text)
         self.assertIn("mode 0777); chmod go-w '%s', or set MARROW_TRUST_ALL_PLUGINS=1" % folder, text)
         self.assertNotIn("test.add", text)
-        self.assertIn("test.add", marrow("doctor", plugins=[folder], extra_environment=self.own(MARROW_TRUST_ALL_PLUGINS="1")).stdout)
+        self.assertIn(
+            "test.add",
+            marrow("doctor", plugins=[folder], extra_environment=self.own(MARROW_TRUST_ALL_PLUGINS="1")).stdout,
+        )
         folder.chmod(0o755)
-        self.assertIn("test.add", marrow("doctor", plugins=[folder], extra_environment=self.own()).stdout, "the verdict is not kept")
+        self.assertIn(
+            "test.add",
+            marrow("doctor", plugins=[folder], extra_environment=self.own()).stdout,
+            "the verdict is not kept",
+        )
 
     def test_what_was_checked_is_loaded_wherever_a_link_leads_by_then(self):
         # Others may turn a link in an open folder between the check and the load: the link is not used twice.
@@ -122,9 +179,18 @@ class Plugins(Case):
         opened.chmod(0o777)
         (opened / "link").symlink_to(folder)
         pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  c: {uses: test.constant}\noutputs: {number: c}\n")
-        for command in (["describe", opened / "link" / "marrow_test_numbers.so"], ["run", pipeline, "--out", self.scratch / "out"]):
-            result = marrow(*command, plugins=[opened / "link"], extra_environment=self.own(LD_DEBUG="files"), timeout=240)
-            loads = [line.split("calling init: ")[1] for line in result.stderr.splitlines() if "calling init: " in line and "marrow_test" in line]
+        for command in (
+            ["describe", opened / "link" / "marrow_test_numbers.so"],
+            ["run", pipeline, "--out", self.scratch / "out"],
+        ):
+            result = marrow(
+                *command, plugins=[opened / "link"], extra_environment=self.own(LD_DEBUG="files"), timeout=240
+            )
+            loads = [
+                line.split("calling init: ")[1]
+                for line in result.stderr.splitlines()
+                if "calling init: " in line and "marrow_test" in line
+            ]
             self.assertEqual(set(loads), {str(folder / "marrow_test_numbers.so")}, command)
 
     def test_manifests_are_written_whole(self):
@@ -133,7 +199,9 @@ class Plugins(Case):
         programs = [subprocess.Popen([MARROW, "describe", library, "--write"]) for _ in range(6)]
         self.assertEqual([program.wait(timeout=240) for program in programs], [0] * 6)
         self.assertEqual(len(json.loads(manifest.read_text())["nodes"]), 15)
-        self.assertEqual(sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left")
+        self.assertEqual(
+            sorted(path.name for path in folder.iterdir()), [manifest.name, library.name], "no temporary file is left"
+        )
         self.assertEqual(manifest.stat().st_mode & 0o777, 0o644)
 
     def test_a_manifest_replaces_no_other_file(self):
@@ -144,7 +212,11 @@ class Plugins(Case):
             manifest.write_text(foreign)
             result = describe(library)
             self.assertEqual(result.returncode, 2, foreign)
-            self.assertEqual(result.stderr, "marrow: error: %s is there already and is no manifest that marrow wrote; move it away, or rename %s\n" % (manifest, library))
+            self.assertEqual(
+                result.stderr,
+                "marrow: error: %s is there already and is no manifest that marrow wrote; move it away, or rename %s\n"
+                % (manifest, library),
+            )
             self.assertEqual(manifest.read_text(), foreign)
         manifest.write_text('{"marrow_manifest": 0}')  # of another version
         for _ in range(2):
@@ -155,15 +227,25 @@ class Plugins(Case):
             other.write_bytes(library.read_bytes())
             result = describe(other)
             self.assertEqual(result.returncode, 2, name)
-            self.assertIn("a manifest is written only beside a library whose name ends in .so, got %s; rename it" % other, result.stderr)
+            self.assertIn(
+                "a manifest is written only beside a library whose name ends in .so, got %s; rename it" % other,
+                result.stderr,
+            )
             self.assertEqual(other.read_bytes(), library.read_bytes())
 
     def test_a_manifest_on_a_full_disk(self):
         folder = self.unknown_library()
-        limited = subprocess.run([MARROW, "describe", folder / "marrow_test_numbers.so", "--write"], capture_output=True, text=True,
-                                 restore_signals=False, preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)))
+        limited = subprocess.run(
+            [MARROW, "describe", folder / "marrow_test_numbers.so", "--write"],
+            capture_output=True,
+            text=True,
+            restore_signals=False,
+            preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (1000, 1000)),
+        )
         self.assertEqual(limited.returncode, 2)
-        self.assertEqual(limited.stderr, "marrow: error: cannot write %s/marrow_test_numbers.json: File too large\n" % folder)
+        self.assertEqual(
+            limited.stderr, "marrow: error: cannot write %s/marrow_test_numbers.json: File too large\n" % folder
+        )
         self.assertEqual([path.name for path in folder.iterdir()], ["marrow_test_numbers.so"])
 
 

@@ -25,16 +25,24 @@ class Schema(Case):
 
     def test_faults_are_found(self):
         good = yaml.safe_load((SOURCE / "pipelines" / "femur.yaml").read_text())
-        for spoil in (lambda p: p["nodes"]["edges"].update(uses="edges.nothing"), lambda p: p["nodes"]["edges"]["with"].update(low=1000),
-                      lambda p: p["nodes"]["edges"]["with"].update(hihg=1), lambda p: p["nodes"]["edges"]["in"].pop("view"),
-                      lambda p: p.update(colour="red"), lambda p: p.pop("marrow")):
+        for spoil in (
+            lambda p: p["nodes"]["edges"].update(uses="edges.nothing"),
+            lambda p: p["nodes"]["edges"]["with"].update(low=1000),
+            lambda p: p["nodes"]["edges"]["with"].update(hihg=1),
+            lambda p: p["nodes"]["edges"]["in"].pop("view"),
+            lambda p: p.update(colour="red"),
+            lambda p: p.pop("marrow"),
+        ):
             bad = json.loads(json.dumps(good))
             spoil(bad)
             self.assertFalse(self.validator.is_valid(bad))
 
     def test_the_committed_schema_is_current(self):
-        self.assertEqual(json.loads((SOURCE / "schemas" / "pipeline.schema.json").read_text()), self.schema,
-                         "run: marrow schema --out schemas/pipeline.schema.json")
+        self.assertEqual(
+            json.loads((SOURCE / "schemas" / "pipeline.schema.json").read_text()),
+            self.schema,
+            "run: marrow schema --out schemas/pipeline.schema.json",
+        )
 
 
 # All that an experiment file can say.
@@ -69,13 +77,36 @@ timed_cells: 1
 """
 # What of it becomes what, and is then refused by the schema and by the program alike.
 WRONG = {
-    "experiment: 1": "experiment: 2", "name: all": "name: a/b", "help: one": "halp: one", "pipeline: PIPELINES/femur.yaml\n": "", "edges.low": "edges",
-    "inputs: {}": "inputs: {case: [1]}", "  input: case": "  input: [case]", "folders: [cases/*]": "folders: cases/*", "    output: case": "    out: case", "seeds: 1..2": "seeds: 1-2",
-    "    pipeline: PIPELINES/simulate.yaml\n": "", "set: {cameras.beta_deg: [0, 60]}": "set: [cameras]", "[-10, 10]": "[-10]", "[shape_seed]": "shape_seed",
-    "  bobyqa: {optimizer.uses: optimizer.bobyqa}": "  bobyqa: optimizer.bobyqa", "  nelder_mead:": "  nelder/mead:", "[75, 80]": "75", "node: start, ": "", "count: 2": "count: 0",
-    "seed: 3": "seed: -3", "rotation_deg: 4": "rotation_deg: 400", "translation_mm: 5": "translation: 5", "{figure: ": "{path: ", "label: rotation": "lable: rotation",
-    "mtre_mm: 2": "mtre_mm: low", "initial_error: errors.distal.start.mtre_mm": "initial_error: errors", "baseline: bobyqa+75": "baseline: [bobyqa]", "pictures: [overlay]": "pictures: overlay",
-    "timed_cells: 1": "timed_cells: all"}
+    "experiment: 1": "experiment: 2",
+    "name: all": "name: a/b",
+    "help: one": "halp: one",
+    "pipeline: PIPELINES/femur.yaml\n": "",
+    "edges.low": "edges",
+    "inputs: {}": "inputs: {case: [1]}",
+    "  input: case": "  input: [case]",
+    "folders: [cases/*]": "folders: cases/*",
+    "    output: case": "    out: case",
+    "seeds: 1..2": "seeds: 1-2",
+    "    pipeline: PIPELINES/simulate.yaml\n": "",
+    "set: {cameras.beta_deg: [0, 60]}": "set: [cameras]",
+    "[-10, 10]": "[-10]",
+    "[shape_seed]": "shape_seed",
+    "  bobyqa: {optimizer.uses: optimizer.bobyqa}": "  bobyqa: optimizer.bobyqa",
+    "  nelder_mead:": "  nelder/mead:",
+    "[75, 80]": "75",
+    "node: start, ": "",
+    "count: 2": "count: 0",
+    "seed: 3": "seed: -3",
+    "rotation_deg: 4": "rotation_deg: 400",
+    "translation_mm: 5": "translation: 5",
+    "{figure: ": "{path: ",
+    "label: rotation": "lable: rotation",
+    "mtre_mm: 2": "mtre_mm: low",
+    "initial_error: errors.distal.start.mtre_mm": "initial_error: errors",
+    "baseline: bobyqa+75": "baseline: [bobyqa]",
+    "pictures: [overlay]": "pictures: overlay",
+    "timed_cells: 1": "timed_cells: all",
+}
 
 
 class ExperimentSchema(Case):
@@ -90,14 +121,18 @@ class ExperimentSchema(Case):
 
     def program(self, text):
         (self.scratch / "cases" / "one").mkdir(parents=True, exist_ok=True)
-        return marrow("compare", self.write("e.yaml", text.replace("PIPELINES", str(SOURCE / "pipelines"))), "--dry-run")
+        return marrow(
+            "compare", self.write("e.yaml", text.replace("PIPELINES", str(SOURCE / "pipelines"))), "--dry-run"
+        )
 
     def test_every_experiment_is_valid_and_names_its_schema(self):
         files = sorted((SOURCE / "pipelines" / "experiments").glob("*.yaml"))
         self.assertGreaterEqual(len(files), 5)
         for path in files:
             text = path.read_text()
-            self.assertEqual(text.splitlines()[0], "# yaml-language-server: $schema=../../schemas/experiment.schema.json", str(path))
+            self.assertEqual(
+                text.splitlines()[0], "# yaml-language-server: $schema=../../schemas/experiment.schema.json", str(path)
+            )
             self.assertEqual(self.errors(text), [], str(path))
             result = marrow("compare", path, "--dry-run")
             self.assertEqual(result.returncode, 0, str(path) + result.stderr)
@@ -109,7 +144,12 @@ class ExperimentSchema(Case):
         self.assertIn("24 cells: 4 variants, 3 cases, 2 starts", result.stdout)
         file, schema = yaml.safe_load(EXPERIMENT), self.schema["properties"]
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
-        for keys, known in ((file, schema), (dict(file["cases"], seeds="by themselves"), schema["cases"]["properties"]), (file["cases"]["simulate"], simulation), (file["starts"], schema["starts"]["properties"])):
+        for keys, known in (
+            (file, schema),
+            (dict(file["cases"], seeds="by themselves"), schema["cases"]["properties"]),
+            (file["cases"]["simulate"], simulation),
+            (file["starts"], schema["starts"]["properties"]),
+        ):
             self.assertEqual(set(keys), set(known), "so the program knows all keys that the schema knows")
 
     def test_what_is_wrong_is_refused_by_schema_and_program(self):
@@ -123,7 +163,11 @@ class ExperimentSchema(Case):
         self.assertIn("'seeds' beside other cases", self.program(text).stderr)
 
     def test_names_and_numbers_as_in_yaml(self):
-        for change in (("seeds: 1..2", "seeds: [1, 5]"), ("variants:\n  nelder_mead:", "variants:\n  nelder_mead: {}"), ("edges.low: 40", "edges.low: 40.5")):
+        for change in (
+            ("seeds: 1..2", "seeds: [1, 5]"),
+            ("variants:\n  nelder_mead:", "variants:\n  nelder_mead: {}"),
+            ("edges.low: 40", "edges.low: 40.5"),
+        ):
             self.assertEqual(self.errors(EXPERIMENT.replace(*change)), [])
 
 

@@ -7,7 +7,18 @@ import tempfile
 
 import yaml
 
-from cases import FEMUR, SMALL, contents, copy_case, matrix_product, metrics, rotation_vector_deg, simulate, times, transposed
+from cases import (
+    FEMUR,
+    SMALL,
+    contents,
+    copy_case,
+    matrix_product,
+    metrics,
+    rotation_vector_deg,
+    simulate,
+    times,
+    transposed,
+)
 from marrow_cli import Case, main, marrow
 
 
@@ -45,8 +56,10 @@ class Siblings(Case):
         origin = pose["fragment_frame"]["origin_mm"] + [1]
         shift = times(camera, [a - b for a, b in zip(times(pose["matrix"], origin)[:3], times(truth, origin)[:3])])
         frontal, lateral, along = pose["predicted_deviation"]["translation_mm"]
-        print("one view, right, down and along the beam: off by %s mm, turned by %s deg" % (
-            " ".join("%.3f" % x for x in shift), " ".join("%.3f" % x for x in turn)))
+        print(
+            "one view, right, down and along the beam: off by %s mm, turned by %s deg"
+            % (" ".join("%.3f" % x for x in shift), " ".join("%.3f" % x for x in turn))
+        )
         print("   predicted %.3f and %.3f mm in the image, %.3f mm along the beam" % (frontal, along, lateral))
         self.assertLess(max(abs(shift[0]), abs(shift[1])), 0.5)
         self.assertLess(abs(turn[2]), 0.5)
@@ -55,14 +68,29 @@ class Siblings(Case):
         self.assertGreater(errors["predicted_max_mm"], 3 * errors["predicted_along_mm"])
 
     def test_three_views_60_degrees_apart(self):
-        case = simulate(self.scratch / "simulated", *SMALL, "--set", "cameras.names=[a, b, c]", "--set", "cameras.alpha_deg=[0, 0, 0]", "--set",
-                        "cameras.beta_deg=[0, 60, 120]")
+        case = simulate(
+            self.scratch / "simulated",
+            *SMALL,
+            "--set",
+            "cameras.names=[a, b, c]",
+            "--set",
+            "cameras.alpha_deg=[0, 0, 0]",
+            "--set",
+            "cameras.beta_deg=[0, 60, 120]"
+        )
         self.check_errors(self.run_femur(case), "distal", "three views")
 
     def test_both_fragments(self):
         # Tall images, which show condyles and trochanters: the shaft alone is too round to tell its axial rotation.
-        case = simulate(self.scratch / "simulated", "level=0.35", "isocentre_from_distal_end_mm=200", "--set", "cameras.height_px=1024", "--set",
-                        "case.register=[distal, proximal]")
+        case = simulate(
+            self.scratch / "simulated",
+            "level=0.35",
+            "isocentre_from_distal_end_mm=200",
+            "--set",
+            "cameras.height_px=1024",
+            "--set",
+            "case.register=[distal, proximal]",
+        )
         out = self.run_femur(case)
         for fragment in ("distal", "proximal"):
             self.check_errors(out, fragment, "both fragments")
@@ -79,7 +107,7 @@ class Siblings(Case):
         for name, node in yaml.safe_load(FEMUR.read_text())["nodes"].items():
             for other in siblings(nodes, node):
                 if other == "segment.region_growing":
-                    continue  # in voxels as coarse as this case's it takes part of the other fragment: the chapter says that it cannot split bones
+                    continue  # at this case's coarse voxels it takes part of the other fragment, as the chapter says
                 if other == "evaluate.mtre":
                     continue  # it has other figures
                 if other in ("optimizer.direct", "optimizer.grid"):
@@ -90,12 +118,28 @@ class Siblings(Case):
                 with self.subTest(setting):
                     self.check_errors(self.run_femur(self.case, "--set", setting, out=setting), "distal", setting)
                 replaced.add(other)
-        self.assertLessEqual({"segment.threshold", "segment.distance_regularised", "segment.sparse_field", "mesh.flying_edges", "mesh.surface_nets", "mesh.poisson",
-                              "mesh.delaunay", "mesh.smooth", "edges.canny", "initial.manual", "project.silhouette", "optimizer.bobyqa"},
-                             replaced)
+        self.assertLessEqual(
+            {
+                "segment.threshold",
+                "segment.distance_regularised",
+                "segment.sparse_field",
+                "mesh.flying_edges",
+                "mesh.surface_nets",
+                "mesh.poisson",
+                "mesh.delaunay",
+                "mesh.smooth",
+                "edges.canny",
+                "initial.manual",
+                "project.silhouette",
+                "optimizer.bobyqa",
+            },
+            replaced,
+        )
 
     def test_the_truth_changes_no_byte_of_a_pose(self):
-        without = copy_case(self.case, self.scratch / "case", lambda description: description["fragments"]["distal"].pop("truth"))
+        without = copy_case(
+            self.case, self.scratch / "case", lambda description: description["fragments"]["distal"].pop("truth")
+        )
         one, other = self.run_femur(self.case, out="with"), self.run_femur(without, out="without")
         self.assertTrue((one / "outputs" / "errors").exists())
         self.assertFalse((other / "outputs" / "errors").exists())
@@ -106,11 +150,16 @@ class Siblings(Case):
 
 def siblings(nodes, used):
     """The nodes of the same kind that give the same outputs and are given all inputs that they need."""
+
     def ports(name):
         return [(port["name"], port["type"], port["axis"]) for port in nodes[name]["outputs"]]
 
     for name, node in nodes.items():
-        if name == used["uses"] or name.split(".")[0] != used["uses"].split(".")[0] or ports(name) != ports(used["uses"]):
+        if (
+            name == used["uses"]
+            or name.split(".")[0] != used["uses"].split(".")[0]
+            or ports(name) != ports(used["uses"])
+        ):
             continue
         if all(port["optional"] or port["name"] in used.get("in", {}) for port in node["inputs"]):
             yield name

@@ -9,8 +9,23 @@ import time
 
 from marrow_cli import MARROW, TEST_PLUGINS, Case, main, marrow, wait_until
 
-FORGED = json.dumps({"id": "../../../forged", "variant": "one", "case": "seed-1", "start": "0", "status": "done", "tries": 1, "values": [0.001],
-                     "units": [""], "initial_error": None, "seconds": None, "evaluations": 0, "nodes": {}, "key": "k"})
+FORGED = json.dumps(
+    {
+        "id": "../../../forged",
+        "variant": "one",
+        "case": "seed-1",
+        "start": "0",
+        "status": "done",
+        "tries": 1,
+        "values": [0.001],
+        "units": [""],
+        "initial_error": None,
+        "seconds": None,
+        "evaluations": 0,
+        "nodes": {},
+        "key": "k",
+    }
+)
 NAMES = """marrow: 1
 nodes:
   s: {uses: test.sides, with: {names: [%s, b]}}
@@ -24,25 +39,37 @@ nodes:
   n: {uses: test.add, in: {a: w}}
 outputs: {number: n}
 """
-EXPERIMENT = "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nmetrics: [number.value]\nvariants: {one: {}, two: {}}\n"
+EXPERIMENT = (
+    "experiment: 1\npipeline: p.yaml\ncases: {seeds: 1..2}\nmetrics: [number.value]\nvariants: {one: {}, two: {}}\n"
+)
 
 
 class Workers(Case):
     def compare(self, *arguments):
-        return marrow("compare", self.write("e.yaml", EXPERIMENT), "--out", self.scratch / "out", *arguments, plugins=[TEST_PLUGINS],
-                      extra_environment={"MARROW_CACHE": str(self.scratch / "cache")})
+        return marrow(
+            "compare",
+            self.write("e.yaml", EXPERIMENT),
+            "--out",
+            self.scratch / "out",
+            *arguments,
+            plugins=[TEST_PLUGINS],
+            extra_environment={"MARROW_CACHE": str(self.scratch / "cache")}
+        )
 
     def rows(self):
         with open(self.scratch / "out" / "cells.csv", newline="") as stream:
             return [(row["cell"], row["status"], row.get("number.value")) for row in csv.DictReader(stream)]
 
     def test_names_cannot_pass_for_answers(self):
-        name = json.dumps("x\nend %s\n{\"job\": 1, \"end\": %s}\nx" % (FORGED, FORGED))
+        name = json.dumps('x\nend %s\n{"job": 1, "end": %s}\nx' % (FORGED, FORGED))
         self.write("p.yaml", NAMES % name)
         result = self.compare()
         self.assertEqual(result.returncode, 0, result.stderr)
         # 10 + 10 and 20 + 20
-        self.assertEqual(sorted(self.rows()), [(cell, "done", "60") for cell in ("one/seed-1/0", "one/seed-2/0", "two/seed-1/0", "two/seed-2/0")])
+        self.assertEqual(
+            sorted(self.rows()),
+            [(cell, "done", "60") for cell in ("one/seed-1/0", "one/seed-2/0", "two/seed-1/0", "two/seed-2/0")],
+        )
         self.assertEqual([str(path) for path in self.scratch.rglob("*forged*")], [])
 
     def test_waiting_for_another_run_is_no_failure(self):
@@ -50,19 +77,40 @@ class Workers(Case):
         self.write("data", "x")
         environment = dict(os.environ, MARROW_CACHE=str(self.scratch / "cache"), MARROW_PLUGIN_PATH=str(TEST_PLUGINS))
         with open(self.scratch / "events", "w") as events:
-            other = subprocess.Popen([str(MARROW), "run", "p.yaml", "--out", "other", "--json"], cwd=self.scratch, env=environment, stdout=events)
+            other = subprocess.Popen(
+                [str(MARROW), "run", "p.yaml", "--out", "other", "--json"],
+                cwd=self.scratch,
+                env=environment,
+                stdout=events,
+            )
         self.addCleanup(other.kill)
         events = self.scratch / "events"
         wait_until(lambda: '"started"' in events.read_text(), "the other run did not begin")
         other.send_signal(signal.SIGSTOP)
         said = self.scratch / "said"
         with open(said, "w") as errors:
-            command = [str(MARROW), "compare", str(self.write("e.yaml", EXPERIMENT)), "--out", "out", "--time-limit", "8"]
-            comparison = subprocess.Popen([*command, "--jobs", "1"], cwd=self.scratch, env=environment, stdout=subprocess.PIPE,
-                                          stderr=errors, text=True)
+            command = [
+                str(MARROW),
+                "compare",
+                str(self.write("e.yaml", EXPERIMENT)),
+                "--out",
+                "out",
+                "--time-limit",
+                "8",
+            ]
+            comparison = subprocess.Popen(
+                [*command, "--jobs", "1"],
+                cwd=self.scratch,
+                env=environment,
+                stdout=subprocess.PIPE,
+                stderr=errors,
+                text=True,
+            )
         self.addCleanup(comparison.kill)
-        wait_until(lambda: comparison.poll() is not None or "waits for another run" in said.read_text(),
-                   "it does not say that it waits")
+        wait_until(
+            lambda: comparison.poll() is not None or "waits for another run" in said.read_text(),
+            "it does not say that it waits",
+        )
         time.sleep(9)  # longer than a cell may take
         self.assertIsNone(comparison.poll(), "it did not wait")
         other.send_signal(signal.SIGCONT)

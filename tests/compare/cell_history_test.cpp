@@ -19,7 +19,8 @@ MetricChoice metric(MetricChoice::Better better, std::optional<double> limit) { 
 
 TEST(CellRow, IsASuccessWithinEveryLimit) {
   Experiment experiment;
-  experiment.metrics = {metric(MetricChoice::Better::lower, 2.0), metric(MetricChoice::Better::higher, 0.5), metric(MetricChoice::Better::lower, std::nullopt)};
+  experiment.metrics = {metric(MetricChoice::Better::lower, 2.0), metric(MetricChoice::Better::higher, 0.5),
+                        metric(MetricChoice::Better::lower, std::nullopt)};
   CellRow row;
   const auto success = [&](std::optional<double> a, std::optional<double> b, std::optional<double> c) {
     row.values = {a, b, c};
@@ -110,7 +111,8 @@ TEST(Draw, StartsAreTheSameOnAnyMachine) {
   for (std::size_t i = 0; i < 5; ++i) {
     EXPECT_EQ(starts[i].name, std::to_string(i));
     for (const auto& [vector, most] : {std::pair(starts[i].rotation_deg, 4.0), {starts[i].translation_mm, 7.0}}) {
-      const double z = 2 * random.uniform() - 1, angle = 2 * std::numbers::pi * random.uniform(), length = most * random.uniform();
+      const double z = 2 * random.uniform() - 1, angle = 2 * std::numbers::pi * random.uniform(),
+                   length = most * random.uniform();
       EXPECT_NEAR(vector[0], length * std::sqrt(1 - z * z) * std::cos(angle), 1e-12);
       EXPECT_NEAR(vector[1], length * std::sqrt(1 - z * z) * std::sin(angle), 1e-12);
       EXPECT_NEAR(vector[2], length * z, 1e-12);
@@ -118,7 +120,8 @@ TEST(Draw, StartsAreTheSameOnAnyMachine) {
     EXPECT_NEAR(starts[i].distance_mm, 30 * random.uniform(), 1e-12);
   }
   protocol.count = 2;
-  EXPECT_EQ(draw_starts(protocol)[1].rotation_deg, starts[1].rotation_deg) << "the first ones do not depend on how many there are";
+  EXPECT_EQ(draw_starts(protocol)[1].rotation_deg, starts[1].rotation_deg)
+      << "the first ones do not depend on how many there are";
   protocol.distance_mm = 0;
   EXPECT_EQ(draw_starts(protocol)[1].distance_mm, 0);
 }

@@ -5,8 +5,8 @@
 
 namespace {
 
-const std::string kStart = std::string(kHead) + kCases;                    // lines 1 to 3
-const std::string kGood = kStart + kVariants + kMetrics;                   // lines 1 to 7
+const std::string kStart = std::string(kHead) + kCases;   // lines 1 to 3
+const std::string kGood = kStart + kVariants + kMetrics;  // lines 1 to 7
 const std::string kAfterCases = std::string(kVariants) + kMetrics;
 
 class ExperimentFaults : public ExperimentFiles {
@@ -22,11 +22,15 @@ class ExperimentFaults : public ExperimentFiles {
     EXPECT_EQ(fault.hint, hint);
   }
   /// Of a line after all that there has to be.
-  void expect_fault_of(const std::string& line, const std::string& message, const std::string& hint = "") { expect_fault(kGood + line + "\n", 8, message, hint); }
+  void expect_fault_of(const std::string& line, const std::string& message, const std::string& hint = "") {
+    expect_fault(kGood + line + "\n", 8, message, hint);
+  }
   /// Of a line of a simulation.
   void expect_simulation_fault(const std::string& line, const std::string& message, const std::string& hint = "") {
-    const std::string pipeline = line.starts_with("pipeline") ? "" : "    pipeline: s.yaml\n", seeds = line.starts_with("seeds") ? "" : "    seeds: 1..2\n";
-    expect_fault(std::string(kHead) + "cases:\n  simulate:\n    " + line + "\n" + pipeline + seeds + kAfterCases, 5, message, hint);
+    const std::string pipeline = line.starts_with("pipeline") ? "" : "    pipeline: s.yaml\n",
+                      seeds = line.starts_with("seeds") ? "" : "    seeds: 1..2\n";
+    expect_fault(std::string(kHead) + "cases:\n  simulate:\n    " + line + "\n" + pipeline + seeds + kAfterCases, 5,
+                 message, hint);
   }
 };
 
@@ -36,40 +40,57 @@ const char* const kStartsHere = "the path starts at the experiment's file";
 TEST_F(ExperimentFaults, NoFile) {
   marrow::compare::read_experiment(scratch.path / "none.yaml", test_catalogue(), diagnostics);
   ASSERT_EQ(diagnostics.size(), 1u);
-  EXPECT_NE(diagnostics.text().find("none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(
+      diagnostics.text().find(
+          "none.yaml: error: the experiment file cannot be read: No such file or directory\n  hint: check the path"),
+      std::string::npos)
+      << diagnostics.text();
 }
 
 TEST_F(ExperimentFaults, NoYaml) {
   read("experiment: 1\npipeline: [p.yaml\ncases: {}\n");
-  EXPECT_NE(diagnostics.text().find("e.yaml:2:11: error: this [ is not closed"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(diagnostics.text().find("e.yaml:2:11: error: this [ is not closed"), std::string::npos)
+      << diagnostics.text();
   expect_fault("- experiment\n", 1, "the experiment must be a map, got a list", kMapHint);
 }
 
 TEST_F(ExperimentFaults, WhatIsMissing) {
-  expect_fault(std::string("pipeline: p.yaml\n") + kCases + kAfterCases, 1, "the key 'experiment' is missing", "begin the file with  experiment: 1");
-  expect_fault(std::string("experiment: 1\n") + kCases + kAfterCases, 1, "the key 'pipeline' is missing", "name the pipeline file whose variants are compared");
-  expect_fault(kHead + kAfterCases, 1, "the key 'cases' is missing", "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its data itself,  {seeds: 1..20}");
-  expect_fault(kStart + kVariants, 1, "the key 'metrics' is missing", "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
-  expect_fault(kStart + kMetrics, 1, "there are no variants", "name at least one under  variants:  or options under  matrix:");
+  expect_fault(std::string("pipeline: p.yaml\n") + kCases + kAfterCases, 1, "the key 'experiment' is missing",
+               "begin the file with  experiment: 1");
+  expect_fault(std::string("experiment: 1\n") + kCases + kAfterCases, 1, "the key 'pipeline' is missing",
+               "name the pipeline file whose variants are compared");
+  expect_fault(kHead + kAfterCases, 1, "the key 'cases' is missing",
+               "say on which data, as  cases: {folders: [...]},  {simulate: ...}  or, where the pipeline makes its "
+               "data itself,  {seeds: 1..20}");
+  expect_fault(kStart + kVariants, 1, "the key 'metrics' is missing",
+               "name the figures to compare, as  metrics: [errors.distal.final.mtre_mm]");
+  expect_fault(kStart + kMetrics, 1, "there are no variants",
+               "name at least one under  variants:  or options under  matrix:");
 }
 
 TEST_F(ExperimentFaults, HeadOfTheFile) {
   expect_fault_of("basline: one", "unknown key 'basline' in the experiment", "did you mean 'baseline'?");
   expect_fault_of("metrics: [other.value]", "'metrics' is given twice in the experiment", "the first is at line 7");
-  expect_fault("experiment: 2\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1, "this file is of format 2, this program reads format 1");
-  expect_fault("experiment: one\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1, "experiment: expected an integer, got 'one'");
-  expect_fault_of("name: my/edges", "an experiment's name becomes a file name: 'my/edges' cannot be one, it holds '/'", marrow::kNameHint);
+  expect_fault("experiment: 2\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1,
+               "this file is of format 2, this program reads format 1");
+  expect_fault("experiment: one\npipeline: p.yaml\n" + kGood.substr(kStart.find("cases")), 1,
+               "experiment: expected an integer, got 'one'");
+  expect_fault_of("name: my/edges", "an experiment's name becomes a file name: 'my/edges' cannot be one, it holds '/'",
+                  marrow::kNameHint);
   expect_fault_of("name: [edges]", "name: expected a text, got a list");
   expect_fault_of("help: {}", "help: expected a text, got a map");
-  expect_fault("experiment: 1\npipeline: q.yaml\n" + kGood.substr(kStart.find("cases")), 2, "there is no file 'q.yaml'", kStartsHere);
-  expect_fault("experiment: 1\npipeline: [p.yaml]\n" + kGood.substr(kStart.find("cases")), 2, "pipeline: expected a text, got a list");
+  expect_fault("experiment: 1\npipeline: q.yaml\n" + kGood.substr(kStart.find("cases")), 2, "there is no file 'q.yaml'",
+               kStartsHere);
+  expect_fault("experiment: 1\npipeline: [p.yaml]\n" + kGood.substr(kStart.find("cases")), 2,
+               "pipeline: expected a text, got a list");
 }
 
 TEST_F(ExperimentFaults, Inputs) {
   expect_fault_of("inputs: [1]", "'inputs' must be a map, got a list", kMapHint);
   expect_fault_of("inputs: {x: [1]}", "'x' must be one value");
   expect_fault_of("inputs: {csae: 1}", "the pipeline has no input 'csae'", "did you mean 'case'?");
-  scratch.write("p.yaml", std::string(kPipeline).insert(std::string(kPipeline).find("{case:") + 1, "x: {type: number}, "));
+  scratch.write("p.yaml",
+                std::string(kPipeline).insert(std::string(kPipeline).find("{case:") + 1, "x: {type: number}, "));
   expect_fault_of("inputs: {x: much}", "input 'x': expected a number, got 'much'");
 }
 
@@ -88,20 +109,27 @@ TEST_F(ExperimentFaults, Patches) {
 TEST_F(ExperimentFaults, Variants) {
   const auto variants = [](const std::string& lines) { return kStart + kMetrics + lines + "\n"; };
   expect_fault(variants("variants: [one]"), 5, "'variants' must be a map, got a list", kMapHint);
-  expect_fault(variants("variants:\n  a/b: {}"), 6, "a variant's name becomes a file name: 'a/b' cannot be one, it holds '/'", marrow::kNameHint);
-  expect_fault(variants("variants:\n  one: {}\n  one: {}"), 7, "'one' is given twice in 'variants'", "the first is at line 6");
+  expect_fault(variants("variants:\n  a/b: {}"), 6,
+               "a variant's name becomes a file name: 'a/b' cannot be one, it holds '/'", marrow::kNameHint);
+  expect_fault(variants("variants:\n  one: {}\n  one: {}"), 7, "'one' is given twice in 'variants'",
+               "the first is at line 6");
   expect_fault(variants("variants:\n  one: c.value"), 6, "variant 'one' must be a map, got 'c.value'", kMapHint);
-  expect_fault(variants("variants:\n  one: {}\n  two: {c.vlaue: 2}"), 7, "'test.constant' has no option 'vlaue'", "did you mean 'value'?");
+  expect_fault(variants("variants:\n  one: {}\n  two: {c.vlaue: 2}"), 7, "'test.constant' has no option 'vlaue'",
+               "did you mean 'value'?");
   expect_fault(variants("variants:\n  two: {d.value: 2}"), 6, "the pipeline has no node 'd'", "did you mean 'c'?");
 }
 
 TEST_F(ExperimentFaults, Matrix) {
   const auto matrix = [](const std::string& lines) { return kStart + kMetrics + lines + "\n"; };
   expect_fault(matrix("matrix: [c.value]"), 5, "'matrix' must be a map, got a list", kMapHint);
-  expect_fault(matrix("matrix: {c.value: 1}"), 5, "'c.value' in the matrix must be a list of values", "write it as  c.value: [a, b]");
-  expect_fault(matrix("matrix: {c.value: []}"), 5, "'c.value' in the matrix must be a list of values", "write it as  c.value: [a, b]");
-  expect_fault(matrix("matrix:\n  c.value: [1,\n   2000]"), 7, "option 'value' of test.constant: 2000 is above the most allowed, 1000");
-  expect_fault(matrix("matrix: {c.path: [../a]}"), 5, "a variant's name becomes a file name: '.._a' cannot be one, it begins with a dot", marrow::kNameHint);
+  expect_fault(matrix("matrix: {c.value: 1}"), 5, "'c.value' in the matrix must be a list of values",
+               "write it as  c.value: [a, b]");
+  expect_fault(matrix("matrix: {c.value: []}"), 5, "'c.value' in the matrix must be a list of values",
+               "write it as  c.value: [a, b]");
+  expect_fault(matrix("matrix:\n  c.value: [1,\n   2000]"), 7,
+               "option 'value' of test.constant: 2000 is above the most allowed, 1000");
+  expect_fault(matrix("matrix: {c.path: [../a]}"), 5,
+               "a variant's name becomes a file name: '.._a' cannot be one, it begins with a dot", marrow::kNameHint);
 }
 
 TEST_F(ExperimentFaults, FaultOfThePipelineIsSaidOnce) {
@@ -126,19 +154,25 @@ TEST_F(ExperimentFaults, Cases) {
   expect_fault(cases("\n  folders:\n  - cases/*\n  - more/*"), 6, "two cases are named 'a'",
                "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "more/a").string());
   std::filesystem::create_directories(scratch.path / "odd\nfolder" / "a");
-  expect_fault(cases("\n  folders:\n  - cases/*\n  - odd*/*"), 6, "two cases are named 'a'",
-               "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "odd\\x0afolder/a").string());
+  expect_fault(
+      cases("\n  folders:\n  - cases/*\n  - odd*/*"), 6, "two cases are named 'a'",
+      "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "odd\\x0afolder/a").string());
   expect_fault(cases("{input: [a], folders: [cases/*]}"), 3, "input: expected a text, got a list");
   read(cases("{input: caes, folders: [cases/*]}"));
   EXPECT_EQ(diagnostics.size(), 2u);
-  EXPECT_NE(diagnostics.text().find("e.yaml:3:1: error: the pipeline has no input 'caes'"), std::string::npos) << diagnostics.text();
-  EXPECT_NE(diagnostics.text().find("p.yaml:2:10: error: input 'case' has no value"), std::string::npos) << diagnostics.text();
+  EXPECT_NE(diagnostics.text().find("e.yaml:3:1: error: the pipeline has no input 'caes'"), std::string::npos)
+      << diagnostics.text();
+  EXPECT_NE(diagnostics.text().find("p.yaml:2:10: error: input 'case' has no value"), std::string::npos)
+      << diagnostics.text();
 }
 
 TEST_F(ExperimentFaults, Simulation) {
-  expect_fault(std::string(kHead) + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4, "'simulate' must be a map, got 's.yaml'", kMapHint);
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml}\n" + kAfterCases, 4, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
+  expect_fault(std::string(kHead) + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4,
+               "'simulate' must be a map, got 's.yaml'", kMapHint);
+  expect_fault(std::string(kHead) + "cases:\n  simulate: {seeds: 1..2}\n" + kAfterCases, 4,
+               "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
+  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml}\n" + kAfterCases, 4,
+               "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
   expect_simulation_fault("pipelin: s.yaml", "unknown key 'pipelin' in 'simulate'", "did you mean 'pipeline'?");
   expect_simulation_fault("pipeline: q.yaml", "there is no file 'q.yaml'", kStartsHere);
   expect_simulation_fault("output: csae", "the pipeline s has no output 'csae'", "did you mean 'case'?");
@@ -157,10 +191,12 @@ TEST_F(ExperimentFaults, Simulation) {
 
 TEST_F(ExperimentFaults, Seeds) {
   const std::string ranges = "'seeds' must be a range such as 1..20, of at most 100000, or a list of integers";
-  for (const char* wrong : {"5..1", "-1..3", "1..200000", "1..", "many", "7", "[]", "{}"}) expect_simulation_fault(std::string("seeds: ") + wrong, ranges);
+  for (const char* wrong : {"5..1", "-1..3", "1..200000", "1..", "many", "7", "[]", "{}"})
+    expect_simulation_fault(std::string("seeds: ") + wrong, ranges);
   expect_simulation_fault("seeds: [1, two]", "a seed: expected an integer, got 'two'");
   expect_simulation_fault("seeds: [1, -2]", "a seed must be 0 or more, got -2");
-  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml, seeds: [4, 4]}\n" + kAfterCases, 4, "two cases are named 'seed-4'", "give each seed once");
+  expect_fault(std::string(kHead) + "cases:\n  simulate: {pipeline: s.yaml, seeds: [4, 4]}\n" + kAfterCases, 4,
+               "two cases are named 'seed-4'", "give each seed once");
 }
 
 TEST_F(ExperimentFaults, Starts) {
@@ -181,7 +217,9 @@ TEST_F(ExperimentFaults, StartsOfANodeThatCannotBeDisplaced) {
   read(kGood + "starts: {node: c, count: 3}\n");
   ASSERT_EQ(diagnostics.size(), 2u) << diagnostics.text();
   for (const char* option : {"rotation_deg", "translation_mm"})
-    EXPECT_NE(diagnostics.text().find("e.yaml:8:1: error: 'test.constant' has no option '" + std::string(option) + "'"), std::string::npos) << diagnostics.text();
+    EXPECT_NE(diagnostics.text().find("e.yaml:8:1: error: 'test.constant' has no option '" + std::string(option) + "'"),
+              std::string::npos)
+        << diagnostics.text();
 }
 
 TEST_F(ExperimentFaults, Metrics) {
@@ -191,25 +229,33 @@ TEST_F(ExperimentFaults, Metrics) {
   expect_fault(metrics("[]"), 7, "'metrics' names no figure", as_list);
   expect_fault(metrics("\n- [a]"), 8, "an item of 'metrics': expected a text, got a list");
   expect_fault(metrics("\n- number.value\n- number.value"), 9, "'number.value' is given twice in 'metrics'");
-  expect_fault(metrics("\n- {label: Sum}"), 8, "a metric does not say which figure", "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
-  expect_fault(metrics("\n- {figure: number.value, lable: Sum}"), 8, "unknown key 'lable' in a metric", "did you mean 'label'?");
-  expect_fault(metrics("\n- {figure: number.value, better: highest}"), 8, "'highest' is no way to be better", "did you mean 'higher'?");
+  expect_fault(metrics("\n- {label: Sum}"), 8, "a metric does not say which figure",
+               "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
+  expect_fault(metrics("\n- {figure: number.value, lable: Sum}"), 8, "unknown key 'lable' in a metric",
+               "did you mean 'label'?");
+  expect_fault(metrics("\n- {figure: number.value, better: highest}"), 8, "'highest' is no way to be better",
+               "did you mean 'higher'?");
   expect_fault(metrics("\n- {figure: number.value, label: [Sum]}"), 8, "label: expected a text, got a list");
   expect_fault(metrics("\n- {figure: [number.value]}"), 8, "figure: expected a text, got a list");
   expect_fault(metrics("[nubmer.value]"), 7, "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
-  expect_fault(metrics("[truth.value]"), 7, "output 'truth' is truth, not figures of merit", "name an output of an evaluate node");
-  expect_fault(metrics("[number]"), 7, "'number' does not say which figure", "write it as  number.mtre_mm, with the items of its lists between");
+  expect_fault(metrics("[truth.value]"), 7, "output 'truth' is truth, not figures of merit",
+               "name an output of an evaluate node");
+  expect_fault(metrics("[number]"), 7, "'number' does not say which figure",
+               "write it as  number.mtre_mm, with the items of its lists between");
 }
 
 TEST_F(ExperimentFaults, SuccessBaselineAndPictures) {
   expect_fault_of("success: 2", "'success' must be a map, got '2'", kMapHint);
   expect_fault_of("success: {number.value: low}", "number.value: expected a number, got 'low'");
-  expect_fault_of("success: {number.valeu: 1}", "'number.valeu' is not among the metrics", "did you mean 'number.value'?");
+  expect_fault_of("success: {number.valeu: 1}", "'number.valeu' is not among the metrics",
+                  "did you mean 'number.value'?");
   expect_fault_of("baseline: tow", "there is no variant 'tow'", "did you mean 'two'?");
   expect_fault_of("baseline: [two]", "baseline: expected a text, got a list");
   expect_fault_of("initial_error: nubmer.value", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
-  expect_fault_of("initial_error: truth.value", "output 'truth' is truth, not figures of merit", "name an output of an evaluate node");
-  expect_fault_of("initial_error: number", "'number' does not say which figure", "write it as  number.mtre_mm, with the items of its lists between");
+  expect_fault_of("initial_error: truth.value", "output 'truth' is truth, not figures of merit",
+                  "name an output of an evaluate node");
+  expect_fault_of("initial_error: number", "'number' does not say which figure",
+                  "write it as  number.mtre_mm, with the items of its lists between");
   expect_fault_of("initial_error: []", "initial_error: expected a text, got a list");
   expect_fault_of("pictures: number", "'pictures' must be a list", "write it as  pictures: [a, b]");
   expect_fault_of("pictures: [nubmer]", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");

@@ -6,11 +6,13 @@
 #include "marrow/compare/experiment.hpp"
 #include "runtime/fixture.hpp"
 
-inline constexpr const char* kPipeline = "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case, value: 1}}\n"
-                                         "  n: {uses: test.add, in: {a: c, b: c}}\n  f: {uses: test.fail_above, in: {a: n}, with: {value: 9}}\n"
-                                         "  t: {uses: test.truth}\noutputs: {number: n, other: f, truth: t}\n";
-inline constexpr const char* kSimulation = "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
-                                           "  c: {uses: test.constant, with: {value: $x, count: $shape}}\noutputs: {case: c}\n";
+inline constexpr const char* kPipeline =
+    "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case, value: 1}}\n"
+    "  n: {uses: test.add, in: {a: c, b: c}}\n  f: {uses: test.fail_above, in: {a: n}, with: {value: 9}}\n"
+    "  t: {uses: test.truth}\noutputs: {number: n, other: f, truth: t}\n";
+inline constexpr const char* kSimulation =
+    "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
+    "  c: {uses: test.constant, with: {value: $x, count: $shape}}\noutputs: {case: c}\n";
 inline constexpr const char* kHead = "experiment: 1\npipeline: p.yaml\n";
 inline constexpr const char* kCases = "cases: {folders: [cases/*]}\n";
 inline constexpr const char* kVariants = "variants:\n  one: {}\n  two: {c.value: 2}\n";

@@ -10,7 +10,8 @@ namespace {
 using marrow::compare::Experiment;
 
 TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
-  const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
+  const Experiment e =
+      read(std::string(kHead) + kCases + kVariants + kMetrics + "success: {number.value: 3}\nbaseline: two\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[0].name, "a");
@@ -33,16 +34,20 @@ TEST_F(ExperimentFiles, APathThroughALinkIsWhatTheSystemFinds) {
   fs::create_directories(scratch.path / "other" / "cases" / "c");
   fs::create_directory_symlink("other/inner", scratch.path / "link");
   fs::copy_file(scratch.path / "p.yaml", scratch.path / "other" / "p.yaml");
-  const Experiment e = read("experiment: 1\npipeline: link/../p.yaml\ncases: {folders: [link/../cases/*]}\n" + std::string(kVariants) + kMetrics);
+  const Experiment e = read("experiment: 1\npipeline: link/../p.yaml\ncases: {folders: [link/../cases/*]}\n" +
+                            std::string(kVariants) + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   EXPECT_TRUE(fs::equivalent(e.pipeline, scratch.path / "other" / "p.yaml"));
   ASSERT_EQ(e.cases.size(), 1u);
   EXPECT_EQ(e.cases[0].name, "c");
-  EXPECT_EQ(read(std::string(kHead) + "cases: {folders: [cases/*/../*]}\n" + kVariants + kMetrics).cases.size(), 2u) << "each once";
+  EXPECT_EQ(read(std::string(kHead) + "cases: {folders: [cases/*/../*]}\n" + kVariants + kMetrics).cases.size(), 2u)
+      << "each once";
 }
 
 TEST_F(ExperimentFiles, MetricsHaveNamesForPeople) {
-  const Experiment e = read(std::string(kHead) + kCases + kVariants + "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
+  const Experiment e =
+      read(std::string(kHead) + kCases + kVariants +
+           "metrics:\n  - {figure: number.value, label: Sum}\n  - other.value\nsuccess: {number.value: 3}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.metrics.size(), 2u);
   EXPECT_EQ(e.metrics[0].path + " " + e.metrics[0].label, "number.value Sum");
@@ -56,7 +61,8 @@ TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const auto text = [&](std::size_t variant) {
     std::string all;
-    for (const auto& one : marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder).overrides) all += one.key + "=" + one.value + " ";
+    for (const auto& one : marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder).overrides)
+      all += one.key + "=" + one.value + " ";
     return all;
   };
   EXPECT_EQ(text(0), "c.uses=test.constant f.value=3 c.word=two ");
@@ -65,7 +71,8 @@ TEST_F(ExperimentFiles, WhatIsSetForAllComesBeforeWhatAVariantChanges) {
 }
 
 TEST_F(ExperimentFiles, MatrixGivesEveryCombination) {
-  const Experiment e = read(std::string(kHead) + kCases + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
+  const Experiment e =
+      read(std::string(kHead) + kCases + "matrix:\n  c.value: [1, 2, 3]\n  n.uses: [test.add, test.add]\n" + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.variants.size(), 6u);
   std::set<std::string> names;
@@ -78,7 +85,8 @@ TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
   std::string pipeline = kPipeline;
   pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
   scratch.write("p.yaml", pipeline);
-  const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics + "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
+  const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics +
+                            "starts: {node: s, count: 1000, rotation_deg: 3, distance_mm: 40}\n");
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   double mean = 0;
   int below_10 = 0;
@@ -95,7 +103,8 @@ TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
   std::string pipeline = kPipeline;
   pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
   scratch.write("p.yaml", pipeline);
-  const std::string text = std::string(kHead) + kCases + kVariants + kMetrics + "starts: {node: s, count: 2000, seed: 7, rotation_deg: 3, translation_mm: 5}\n";
+  const std::string text = std::string(kHead) + kCases + kVariants + kMetrics +
+                           "starts: {node: s, count: 2000, seed: 7, rotation_deg: 3, translation_mm: 5}\n";
   const Experiment e = read(text);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.starts.size(), 2000u);
@@ -117,13 +126,18 @@ TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
 }
 
 TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
-  const Experiment e = read(std::string(kHead) + "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, set: {c.word: two}, draw: {x: [-2, 2]}, seed_input: [shape]}}\n" + kVariants + kMetrics);
+  const Experiment e = read(std::string(kHead) +
+                            "cases: {simulate: {pipeline: s.yaml, seeds: 3..5, set: {c.word: two}, draw: {x: [-2, 2]}, "
+                            "seed_input: [shape]}}\n" +
+                            kVariants + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   ASSERT_EQ(e.cases.size(), 3u);
   EXPECT_EQ(marrow::compare::simulation_arguments_of(e, 0).overrides.at(0).key, "c.word");
   EXPECT_EQ(e.cases[2].name, "seed-5");
   EXPECT_EQ(e.cases[2].seed, 5u);
-  const auto input = [&](std::size_t index, std::size_t i) { return marrow::compare::simulation_arguments_of(e, index).inputs.at(i); };
+  const auto input = [&](std::size_t index, std::size_t i) {
+    return marrow::compare::simulation_arguments_of(e, index).inputs.at(i);
+  };
   EXPECT_EQ(input(2, 1).name + "=" + input(2, 1).value, "shape=5");
   EXPECT_LE(std::abs(std::stod(input(2, 0).value)), 2);
   EXPECT_NE(input(1, 0).value, input(2, 0).value);
@@ -131,7 +145,8 @@ TEST_F(ExperimentFiles, SimulatedCasesDrawTheirInputs) {
 }
 
 TEST_F(ExperimentFiles, SeedsAloneAreThoseOfTheRuns) {
-  const Experiment e = read(std::string(kHead) + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
+  const Experiment e =
+      read(std::string(kHead) + "cases: {seeds: [4, 9]}\ninputs: {case: cases/a}\n" + kVariants + kMetrics);
   ASSERT_EQ(e.cases.size(), 2u);
   EXPECT_EQ(e.cases[1].name, "seed-9");
   EXPECT_FALSE(e.cases[1].is_simulated);
@@ -146,10 +161,13 @@ TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
   pipeline.insert(pipeline.find("{case:") + 1, "file: {type: path}, ");
   pipeline.replace(pipeline.find("path: $case"), 11, "path: $file");
   scratch.write("p.yaml", pipeline);
-  const Experiment e = read(std::string(kHead) + kCases + "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
+  const Experiment e = read(std::string(kHead) + kCases +
+                            "inputs: {file: data.txt}\nvariants:\n  one: {}\n  two: {c.path: cases/a}\n" + kMetrics);
   ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   const auto path = [&](std::size_t variant) {
-    const auto p = marrow::read_pipeline(e.pipeline, marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder), test_catalogue(), diagnostics);
+    const auto p =
+        marrow::read_pipeline(e.pipeline, marrow::compare::arguments_of(e, {variant, 0, 0}, e.cases[0].folder),
+                              test_catalogue(), diagnostics);
     return std::get<std::string>(p.nodes[0].options.back());
   };
   EXPECT_EQ(path(0), (scratch.path / "data.txt").string()) << "wherever the program was started";

@@ -37,8 +37,12 @@ def compare(what, got, expected, tolerance, data):
 
 
 def check_wilson():
-    settings = [(k, n, c) for n in (1, 2, 10, 37, 500, 100000) for k in sorted({0, 1, n // 3, n - 1, n})
-                for c in (0.5, 0.95, 0.999)]
+    settings = [
+        (k, n, c)
+        for n in (1, 2, 10, 37, 500, 100000)
+        for k in sorted({0, 1, n // 3, n - 1, n})
+        for c in (0.5, 0.95, 0.999)
+    ]
     got = answers([f"wilson {k} {n} {c}" for k, n, c in settings])
     for (k, n, c), interval in zip(settings, got):
         expected = stats.binomtest(k, n).proportion_ci(c, method="wilson")
@@ -112,8 +116,13 @@ def all_signs(values):
         return 1.0
     if len(ranks) == 1:
         return 1.0  # two assignments, one to either side; scipy wants two observations
-    test = stats.permutation_test((ranks,), lambda r, axis: numpy.sum(r, axis=axis), permutation_type="samples",
-                                  vectorized=True, n_resamples=numpy.inf)
+    test = stats.permutation_test(
+        (ranks,),
+        lambda r, axis: numpy.sum(r, axis=axis),
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=numpy.inf,
+    )
     return min(1.0, test.pvalue)
 
 
@@ -143,8 +152,9 @@ def check_bootstrap(random):
         compare("bootstrap, same resamples", interval, numpy.percentile(medians, tails), 1e-13, values)
         if numpy.ptp(values) == 0:
             continue  # scipy refuses one value
-        theirs = stats.bootstrap((values,), numpy.median, confidence_level=confidence, n_resamples=10000,
-                                 method="percentile", random_state=1).confidence_interval
+        theirs = stats.bootstrap(
+            (values,), numpy.median, confidence_level=confidence, n_resamples=10000, method="percentile", random_state=1
+        ).confidence_interval
         of_width = (numpy.array(interval) - theirs.low) / (theirs.high - theirs.low)
         compare("bootstrap, scipy's own resamples (of the width)", 1 + of_width, [1, 2], 0.1, values)
 

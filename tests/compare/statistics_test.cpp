@@ -104,10 +104,17 @@ TEST(CaptureRange, OfOtherBinsAndRates) {
 }
 
 TEST(CaptureRange, RefusesWhatIsNoDistance) {
-  EXPECT_EQ(message_of([] { capture_range({{nan, true}}); }), "the error of a start is nan, which is no distance; leave runs out whose start is not known");
-  EXPECT_EQ(message_of([] { capture_range({{-1, true}}); }), "the error of a start is -1.000000, which is no distance; leave runs out whose start is not known");
+  EXPECT_EQ(message_of([] {
+              capture_range({{nan, true}});
+            }),
+            "the error of a start is nan, which is no distance; leave runs out whose start is not known");
+  EXPECT_EQ(message_of([] {
+              capture_range({{-1, true}});
+            }),
+            "the error of a start is -1.000000, which is no distance; leave runs out whose start is not known");
   EXPECT_EQ(message_of([] { capture_range({}, 0); }), "the width of a bin is 0.000000; give a positive one");
-  EXPECT_EQ(message_of([] { capture_range({}, 2, 95); }), "the success rate is 95.000000; give a fraction from 0 to 1, such as 0.95");
+  EXPECT_EQ(message_of([] { capture_range({}, 2, 95); }),
+            "the success rate is 95.000000; give a fraction from 0 to 1, such as 0.95");
 }
 
 TEST(Summarise, InterpolatesBetweenSortedValues) {
@@ -212,9 +219,7 @@ TEST(SignedRank, IsTheTable) {
   EXPECT_TRUE(test.exact);
 }
 
-TEST(SignedRank, OfOneCaseSaysNothing) {
-  EXPECT_EQ(signed_rank_test({5}).p, 1);
-}
+TEST(SignedRank, OfOneCaseSaysNothing) { EXPECT_EQ(signed_rank_test({5}).p, 1); }
 
 TEST(SignedRank, TiesKeepTheExactDistribution) {
   // Five equal differences: all ranks 3, so only the signs count: 2/32, where the approximation has 0.0369.

@@ -71,8 +71,15 @@ WRONG = {  # node: checks of which at least one must fail
 
 def conformance(*subjects, seconds=10, **variables):
     """Exit code, and {node: {check: (passed, text)}}."""
-    environment = {**os.environ, "MARROW_PLUGIN_PATH": str(BUILD / "tests" / "conformance_plugins"), "MARROW_CHECK_SECONDS": str(seconds), **variables}
-    result = subprocess.run([str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment)
+    environment = {
+        **os.environ,
+        "MARROW_PLUGIN_PATH": str(BUILD / "tests" / "conformance_plugins"),
+        "MARROW_CHECK_SECONDS": str(seconds),
+        **variables,
+    }
+    result = subprocess.run(
+        [str(BUILD / "bin" / "marrow"), "conformance", *subjects], capture_output=True, text=True, env=environment
+    )
     nodes, checks = {}, {}
     for line in result.stdout.splitlines():
         if re.fullmatch(r"[a-z_]+\.[a-z_0-9]+", line):
@@ -94,16 +101,47 @@ class Conformance(unittest.TestCase):
                 self.assertTrue(failed & expected, "failed: %s, expected one of %s" % (failed, expected))
 
     def test_a_fault_in_one_place_fails_there_alone(self):
-        self.assertEqual({name for name, (passed, _) in conformance("edges.shifted", seconds=60)[1]["edges.shifted"].items() if not passed}, WRONG["edges.shifted"])
-        self.assertEqual({name for name, (passed, _) in conformance("mesh.hasty", seconds=60)[1]["mesh.hasty"].items() if not passed}, WRONG["mesh.hasty"])
-        self.assertEqual({name for name, (passed, _) in conformance("mesh.unturned", seconds=60)[1]["mesh.unturned"].items() if not passed}, WRONG["mesh.unturned"])
+        self.assertEqual(
+            {
+                name
+                for name, (passed, _) in conformance("edges.shifted", seconds=60)[1]["edges.shifted"].items()
+                if not passed
+            },
+            WRONG["edges.shifted"],
+        )
+        self.assertEqual(
+            {
+                name
+                for name, (passed, _) in conformance("mesh.hasty", seconds=60)[1]["mesh.hasty"].items()
+                if not passed
+            },
+            WRONG["mesh.hasty"],
+        )
+        self.assertEqual(
+            {
+                name
+                for name, (passed, _) in conformance("mesh.unturned", seconds=60)[1]["mesh.unturned"].items()
+                if not passed
+            },
+            WRONG["mesh.unturned"],
+        )
 
     def test_what_happened_is_said(self):
-        texts = {name: text for name, (_, text) in conformance("edges.crashing", seconds=60)[1]["edges.crashing"].items()}
+        texts = {
+            name: text for name, (_, text) in conformance("edges.crashing", seconds=60)[1]["edges.crashing"].items()
+        }
         self.assertEqual(texts["one_pixel"], "it crashed: Aborted")
-        texts = {name: text for name, (_, text) in conformance("mesh.endless", "--check", "nothing_inside")[1]["mesh.endless"].items()}
+        texts = {
+            name: text
+            for name, (_, text) in conformance("mesh.endless", "--check", "nothing_inside")[1]["mesh.endless"].items()
+        }
         self.assertEqual(texts["nothing_inside"], "it took longer than 10 s")
-        texts = {name: text for name, (_, text) in conformance("mesh.fat", "--check", "sphere_distance", seconds=60)[1]["mesh.fat"].items()}
+        texts = {
+            name: text
+            for name, (_, text) in conformance("mesh.fat", "--check", "sphere_distance", seconds=60)[1][
+                "mesh.fat"
+            ].items()
+        }
         self.assertRegex(texts["sphere_distance"], r"^0\.(29|30)\d* mm, limit 0\.15$")
 
     def test_files_lie_in_a_folder_that_nobody_foresees_and_are_removed(self):
@@ -125,17 +163,36 @@ class Conformance(unittest.TestCase):
 
     def test_what_is_stopped_leaves_nothing(self):
         with tempfile.TemporaryDirectory() as folder:
-            environment = dict(os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), TMPDIR=folder)
-            process = subprocess.Popen([str(BUILD / "bin" / "marrow"), "conformance", "mesh.endless"], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            environment = dict(
+                os.environ, MARROW_PLUGIN_PATH=str(BUILD / "tests" / "conformance_plugins"), TMPDIR=folder
+            )
+            process = subprocess.Popen(
+                [str(BUILD / "bin" / "marrow"), "conformance", "mesh.endless"],
+                env=environment,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+            )
             process.stdout.readline()
             self.assertEqual(len(os.listdir(folder)), 1)
             self.assertEqual(os.stat(os.path.join(folder, os.listdir(folder)[0])).st_mode & 0o777, 0o700)
             process.send_signal(signal.SIGINT)
-            self.assertEqual((process.communicate(timeout=60)[1], process.returncode), ("marrow: stopped by Ctrl-C\n", 130))
+            self.assertEqual(
+                (process.communicate(timeout=60)[1], process.returncode), ("marrow: stopped by Ctrl-C\n", 130)
+            )
             self.assertEqual(os.listdir(folder), [])
 
     def test_right_ones_pass(self):
-        for node in ("camera.plain", "edges.plain", "mesh.plain", "optimizer.plain", "project.plain", "segment.plain", "shaft.plain", "similarity.plain"):
+        for node in (
+            "camera.plain",
+            "edges.plain",
+            "mesh.plain",
+            "optimizer.plain",
+            "project.plain",
+            "segment.plain",
+            "shaft.plain",
+            "similarity.plain",
+        ):
             result, nodes = conformance(node, seconds=300)
             self.assertEqual(result.returncode, 0, result.stdout)
 
@@ -154,7 +211,10 @@ class Conformance(unittest.TestCase):
 
     def test_a_library_means_its_nodes(self):
         result, nodes = conformance("marrow_wrong_edges.so", "--check", "contract")
-        self.assertEqual(sorted(nodes), ["edges.changing", "edges.crashing", "edges.plain", "edges.shifted", "edges.turned", "edges.unsorted"])
+        self.assertEqual(
+            sorted(nodes),
+            ["edges.changing", "edges.crashing", "edges.plain", "edges.shifted", "edges.turned", "edges.unsorted"],
+        )
 
     def test_a_library_of_any_folder(self):
         with tempfile.TemporaryDirectory() as folder:

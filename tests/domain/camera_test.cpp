@@ -85,14 +85,18 @@ TEST(Camera, CheckNamesTheFault) {
   EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }), "no error");
   camera = frontal();
   camera.intrinsics(0, 0) = 0;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("needs positive focal lengths"), std::string::npos);
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("needs positive focal lengths"),
+            std::string::npos);
   camera = frontal();
   camera.intrinsics(1, 1) = -1;
   EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }),
             "view 'a': the camera matrix needs positive focal lengths in its first two diagonal places");
   camera = frontal();
   camera.intrinsics(2, 2) = 2;
-  EXPECT_EQ(message_of([&] { check_camera(camera, "view 'a'"); }).find("view 'a': the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1]"), 0u);
+  EXPECT_EQ(message_of([&] {
+              check_camera(camera, "view 'a'");
+            }).find("view 'a': the camera matrix is not [f_u s u_0; 0 f_v v_0; 0 0 1]"),
+            0u);
   camera = frontal();
   camera.intrinsics(1, 0) = 5;
   EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }), "no error");
@@ -101,7 +105,8 @@ TEST(Camera, CheckNamesTheFault) {
   EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("it looks transposed"), std::string::npos);
   camera = frontal();
   camera.width_px = 65537;
-  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("expected at most 65536 each way"), std::string::npos);
+  EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("expected at most 65536 each way"),
+            std::string::npos);
   camera = frontal();
   camera.intrinsics(0, 2) = std::nan("");
   EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }), "no error");

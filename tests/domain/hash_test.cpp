@@ -107,7 +107,8 @@ TEST(Hash, OfEdgesAndLinesDependsOnEachField) {
       [](auto& e) { e.pixels[0].magnitude = 9; }, [](auto& e) { e.pixels.clear(); });
   expect_sensitive(
       marrow::ShaftLines{}, [](auto& l) { l.left.from_px.x() = 1; }, [](auto& l) { l.left.to_px.x() = 1; },
-      [](auto& l) { l.right.from_px.x() = 1; }, [](auto& l) { l.width_mm = 1; }, [](auto& l) { l.width_deviation_mm = 1; }, [](auto& l) { l.log_likelihood = 1; },
+      [](auto& l) { l.right.from_px.x() = 1; }, [](auto& l) { l.width_mm = 1; },
+      [](auto& l) { l.width_deviation_mm = 1; }, [](auto& l) { l.log_likelihood = 1; },
       [](auto& l) { l.rejected.resize(1); },
       [](auto& l) {
         l.rejected.resize(1);

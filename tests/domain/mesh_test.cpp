@@ -102,10 +102,13 @@ TEST(Mesh, SamplesAreUniformInATriangle) {
   std::array<int, 36> inside{};
   for (const Vector3d& point : points) ++inside[std::size_t(int(point.y()) * 6 + int(point.x()))];
   for (std::size_t i = 0; i < 36; ++i) EXPECT_NEAR(inside[i], 100, 12) << i;
-  // The first half of the points lies in the first triangle; each stands for as much area, beginning and ending with half of it.
+  // The first half of the points lies in the first triangle; each stands for as much area, beginning and ending with
+  // half of it.
   EXPECT_LT(points[1799].x() + points[1799].y(), 6);
   EXPECT_GT(points[1800].x() + points[1800].y(), 6);
-  const auto share = [&](const Vector3d& p) { return std::pow((p.x() + p.y()) / 6, 2); };  // of the first triangle's area, between the point and its first corner
+  const auto share = [&](const Vector3d& p) {
+    return std::pow((p.x() + p.y()) / 6, 2);
+  };  // of the first triangle's area, between the point and its first corner
   EXPECT_NEAR(share(points[0]), 0.5 / 1800, 1e-9);
   EXPECT_NEAR(share(points[700]), 700.5 / 1800, 1e-9);
   EXPECT_NEAR(points[1].y() / (points[1].x() + points[1].y()), 0.6180339887, 1e-9) << "of the side, the golden section";
@@ -153,7 +156,8 @@ TEST(Mesh, CheckNamesTheFault) {
   Mesh mesh = box({0, 0, 0}, {1, 1, 1});
   EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "no error");
   mesh.vertices_mm[3].y() = -3e38;
-  EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "model: a vertex lies 3e+35 m from the origin; expected coordinates in mm, of at most 1 km");
+  EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }),
+            "model: a vertex lies 3e+35 m from the origin; expected coordinates in mm, of at most 1 km");
   mesh.vertices_mm[3].y() = 1e6;
   EXPECT_EQ(message_of([&] { check_mesh(mesh, "model"); }), "no error");
   mesh.vertices_mm[3].y() = std::nan("");

@@ -12,13 +12,9 @@ using marrow::FragmentFrame;
 using marrow::RigidTransform;
 using marrow::Vector6d;
 
-FragmentFrame some_frame() {
-  return {Vector3d(40, -30, 250), marrow::rotation_from_vector({0.4, -0.1, 0.2})};
-}
+FragmentFrame some_frame() { return {Vector3d(40, -30, 250), marrow::rotation_from_vector({0.4, -0.1, 0.2})}; }
 
-RigidTransform some_pose() {
-  return {"world", "ct", marrow::rotation_from_vector({-0.3, 0.8, 0.1}), {12, -7, 100}};
-}
+RigidTransform some_pose() { return {"world", "ct", marrow::rotation_from_vector({-0.3, 0.8, 0.1}), {12, -7, 100}}; }
 
 TEST(Moved, AppliesTheMotionInTheModelBeforeThePose) {
   Vector6d motion;

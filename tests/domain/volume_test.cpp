@@ -23,9 +23,7 @@ marrow::Volume ramp() {
   return volume;
 }
 
-float sample(const Vector3d& index) {
-  return marrow::sample_trilinear(ramp().grid, ramp().values, index);
-}
+float sample(const Vector3d& index) { return marrow::sample_trilinear(ramp().grid, ramp().values, index); }
 
 TEST(Grid, IndexAndPointAreInverse) {
   marrow::Grid grid = ramp().grid;
@@ -77,9 +75,12 @@ TEST(Volume, CheckNamesTheFault) {
             "CT: voxel spacing -1.000000 mm is not a positive length");
   EXPECT_NE(message([](auto& v) { v.grid.spacing_mm[0] = std::nan(""); }).find("is not a positive length"),
             std::string::npos);
-  EXPECT_EQ(message([](auto& v) { v.grid.spacing_mm[1] = 0.0009; }), "CT: voxel spacing 0.0009 mm; expected 0.001 to 100 mm: is it in another unit?");
-  EXPECT_EQ(message([](auto& v) { v.grid.spacing_mm[1] = 101; }), "CT: voxel spacing 101 mm; expected 0.001 to 100 mm: is it in another unit?");
-  EXPECT_EQ(message([](auto& v) { v.grid.origin_mm[1] = -2e6; }), "CT: the volume begins 2e+06 mm from the origin; expected at most 1 km");
+  EXPECT_EQ(message([](auto& v) { v.grid.spacing_mm[1] = 0.0009; }),
+            "CT: voxel spacing 0.0009 mm; expected 0.001 to 100 mm: is it in another unit?");
+  EXPECT_EQ(message([](auto& v) { v.grid.spacing_mm[1] = 101; }),
+            "CT: voxel spacing 101 mm; expected 0.001 to 100 mm: is it in another unit?");
+  EXPECT_EQ(message([](auto& v) { v.grid.origin_mm[1] = -2e6; }),
+            "CT: the volume begins 2e+06 mm from the origin; expected at most 1 km");
   EXPECT_EQ(message([](auto& v) { v.values.pop_back(); }), "CT: 60 voxels expected from its size, got 59");
   EXPECT_NE(message([](auto& v) { v.grid.direction(0, 0) = 0; }).find("CT: not a rotation"), std::string::npos);
   EXPECT_EQ(message([](auto& v) { v.values[3 * 12 + 2 * 4 + 1] = std::numeric_limits<float>::quiet_NaN(); }),

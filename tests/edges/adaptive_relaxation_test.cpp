@@ -3,9 +3,7 @@
 
 #include <numeric>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) {
-  return adaptive_relaxation(view, Options{});
-}
+static marrow::EdgeMap find_edges(const marrow::View& view) { return adaptive_relaxation(view, Options{}); }
 
 #include "edges/checks.hpp"
 

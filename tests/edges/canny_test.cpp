@@ -3,9 +3,7 @@
 
 #include <numeric>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) {
-  return canny(view, Options{});
-}
+static marrow::EdgeMap find_edges(const marrow::View& view) { return canny(view, Options{}); }
 
 #include "edges/checks.hpp"
 

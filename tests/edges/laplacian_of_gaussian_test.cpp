@@ -3,8 +3,6 @@
 
 #include <numeric>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) {
-  return laplacian_of_gaussian(view, {});
-}
+static marrow::EdgeMap find_edges(const marrow::View& view) { return laplacian_of_gaussian(view, {}); }
 
 #include "edges/checks.hpp"

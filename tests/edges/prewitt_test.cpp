@@ -3,8 +3,6 @@
 
 #include <numeric>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) {
-  return prewitt(view, {});
-}
+static marrow::EdgeMap find_edges(const marrow::View& view) { return prewitt(view, {}); }
 
 #include "edges/checks.hpp"

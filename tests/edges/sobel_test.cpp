@@ -3,8 +3,6 @@
 
 #include <numeric>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) {
-  return sobel(view, {});
-}
+static marrow::EdgeMap find_edges(const marrow::View& view) { return sobel(view, {}); }
 
 #include "edges/checks.hpp"

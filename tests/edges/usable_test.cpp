@@ -57,9 +57,7 @@ TEST(Usable, FindsTheFieldOfARoundCollimator) {
   expect_outline(collimated(170, 4000, false), 170);
 }
 
-TEST(Usable, FindsAFieldOfWhichTheImageHoldsArcsOnly) {
-  expect_outline(collimated(230, 1000), 230);
-}
+TEST(Usable, FindsAFieldOfWhichTheImageHoldsArcsOnly) { expect_outline(collimated(230, 1000), 230); }
 
 TEST(Usable, TakesNoLimbOrBrightCornerForACollimator) {
   EXPECT_FALSE(field_of(collimated(1000, 0)));

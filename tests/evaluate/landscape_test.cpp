@@ -31,7 +31,8 @@ TEST(Landscape, IsTheCostAlongEachAxisOfTheFragment) {
     motion[axis] = axis < 3 ? marrow::radians(2.5) : 2.5;
     const marrow::Truth floor{marrow::moved(pose.world_from_model, pose.frame, motion)};
     marrow::Context context;
-    const auto profile = landscape(Bowl(floor.world_from_model, pose.frame), pose, &floor, {}, context).profiles.at(std::size_t(axis));
+    const auto profile =
+        landscape(Bowl(floor.world_from_model, pose.frame), pose, &floor, {}, context).profiles.at(std::size_t(axis));
     EXPECT_EQ(profile.unit, axis < 3 ? "deg" : "mm");
     ASSERT_EQ(profile.costs.size(), 81u);
     EXPECT_NEAR(profile.offsets.front(), -10, 1e-12);

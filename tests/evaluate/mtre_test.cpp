@@ -6,8 +6,12 @@
 namespace {
 
 TEST(Mtre, OfATranslationIsItsLengthEverywhere) {
-  const auto metrics = shipped::call("evaluate.mtre", {{"pose", shipped::item(shifted(3, 4, 12))}, {"truth", exact()}, {"model", tool_box()}}).at("metrics");
-  for (const char* name : {"mtre_mm", "rms_mm", "max_mm"}) EXPECT_NEAR(shipped::figure(metrics, name), 13, 1e-9) << name;
+  const auto metrics =
+      shipped::call("evaluate.mtre",
+                    {{"pose", shipped::item(shifted(3, 4, 12))}, {"truth", exact()}, {"model", tool_box()}})
+          .at("metrics");
+  for (const char* name : {"mtre_mm", "rms_mm", "max_mm"})
+    EXPECT_NEAR(shipped::figure(metrics, name), 13, 1e-9) << name;
 }
 
 TEST(Mtre, OfAHalfTurnAtLandmarks) {
@@ -16,7 +20,10 @@ TEST(Mtre, OfAHalfTurnAtLandmarks) {
   landmarks.points = {{"a", {3, 0, 5}}, {"b", {0, -4, 9}}, {"c", {0, 0, 20}}};
   marrow::Pose pose;
   pose.world_from_model.rotation = Eigen::Vector3d(-1, -1, 1).asDiagonal();
-  const auto metrics = shipped::call("evaluate.mtre", {{"pose", shipped::item(pose)}, {"truth", exact()}, {"landmarks", shipped::item(landmarks)}}).at("metrics");
+  const auto metrics =
+      shipped::call("evaluate.mtre",
+                    {{"pose", shipped::item(pose)}, {"truth", exact()}, {"landmarks", shipped::item(landmarks)}})
+          .at("metrics");
   EXPECT_NEAR(shipped::figure(metrics, "mtre_mm"), 14.0 / 3, 1e-12);
   EXPECT_NEAR(shipped::figure(metrics, "rms_mm"), std::sqrt(100.0 / 3), 1e-12);
   EXPECT_NEAR(shipped::figure(metrics, "max_mm"), 8, 1e-12);
@@ -25,16 +32,21 @@ TEST(Mtre, OfAHalfTurnAtLandmarks) {
 TEST(Mtre, SaysWhatIsWrong) {
   EXPECT_EQ(shipped::refusal("evaluate.mtre", {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}}),
             "there is nothing to measure at; wire a model, whose surface is sampled, or landmarks");
-  EXPECT_EQ(shipped::refusal("evaluate.mtre", {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"landmarks", shipped::item(marrow::Landmarks())}}),
+  EXPECT_EQ(shipped::refusal("evaluate.mtre", {{"pose", shipped::item(shifted(0, 0, 0))},
+                                               {"truth", exact()},
+                                               {"landmarks", shipped::item(marrow::Landmarks())}}),
             "the landmarks have no points in the CT; leave them out to measure on the model's surface");
   marrow::Mesh other = marrow::test::box({0, 0, 0}, {1, 1, 1});
   other.frame = "stl";
-  EXPECT_EQ(shipped::refusal("evaluate.mtre", {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"model", shipped::item(other)}}),
+  EXPECT_EQ(shipped::refusal(
+                "evaluate.mtre",
+                {{"pose", shipped::item(shifted(0, 0, 0))}, {"truth", exact()}, {"model", shipped::item(other)}}),
             "the model is in the frame 'stl', but the pose takes points in 'ct'; give the model that was registered");
   marrow::Pose pose;
   pose.world_from_model.source = "mri";
-  EXPECT_EQ(shipped::refusal("evaluate.mtre", {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}}),
-            "the pose is world_from_mri, but the truth is world_from_ct; compare poses between the same two frames");
+  EXPECT_EQ(
+      shipped::refusal("evaluate.mtre", {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}}),
+      "the pose is world_from_mri, but the truth is world_from_ct; compare poses between the same two frames");
 }
 
 }  // namespace

@@ -122,17 +122,20 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
   marrow::EdgeMap edges{203, 149, {}};
   for (int i = 0; i < 120; ++i) {
     const double angle = 6.28 * part();
-    edges.pixels.push_back({float(203 * part()), float(149 * part()), float(std::cos(angle)), float(std::sin(angle)), 1});
+    edges.pixels.push_back(
+        {float(203 * part()), float(149 * part()), float(std::cos(angle)), float(std::sin(angle)), 1});
   }
   edges.pixels.push_back({-20, 30, 1, 0, 1});  // beyond the image, as a detector may say of its border
   edges.pixels.push_back({230, 170, 1, 0, 1});
   const marrow::evaluate::EdgeSearch search(edges);
   int none = 0;
   for (int i = 0; i < 3000; ++i) {
-    const double u = 203 * part(), v = 149 * part(), angle = 6.28 * part(), reach_px = i % 3 == 0 ? 400 : 60 * part(), least_cosine = i % 2 ? 0.9 : -1;
+    const double u = 203 * part(), v = 149 * part(), angle = 6.28 * part(), reach_px = i % 3 == 0 ? 400 : 60 * part(),
+                 least_cosine = i % 2 ? 0.9 : -1;
     double best = std::numeric_limits<double>::infinity();
     for (const auto& edge : edges.pixels)
-      if (edge.direction_u * std::cos(angle) + edge.direction_v * std::sin(angle) >= least_cosine) best = std::min(best, std::hypot(edge.u_px - u, edge.v_px - v));
+      if (edge.direction_u * std::cos(angle) + edge.direction_v * std::sin(angle) >= least_cosine)
+        best = std::min(best, std::hypot(edge.u_px - u, edge.v_px - v));
     const marrow::EdgePixel* found = search.nearest(u, v, std::cos(angle), std::sin(angle), reach_px, least_cosine);
     ASSERT_EQ(found != nullptr, best <= reach_px) << best << " px, reach " << reach_px;
     if (found) {
@@ -145,7 +148,8 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
 }
 
 TEST(OutlineDistance, SpreadAndPercentilesOfARoughLine) {
-  // Edges 1, 2, ... 10 px outside by turns: across the outline, each point's own edge is the nearest only where the next are as far.
+  // Edges 1, 2, ... 10 px outside by turns: across the outline, each point's own edge is the nearest only where the
+  // next are as far.
   marrow::EdgeMap edges{200, 150, {}};
   for (int v = 20; v < 120; ++v) edges.pixels.push_back({100 + 0.1f * float(v % 10), float(v), 1, 0, 1});
   auto found = distances(one("frontal", view("frontal")), one("frontal", edges));

@@ -16,9 +16,7 @@ using Eigen::Vector3d;
 // its frontal axis is +x and its lateral axis (0, 0.6, 0.8) x (1, 0, 0) = (0, 0.8, -0.6).
 const Vector3d kCentre(40, -30, 250), kLong(0, 0.6, 0.8), kFrontal(1, 0, 0), kLateral(0, 0.8, -0.6);
 
-marrow::Mesh shaft() {
-  return marrow::test::cylinder(kCentre, kLong, 10, 100, 64);
-}
+marrow::Mesh shaft() { return marrow::test::cylinder(kCentre, kLong, 10, 100, 64); }
 
 marrow::Truth some_truth() {
   marrow::Truth truth;

@@ -5,9 +5,7 @@
 #include "shipped.hpp"
 
 /// The truth of all tests: CT coordinates are the world's.
-inline marrow::Value exact() {
-  return shipped::item(marrow::Truth());
-}
+inline marrow::Value exact() { return shipped::item(marrow::Truth()); }
 
 inline marrow::Pose shifted(double x_mm, double y_mm, double z_mm) {
   marrow::Pose pose;
@@ -15,9 +13,7 @@ inline marrow::Pose shifted(double x_mm, double y_mm, double z_mm) {
   return pose;
 }
 
-inline marrow::Value tool_box() {
-  return shipped::item(marrow::test::box({0, 0, 0}, {20, 30, 60}));
-}
+inline marrow::Value tool_box() { return shipped::item(marrow::test::box({0, 0, 0}, {20, 30, 60})); }
 
 /// One landmark at the origin.
 inline marrow::Value origin() {
@@ -26,7 +22,8 @@ inline marrow::Value origin() {
   return shipped::item(landmarks);
 }
 
-/// Views "frontal", which looks along +y, and "lateral", along -x, at the origin from 600 mm, with a focal length of 2000 px: a pixel is 0.3 mm there.
+/// Views "frontal", which looks along +y, and "lateral", along -x, at the origin from 600 mm, with a focal length of
+/// 2000 px: a pixel is 0.3 mm there.
 inline marrow::List<marrow::View> two_views() {
   marrow::List<marrow::View> views;
   for (const bool frontal : {true, false}) {
@@ -44,6 +41,4 @@ inline marrow::List<marrow::View> two_views() {
   return views;
 }
 
-inline marrow::Value views_of(const marrow::List<marrow::View>& views) {
-  return shipped::list(views, "view");
-}
+inline marrow::Value views_of(const marrow::List<marrow::View>& views) { return shipped::list(views, "view"); }

@@ -9,7 +9,13 @@ namespace {
 const std::string kProjection = "evaluate.projection_distance", kReprojection = "evaluate.reprojection_distance";
 
 marrow::Value of(const std::string& node, const marrow::Pose& pose, const shipped::Options& options = {}) {
-  return shipped::call(node, {{"pose", shipped::item(pose)}, {"truth", exact()}, {"landmarks", origin()}, {"views", views_of(two_views())}}, options).at("metrics");
+  return shipped::call(node,
+                       {{"pose", shipped::item(pose)},
+                        {"truth", exact()},
+                        {"landmarks", origin()},
+                        {"views", views_of(two_views())}},
+                       options)
+      .at("metrics");
 }
 
 TEST(ProjectionDistance, AcrossTheBeamOfOneViewAlongThatOfTheOther) {
@@ -27,7 +33,8 @@ TEST(ProjectionDistance, AcrossTheBeamOfOneViewAlongThatOfTheOther) {
 TEST(ProjectionDistance, OnTheDetectorOnlyWhereItsDistanceIsKnown) {
   EXPECT_TRUE(std::isnan(shipped::figure(of(kProjection, shifted(3, 0, 0)), "mpd_detector_mm")));
   const auto metrics = of(kProjection, shifted(3, 3, 0), {{"source_to_detector_mm", std::vector<double>{1000, 1200}}});
-  EXPECT_NEAR(shipped::figure(metrics, "frontal_mpd_detector_mm"), 1000 * 3 / 603.0, 1e-9) << "3 mm further from the source";
+  EXPECT_NEAR(shipped::figure(metrics, "frontal_mpd_detector_mm"), 1000 * 3 / 603.0, 1e-9)
+      << "3 mm further from the source";
   EXPECT_NEAR(shipped::figure(metrics, "lateral_mpd_detector_mm"), 1200 * 3 / 597.0, 1e-9) << "3 mm nearer to it";
 }
 
@@ -41,23 +48,36 @@ TEST(ReprojectionDistance, IsThatOfTheRayAndNotOfThePoint) {
 
 TEST(ReprojectionDistance, OfATurnIsLargerAtTheEndsOfTheSurface) {
   marrow::Pose pose;
-  pose.world_from_model.rotation = marrow::rotation_from_vector({0, marrow::radians(1), 0});  // seen as a turn in the frontal view
-  const auto metrics = shipped::call(kReprojection, {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}, {"views", views_of(two_views())}}).at("metrics");
-  const auto mtre = shipped::call("evaluate.mtre", {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}}).at("metrics");
+  pose.world_from_model.rotation =
+      marrow::rotation_from_vector({0, marrow::radians(1), 0});  // seen as a turn in the frontal view
+  const auto metrics =
+      shipped::call(
+          kReprojection,
+          {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}, {"views", views_of(two_views())}})
+          .at("metrics");
+  const auto mtre =
+      shipped::call("evaluate.mtre", {{"pose", shipped::item(pose)}, {"truth", exact()}, {"model", tool_box()}})
+          .at("metrics");
   // All of it lies across the frontal beam, and only the part along z across the lateral one.
   EXPECT_NEAR(shipped::figure(metrics, "frontal_mrpd_mm"), shipped::figure(mtre, "mtre_mm"), 0.002);
   EXPECT_LT(shipped::figure(metrics, "lateral_mrpd_mm"), 0.6 * shipped::figure(mtre, "mtre_mm"));
 }
 
 TEST(ProjectionDistance, SaysWhatIsWrong) {
-  const auto refusal = [](const std::string& node, const marrow::Pose& pose, const marrow::List<marrow::View>& views, const shipped::Options& options = {}) {
-    return shipped::refusal(node, {{"pose", shipped::item(pose)}, {"truth", exact()}, {"landmarks", origin()}, {"views", views_of(views)}}, options);
+  const auto refusal = [](const std::string& node, const marrow::Pose& pose, const marrow::List<marrow::View>& views,
+                          const shipped::Options& options = {}) {
+    return shipped::refusal(
+        node, {{"pose", shipped::item(pose)}, {"truth", exact()}, {"landmarks", origin()}, {"views", views_of(views)}},
+        options);
   };
   for (const std::string& node : {kProjection, kReprojection}) {
-    EXPECT_EQ(refusal(node, shifted(0, 0, 0), {}), "there is no view to project into; wire the views that the pose was found in");
-    EXPECT_EQ(refusal(node, shifted(0, -700, 0), two_views()), "view 'frontal': a target does not lie in front of the X-ray source at the pose found");
+    EXPECT_EQ(refusal(node, shifted(0, 0, 0), {}),
+              "there is no view to project into; wire the views that the pose was found in");
+    EXPECT_EQ(refusal(node, shifted(0, -700, 0), two_views()),
+              "view 'frontal': a target does not lie in front of the X-ray source at the pose found");
   }
-  EXPECT_EQ(refusal(kProjection, shifted(0, 0, 0), two_views(), {{"source_to_detector_mm", std::vector<double>{1000, 1000, 1000}}}),
+  EXPECT_EQ(refusal(kProjection, shifted(0, 0, 0), two_views(),
+                    {{"source_to_detector_mm", std::vector<double>{1000, 1000, 1000}}}),
             "source_to_detector_mm has 3 numbers, but there are 2 views; give one for all, or one for each");
   EXPECT_EQ(refusal(kProjection, shifted(0, 0, 0), two_views(), {{"source_to_detector_mm", std::vector<double>{-1}}}),
             "source_to_detector_mm: each number must be positive, got -1.000000");
@@ -67,7 +87,8 @@ TEST(ProjectionDistance, SaysWhatIsWrong) {
     far.add(view.name, view);
   }
   EXPECT_EQ(refusal(kProjection, shifted(0, 0, 0), far),
-            "view 'frontal': a target does not lie in front of the X-ray source at the true pose; is the truth of another world frame?");
+            "view 'frontal': a target does not lie in front of the X-ray source at the true pose; is the truth of "
+            "another world frame?");
 }
 
 }  // namespace

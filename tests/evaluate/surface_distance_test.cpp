@@ -10,7 +10,9 @@ using Eigen::Vector3d;
 using marrow::test::box;
 
 marrow::Value distance(const marrow::Mesh& mesh, const marrow::Mesh& reference) {
-  return shipped::call("evaluate.surface_distance", {{"mesh", shipped::item(mesh)}, {"reference", shipped::item(reference)}}).at("metrics");
+  return shipped::call("evaluate.surface_distance",
+                       {{"mesh", shipped::item(mesh)}, {"reference", shipped::item(reference)}})
+      .at("metrics");
 }
 
 /// A ball: the faces of a box, each cut into `parts` x `parts`, drawn to the sphere.
@@ -36,26 +38,30 @@ marrow::Mesh ball(double radius_mm, int parts) {
 
 TEST(SurfaceDistance, IsZeroOfTheSame) {
   const auto metrics = distance(box({1, 2, 3}, {20, 30, 60}), box({1, 2, 3}, {20, 30, 60}));
-  for (const char* name : {"mean_mm", "rms_mm", "p95_mm", "max_mm", "bias_mm"}) EXPECT_NEAR(shipped::figure(metrics, name), 0, 1e-9) << name;
+  for (const char* name : {"mean_mm", "rms_mm", "p95_mm", "max_mm", "bias_mm"})
+    EXPECT_NEAR(shipped::figure(metrics, name), 0, 1e-9) << name;
 }
 
 TEST(SurfaceDistance, OfConcentricBalls) {
   // Of radii 20 and 22, in 40 x 40 patches a face: flat triangles lie up to 0.01 mm below the spheres.
   const auto metrics = distance(ball(22, 40), ball(20, 40));
-  for (const char* name : {"mean_mm", "rms_mm", "p95_mm", "max_mm"}) EXPECT_NEAR(shipped::figure(metrics, name), 2, 0.012) << name;
+  for (const char* name : {"mean_mm", "rms_mm", "p95_mm", "max_mm"})
+    EXPECT_NEAR(shipped::figure(metrics, name), 2, 0.012) << name;
   EXPECT_NEAR(shipped::figure(metrics, "bias_mm"), 2, 0.012);
   EXPECT_NEAR(shipped::figure(distance(ball(20, 40), ball(22, 40)), "bias_mm"), -2, 0.012) << "too small";
 }
 
 TEST(SurfaceDistance, OfBoxesOfWhichOneIsLonger) {
-  // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and of its sides what sticks out
-  // (20 x 3, four times at each end) 0 to 3 mm: 2 * (400 * 3 + 240 * 1.5) over its area of 4480. The shorter one's ends lie 3 mm
-  // off, or m mm where a side is nearer: 14 * 14 * 3 + the integral of m * 4 (20 - 2 m) from 0 to 3, 288; squared 14 * 14 * 9 + 558.
+  // 20 x 20 x 40 in 20 x 20 x 46. The longer one's ends (areas 400) lie 3 mm off the shorter one, and of its sides what
+  // sticks out (20 x 3, four times at each end) 0 to 3 mm: 2 * (400 * 3 + 240 * 1.5) over its area of 4480. The shorter
+  // one's ends lie 3 mm off, or m mm where a side is nearer: 14 * 14 * 3 + the integral of m * 4 (20 - 2 m) from 0 to
+  // 3, 288; squared 14 * 14 * 9 + 558.
   const auto metrics = distance(box({0, 0, 0}, {20, 20, 46}), box({0, 0, 0}, {20, 20, 40}));
   const double longer = 2 * (400 * 3 + 240 * 1.5) / 4480, shorter = 2 * (196 * 3 + 288) / 4000.0;
   EXPECT_NEAR(shipped::figure(metrics, "mean_mm"), 0.5 * (longer + shorter), 0.005);
   EXPECT_NEAR(shipped::figure(metrics, "bias_mm"), longer, 0.005);
-  EXPECT_NEAR(shipped::figure(metrics, "rms_mm"), std::sqrt(0.5 * (2 * (400 * 9 + 240 * 3) / 4480.0 + 2 * (196 * 9 + 558) / 4000.0)), 0.005);
+  EXPECT_NEAR(shipped::figure(metrics, "rms_mm"),
+              std::sqrt(0.5 * (2 * (400 * 9 + 240 * 3) / 4480.0 + 2 * (196 * 9 + 558) / 4000.0)), 0.005);
   EXPECT_NEAR(shipped::figure(metrics, "max_mm"), 3, 1e-9);
   EXPECT_NEAR(shipped::figure(metrics, "p95_mm"), 3, 1e-9);
 }
@@ -73,13 +79,15 @@ TEST(SurfaceDistance, TheLargestIsFoundAtAVertexToo) {
 
 TEST(SurfaceDistance, SaysWhatIsWrong) {
   const auto refusal = [](const marrow::Mesh& mesh, const marrow::Mesh& reference) {
-    return shipped::refusal("evaluate.surface_distance", {{"mesh", shipped::item(mesh)}, {"reference", shipped::item(reference)}});
+    return shipped::refusal("evaluate.surface_distance",
+                            {{"mesh", shipped::item(mesh)}, {"reference", shipped::item(reference)}});
   };
   EXPECT_EQ(refusal(box({0, 0, 0}, {1, 1, 1}), {}), "reference: the surface has no triangles");
   marrow::Mesh other = box({0, 0, 0}, {1, 1, 1});
   other.frame = "world";
-  EXPECT_EQ(refusal(other, box({0, 0, 0}, {1, 1, 1})),
-            "the mesh is in the frame 'world', but the reference in 'ct'; move one of them into the frame of the other");
+  EXPECT_EQ(
+      refusal(other, box({0, 0, 0}, {1, 1, 1})),
+      "the mesh is in the frame 'world', but the reference in 'ct'; move one of them into the frame of the other");
 }
 
 }  // namespace

@@ -1,7 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Poor surroundings: another user, no home, empty variables, tight limits, closed streams, read-only and full disks. Each run passes with
-the right bytes, or says in a sentence what is wrong and ends with another code than 0."""
+"""Poor surroundings: another user, no home, empty variables, tight limits, closed streams, read-only and full disks.
+Each run passes with the right bytes, or says in a sentence what is wrong and ends with another code than 0."""
 import os
 import pathlib
 import re
@@ -47,7 +47,9 @@ class Environments(unittest.TestCase):
         folder.chmod(mode)
         return folder
 
-    def marrow(self, *arguments, user=None, limits=(), closed=(), streams=None, without=(), cwd=None, wrapper=(), **variables):
+    def marrow(
+        self, *arguments, user=None, limits=(), closed=(), streams=None, without=(), cwd=None, wrapper=(), **variables
+    ):
         """The program in a child that has become what it should be; without a store unless one is named."""
         if user and not self.is_reached_by_others:
             self.skipTest("the program lies where other users cannot reach it")
@@ -66,8 +68,17 @@ class Environments(unittest.TestCase):
                 os.close(descriptor)
 
         streams = streams or {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        return subprocess.run([*wrapper, str(self.program.marrow), *map(str, arguments)], env=environment, cwd=cwd or self.folder, preexec_fn=become, text=True,
-                              errors="replace", timeout=400, stdin=subprocess.DEVNULL, **streams)
+        return subprocess.run(
+            [*wrapper, str(self.program.marrow), *map(str, arguments)],
+            env=environment,
+            cwd=cwd or self.folder,
+            preexec_fn=become,
+            text=True,
+            errors="replace",
+            timeout=400,
+            stdin=subprocess.DEVNULL,
+            **streams
+        )
 
     def said(self, result):
         return "code %d: %s" % (result.returncode, result.stderr)
@@ -98,16 +109,22 @@ class Environments(unittest.TestCase):
         result = self.marrow(*self.run_subject.arguments(out), user=USER, HOME=str(home), without=["MARROW_CACHE"])
         self.assert_passes(result, out)
         self.assertTrue((home / ".cache" / "marrow").is_dir())
-        again = self.marrow(*self.run_subject.arguments(out.parent / "again"), user=USER, HOME=str(home), without=["MARROW_CACHE"])
+        again = self.marrow(
+            *self.run_subject.arguments(out.parent / "again"), user=USER, HOME=str(home), without=["MARROW_CACHE"]
+        )
         self.assert_passes(again, out.parent / "again")
         self.assertIn("cached", again.stdout)
 
     @needs_root
     def test_without_home(self):
         before, work = pathlib.Path("/tmp/.cache/marrow").exists(), self.owned("work", USER)
-        result = self.marrow(*self.run_subject.arguments(work / "out"), user=USER, without=["HOME", "MARROW_CACHE", "XDG_CACHE_HOME"])
+        result = self.marrow(
+            *self.run_subject.arguments(work / "out"), user=USER, without=["HOME", "MARROW_CACHE", "XDG_CACHE_HOME"]
+        )
         self.assert_passes(result, work / "out")
-        self.assertEqual(pathlib.Path("/tmp/.cache/marrow").exists(), before, "/tmp is for all: what lies there may be anyone's")
+        self.assertEqual(
+            pathlib.Path("/tmp/.cache/marrow").exists(), before, "/tmp is for all: what lies there may be anyone's"
+        )
         self.assertRegex(result.stderr, r"(?m)^marrow: .*not kept.*home")
 
     def test_empty_variables(self):
@@ -115,7 +132,9 @@ class Environments(unittest.TestCase):
             with self.subTest(names):
                 work = self.folder / "-".join(names)
                 work.mkdir()
-                result = self.marrow(*self.run_subject.arguments(work / "out"), cwd=work, **{name: "" for name in names})
+                result = self.marrow(
+                    *self.run_subject.arguments(work / "out"), cwd=work, **{name: "" for name in names}
+                )
                 self.assert_passes(result, work / "out")
                 self.assertEqual([path.name for path in work.iterdir()], ["out"], "only the folder that was asked for")
                 listed = self.marrow("list", cwd=work, **{name: "" for name in names})
@@ -124,6 +143,7 @@ class Environments(unittest.TestCase):
     @staticmethod
     def wait_for_end_of_all(user, end):
         """What is left of the last program counts for the next one's limit: the system might not even start it."""
+
         def has_processes():
             for status in pathlib.Path("/proc").glob("[0-9]*/status"):
                 try:
@@ -144,13 +164,21 @@ class Environments(unittest.TestCase):
             with self.subTest(most):
                 out = work / str(most)
                 self.wait_for_end_of_all(USER, end)
-                result = self.marrow(*self.run_subject.arguments(out, threads=16), user=USER, limits=[(resource.RLIMIT_NPROC, most)],
-                                     MARROW_CACHE=str(work / ("store-%d" % most)))
+                result = self.marrow(
+                    *self.run_subject.arguments(out, threads=16),
+                    user=USER,
+                    limits=[(resource.RLIMIT_NPROC, most)],
+                    MARROW_CACHE=str(work / ("store-%d" % most))
+                )
                 self.assert_passes_or_says_so(result, out)
                 self.wait_for_end_of_all(USER, end)
                 compared = work / ("compare-%d" % most)
-                result = self.marrow(*self.compare_subject.arguments(compared, more=["--quiet"]), user=USER, limits=[(resource.RLIMIT_NPROC, most)],
-                                     MARROW_CACHE=str(work / ("compare-store-%d" % most)))
+                result = self.marrow(
+                    *self.compare_subject.arguments(compared, more=["--quiet"]),
+                    user=USER,
+                    limits=[(resource.RLIMIT_NPROC, most)],
+                    MARROW_CACHE=str(work / ("compare-store-%d" % most))
+                )
                 self.assert_compared_or_says_so(result, compared)
 
     def assert_compared_or_says_so(self, result, out):
@@ -162,11 +190,18 @@ class Environments(unittest.TestCase):
         for most in amounts:
             with self.subTest(most):
                 out = self.folder / ("out-%d" % most)
-                result = self.marrow(*self.run_subject.arguments(out), limits=[(which, most)], MARROW_CACHE=str(self.folder / ("store-%d" % most)))
+                result = self.marrow(
+                    *self.run_subject.arguments(out),
+                    limits=[(which, most)],
+                    MARROW_CACHE=str(self.folder / ("store-%d" % most))
+                )
                 self.assert_passes_or_says_so(result, out)
                 compared = self.folder / ("compare-%d" % most)
-                result = self.marrow(*self.compare_subject.arguments(compared, more=["--quiet"]), limits=[(which, most)],
-                                     MARROW_CACHE=str(self.folder / ("compare-store-%d" % most)))
+                result = self.marrow(
+                    *self.compare_subject.arguments(compared, more=["--quiet"]),
+                    limits=[(which, most)],
+                    MARROW_CACHE=str(self.folder / ("compare-store-%d" % most))
+                )
                 if result.returncode != 127:
                     self.assert_compared_or_says_so(result, compared)
 
@@ -193,7 +228,9 @@ class Environments(unittest.TestCase):
     def test_full_streams(self):
         with open("/dev/full", "w") as full:
             out = self.folder / "out"
-            self.assert_passes(self.marrow(*self.run_subject.arguments(out), streams={"stdout": subprocess.PIPE, "stderr": full}), out)
+            self.assert_passes(
+                self.marrow(*self.run_subject.arguments(out), streams={"stdout": subprocess.PIPE, "stderr": full}), out
+            )
             result = self.marrow("list", "--json", streams={"stdout": full, "stderr": subprocess.PIPE})
             self.assert_sentence(result, [1])
             self.assertIn("could not be written", result.stderr)
@@ -202,24 +239,39 @@ class Environments(unittest.TestCase):
         reader, writer = os.pipe()
         os.close(reader)
         with open(writer, "w") as closed:
-            self.assert_passes(self.marrow(*self.run_subject.arguments(self.folder / "out"), streams={"stdout": closed, "stderr": closed}), self.folder / "out")
+            self.assert_passes(
+                self.marrow(
+                    *self.run_subject.arguments(self.folder / "out"), streams={"stdout": closed, "stderr": closed}
+                ),
+                self.folder / "out",
+            )
 
     @needs_root
     def test_read_only_folders(self):
         work, read_only = self.owned("work", USER), self.owned("read-only", USER, 0o555)
-        result = self.marrow(*self.run_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store"))
+        result = self.marrow(
+            *self.run_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store")
+        )
         self.assert_sentence(result)
         self.assertIn("cannot make the output folder", result.stderr)
-        result = self.marrow(*self.run_subject.arguments(work / "out"), user=USER, cwd=read_only, MARROW_CACHE=str(read_only / "store"))
+        result = self.marrow(
+            *self.run_subject.arguments(work / "out"), user=USER, cwd=read_only, MARROW_CACHE=str(read_only / "store")
+        )
         self.assert_passes(result, work / "out")
         self.assertIn("kept", result.stderr)
-        result = self.marrow(*self.compare_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store"))
+        result = self.marrow(
+            *self.compare_subject.arguments(None), user=USER, cwd=read_only, MARROW_CACHE=str(work / "store")
+        )
         self.assert_sentence(result)
 
     def test_a_working_folder_that_is_gone(self):
         gone = self.folder / "gone"
         gone.mkdir()
-        result = self.marrow(*self.run_subject.arguments(self.folder / "out"), wrapper=["sh", "-c", 'rmdir "%s"; exec "$0" "$@"' % gone], cwd=gone)
+        result = self.marrow(
+            *self.run_subject.arguments(self.folder / "out"),
+            wrapper=["sh", "-c", 'rmdir "%s"; exec "$0" "$@"' % gone],
+            cwd=gone
+        )
         self.assert_passes_or_says_so(result, self.folder / "out")
 
     def test_a_name_that_is_too_long(self):
@@ -228,7 +280,16 @@ class Environments(unittest.TestCase):
 
     @unittest.skipUnless(can_mount(), "small disks cannot be mounted here")
     def test_full_disk(self):
-        wrapper = ["unshare", "-m", "sh", "-c", 'mount -t tmpfs -o "$0" tmpfs full && cp -r full-before/. full/ && "$@"; code=$?; cp -r full after; exit $code']
+        wrapper = [
+            "unshare",
+            "-m",
+            "sh",
+            "-c",
+            (
+                'mount -t tmpfs -o "$0" tmpfs full && cp -r full-before/. full/ && "$@"; code=$?; cp -r full after;'
+                " exit $code"
+            ),
+        ]
         for options in ("size=4k", "size=16k", "size=28k", "size=40k", "nr_inodes=6", "nr_inodes=20"):
             for what in ("out", "store", "compare"):
                 with self.subTest(options=options, what=what):
@@ -237,14 +298,28 @@ class Environments(unittest.TestCase):
                     (work / "full-before").mkdir()
                     full, store = work / "full", work / "store"
                     if what == "store":
-                        result = self.marrow(*self.run_subject.arguments(work / "out"), wrapper=[*wrapper, options], cwd=work, MARROW_CACHE=str(full / "store"))
+                        result = self.marrow(
+                            *self.run_subject.arguments(work / "out"),
+                            wrapper=[*wrapper, options],
+                            cwd=work,
+                            MARROW_CACHE=str(full / "store")
+                        )
                         self.assert_passes(result, work / "out")
                     elif what == "out":
-                        result = self.marrow(*self.run_subject.arguments(full / "out"), wrapper=[*wrapper, options], cwd=work, MARROW_CACHE=str(store))
+                        result = self.marrow(
+                            *self.run_subject.arguments(full / "out"),
+                            wrapper=[*wrapper, options],
+                            cwd=work,
+                            MARROW_CACHE=str(store)
+                        )
                         self.assert_passes_or_says_so(result, work / "after" / "out")
                     else:
-                        result = self.marrow(*self.compare_subject.arguments(full / "out", more=["--quiet"]), wrapper=[*wrapper, options], cwd=work,
-                                             MARROW_CACHE=str(store))
+                        result = self.marrow(
+                            *self.compare_subject.arguments(full / "out", more=["--quiet"]),
+                            wrapper=[*wrapper, options],
+                            cwd=work,
+                            MARROW_CACHE=str(store)
+                        )
                         self.assert_compared_or_says_so(result, work / "after" / "out")
 
     @needs_root
@@ -270,12 +345,18 @@ def main():
     with program_of(options) as program:
         program.scratch.chmod(0o755)
         Environments.program = program
-        tried = subprocess.run(["test", "-x", str(program.marrow)], preexec_fn=lambda: os.setuid(USER)) if os.getuid() == 0 else None
+        tried = (
+            subprocess.run(["test", "-x", str(program.marrow)], preexec_fn=lambda: os.setuid(USER))
+            if os.getuid() == 0
+            else None
+        )
         Environments.is_reached_by_others = tried is not None and tried.returncode == 0
         Run(program).reference()
         Compare(program).reference()
         loaded = unittest.defaultTestLoader.loadTestsFromTestCase(Environments)
-        chosen = unittest.TestSuite(test for test in loaded if not options.tests or any(name in test.id() for name in options.tests))
+        chosen = unittest.TestSuite(
+            test for test in loaded if not options.tests or any(name in test.id() for name in options.tests)
+        )
         return 0 if unittest.TextTestRunner(verbosity=2).run(chosen).wasSuccessful() else 1
 
 

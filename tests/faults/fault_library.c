@@ -336,9 +336,7 @@ FUNCTION(int, poll, (struct pollfd * events, nfds_t count, int milliseconds), (e
 // Memory asked for while a library is loaded is a call of its own: most of it is for tables that libraries fill at
 // once.
 static __thread int loading __attribute__((tls_model("initial-exec")));
-static void loaded(int* before) {
-  loading = *before;
-}
+static void loaded(int* before) { loading = *before; }
 
 void* dlopen(const char* path, int flags) {
   __attribute__((cleanup(loaded))) int before = loading;  // also where an exception passes
@@ -346,9 +344,7 @@ void* dlopen(const char* path, int flags) {
   return NEXT(dlopen)(path, flags);
 }
 
-static int lacks_memory(void) {
-  return fails(loading ? kLoaderMalloc : kMalloc, -1, NULL);
-}
+static int lacks_memory(void) { return fails(loading ? kLoaderMalloc : kMalloc, -1, NULL); }
 
 // glibc's own names: dlsym itself asks for memory.
 extern void* __libc_malloc(size_t);
@@ -356,21 +352,11 @@ extern void* __libc_calloc(size_t, size_t);
 extern void* __libc_realloc(void*, size_t);
 extern void* __libc_memalign(size_t, size_t);
 
-void* malloc(size_t size) {
-  return lacks_memory() ? NULL : __libc_malloc(size);
-}
-void* calloc(size_t count, size_t size) {
-  return lacks_memory() ? NULL : __libc_calloc(count, size);
-}
-void* realloc(void* data, size_t size) {
-  return lacks_memory() ? NULL : __libc_realloc(data, size);
-}
-void* memalign(size_t alignment, size_t size) {
-  return lacks_memory() ? NULL : __libc_memalign(alignment, size);
-}
-void* aligned_alloc(size_t alignment, size_t size) {
-  return lacks_memory() ? NULL : __libc_memalign(alignment, size);
-}
+void* malloc(size_t size) { return lacks_memory() ? NULL : __libc_malloc(size); }
+void* calloc(size_t count, size_t size) { return lacks_memory() ? NULL : __libc_calloc(count, size); }
+void* realloc(void* data, size_t size) { return lacks_memory() ? NULL : __libc_realloc(data, size); }
+void* memalign(size_t alignment, size_t size) { return lacks_memory() ? NULL : __libc_memalign(alignment, size); }
+void* aligned_alloc(size_t alignment, size_t size) { return lacks_memory() ? NULL : __libc_memalign(alignment, size); }
 int posix_memalign(void** data, size_t alignment, size_t size) {
   if (lacks_memory()) return ENOMEM;
   void* made = __libc_memalign(alignment, size);

@@ -17,7 +17,9 @@ SKIPPED = 77  # ctest's SKIP_RETURN_CODE
 
 def arguments_parser(description):
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--build", type=pathlib.Path, default=SOURCE / "build", help="the build folder (default: build)")
+    parser.add_argument(
+        "--build", type=pathlib.Path, default=SOURCE / "build", help="the build folder (default: build)"
+    )
     parser.add_argument("--all", action="store_true", help="the whole, not a sample")
     parser.add_argument("--seed", type=int, default=1, help="of what is drawn by chance (default: 1)")
     parser.add_argument("--jobs", type=int, default=2, help="how many at once (default: 2)")

@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Lets one call of the system after the other fail (tests/faults/fault_library.c) in a run, a comparison and a tidying of the store.
-Each must end with a code and a sentence, leave nothing half under a final name, and succeed when it is started again."""
+"""Lets one call of the system after the other fail (tests/faults/fault_library.c) in a run, a comparison and a tidying
+of the store. Each must end with a code and a sentence, leave nothing half under a final name, and succeed when it is
+started again."""
 import collections
 import concurrent.futures
 import random
@@ -14,10 +15,32 @@ import sys
 from harness import arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
-CALLS = ["open", "read", "write", "close", "rename", "mkdir", "remove", "truncate", "fsync", "lock", "mmap", "malloc", "loader_malloc", "thread", "fork",
-         "exec", "pipe", "dup", "poll"]
+CALLS = [
+    "open",
+    "read",
+    "write",
+    "close",
+    "rename",
+    "mkdir",
+    "remove",
+    "truncate",
+    "fsync",
+    "lock",
+    "mmap",
+    "malloc",
+    "loader_malloc",
+    "thread",
+    "fork",
+    "exec",
+    "pipe",
+    "dup",
+    "poll",
+]
 Fault = collections.namedtuple("Fault", "subject where call n times below")
-HELP = "SUBJECT/main|children/CALL/N/1|forever/PLACE: only this fault, as the list of failures names it; PLACE is everywhere, out or store"
+HELP = (
+    "SUBJECT/main|children/CALL/N/1|forever/PLACE: only this fault, as the list of failures names it; PLACE is"
+    " everywhere, out or store"
+)
 
 
 class Injector:
@@ -40,10 +63,19 @@ class Injector:
         """{(where, call): how often it is called when nothing fails}"""
         folder = self.new_folder()
         subject.prepare(folder)
-        result = self.program.run(subject.command(folder), folder, LD_PRELOAD=str(self.program.fault_library), FAULT_COUNT_FILE=str(folder / "counts"))
+        result = self.program.run(
+            subject.command(folder),
+            folder,
+            LD_PRELOAD=str(self.program.fault_library),
+            FAULT_COUNT_FILE=str(folder / "counts"),
+        )
         assert result.returncode == 0, result.stderr
         table = struct.unpack("<%dQ" % (2 * len(CALLS)), (folder / "counts").read_bytes())
-        return {(where, call): table[row * len(CALLS) + i] for row, where in enumerate(("main", "children")) for i, call in enumerate(CALLS)}
+        return {
+            (where, call): table[row * len(CALLS) + i]
+            for row, where in enumerate(("main", "children"))
+            for i, call in enumerate(CALLS)
+        }
 
     def groups(self, names, calls):
         """Lists of faults that differ in n alone."""
@@ -61,8 +93,14 @@ class Injector:
         """What was wrong, and the program's own words."""
         subject, folder = self.subjects[fault.subject], self.new_folder()
         subject.prepare(folder)
-        settings = {"LD_PRELOAD": str(self.program.fault_library), "FAULT_CALL": fault.call, "FAULT_N": str(fault.n), "FAULT_TIMES": fault.times,
-                    "FAULT_IN": fault.where, "FAULT_MARK": str(folder / "mark")}
+        settings = {
+            "LD_PRELOAD": str(self.program.fault_library),
+            "FAULT_CALL": fault.call,
+            "FAULT_N": str(fault.n),
+            "FAULT_TIMES": fault.times,
+            "FAULT_IN": fault.where,
+            "FAULT_MARK": str(folder / "mark"),
+        }
         if fault.below != "everywhere":
             settings["FAULT_BELOW"] = str(folder / fault.below)
         try:
@@ -71,7 +109,9 @@ class Injector:
             return ["it did not end"], ""
         code, complaints = result.returncode, []
         if code not in (0, 1, 2, 130):
-            complaints.append("it was ended by %s" % signal.Signals(-code).name if code < 0 else "its exit code is %d" % code)
+            complaints.append(
+                "it was ended by %s" % signal.Signals(-code).name if code < 0 else "its exit code is %d" % code
+            )
         elif code != 0 and not SENTENCE.search(result.stderr):
             complaints.append("exit code %d without a sentence" % code)
         if fault.below == "store" and fault.subject == "run" and code != 0:
@@ -99,7 +139,9 @@ def chosen_faults(injector, options):
             # A draw of its own: how often a call is made may differ, and must not change which of the others fails.
             faults.append(random.Random("%d %s" % (injector.seed, group[0])).choice(group))
             continue
-        rare = group[0].call == "loader_malloc" or (group[0].call == "malloc" and (group[0].times == "forever" or group[0].subject == "compare"))
+        rare = group[0].call == "loader_malloc" or (
+            group[0].call == "malloc" and (group[0].times == "forever" or group[0].subject == "compare")
+        )
         most = options.most if rare else len(group)
         faults += group if len(group) <= most else injector.chance.sample(group, most)
     if options.all:
@@ -110,7 +152,12 @@ def chosen_faults(injector, options):
 def main():
     parser = arguments_parser(__doc__)
     parser.add_argument("--trials", type=int, default=70, help="faults of a sample, each of another kind (default: 70)")
-    parser.add_argument("--most", type=int, default=1000, help="with --all: most allocations that fail of a comparison, of a loader, or for ever (default: 1000)")
+    parser.add_argument(
+        "--most",
+        type=int,
+        default=1000,
+        help="with --all: most allocations that fail of a comparison, of a loader, or for ever (default: 1000)",
+    )
     parser.add_argument("--subjects", nargs="*", help="run, compare, gc (default: all)")
     parser.add_argument("--calls", nargs="*", choices=CALLS, metavar="CALL", help="only these: " + " ".join(CALLS))
     parser.add_argument("--only", help=HELP)

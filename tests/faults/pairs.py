@@ -1,7 +1,8 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Starts two runs or comparisons at the same moment: into the same folder, with the same store, beside a tidying of the store. Each
-folder must hold the results of exactly one of them, all bytes right, and who comes second is told so in a sentence."""
+"""Starts two runs or comparisons at the same moment: into the same folder, with the same store, beside a tidying of the
+store. Each folder must hold the results of exactly one of them, all bytes right, and who comes second is told so in a
+sentence."""
 import collections
 import concurrent.futures
 import random
@@ -22,10 +23,17 @@ class Pairs:
     def __init__(self, program, seed):
         self.program, self.chance = program, random.Random(seed)
         self.run, self.compare, self.collect = Run(program), Compare(program), Collect(program)
-        self.kinds = {"two runs, default folder": self.default_folder, "two runs, one --out": self.one_out, "two runs, one store": self.one_store,
-                      "a run and gc": self.run_and_gc, "two comparisons, one folder": self.one_comparison,
-                      "two experiments, default folder": self.two_experiments, "two comparisons, one store": self.comparisons_one_store,
-                      "a comparison and gc": self.comparison_and_gc, "a comparison and a run": self.comparison_and_run}
+        self.kinds = {
+            "two runs, default folder": self.default_folder,
+            "two runs, one --out": self.one_out,
+            "two runs, one store": self.one_store,
+            "a run and gc": self.run_and_gc,
+            "two comparisons, one folder": self.one_comparison,
+            "two experiments, default folder": self.two_experiments,
+            "two comparisons, one store": self.comparisons_one_store,
+            "a comparison and gc": self.comparison_and_gc,
+            "a comparison and a run": self.comparison_and_run,
+        }
         for seed in (1, 2):
             self.run.reference(seed)
         for experiment in EXPERIMENTS:
@@ -34,13 +42,27 @@ class Pairs:
     def pairs(self, count):
         names = list(self.kinds)
         for number in range(count):  # as many of each kind, most of them at once, some a little later
-            yield Pair(number, names[number % len(names)], self.chance.choice([0, 0, 0, self.chance.uniform(0, 0.05), self.chance.uniform(0, 0.4)]))
+            yield Pair(
+                number,
+                names[number % len(names)],
+                self.chance.choice([0, 0, 0, self.chance.uniform(0, 0.05), self.chance.uniform(0, 0.4)]),
+            )
 
     def both(self, folder, first, second, gap_s):
         processes = []
         for arguments in (first, second):
-            processes.append(subprocess.Popen([str(self.program.marrow), *map(str, arguments)], env=self.program.environment_of(folder), cwd=folder, text=True,
-                                              errors="replace", stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE))
+            processes.append(
+                subprocess.Popen(
+                    [str(self.program.marrow), *map(str, arguments)],
+                    env=self.program.environment_of(folder),
+                    cwd=folder,
+                    text=True,
+                    errors="replace",
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.PIPE,
+                    stderr=subprocess.PIPE,
+                )
+            )
             time.sleep(gap_s if arguments is first else 0)
         with concurrent.futures.ThreadPoolExecutor(2) as pool:
             texts = list(pool.map(lambda process: process.communicate(timeout=180), processes))
@@ -111,7 +133,8 @@ class Pairs:
         ended = self.both(folder, *(self.compare.arguments(None, experiment) for experiment in EXPERIMENTS), gap_s)
         yield from self.one_was_told(ended)
         out = folder / "runs" / "compare" / "small-experiment"
-        # Where both went well, one of them had ended when the other came, which goes on with its name, as after an edit.
+        # Where both went well, one of them had ended when the other came, which goes on with its name, as after an
+        # edit.
         good = [experiment for experiment, one in zip(EXPERIMENTS, ended) if one.code == 0]
         held = (out / "experiment.yaml").read_bytes() if good else b""
         whose = [experiment for experiment in good if (self.program.data / experiment).read_bytes() == held]
@@ -121,7 +144,11 @@ class Pairs:
             yield from self.compare.complaints_of(out, True, True, experiment)
 
     def comparisons_one_store(self, folder, gap_s):
-        ended = self.both(folder, *(self.compare.arguments(folder / str(i), experiment) for i, experiment in enumerate(EXPERIMENTS)), gap_s)
+        ended = self.both(
+            folder,
+            *(self.compare.arguments(folder / str(i), experiment) for i, experiment in enumerate(EXPERIMENTS)),
+            gap_s
+        )
         yield from self.both_went_well(ended)
         for i, experiment in enumerate(EXPERIMENTS):
             yield from self.compare.complaints_of(folder / str(i), True, True, experiment)
@@ -153,7 +180,9 @@ def main():
             for pair, complaints in zip(chosen, pool.map(pairs.try_pair, chosen)):
                 counts[(pair.kind, "failed" if complaints else "good")] += 1
                 if complaints:
-                    failures.append("%d: %s, %.3f s apart: %s" % (pair.number, pair.kind, pair.gap_s, "; ".join(complaints)))
+                    failures.append(
+                        "%d: %s, %.3f s apart: %s" % (pair.number, pair.kind, pair.gap_s, "; ".join(complaints))
+                    )
                     print(failures[-1], flush=True)
     for (kind, end), count in sorted(counts.items()):
         print("%5d  %-32s %s" % (count, kind, end))

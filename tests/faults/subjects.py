@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What is disturbed: a small run, a small comparison and a tidying of the store, and how to see that nothing half was left."""
+"""What is disturbed: a small run, a small comparison and a tidying of the store, and how to see that nothing half was
+left."""
 import csv
 import json
 import os
@@ -12,7 +13,16 @@ import zlib
 
 SENTENCE = re.compile(r"^(marrow: (error: |stopped)|\S+: error: ).{8}", re.MULTILINE)
 # A folder of libraries with the few plugins that are used: the manifests of all of them are most of a small run's work.
-PLUGINS = ["read_image", "read_mesh", "read_volume", "write_case", "write_mesh", "write_picture", "write_text", "write_volume"]
+PLUGINS = [
+    "read_image",
+    "read_mesh",
+    "read_volume",
+    "write_case",
+    "write_mesh",
+    "write_picture",
+    "write_text",
+    "write_volume",
+]
 
 PIPELINE = """marrow: 1
 name: small
@@ -59,9 +69,11 @@ def png(width, height):
 
 
 def mha(side):
-    header = ("ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
-              "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = 1 1 1\nDimSize = %d %d %d\n"
-              "ElementType = MET_FLOAT\nElementDataFile = LOCAL\n" % (side, side, side))
+    header = (
+        "ObjectType = Image\nNDims = 3\nBinaryData = True\nBinaryDataByteOrderMSB = False\nCompressedData = False\n"
+        "TransformMatrix = 1 0 0 0 1 0 0 0 1\nOffset = 0 0 0\nElementSpacing = 1 1 1\nDimSize = %d %d %d\n"
+        "ElementType = MET_FLOAT\nElementDataFile = LOCAL\n" % (side, side, side)
+    )
     return header.encode() + struct.pack("<%df" % side**3, *range(side**3))
 
 
@@ -100,10 +112,15 @@ class Program:
         for name in PLUGINS:
             for file in (build / "lib" / "marrow").glob("marrow_%s.*" % name):
                 (libraries / "marrow" / file.name).symlink_to(file)
-        for file in [*(build / "tests" / "plugins").glob("marrow_test_*"), *(build / "tests" / "fault_plugins").glob("marrow_small_case.*")]:
+        for file in [
+            *(build / "tests" / "plugins").glob("marrow_test_*"),
+            *(build / "tests" / "fault_plugins").glob("marrow_small_case.*"),
+        ]:
             (libraries / "marrow" / file.name).symlink_to(file)
         (scratch / "home").mkdir()
-        self.environment = {key: value for key, value in os.environ.items() if not key.startswith(("MARROW_", "FAULT_", "XDG_"))}
+        self.environment = {
+            key: value for key, value in os.environ.items() if not key.startswith(("MARROW_", "FAULT_", "XDG_"))
+        }
         self.environment.update(LD_LIBRARY_PATH=str(libraries), HOME=str(scratch / "home"))
         write_data(self.data)
 
@@ -111,8 +128,16 @@ class Program:
         return {**self.environment, "MARROW_CACHE": str(folder / "store"), **more}
 
     def run(self, arguments, folder, **more):
-        return subprocess.run([str(self.marrow), *map(str, arguments)], capture_output=True, text=True, errors="replace", cwd=folder, timeout=400,
-                              stdin=subprocess.DEVNULL, env=self.environment_of(folder, **more))
+        return subprocess.run(
+            [str(self.marrow), *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            cwd=folder,
+            timeout=400,
+            stdin=subprocess.DEVNULL,
+            env=self.environment_of(folder, **more),
+        )
 
     def damaged_entries(self, folder):
         result = self.run(["cache", "info"], folder)
@@ -122,8 +147,11 @@ class Program:
 
 def bytes_below(folder):
     """All files but hidden and temporary ones."""
-    return {str(path.relative_to(folder)): path.read_bytes() for path in sorted(folder.rglob("*"))
-            if path.is_file() and not any(part.startswith(".") or ".tmp" in part for part in path.relative_to(folder).parts)}
+    return {
+        str(path.relative_to(folder)): path.read_bytes()
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and not any(part.startswith(".") or ".tmp" in part for part in path.relative_to(folder).parts)
+    }
 
 
 def broken_json(folder):
@@ -137,14 +165,23 @@ def broken_json(folder):
 
 class Run:
     """A run that reads a picture and a mesh, computes a little and writes five outputs, a case's folder among them."""
+
     name = "run"
 
     def __init__(self, program, pipeline="small.yaml"):
         self.program, self.pipeline = program, pipeline
 
     def arguments(self, out, seed=1, threads=2):
-        return ["run", self.program.data / self.pipeline, "data=%s" % (self.program.data / "text"), "--seed", seed, "--threads", threads,
-                *(["--out", out] if out else [])]
+        return [
+            "run",
+            self.program.data / self.pipeline,
+            "data=%s" % (self.program.data / "text"),
+            "--seed",
+            seed,
+            "--threads",
+            threads,
+            *(["--out", out] if out else []),
+        ]
 
     def prepare(self, folder):
         pass
@@ -166,8 +203,16 @@ class Run:
     def complaints_of(self, out, is_whole, seed=1):
         """What a run's folder holds that it should not; all of its outputs where it said that all went well."""
         reference = self.reference(seed)
-        outputs = {name: content for name, content in bytes_below(out).items() if name.startswith("outputs")} if out.is_dir() else {}
-        complaints = ["%s is not what it should be (%d bytes)" % (name, len(content)) for name, content in outputs.items() if reference.get(name) != content]
+        outputs = (
+            {name: content for name, content in bytes_below(out).items() if name.startswith("outputs")}
+            if out.is_dir()
+            else {}
+        )
+        complaints = [
+            "%s is not what it should be (%d bytes)" % (name, len(content))
+            for name, content in outputs.items()
+            if reference.get(name) != content
+        ]
         complaints += broken_json(out)
         if is_whole:
             complaints += ["%s is not there" % name for name in reference if name not in outputs]
@@ -185,6 +230,7 @@ class Run:
 
 class Compare:
     """Two variants on two cases, with times, pictures and a report."""
+
     name = "compare"
     files = ("cells.csv", "cells.jsonl", "comparison.json", "report.html", "experiment.yaml")
 
@@ -192,7 +238,16 @@ class Compare:
         self.program = program
 
     def arguments(self, out, experiment="small-experiment.yaml", more=()):
-        return ["compare", self.program.data / experiment, "--jobs", 2, "--time-limit", 60, *more, *(["--out", out] if out else [])]
+        return [
+            "compare",
+            self.program.data / experiment,
+            "--jobs",
+            2,
+            "--time-limit",
+            60,
+            *more,
+            *(["--out", out] if out else []),
+        ]
 
     def prepare(self, folder):
         pass
@@ -205,7 +260,10 @@ class Compare:
     def rows(self, out):
         """All of each cell but times and tries."""
         with open(out / "cells.csv", newline="") as stream:
-            return {row["cell"]: {key: value for key, value in row.items() if key not in ("seconds", "tries")} for row in csv.DictReader(stream)}
+            return {
+                row["cell"]: {key: value for key, value in row.items() if key not in ("seconds", "tries")}
+                for row in csv.DictReader(stream)
+            }
 
     def reference(self, experiment="small-experiment.yaml"):
         folder = self.program.scratch / ("reference-" + experiment.replace("/", "-"))
@@ -241,6 +299,7 @@ class Compare:
 
 class Collect:
     """marrow cache gc on a store of a few results and what a killed process left."""
+
     name = "gc"
 
     def __init__(self, program):

@@ -18,7 +18,8 @@ TEST(Misalignment, IsTheMotionAboutTheFragmentsOwnAxes) {
 }
 
 TEST(Misalignment, NoneWhereNothingMoved) {
-  for (const marrow::Metric& metric : misalignment(displaced(marrow::Vector6d::Zero()), {}).items) EXPECT_NEAR(metric.value, 0, 1e-9) << metric.name;
+  for (const marrow::Metric& metric : misalignment(displaced(marrow::Vector6d::Zero()), {}).items)
+    EXPECT_NEAR(metric.value, 0, 1e-9) << metric.name;
 }
 
 TEST(Misalignment, RefusesOtherFragments) {
@@ -31,7 +32,9 @@ TEST(Misalignment, RefusesOtherFragments) {
     return "";
   };
   auto poses = displaced(marrow::Vector6d::Zero());
-  EXPECT_EQ(message(poses, {"distal", "shaft"}), "there is no pose of a fragment 'shaft', only of proximal, distal; name both fragments with moved and reference, and register both");
+  EXPECT_EQ(message(poses, {"distal", "shaft"}),
+            "there is no pose of a fragment 'shaft', only of proximal, distal; name both fragments with moved and "
+            "reference, and register both");
   EXPECT_EQ(message(poses, {"distal", "distal"}), "moved and reference both name 'distal'; they must be two fragments");
   for (const auto frame : {&marrow::RigidTransform::source, &marrow::RigidTransform::target}) {
     marrow::List<marrow::Pose> mixed;
@@ -39,6 +42,7 @@ TEST(Misalignment, RefusesOtherFragments) {
     other.world_from_model.*frame = "elsewhere";
     mixed.add("proximal", poses[0]);
     mixed.add("distal", other);
-    EXPECT_EQ(message(mixed, {}), "the poses of 'proximal' and 'distal' are between other frames; both fragments must come from one CT");
+    EXPECT_EQ(message(mixed, {}),
+              "the poses of 'proximal' and 'distal' are between other frames; both fragments must come from one CT");
   }
 }

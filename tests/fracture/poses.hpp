@@ -6,7 +6,8 @@
 
 #include "marrow/plugin.hpp"
 
-/// The proximal fragment somewhere, the distal one displaced from beside it by a motion about its own axes (degrees, mm).
+/// The proximal fragment somewhere, the distal one displaced from beside it by a motion about its own axes (degrees,
+/// mm).
 inline marrow::List<marrow::Pose> displaced(const marrow::Vector6d& motion_deg_mm) {
   marrow::Pose proximal, distal;
   proximal.frame.origin_mm = {5, 3, 200};

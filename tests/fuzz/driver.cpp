@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang: the seeds, then what a seeded mutator makes of
-// them, until the time is over. It sees crashes, foreign exceptions, too much memory and too much time; leaks and errors of memory
-// that do no harm at once need the sanitizers of tools/fuzz.
+// Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang: the seeds, then what a seeded mutator
+// makes of them, until the time is over. It sees crashes, foreign exceptions, too much memory and too much time; leaks
+// and errors of memory that do no harm at once need the sanitizers of tools/fuzz.
 //   fuzz_NAME --seconds 10 --seeds FOLDER --dictionary FILE        fuzz_NAME FILE...
 #include <fcntl.h>
 #include <sys/time.h>
@@ -46,7 +46,9 @@ std::string reproducer;  // where it goes when it is a finding
 }
 
 void on_signal(int number) {
-  report(number == SIGPROF ? "more than 2 s of processor time" : number == SIGALRM ? "no end within 60 s" : strsignal(number));
+  report(number == SIGPROF   ? "more than 2 s of processor time"
+         : number == SIGALRM ? "no end within 60 s"
+                             : strsignal(number));
 }
 
 void set_handlers() {
@@ -58,7 +60,8 @@ void set_handlers() {
   struct sigaction action {};
   action.sa_handler = on_signal;
   action.sa_flags = SA_ONSTACK;
-  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPROF, SIGALRM}) sigaction(number, &action, nullptr);
+  for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGPROF, SIGALRM})
+    sigaction(number, &action, nullptr);
 }
 
 void set_timer(int which, int seconds) {
@@ -113,11 +116,16 @@ Settings settings_of(int count, char** words) {
       continue;
     }
     if (++i == count) throw std::runtime_error(word + " needs a value");
-    if (word == "--seconds") settings.seconds = std::stod(words[i]);
-    else if (word == "--seed") settings.seed = std::stoull(words[i]);
-    else if (word == "--seeds") settings.seeds = words[i];
-    else if (word == "--dictionary") settings.dictionary = words[i];
-    else throw std::runtime_error("unknown option " + word);
+    if (word == "--seconds")
+      settings.seconds = std::stod(words[i]);
+    else if (word == "--seed")
+      settings.seed = std::stoull(words[i]);
+    else if (word == "--seeds")
+      settings.seeds = words[i];
+    else if (word == "--dictionary")
+      settings.dictionary = words[i];
+    else
+      throw std::runtime_error("unknown option " + word);
   }
   return settings;
 }
@@ -156,7 +164,8 @@ int main(int count, char** words) try {
   }
   std::size_t largest_heap = 0;
   const std::size_t executions = fuzz(settings, largest_heap);
-  std::printf("%s: %zu executions without a finding, at most %zu kB of memory\n", name.c_str(), executions, largest_heap / 1000);
+  std::printf("%s: %zu executions without a finding, at most %zu kB of memory\n", name.c_str(), executions,
+              largest_heap / 1000);
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

@@ -10,10 +10,13 @@ using namespace marrow;
 
 void put_neighbours() {
   fuzz::put("pipeline.yaml",
-            "marrow: 1\ninputs:\n  case: {type: path, default: .}\n  amount: {type: number, default: 1}\nnodes:\n  one: {uses: test.constant, with: {value: $amount}}\n"
-            "  start: {uses: test.displaced}\n  judge: {uses: evaluate.test, in: {of: one}}\n  all: {uses: test.sides}\noutputs: {errors: judge, start: start, sides: all.both}\n");
+            "marrow: 1\ninputs:\n  case: {type: path, default: .}\n  amount: {type: number, default: 1}\nnodes:\n  "
+            "one: {uses: test.constant, with: {value: $amount}}\n"
+            "  start: {uses: test.displaced}\n  judge: {uses: evaluate.test, in: {of: one}}\n  all: {uses: "
+            "test.sides}\noutputs: {errors: judge, start: start, sides: all.both}\n");
   fuzz::put("simulate.yaml",
-            "marrow: 1\ninputs:\n  seed: {type: integer, default: 1}\n  shift: {type: number, default: 0}\nnodes:\n  one: {uses: test.constant, with: {count: $seed, value: $shift}}\noutputs: {case: one}\n");
+            "marrow: 1\ninputs:\n  seed: {type: integer, default: 1}\n  shift: {type: number, default: 0}\nnodes:\n  "
+            "one: {uses: test.constant, with: {count: $seed, value: $shift}}\noutputs: {case: one}\n");
   for (const char* name : {"cases/a", "cases/b"}) std::filesystem::create_directories(fuzz::folder() / name);
 }
 
@@ -37,8 +40,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect_value_or_error([&] {
     Diagnostics faults;
     const compare::Experiment experiment = compare::read_experiment(file, fuzz::nodes(), faults);
-    if (!faults.empty()) faults.text();
-    else if (experiment.cell_count() > 0) compare::arguments_of(experiment, {}, "case");
+    if (!faults.empty())
+      faults.text();
+    else if (experiment.cell_count() > 0)
+      compare::arguments_of(experiment, {}, "case");
   });
   return 0;
 }

@@ -21,7 +21,8 @@ std::string with_checksums(std::string_view bytes) {
   for (std::size_t at = 8; at + 12 <= png.size();) {
     const std::uint32_t length = big_endian(png.data() + at);
     if (length > png.size() - at - 12) break;
-    const std::uint32_t checksum = std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(png.data() + at + 4), length + 4));
+    const std::uint32_t checksum =
+        std::uint32_t(crc32(0, reinterpret_cast<const Bytef*>(png.data() + at + 4), length + 4));
     for (int i = 0; i < 4; ++i) png[at + 8 + length + std::size_t(i)] = char(checksum >> (24 - 8 * i));
     at += 12 + std::size_t(length);
   }
@@ -30,9 +31,12 @@ std::string with_checksums(std::string_view bytes) {
 
 std::filesystem::path file_of(marrow::fuzz::Input& input) {
   switch (input.choice("cpt")) {
-    case 'c': return marrow::fuzz::put("a.png", with_checksums(input.rest));
-    case 'p': return marrow::fuzz::put("a.png", input.rest);
-    default: return marrow::fuzz::put("a.tif", input.rest);
+    case 'c':
+      return marrow::fuzz::put("a.png", with_checksums(input.rest));
+    case 'p':
+      return marrow::fuzz::put("a.png", input.rest);
+    default:
+      return marrow::fuzz::put("a.tif", input.rest);
   }
 }
 

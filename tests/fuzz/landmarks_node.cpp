@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "landmarks_node.hpp"
 
-#include "tests/without_registration.hpp"
+#include "tests/without_registration.hpp"  // before the node
+
 #include "plugins/read/landmarks.cpp"
 
 void marrow::fuzz::read_landmarks(const std::filesystem::path& path) { landmarks({path}); }

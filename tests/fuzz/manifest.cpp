@@ -43,7 +43,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect_value_or_error([&] {
     const LibraryInfo info = manifest_from_text(text);
     const std::string again = manifest_text(info);
-    if (manifest_text(manifest_from_text(again)) != again) fuzz::finding("a manifest is read as another one than was written:\n" + again);
+    if (manifest_text(manifest_from_text(again)) != again)
+      fuzz::finding("a manifest is read as another one than was written:\n" + again);
   });
   return 0;
 }

@@ -9,11 +9,51 @@
 namespace marrow::fuzz {
 namespace {
 
-constexpr std::uint64_t kNumbers[] = {0,          1,          2,          3,          7,          8,           16,          127,         128,
-                                      255,        256,        4095,       32767,      32768,      65535,       65536,       0x7fffffff,  0x80000000,
-                                      0xfffffffe, 0xffffffff, 0x10000000, 1000000000, 0x7fffffffffffffff,      0x8000000000000000,       0xffffffffffffffff};
-constexpr const char* kDigits[] = {"0",    "-1",   "1",    "2",     "65536", "2147483647", "-2147483648", "4294967296", "9223372036854775807", "99999999999999999999",
-                                   "1e30", "-1e9", "1e-9", "0.001", "nan",   "inf",        "-inf",        "1e999",      "0x10",                "010"};
+constexpr std::uint64_t kNumbers[] = {0,
+                                      1,
+                                      2,
+                                      3,
+                                      7,
+                                      8,
+                                      16,
+                                      127,
+                                      128,
+                                      255,
+                                      256,
+                                      4095,
+                                      32767,
+                                      32768,
+                                      65535,
+                                      65536,
+                                      0x7fffffff,
+                                      0x80000000,
+                                      0xfffffffe,
+                                      0xffffffff,
+                                      0x10000000,
+                                      1000000000,
+                                      0x7fffffffffffffff,
+                                      0x8000000000000000,
+                                      0xffffffffffffffff};
+constexpr const char* kDigits[] = {"0",
+                                   "-1",
+                                   "1",
+                                   "2",
+                                   "65536",
+                                   "2147483647",
+                                   "-2147483648",
+                                   "4294967296",
+                                   "9223372036854775807",
+                                   "99999999999999999999",
+                                   "1e30",
+                                   "-1e9",
+                                   "1e-9",
+                                   "0.001",
+                                   "nan",
+                                   "inf",
+                                   "-inf",
+                                   "1e999",
+                                   "0x10",
+                                   "010"};
 
 std::string unescaped(const std::string& text) {
   std::string word;
@@ -59,12 +99,24 @@ void Mutator::change(std::string& bytes, const std::string& other) {
     case 1:
       if (!bytes.empty()) bytes[at] = char(random_());
       break;
-    case 2: put_number(bytes); break;
-    case 3: put_digits(bytes); break;
-    case 4: bytes.erase(at, length); break;
-    case 5: bytes.insert(at, bytes.substr(at, length)); break;
-    case 6: bytes.insert(at, std::string(1 + below(below(8) ? 16 : 3000), char(random_()))); break;
-    case 7: bytes.resize(at); break;
+    case 2:
+      put_number(bytes);
+      break;
+    case 3:
+      put_digits(bytes);
+      break;
+    case 4:
+      bytes.erase(at, length);
+      break;
+    case 5:
+      bytes.insert(at, bytes.substr(at, length));
+      break;
+    case 6:
+      bytes.insert(at, std::string(1 + below(below(8) ? 16 : 3000), char(random_())));
+      break;
+    case 7:
+      bytes.resize(at);
+      break;
     case 8:  // a part of another input
       if (!other.empty()) {
         const std::size_t from = below(other.size());
@@ -92,7 +144,9 @@ void Mutator::put_number(std::string& bytes) {
 /// Another number for one that is written out.
 void Mutator::put_digits(std::string& bytes) {
   std::vector<std::size_t> begins;
-  const auto is_digit = [&](std::size_t i) { return i < bytes.size() && std::isdigit(static_cast<unsigned char>(bytes[i])); };
+  const auto is_digit = [&](std::size_t i) {
+    return i < bytes.size() && std::isdigit(static_cast<unsigned char>(bytes[i]));
+  };
   for (std::size_t i = 0; i < bytes.size(); ++i)
     if (is_digit(i) && (i == 0 || !is_digit(i - 1))) begins.push_back(i);
   if (begins.empty()) return;

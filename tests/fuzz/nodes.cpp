@@ -13,7 +13,9 @@ const Catalogue& nodes() {
     setenv("XDG_CACHE_HOME", folder().c_str(), 1);
     return Catalogue({MARROW_FUZZ_PLUGINS});
   }();
-  if (known.node_names().empty()) throw std::runtime_error("there are no nodes in " MARROW_FUZZ_PLUGINS ": " + (known.libraries().empty() ? "no library" : known.libraries()[0].refused));
+  if (known.node_names().empty())
+    throw std::runtime_error("there are no nodes in " MARROW_FUZZ_PLUGINS ": " +
+                             (known.libraries().empty() ? "no library" : known.libraries()[0].refused));
   return known;
 }
 

@@ -16,8 +16,10 @@ PipelineArguments arguments_of(std::string_view lines) {
     const std::size_t equals = line.find('=');
     if (equals == std::string::npos || equals == 0) continue;
     const std::string key = line.substr(0, equals), value = line.substr(equals + 1);
-    if (key.find('.') == std::string::npos) arguments.inputs.push_back({key, value});
-    else arguments.overrides.push_back({key, value});
+    if (key.find('.') == std::string::npos)
+      arguments.inputs.push_back({key, value});
+    else
+      arguments.overrides.push_back({key, value});
   }
   return arguments;
 }
@@ -28,7 +30,8 @@ void expect_same_again(const Pipeline& pipeline) {
   Diagnostics faults;
   const Pipeline again = read_pipeline(fuzz::put("resolved.yaml", once), {}, fuzz::nodes(), faults);
   if (!faults.empty()) fuzz::finding("the resolved pipeline has faults:\n" + faults.text() + once);
-  if (const std::string twice = resolved_yaml(again); twice != once) fuzz::finding("the resolved pipeline is read as another one:\n" + once + "---\n" + twice);
+  if (const std::string twice = resolved_yaml(again); twice != once)
+    fuzz::finding("the resolved pipeline is read as another one:\n" + once + "---\n" + twice);
 }
 
 }  // namespace
@@ -40,8 +43,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   fuzz::expect_value_or_error([&] {
     Diagnostics faults;
     const Pipeline pipeline = read_pipeline(file, arguments, fuzz::nodes(), faults);
-    if (faults.empty()) expect_same_again(pipeline);
-    else faults.text();
+    if (faults.empty())
+      expect_same_again(pipeline);
+    else
+      faults.text();
   });
   return 0;
 }

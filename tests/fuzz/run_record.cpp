@@ -11,9 +11,11 @@ namespace {
 using namespace marrow;
 
 constexpr std::string_view kPipeline =
-    "marrow: 1\nnodes:\n  one: {uses: test.constant, with: {value: 2}}\n  two: {uses: test.add, in: {a: one, b: [one, one]}}\noutputs: {sum: two}\n";
+    "marrow: 1\nnodes:\n  one: {uses: test.constant, with: {value: 2}}\n  two: {uses: test.add, in: {a: one, b: [one, "
+    "one]}}\noutputs: {sum: two}\n";
 constexpr std::string_view kRecord =
-    R"({"pipeline":"p","status":"done","seed":1,"nodes":[{"id":"one","status":"done","keys":{"number":"0f"},"items":{"number":[["","0f"]]}}]})";
+    R"({"pipeline":"p","status":"done","seed":1,"nodes":[)"
+    R"({"id":"one","status":"done","keys":{"number":"0f"},"items":{"number":[["","0f"]]}}]})";
 
 /// Of one variant, case and start, and two figures.
 const compare::Experiment& experiment() {

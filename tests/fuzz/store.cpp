@@ -13,7 +13,8 @@ using namespace marrow;
 
 constexpr Digest kKey{0x0123456789abcdefull, 0xfedcba9876543210ull};
 
-/// In front of the description, as store_entry.cpp writes it: what the file is, how long the description is, and its hash.
+/// In front of the description, as store_entry.cpp writes it: what the file is, how long the description is, and its
+/// hash.
 std::string with_preamble(std::string_view description, std::string_view payload) {
   Packer packer;
   packer.bytes("marrowr2", 8);
@@ -65,12 +66,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (way == 'd') {
       const std::size_t wanted = std::uint8_t(input.choice("\x10\x20\x40\x80"));
       const std::size_t payload = std::min(wanted, input.rest.size());
-      find(with_preamble(input.rest.substr(0, input.rest.size() - payload), input.rest.substr(input.rest.size() - payload)));
+      find(with_preamble(input.rest.substr(0, input.rest.size() - payload),
+                         input.rest.substr(input.rest.size() - payload)));
     }
     if (way == 'v') {
       const char type = input.choice("ABCDEFGHIJKLMNOPQ");
-      unpack<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Landmarks, Pose, Truth, Metrics, Scene, Landscape,
-             Case>(type, input.rest);
+      unpack<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Landmarks, Pose,
+             Truth, Metrics, Scene, Landscape, Case>(type, input.rest);
     }
   });
   return 0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the fuzz targets share. A target is one LLVMFuzzerTestOneInput(): libFuzzer calls it, or the small driver of the ordinary
-// tests. Whatever the bytes, only marrow::Error may come out of a reader: any other exception, a crash, a leak, more than
-// 256 MB or more than 2 s is a finding.
+// What the fuzz targets share. A target is one LLVMFuzzerTestOneInput(): libFuzzer calls it, or the small driver of the
+// ordinary tests. Whatever the bytes, only marrow::Error may come out of a reader: any other exception, a crash, a
+// leak, more than 256 MB or more than 2 s is a finding.
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -23,7 +23,8 @@ std::filesystem::path put(const std::string& name, std::string_view bytes);
 /// Ends the process as a finding.
 [[noreturn]] void finding(const std::string& what);
 
-/// The bytes of one input. Where a target reads several formats the first byte chooses one, so that an input is one file.
+/// The bytes of one input. Where a target reads several formats the first byte chooses one, so that an input is one
+/// file.
 struct Input {
   std::string_view rest;
 

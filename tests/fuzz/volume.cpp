@@ -34,14 +34,22 @@ std::filesystem::path detached(const std::string& name, std::string_view header)
 
 std::filesystem::path file_of(marrow::fuzz::Input& input) {
   switch (input.choice("mdrhnzgt")) {
-    case 'm': return put("a.mha", input.rest);
-    case 'd': return detached("mhd", input.rest);
-    case 'r': return put("a.nrrd", input.rest);
-    case 'h': return detached("nhdr", input.rest);
-    case 'n': return put("a.nii", input.rest);
-    case 'z': return put("a.nii.gz", packed(input.rest));
-    case 'g': return put("a.nii.gz", input.rest);
-    default: return put("a.tif", input.rest);
+    case 'm':
+      return put("a.mha", input.rest);
+    case 'd':
+      return detached("mhd", input.rest);
+    case 'r':
+      return put("a.nrrd", input.rest);
+    case 'h':
+      return detached("nhdr", input.rest);
+    case 'n':
+      return put("a.nii", input.rest);
+    case 'z':
+      return put("a.nii.gz", packed(input.rest));
+    case 'g':
+      return put("a.nii.gz", input.rest);
+    default:
+      return put("a.tif", input.rest);
   }
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a worker that went wrong may send: lines of its protocol, and values in shared memory. (Compiled without access control:
-// a worker's lines are understood by a private function.)
+// What a worker that went wrong may send: lines of its protocol, and values in shared memory. (Compiled without access
+// control: a worker's lines are understood by a private function.)
 #include "marrow/runtime/worker.hpp"
 
 #include <unistd.h>
@@ -24,20 +24,23 @@ void understand(std::string_view text) {
     worker.job_ = 7;
     worker.is_busy_ = true;
     const auto end = worker.understand(line, [](const nlohmann::json&) {});
-    if (end && !end->failed.empty() && !end->answer.is_null()) fuzz::finding("a job that failed has an answer: " + line);
+    if (end && !end->failed.empty() && !end->answer.is_null())
+      fuzz::finding("a job that failed has an answer: " + line);
   }
 }
 
 const Content* content_by_name(const TypeInfo& type) {
-  for (const TypeInfo& known : {TypeInfo::of<Image>(), TypeInfo::of<Volume>(), TypeInfo::of<View>(), TypeInfo::of<Mesh>(), TypeInfo::of<Pose>(),
-                                TypeInfo::of<Landmarks>(), TypeInfo::of<Case>()})
+  for (const TypeInfo& known :
+       {TypeInfo::of<Image>(), TypeInfo::of<Volume>(), TypeInfo::of<View>(), TypeInfo::of<Mesh>(), TypeInfo::of<Pose>(),
+        TypeInfo::of<Landmarks>(), TypeInfo::of<Case>()})
     if (known.id == type.id) return known.content;
   return nullptr;
 }
 
 void read_memory(std::string_view bytes) {
   static const SharedMemory memory;
-  if (ftruncate(memory.descriptor(), off_t(bytes.size())) != 0 || pwrite(memory.descriptor(), bytes.data(), bytes.size(), 0) != ssize_t(bytes.size()))
+  if (ftruncate(memory.descriptor(), off_t(bytes.size())) != 0 ||
+      pwrite(memory.descriptor(), bytes.data(), bytes.size(), 0) != ssize_t(bytes.size()))
     throw std::runtime_error("cannot write to shared memory");
   read_values(memory.descriptor(), getpid(), content_by_name);
 }

@@ -12,7 +12,9 @@ using Eigen::Vector3d;
 using scene::exact_pose, scene::model, scene::seen_in;
 
 marrow::Pose found(const marrow::Landmarks& landmarks, const shipped::Options& options = {}) {
-  return shipped::call("initial.fiducials", {{"model", model()}, {"landmarks", shipped::item(landmarks)}}, options).at("pose").as<marrow::Pose>();
+  return shipped::call("initial.fiducials", {{"model", model()}, {"landmarks", shipped::item(landmarks)}}, options)
+      .at("pose")
+      .as<marrow::Pose>();
 }
 std::string refusal(const marrow::Landmarks& landmarks) {
   return shipped::refusal("initial.fiducials", {{"model", model()}, {"landmarks", shipped::item(landmarks)}});
@@ -45,7 +47,8 @@ TEST(Fiducials, ErrorsAreThoseOfFitzpatricksFormula) {
   double sum = 0;
   for (int k = 0; k < 3; ++k) {
     const double along = principal.eigenvectors().col(k).dot(target - centre);
-    sum += ((target - centre).squaredNorm() - along * along) / (principal.eigenvalues().sum() - principal.eigenvalues()[k]);
+    sum += ((target - centre).squaredNorm() - along * along) /
+           (principal.eigenvalues().sum() - principal.eigenvalues()[k]);
   }
   const double formula = 0.48 / n * (1 + sum / 3);
 
@@ -62,7 +65,8 @@ TEST(Fiducials, ErrorsAreThoseOfFitzpatricksFormula) {
     by_motion.rightCols<3>() = pose.frame.axes;
     predicted += (by_motion * *pose.covariance * by_motion.transpose()).trace() / kRuns;
   }
-  std::printf("FRE %.3f mm (%.3f expected), TRE %.3f mm (%.3f by the formula)\n", std::sqrt(fre), std::sqrt(0.48 * (1 - 2 / n)), std::sqrt(tre), std::sqrt(formula));
+  std::printf("FRE %.3f mm (%.3f expected), TRE %.3f mm (%.3f by the formula)\n", std::sqrt(fre),
+              std::sqrt(0.48 * (1 - 2 / n)), std::sqrt(tre), std::sqrt(formula));
   EXPECT_NEAR(predicted, formula, 1e-9) << "the covariance says the same at any target";
   EXPECT_NEAR(fre, 0.48 * (1 - 2 / n), 0.02);
   EXPECT_NEAR(tre, formula, 0.06 * formula);
@@ -76,7 +80,8 @@ TEST(Fiducials, WithoutAGivenNoiseTheResidualsSayIt) {
   for (int run = 0; run < kRuns; ++run) {
     marrow::Landmarks landmarks = seen_in(scene::spread(), {});
     for (auto& tracked : landmarks.tracked) tracked.world_mm += Vector3d(noise(random), noise(random), noise(random));
-    variance += (*found(landmarks).covariance)(3, 3) / (*found(landmarks, {{"noise_mm", 1.0}}).covariance)(3, 3) / kRuns;
+    variance +=
+        (*found(landmarks).covariance)(3, 3) / (*found(landmarks, {{"noise_mm", 1.0}}).covariance)(3, 3) / kRuns;
   }
   EXPECT_NEAR(variance, 0.16, 0.012);
 }
@@ -84,7 +89,8 @@ TEST(Fiducials, WithoutAGivenNoiseTheResidualsSayIt) {
 TEST(Fiducials, NoiseOfPointsInAPlaneMakesNoReflection) {
   // Three points, and flat noise across their plane: a reflection would fit as well as the rotation.
   marrow::Landmarks landmarks = seen_in({{20, 0, 0}, {-10, 17, 0}, {-10, -17, 0}, {0, 0, 0}}, {});
-  for (std::size_t i = 0; i < 4; ++i) landmarks.tracked[i].world_mm += exact_pose().rotation * Vector3d(0, 0, i == 3 ? 1.5 : -0.5);
+  for (std::size_t i = 0; i < 4; ++i)
+    landmarks.tracked[i].world_mm += exact_pose().rotation * Vector3d(0, 0, i == 3 ? 1.5 : -0.5);
   const marrow::Pose pose = found(landmarks);
   EXPECT_NEAR(pose.world_from_model.rotation.determinant(), 1, 1e-9);
   EXPECT_LT(marrow::geodesic_angle_rad(pose.world_from_model.rotation, exact_pose().rotation), 1e-6);
@@ -96,21 +102,30 @@ TEST(Fiducials, WarnsOfExchangedNames) {
   std::swap(landmarks.tracked[0].world_mm, landmarks.tracked[1].world_mm);
   const marrow::Pose pose = found(landmarks);
   ASSERT_EQ(pose.warnings.size(), 1u);
-  EXPECT_EQ(pose.warnings[0].find("the tracked points do not fit those in the CT: they are off by "), 0u) << pose.warnings[0];
+  EXPECT_EQ(pose.warnings[0].find("the tracked points do not fit those in the CT: they are off by "), 0u)
+      << pose.warnings[0];
 }
 
 TEST(Fiducials, SaysWhatIsWrong) {
   const auto points = scene::spread();
-  EXPECT_EQ(refusal(seen_in({points[0], points[1]}, {})), "the tracked points in the CT are 2, but a pose takes three at least");
-  EXPECT_EQ(refusal(seen_in({{0, 0, 0}, {0, 0.1, 30}, {0, 0, 60}}, {})),
-            "the tracked points in the CT lie on one line, so the rotation about it is not determined; add one aside of it");
+  EXPECT_EQ(refusal(seen_in({points[0], points[1]}, {})),
+            "the tracked points in the CT are 2, but a pose takes three at least");
+  EXPECT_EQ(
+      refusal(seen_in({{0, 0, 0}, {0, 0.1, 30}, {0, 0, 60}}, {})),
+      "the tracked points in the CT lie on one line, so the rotation about it is not determined; add one aside of it");
   marrow::Landmarks landmarks = seen_in(points, {});
   landmarks.tracked[1].name = "patella";
-  EXPECT_EQ(refusal(landmarks), "'patella' was tracked, but the landmarks have no point of that name in the CT; give its place there, or leave it out");
+  EXPECT_EQ(refusal(landmarks),
+            "'patella' was tracked, but the landmarks have no point of that name in the CT; give its place there, or "
+            "leave it out");
   landmarks = seen_in(points, {});
   for (auto& tracked : landmarks.tracked) tracked.world_mm.y() *= -1;
-  EXPECT_EQ(refusal(landmarks).find("the tracked points are the mirror image of those in the CT: a reflection leaves "), 0u) << refusal(landmarks);
-  EXPECT_EQ(shipped::refusal("initial.fiducials", {{"model", shipped::item(marrow::Mesh())}, {"landmarks", shipped::item(landmarks)}}), "model: the surface has no triangles");
+  EXPECT_EQ(refusal(landmarks).find("the tracked points are the mirror image of those in the CT: a reflection leaves "),
+            0u)
+      << refusal(landmarks);
+  EXPECT_EQ(shipped::refusal("initial.fiducials",
+                             {{"model", shipped::item(marrow::Mesh())}, {"landmarks", shipped::item(landmarks)}}),
+            "model: the surface has no triangles");
 }
 
 }  // namespace

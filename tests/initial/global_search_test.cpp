@@ -20,7 +20,8 @@ struct Trial {
     middle.world_from_model = {"world", mesh.frame};
     truth = well::pose_at(middle, 12, -9, 25, -21, 17, 28);
     inputs["model"] = shipped::item(mesh);
-    inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<const well::Well>(truth.world_from_model, truth.frame, 1500, 24));
+    inputs["cost"] =
+        marrow::Value::of<Cost>(std::make_shared<const well::Well>(truth.world_from_model, truth.frame, 1500, 24));
     inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
   }
   Pose run(const shipped::Options& more = {}) const {
@@ -28,7 +29,9 @@ struct Trial {
     for (const auto& [name, value] : more) options[name] = value;
     return shipped::call("initial.global_search", inputs, options).at("pose").as<Pose>();
   }
-  double apart(const Pose& pose) const { return well::way(truth.world_from_model, pose.world_from_model, truth.frame).norm(); }
+  double apart(const Pose& pose) const {
+    return well::way(truth.world_from_model, pose.world_from_model, truth.frame).norm();
+  }
   Pose truth;
   shipped::Inputs inputs;
 };
@@ -40,7 +43,8 @@ TEST(GlobalSearch, FindsThePoseAmongManyMinimaWithoutAStart) {
   const Pose found = trial.run();
   EXPECT_LT(trial.apart(found), 0.5);
   EXPECT_GT(found.evaluations, 4000);
-  EXPECT_GT(trial.apart(trial.run({{"poses", std::int64_t(1)}})), 5) << "from the middle alone it ends in another minimum";
+  EXPECT_GT(trial.apart(trial.run({{"poses", std::int64_t(1)}})), 5)
+      << "from the middle alone it ends in another minimum";
 }
 
 TEST(GlobalSearch, TheRangesLieAboutTheStart) {
@@ -48,7 +52,8 @@ TEST(GlobalSearch, TheRangesLieAboutTheStart) {
   const Pose far = well::pose_at(trial.truth, 0, 0, 0, 60, 90, 0);
   Pose start = far;
   start.world_from_model = well::pose_at(far, 5, 5, -20, 10, -10, 20).world_from_model;
-  trial.inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<const well::Well>(far.world_from_model, far.frame, 1500, 24));
+  trial.inputs["cost"] =
+      marrow::Value::of<Cost>(std::make_shared<const well::Well>(far.world_from_model, far.frame, 1500, 24));
   trial.truth = far;
   trial.inputs["start"] = shipped::item(start);
   EXPECT_LT(trial.apart(trial.run()), 0.5);
@@ -68,7 +73,8 @@ TEST(GlobalSearch, SameBytesAtAnyNumberOfThreads) {
 TEST(GlobalSearch, SaysWhatIsWrong) {
   Trial trial;
   EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"reach_px", std::vector<double>{60, 24}}}),
-            "reach_px has 2 numbers, but contour_spacing_px has 3; give reach_px and the four options of steps as many, one for each level");
+            "reach_px has 2 numbers, but contour_spacing_px has 3; give reach_px and the four options of steps as "
+            "many, one for each level");
   trial.inputs["model"] = shipped::item(marrow::Mesh{});
   EXPECT_NE(shipped::refusal("initial.global_search", trial.inputs).find("model"), std::string::npos);
 }

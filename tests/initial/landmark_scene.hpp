@@ -6,9 +6,7 @@
 
 namespace scene {
 
-inline marrow::Value model() {
-  return shipped::item(marrow::test::cylinder({0, 0, 50}, {0, 0, 1}, 15, 120, 32));
-}
+inline marrow::Value model() { return shipped::item(marrow::test::cylinder({0, 0, 50}, {0, 0, 1}, 15, 120, 32)); }
 
 inline marrow::RigidTransform exact_pose() {
   return {"world", "ct", marrow::rotation_from_vector({0.3, -0.5, 0.8}), {12, -20, -35}};
@@ -44,7 +42,8 @@ inline marrow::Landmarks seen_in(const std::vector<Eigen::Vector3d>& points, con
     char name[40];
     std::snprintf(name, sizeof name, "p(%.3g %.3g %.3g)", point.x(), point.y(), point.z());
     landmarks.points.push_back({name, point});
-    for (const std::string& view : names) landmarks.seen.push_back({name, view, project(all.find(view)->camera, exact_pose() * point)});
+    for (const std::string& view : names)
+      landmarks.seen.push_back({name, view, project(all.find(view)->camera, exact_pose() * point)});
     landmarks.tracked.push_back({name, exact_pose() * point});
   }
   return landmarks;

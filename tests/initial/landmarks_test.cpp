@@ -12,11 +12,17 @@ using Eigen::Vector3d;
 using scene::exact_pose, scene::model, scene::seen_in, scene::views;
 
 marrow::Pose found(const marrow::Landmarks& landmarks, const shipped::Options& options = {}) {
-  return shipped::call("initial.landmarks", {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}}, options)
-      .at("pose").as<marrow::Pose>();
+  return shipped::call(
+             "initial.landmarks",
+             {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}},
+             options)
+      .at("pose")
+      .as<marrow::Pose>();
 }
 std::string refusal(const marrow::Landmarks& landmarks) {
-  return shipped::refusal("initial.landmarks", {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}});
+  return shipped::refusal(
+      "initial.landmarks",
+      {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}});
 }
 
 void expect_exact(const marrow::Pose& pose, const std::string& what) {
@@ -31,7 +37,8 @@ TEST(Landmarks, ExactPixelsGiveTheExactPose) {
   expect_exact(found(seen_in(points, {"frontal"})), "one view");
   expect_exact(found(seen_in(points, {"frontal", "lateral"})), "two views");
   expect_exact(found(seen_in(points, {"frontal", "lateral", "oblique"})), "three views");
-  expect_exact(found(seen_in({points.begin(), points.begin() + 3}, {"frontal", "lateral"})), "three points in two views");
+  expect_exact(found(seen_in({points.begin(), points.begin() + 3}, {"frontal", "lateral"})),
+               "three points in two views");
   expect_exact(found(seen_in({points.begin(), points.begin() + 4}, {"frontal"})), "four points in one view");
 }
 
@@ -68,8 +75,10 @@ TEST(Landmarks, ErrorsAreAsLargeAsPredicted) {
     }
     ratio = (ratio / kRuns).cwiseSqrt();
     const double count = 6.0 * double(names.size());
-    std::printf("%zu views: mean squared error in units of the covariance %.2f (6 expected); by axis %.2f %.2f %.2f deg, %.2f %.2f %.2f mm of the predicted\n",
-                names.size(), squares / kRuns, ratio[0], ratio[1], ratio[2], ratio[3], ratio[4], ratio[5]);
+    std::printf(
+        "%zu views: mean squared error in units of the covariance %.2f (6 expected); by axis %.2f %.2f %.2f deg, %.2f "
+        "%.2f %.2f mm of the predicted\n",
+        names.size(), squares / kRuns, ratio[0], ratio[1], ratio[2], ratio[3], ratio[4], ratio[5]);
     EXPECT_NEAR(squares / kRuns, 6, 0.6) << "3.5 standard deviations of a mean of 400";
     EXPECT_NEAR(ratio.minCoeff(), 1, 0.12);
     EXPECT_NEAR(ratio.maxCoeff(), 1, 0.12);
@@ -84,17 +93,23 @@ TEST(Landmarks, RefusesWhatDoesNotDetermineAPose) {
             "3 landmarks are seen in 1 view; a pose takes three that are seen in two views, or four in one");
   EXPECT_EQ(refusal(seen_in({points.begin(), points.begin() + 2}, {"frontal", "lateral"})),
             "2 landmarks are seen in 2 views; a pose takes three that are seen in two views, or four in one");
-  EXPECT_EQ(refusal({}), "0 landmarks are seen in 0 views; a pose takes three that are seen in two views, or four in one");
-  EXPECT_EQ(refusal(seen_in({{0, 0, 0}, {1, 2, 20}, {2, 4, 40}, {3, 6, 60}}, {"frontal", "lateral"})),
-            "the landmarks that are seen lie on one line, so the rotation about it is not determined; add one aside of it");
+  EXPECT_EQ(refusal({}),
+            "0 landmarks are seen in 0 views; a pose takes three that are seen in two views, or four in one");
+  EXPECT_EQ(
+      refusal(seen_in({{0, 0, 0}, {1, 2, 20}, {2, 4, 40}, {3, 6, 60}}, {"frontal", "lateral"})),
+      "the landmarks that are seen lie on one line, so the rotation about it is not determined; add one aside of it");
   marrow::Landmarks apart = seen_in({points.begin(), points.begin() + 2}, {"frontal"});
   const marrow::Landmarks others = seen_in({points.begin() + 2, points.begin() + 4}, {"lateral"});
   apart.points.insert(apart.points.end(), others.points.begin(), others.points.end());
   apart.seen.insert(apart.seen.end(), others.seen.begin(), others.seen.end());
-  EXPECT_EQ(refusal(apart), "no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; mark more of them");
+  EXPECT_EQ(refusal(apart),
+            "no pose was found for the landmarks: no view shows three of them, and no three are seen in two views; "
+            "mark more of them");
   marrow::Landmarks unknown = seen_in(points, {"frontal"});
   unknown.seen[2].name = "patella";
-  EXPECT_EQ(refusal(unknown), "view 'frontal' shows 'patella', but the landmarks have no point of that name in the CT; give its place there, or leave it out");
+  EXPECT_EQ(refusal(unknown),
+            "view 'frontal' shows 'patella', but the landmarks have no point of that name in the CT; give its place "
+            "there, or leave it out");
 }
 
 TEST(Landmarks, LeavesOutWhatOtherViewsShow) {
@@ -102,17 +117,26 @@ TEST(Landmarks, LeavesOutWhatOtherViewsShow) {
   landmarks.seen.push_back({landmarks.points[0].name, "axial", {3, 4}});
   std::vector<std::string> warnings;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, bool is_warning) { if (is_warning) warnings.emplace_back(text); };
-  const auto outputs = shipped::call("initial.landmarks", {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}}, {}, marrow::Context(hooks));
+  hooks.log = [&](std::string_view text, bool is_warning) {
+    if (is_warning) warnings.emplace_back(text);
+  };
+  const auto outputs = shipped::call(
+      "initial.landmarks",
+      {{"model", model()}, {"landmarks", shipped::item(landmarks)}, {"views", shipped::list(views(), "view")}}, {},
+      marrow::Context(hooks));
   expect_exact(outputs.at("pose").as<marrow::Pose>(), "the frontal view alone");
-  EXPECT_EQ(warnings, std::vector<std::string>{"landmarks are seen in a view 'axial', which is none of the views; they are left out"});
+  EXPECT_EQ(warnings, std::vector<std::string>{
+                          "landmarks are seen in a view 'axial', which is none of the views; they are left out"});
 }
 
 TEST(Landmarks, RefusesAPlaneThatMayTiltToEitherSide) {
-  // 6 points within 30 mm in a plane across the beam, tilted by 10 degrees: both tilts show them within a fraction of a pixel.
+  // 6 points within 30 mm in a plane across the beam, tilted by 10 degrees: both tilts show them within a fraction of a
+  // pixel.
   std::vector<Vector3d> flat;
-  const Eigen::Matrix3d to_beam = exact_pose().rotation.transpose() * marrow::rotation_from_vector({marrow::radians(10), 0, 0});
-  for (const Vector3d& point : {Vector3d(15, 0, 15), {-15, 0, 15}, {15, 0, -15}, {-15, 0, -15}, {0, 0, 12}, {7, 0, 0}}) flat.push_back(to_beam * point);
+  const Eigen::Matrix3d to_beam =
+      exact_pose().rotation.transpose() * marrow::rotation_from_vector({marrow::radians(10), 0, 0});
+  for (const Vector3d& point : {Vector3d(15, 0, 15), {-15, 0, 15}, {15, 0, -15}, {-15, 0, -15}, {0, 0, 12}, {7, 0, 0}})
+    flat.push_back(to_beam * point);
   const std::string said = refusal(seen_in(flat, {"frontal"}));
   EXPECT_EQ(said.find("two poses explain the landmarks: they differ by "), 0u) << said;
   EXPECT_NE(said.find("add a view, or a landmark that lies off that plane"), std::string::npos) << said;
@@ -122,7 +146,10 @@ TEST(Landmarks, RefusesAPlaneThatMayTiltToEitherSide) {
 TEST(Landmarks, RefusesTheMirrorImage) {
   marrow::Landmarks landmarks = seen_in(scene::spread(), {"frontal", "lateral"});
   for (auto& point : landmarks.points) point.model_mm.x() *= -1;
-  EXPECT_EQ(refusal(landmarks).find("the landmarks that two views show are the mirror image of those in the CT: a reflection leaves "), 0u) << refusal(landmarks);
+  EXPECT_EQ(refusal(landmarks).find(
+                "the landmarks that two views show are the mirror image of those in the CT: a reflection leaves "),
+            0u)
+      << refusal(landmarks);
 }
 
 TEST(Landmarks, WarnsOfExchangedNames) {
@@ -130,7 +157,9 @@ TEST(Landmarks, WarnsOfExchangedNames) {
   std::swap(landmarks.seen[0].pixel, landmarks.seen[1].pixel);
   const marrow::Pose pose = found(landmarks);
   ASSERT_EQ(pose.warnings.size(), 1u);
-  EXPECT_NE(pose.warnings[0].find("where 1 px were expected; are two names exchanged, or is a camera wrong?"), std::string::npos) << pose.warnings[0];
+  EXPECT_NE(pose.warnings[0].find("where 1 px were expected; are two names exchanged, or is a camera wrong?"),
+            std::string::npos)
+      << pose.warnings[0];
   EXPECT_GT(pose.cost, 3);
 }
 

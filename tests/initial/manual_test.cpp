@@ -36,7 +36,8 @@ TEST(Manual, ScalesToADistance) {
   Options options;
   options.translation_mm = {3, 0, 4};
   options.distance_mm = 12;
-  EXPECT_LT((manual(model, nullptr, options).world_from_model.translation_mm - Eigen::Vector3d(7.2, 0, 9.6)).norm(), 1e-6);
+  EXPECT_LT((manual(model, nullptr, options).world_from_model.translation_mm - Eigen::Vector3d(7.2, 0, 9.6)).norm(),
+            1e-6);
   options.rotation_deg = {5, -3, 2};
   const marrow::Pose pose = manual(model, nullptr, options);
   double sum = 0;
@@ -52,7 +53,9 @@ TEST(Manual, RefusesADistanceWithoutAMotion) {
     manual(tube::cylinder(14, 90), nullptr, options);
     FAIL();
   } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a rotation or translation, or a shorter distance");
+    EXPECT_STREQ(error.what(),
+                 "distance_mm: no multiple of rotation_deg and translation_mm moves the surface that far; give a "
+                 "rotation or translation, or a shorter distance");
   }
 }
 

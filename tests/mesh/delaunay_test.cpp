@@ -20,7 +20,8 @@ double smallest_angle_deg(const Mesh& mesh) {
   double smallest = 180;
   for (const auto& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) {
-      const Vector3d at = mesh.vertices_mm[t[k]], a = mesh.vertices_mm[t[(k + 1) % 3]] - at, b = mesh.vertices_mm[t[(k + 2) % 3]] - at;
+      const Vector3d at = mesh.vertices_mm[t[k]], a = mesh.vertices_mm[t[(k + 1) % 3]] - at,
+                     b = mesh.vertices_mm[t[(k + 2) % 3]] - at;
       smallest = std::min(smallest, std::acos(a.normalized().dot(b.normalized())) * 180 / kPi);
     }
   return smallest;
@@ -46,7 +47,8 @@ TEST(Delaunay, Torus) {
 }
 
 TEST(Delaunay, TrianglesAreAsSmallAsAskedFor) {
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
   Options options;
   std::size_t fewer = 0;
   for (const double size_mm : {4.0, 2.0, 1.0}) {
@@ -55,12 +57,14 @@ TEST(Delaunay, TrianglesAreAsSmallAsAskedFor) {
     const Mesh mesh = mesh_of(field, options);
     EXPECT_GT(double(mesh.triangles.size()), 1.5 * double(fewer));
     fewer = mesh.triangles.size();
-    for (const auto& t : mesh.triangles) EXPECT_LE((mesh.vertices_mm[t[0]] - mesh.vertices_mm[t[1]]).norm(), 2 * size_mm + 1e-6);
+    for (const auto& t : mesh.triangles)
+      EXPECT_LE((mesh.vertices_mm[t[0]] - mesh.vertices_mm[t[1]]).norm(), 2 * size_mm + 1e-6);
   }
 }
 
 TEST(Delaunay, KeepsApartWhatOneSampleParts) {
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::two_slabs(p, 1.5); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::two_slabs(p, 1.5); });
   Options options;
   options.largest_only = false;
   EXPECT_EQ(shapes::euler_number(mesh_of(field, options)), 4);
@@ -78,7 +82,8 @@ TEST(Delaunay, FindsPartsMuchSmallerThanItsTriangles) {
 
 /// CGAL's own order of cells is that of their addresses; several at once lie in memory otherwise than one alone.
 TEST(Delaunay, SameBytesWhereverItsMemoryLies) {
-  const auto field = shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
   const Mesh alone = mesh_of(field);
   std::array<Mesh, 6> together;
   tbb::parallel_for(0, 6, [&](int i) { together[std::size_t(i)] = mesh_of(field); });
@@ -94,7 +99,8 @@ TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
       EXPECT_TRUE(marrow::is_manifold(mesh_of(shapes::noise_field({9, 8, 10}, seed, 0.4)))) << "seed " << seed;
     } catch (const marrow::Error& error) {
       ++refused;
-      EXPECT_EQ(std::string(error.what()).rfind("field: Delaunay refinement does not close its surface: ", 0), 0u) << error.what();
+      EXPECT_EQ(std::string(error.what()).rfind("field: Delaunay refinement does not close its surface: ", 0), 0u)
+          << error.what();
     }
   std::printf("%d of 12 fields of noise refused\n", refused);
 }
@@ -105,7 +111,8 @@ TEST(Delaunay, StopsWhereTheFieldIsTooRoughForWhatIsAsked) {
   const Interpolated value(field);
   level_set.value = [&](const Vector3d& p) { return value(p + Vector3d(4, 3.5, 4.5)); };
   level_set.radius_mm = 12;
-  for (const Vector3d& index : spread_points(surface::Signs(field), 2)) level_set.points_mm.push_back(index - Vector3d(4, 3.5, 4.5));
+  for (const Vector3d& index : spread_points(surface::Signs(field), 2))
+    level_set.points_mm.push_back(index - Vector3d(4, 3.5, 4.5));
   const auto surface = cgal_mesher::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
   EXPECT_FALSE(surface.complete);
   EXPECT_LT(surface.vertices_mm.size(), 5000u);
@@ -116,7 +123,8 @@ TEST(Delaunay, CanBeCancelled) {
   marrow::Context::Hooks hooks;
   hooks.cancelled = &cancelled;
   marrow::Context context(hooks);
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
   EXPECT_THROW(delaunay(field, {}, context), marrow::Cancelled);
 }
 

@@ -44,7 +44,8 @@ TEST(FlyingEdges, EveryPatternIsAClosedManifold) {
   for (const bool around : {false, true})
     for (unsigned inside = 0; inside < 256; ++inside) {
       if (inside == (around ? 255u : 0u)) continue;  // no surface
-      EXPECT_TRUE(marrow::is_manifold(flying_edges(shapes::pattern_field(inside, around), options))) << "pattern " << inside;
+      EXPECT_TRUE(marrow::is_manifold(flying_edges(shapes::pattern_field(inside, around), options)))
+          << "pattern " << inside;
     }
 }
 

@@ -41,8 +41,10 @@ TEST(MarchingCubes, NoiseIsAClosedManifold) {
     EXPECT_TRUE(marrow::is_manifold(marching_cubes(field, {.largest_only = false}))) << "seed " << seed;
     EXPECT_TRUE(marrow::is_manifold(marching_cubes(field, {}))) << "seed " << seed;
   }
-  for (const int width : {1, 62, 63, 64, 126, 127, 150})  // rows that end in the middle of a word of signs and at its ends
-    EXPECT_TRUE(marrow::is_manifold(marching_cubes(shapes::noise_field({width, 9, 9}, 1), {.largest_only = false}))) << width;
+  for (const int width :
+       {1, 62, 63, 64, 126, 127, 150})  // rows that end in the middle of a word of signs and at its ends
+    EXPECT_TRUE(marrow::is_manifold(marching_cubes(shapes::noise_field({width, 9, 9}, 1), {.largest_only = false})))
+        << width;
 }
 
 TEST(MarchingCubes, SphereInATurnedGrid) {

@@ -29,7 +29,8 @@ TEST(Poisson, Torus) {
 }
 
 TEST(Poisson, ClosesABoneThatIsCutByTheBorder) {
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 24}), [](const Vector3d& p) { return p.head<2>().norm() - 9; });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 24}), [](const Vector3d& p) { return p.head<2>().norm() - 9; });
   const Mesh mesh = poisson(field, {});
   EXPECT_TRUE(marrow::is_manifold(mesh));
   EXPECT_EQ(shapes::euler_number(mesh), 2);
@@ -46,7 +47,8 @@ TEST(Poisson, KeepsTheLargestPart) {
 }
 
 TEST(Poisson, ADeeperOctreeHasMoreTriangles) {
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
   Options options;
   options.depth = 5;
   const Mesh coarse = poisson(field, options);
@@ -56,7 +58,8 @@ TEST(Poisson, ADeeperOctreeHasMoreTriangles) {
 }
 
 TEST(Poisson, SeveralAtOnceGiveTheSameBytes) {
-  const auto field = shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
   const Mesh alone = poisson(field, {});
   std::array<Mesh, 4> together;
   tbb::parallel_for(0, 4, [&](int i) { together[std::size_t(i)] = poisson(field, {}); });
@@ -75,7 +78,8 @@ TEST(Poisson, NoiseIsClosedOrRefusedInWords) {
     } catch (const marrow::Error& error) {
       ++refused;
       EXPECT_STREQ(error.what(),
-                   "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; smooth the field, "
+                   "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth "
+                   "surface; smooth the field, "
                    "or use mesh.marching_cubes, which takes every field");
     }
   }

@@ -16,9 +16,7 @@ namespace shapes {
 
 using Distance = std::function<double(const Eigen::Vector3d&)>;
 
-inline double sphere(const Eigen::Vector3d& p, double radius_mm) {
-  return p.norm() - radius_mm;
-}
+inline double sphere(const Eigen::Vector3d& p, double radius_mm) { return p.norm() - radius_mm; }
 inline double torus(const Eigen::Vector3d& p, double ring_mm, double tube_mm) {
   return std::hypot(std::hypot(p.x(), p.y()) - ring_mm, p.z()) - tube_mm;
 }
@@ -44,7 +42,8 @@ inline marrow::SignedField field_of(const marrow::Grid& grid, const Distance& di
   return field;
 }
 
-/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour. `inside_part`: how much is inside.
+/// A field without any structure: all 256 patterns of a cell, with every kind of neighbour. `inside_part`: how much is
+/// inside.
 inline marrow::SignedField noise_field(std::array<int, 3> size, unsigned seed, double inside_part = 0.5) {
   marrow::SignedField field;
   field.grid.size = size;
@@ -59,7 +58,8 @@ inline marrow::SignedField pattern_field(unsigned pattern, bool inside_around) {
   marrow::SignedField field;
   field.grid.size = {4, 4, 4};
   field.values_mm.assign(64, inside_around ? -0.8f : 0.6f);
-  for (int c = 0; c < 8; ++c) field.values_mm[field.grid.offset(1 + (c & 1), 1 + (c >> 1 & 1), 1 + (c >> 2))] = pattern >> c & 1 ? -0.7f : 0.9f;
+  for (int c = 0; c < 8; ++c)
+    field.values_mm[field.grid.offset(1 + (c & 1), 1 + (c >> 1 & 1), 1 + (c >> 2))] = pattern >> c & 1 ? -0.7f : 0.9f;
   return field;
 }
 
@@ -85,15 +85,18 @@ std::string message_of(const Node& node, const marrow::SignedField& field) {
 /// Every mesher says the same of a field that is no good.
 template <class Node>
 void expect_texts_for_bad_fields(const Node& node) {
-  EXPECT_EQ(message_of(node, {}), "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
+  EXPECT_EQ(message_of(node, {}),
+            "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
   marrow::SignedField field;
   field.grid.size = {3, 3, 3};
   field.values_mm.assign(27, 2.f);
   EXPECT_EQ(message_of(node, field),
-            "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its seeds and thresholds");
+            "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
+            "seeds and thresholds");
   field.values_mm.assign(27, -2.f);
   EXPECT_EQ(message_of(node, field),
-            "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole volume: raise its threshold");
+            "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
+            "volume: raise its threshold");
   field.values_mm[13] = std::nanf("");
   EXPECT_EQ(message_of(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
   field.values_mm[13] = -INFINITY;

@@ -18,7 +18,8 @@ TEST(Simplify, KeepsTheShapeOfASphere) {
   EXPECT_GT(simple.triangles.size(), 1800u);
   EXPECT_EQ(simple.frame, sphere.frame);
   EXPECT_TRUE(marrow::is_closed(simple));
-  for (const Eigen::Vector3d& vertex : simple.vertices_mm) EXPECT_NEAR((vertex - Eigen::Vector3d(0, 0, 25)).norm(), 25, 0.1);
+  for (const Eigen::Vector3d& vertex : simple.vertices_mm)
+    EXPECT_NEAR((vertex - Eigen::Vector3d(0, 0, 25)).norm(), 25, 0.1);
   EXPECT_NEAR(marrow::enclosed_volume_mm3(simple), 4.0 / 3 * M_PI * 25 * 25 * 25, 0.01 * 4.0 / 3 * M_PI * 25 * 25 * 25);
 }
 

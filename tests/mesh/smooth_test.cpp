@@ -29,7 +29,8 @@ TEST(Smooth, TakesNoiseAndKeepsTheVolume) {
   EXPECT_LT(roughness_mm(smoothed, 25), 0.45 * roughness_mm(rough, 25));
   EXPECT_NEAR(marrow::enclosed_volume_mm3(smoothed) / marrow::enclosed_volume_mm3(rough), 1, 2e-3);
   EXPECT_EQ(smooth(rough, {.iterations = 0}).vertices_mm, rough.vertices_mm);
-  EXPECT_LT(roughness_mm(smooth(rough, {.iterations = 60, .pass_band = 0.03}), 25), roughness_mm(smoothed, 25)) << "a narrower band";
+  EXPECT_LT(roughness_mm(smooth(rough, {.iterations = 60, .pass_band = 0.03}), 25), roughness_mm(smoothed, 25))
+      << "a narrower band";
 }
 
 TEST(Smooth, LeavesVerticesOfNoTriangleWhereTheyAre) {

@@ -35,8 +35,8 @@ TEST(SurfaceNets, NoiseIsAClosedManifold) {
   }
 }
 
-/// Two samples that touch along the diagonal of a face, in an inside elsewhere: both cells about the face have one loop, which
-/// crosses it twice.
+/// Two samples that touch along the diagonal of a face, in an inside elsewhere: both cells about the face have one
+/// loop, which crosses it twice.
 TEST(SurfaceNets, AFaceThatIsCrossedTwiceByTheSameTwoLoopsIsSplit) {
   SignedField field;
   field.grid.size = {5, 5, 5};
@@ -68,7 +68,8 @@ TEST(SurfaceNets, Torus) {
 }
 
 TEST(SurfaceNets, KeepsApartWhatOneSampleParts) {
-  const auto field = shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::two_slabs(p, 1.5); });
+  const auto field =
+      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::two_slabs(p, 1.5); });
   EXPECT_EQ(shapes::euler_number(nets(field, false)), 4);
 }
 
@@ -92,7 +93,8 @@ TEST(SurfaceNets, RelaxationTakesTheStepsOfABinaryField) {
   const Mesh long_relaxed = nets(field, true, 100);
   ASSERT_EQ(long_relaxed.vertices_mm.size(), rough.vertices_mm.size());
   for (std::size_t v = 0; v < rough.vertices_mm.size(); ++v) {  // both lie in the same cell, a sample wide
-    const Vector3d moved = field.grid.index_from_point(long_relaxed.vertices_mm[v]) - field.grid.index_from_point(rough.vertices_mm[v]);
+    const Vector3d moved =
+        field.grid.index_from_point(long_relaxed.vertices_mm[v]) - field.grid.index_from_point(rough.vertices_mm[v]);
     EXPECT_LE(moved.cwiseAbs().maxCoeff(), 1 + 1e-9);
   }
 }

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What tools/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the sources."""
+"""What tools/mutate takes for a place to change, and that what tests/mutants.txt explains still stands in the
+sources."""
 import pathlib
 import subprocess
 import sys
@@ -38,33 +39,67 @@ class Places(unittest.TestCase):
         self.assertIn(("a", "false"), changes(body("if (a) b();")))
         self.assertIn(("x > y", "true"), changes(body("if (int x = f(); x > y) b();")))
         self.assertEqual([new for old, new in changes(body("while (a) {}")) if old == "a"], ["false"])
-        self.assertEqual([new for old, new in changes(body("for (int i = a; i < n; ++i) {}")) if old == "i < n"], ["false"])
+        self.assertEqual(
+            [new for old, new in changes(body("for (int i = a; i < n; ++i) {}")) if old == "i < n"], ["false"]
+        )
         self.assertEqual(changes(body("for (const auto& a : b) {}")), [])
         self.assertEqual(changes(body("if (const auto* a = b) {}")), [], "a declaration")
 
     def test_statements(self):
-        self.assertEqual(changes(body("a = b;\nc.d(e);\nreturn x;\nint y;\nMatrix z(w);\nv.reserve(n);")), [("a = b", ""), ("c.d(e)", "")])
+        self.assertEqual(
+            changes(body("a = b;\nc.d(e);\nreturn x;\nint y;\nMatrix z(w);\nv.reserve(n);")),
+            [("a = b", ""), ("c.d(e)", "")],
+        )
         self.assertIn(("b()", ""), changes(body("if (a) b();")))
         self.assertIn(("g([] { h(); })", ""), changes(body("g([] { h(); });")))
         self.assertIn(("h()", ""), changes(body("g([] { h(); });")))
         self.assertEqual(changes("struct S { int a; void f(); };"), [])
         text = body("call(a,\n     b);")
         place = places_of("x.cpp", text)[0]
-        changed = text[:place.start] + place.choices[0] + text[place.end:]
+        changed = text[: place.start] + place.choices[0] + text[place.end :]
         self.assertEqual(changed.count("\n"), text.count("\n"), "lines keep their numbers")
 
     def test_what_is_no_behaviour_stays(self):
-        for text in ('#include <a>\n#define B (1 + 2)\n', "// 1 + 2\n/* 3 * 4 */", 'auto s = "1 + 2" + name;', 'auto s = R"(1 + 2)";', "char c = '1';", "static_assert(a == 1);",
-                     "std::array<int, 3> a;", body('char text[32];')):
+        for text in (
+            "#include <a>\n#define B (1 + 2)\n",
+            "// 1 + 2\n/* 3 * 4 */",
+            'auto s = "1 + 2" + name;',
+            'auto s = R"(1 + 2)";',
+            "char c = '1';",
+            "static_assert(a == 1);",
+            "std::array<int, 3> a;",
+            body("char text[32];"),
+        ):
             self.assertEqual(changes(text), [], text)
-        self.assertEqual(changes(body('throw Error("at " + std::to_string(i + 1));')), [('throw Error("at " + std::to_string(i + 1))', "")])
+        self.assertEqual(
+            changes(body('throw Error("at " + std::to_string(i + 1));')),
+            [('throw Error("at " + std::to_string(i + 1))', "")],
+        )
 
     def test_of_a_registration_only_the_numbers_count(self):
-        self.assertEqual(changes('MARROW_PLUGIN(plugin) {\n  plugin.node("a", f).option("b", &O::b, "c" + d, at_least(2));\n}\n'), [("2", "3"), ("2", "1")])
+        self.assertEqual(
+            changes('MARROW_PLUGIN(plugin) {\n  plugin.node("a", f).option("b", &O::b, "c" + d, at_least(2));\n}\n'),
+            [("2", "3"), ("2", "1")],
+        )
 
     def test_the_draw_is_that_of_the_seed(self):
         def drawn(seed):
-            return subprocess.run([str(SOURCE / "tools" / "mutate"), "--list", "--in", "plugins/fracture", "--count", "5", "--seed", str(seed)], capture_output=True, text=True, check=True).stdout
+            return subprocess.run(
+                [
+                    str(SOURCE / "tools" / "mutate"),
+                    "--list",
+                    "--in",
+                    "plugins/fracture",
+                    "--count",
+                    "5",
+                    "--seed",
+                    str(seed),
+                ],
+                capture_output=True,
+                text=True,
+                check=True,
+            ).stdout
+
         self.assertEqual(drawn(1), drawn(1))
         self.assertNotEqual(drawn(1), drawn(2))
 
@@ -75,7 +110,11 @@ class Explained(unittest.TestCase):
             lines = [line for line in block.splitlines() if line and not line.startswith("#")]
             if lines:
                 self.assertGreaterEqual(len(lines), 4, "path, source line, change, reason: " + block)
-                self.assertIn(lines[1], [line.strip() for line in (SOURCE / lines[0]).read_text().splitlines()], "gone from %s; remove it from tests/mutants.txt" % lines[0])
+                self.assertIn(
+                    lines[1],
+                    [line.strip() for line in (SOURCE / lines[0]).read_text().splitlines()],
+                    "gone from %s; remove it from tests/mutants.txt" % lines[0],
+                )
 
 
 if __name__ == "__main__":

@@ -3,21 +3,11 @@
 
 #include "optimizer_behaviour.hpp"
 
-TEST(Bobyqa, FindsTheMinimum) {
-  optimizer_behaviour::finds_the_minimum(*bobyqa());
-}
-TEST(Bobyqa, KeepsToBoundsAndBudget) {
-  optimizer_behaviour::keeps_to_bounds_and_budget(*bobyqa());
-}
-TEST(Bobyqa, TakesNanForTheWorst) {
-  optimizer_behaviour::takes_nan_for_the_worst(*bobyqa());
-}
-TEST(Bobyqa, LetsExceptionsPass) {
-  optimizer_behaviour::lets_exceptions_pass(*bobyqa());
-}
-TEST(Bobyqa, RefusesNonsense) {
-  optimizer_behaviour::refuses_nonsense(*bobyqa());
-}
+TEST(Bobyqa, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*bobyqa()); }
+TEST(Bobyqa, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*bobyqa()); }
+TEST(Bobyqa, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*bobyqa()); }
+TEST(Bobyqa, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*bobyqa()); }
+TEST(Bobyqa, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*bobyqa()); }
 
 TEST(Bobyqa, RefusesOneDimension) {
   marrow::MinimisationProblem problem;

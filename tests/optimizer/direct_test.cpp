@@ -18,7 +18,9 @@ TEST(Direct, LeavesLocalMinima) {
 }
 TEST(Direct, TakesNanForTheWorst) {
   auto problem = optimizer_behaviour::valley();
-  problem.function = [](const Eigen::VectorXd& x) { return x[0] > 2 ? std::nan("") : (x - Eigen::Vector2d(1.2, -1)).squaredNorm(); };
+  problem.function = [](const Eigen::VectorXd& x) {
+    return x[0] > 2 ? std::nan("") : (x - Eigen::Vector2d(1.2, -1)).squaredNorm();
+  };
   const auto result = direct({})->minimise(problem);
   EXPECT_NEAR(result.x[0], 1.2, 0.02) << "boxes whose middle is not a number are divided last";
   EXPECT_NEAR(result.x[1], -1, 0.02);

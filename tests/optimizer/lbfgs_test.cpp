@@ -13,7 +13,9 @@ TEST(Lbfgs, UsesDerivatives) {
   auto problem = optimizer_behaviour::valley();
   problem.expansion = [&](const Eigen::VectorXd& x) {
     const double bend = x[1] - x[0] * x[0];
-    return marrow::MinimisationProblem::Expansion{problem.function(x), Eigen::Vector2d(-2 * (1 - x[0]) - 400 * x[0] * bend, 200 * bend), Eigen::Matrix2d::Identity()};
+    return marrow::MinimisationProblem::Expansion{problem.function(x),
+                                                  Eigen::Vector2d(-2 * (1 - x[0]) - 400 * x[0] * bend, 200 * bend),
+                                                  Eigen::Matrix2d::Identity()};
   };
   const auto result = lbfgs()->minimise(problem);
   EXPECT_NEAR((result.x - Eigen::Vector2d(1, 1)).norm(), 0, 1e-5);

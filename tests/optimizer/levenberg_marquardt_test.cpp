@@ -4,7 +4,9 @@
 #include "optimizer_behaviour.hpp"
 
 TEST(LevenbergMarquardt, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*levenberg_marquardt()); }
-TEST(LevenbergMarquardt, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*levenberg_marquardt()); }
+TEST(LevenbergMarquardt, KeepsToBoundsAndBudget) {
+  optimizer_behaviour::keeps_to_bounds_and_budget(*levenberg_marquardt());
+}
 TEST(LevenbergMarquardt, TakesNanForTheWorst) { optimizer_behaviour::takes_nan_for_the_worst(*levenberg_marquardt()); }
 TEST(LevenbergMarquardt, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*levenberg_marquardt()); }
 TEST(LevenbergMarquardt, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*levenberg_marquardt()); }
@@ -16,7 +18,8 @@ marrow::MinimisationProblem valley_of_squares() {
     const Eigen::Vector2d r(10 * (x[1] - x[0] * x[0]), 1 - x[0]);
     Eigen::Matrix2d jacobian;
     jacobian << -20 * x[0], 10, -1, 0;
-    return marrow::MinimisationProblem::Expansion{3 + r.squaredNorm(), 2 * jacobian.transpose() * r, 2 * jacobian.transpose() * jacobian};
+    return marrow::MinimisationProblem::Expansion{3 + r.squaredNorm(), 2 * jacobian.transpose() * r,
+                                                  2 * jacobian.transpose() * jacobian};
   };
   return problem;
 }

@@ -9,15 +9,18 @@ using marrow::Volume;
 
 shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
   marrow::List<marrow::View> views;
-  for (const double angle : {0.0, 90.0}) views.add(angle > 0 ? "lateral" : "frontal", marrow::View{"", {}, radiograph_behaviour::camera(angle), {}});
+  for (const double angle : {0.0, 90.0})
+    views.add(angle > 0 ? "lateral" : "frontal", marrow::View{"", {}, radiograph_behaviour::camera(angle), {}});
   shipped::Inputs in{{"volume", shipped::item(volume)}, {"views", shipped::list(views, "view")}};
   if (field) in["field"] = shipped::item(*field);
   return in;
 }
 
 /// The projector keeps what it was made from.
-std::shared_ptr<const Projector> made(const std::string& node, const shipped::Inputs& in, const shipped::Options& options = {}) {
-  const auto kept = std::make_shared<std::pair<shipped::Inputs, shipped::Outputs>>(in, shipped::call(node, in, options));
+std::shared_ptr<const Projector> made(const std::string& node, const shipped::Inputs& in,
+                                      const shipped::Options& options = {}) {
+  const auto kept =
+      std::make_shared<std::pair<shipped::Inputs, shipped::Outputs>>(in, shipped::call(node, in, options));
   return {kept, &kept->second.at("projector").as<Projector>()};
 }
 std::shared_ptr<const Projector> make_medium(const Volume& volume, const marrow::SignedField* field) {
@@ -46,9 +49,12 @@ TEST(LightField, FinerStepsAreMoreAccurate) {
   const marrow::PixelGrid grid{150, 150, 3, 70, 70};
   const auto expected = exact->radiograph(camera, pose, grid);
   const auto error = [&](double step_mm, double step_deg) {
-    const auto values = made("project.lightfield", in, {{"step_mm", step_mm}, {"step_deg", step_deg}, {"range_deg", 4.0}})->radiograph(camera, pose, grid);
+    const auto values =
+        made("project.lightfield", in, {{"step_mm", step_mm}, {"step_deg", step_deg}, {"range_deg", 4.0}})
+            ->radiograph(camera, pose, grid);
     double sum = 0;
-    for (std::size_t i = 0; i < values.size(); ++i) sum += std::abs(double(values[i] - expected[i])) / double(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i)
+      sum += std::abs(double(values[i] - expected[i])) / double(values.size());
     return sum;
   };
   const double coarse = error(4, 2.4), fine = error(2, 1.2);
@@ -61,15 +67,21 @@ TEST(LightField, OutOfRangeItIsJosephs) {
   const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
   const marrow::Camera& camera = radiograph_behaviour::camera(40);
   const std::vector<Eigen::Vector2f> pixels{{250, 250}, {240, 263}, {300, 222}};
-  const auto values = made("project.lightfield", in, {{"step_mm", 5.0}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
-  const auto expected = made("project.joseph", {{"volume", in.at("volume")}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
+  const auto values =
+      made("project.lightfield", in, {{"step_mm", 5.0}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
+  const auto expected =
+      made("project.joseph", {{"volume", in.at("volume")}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
   for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(values[i], expected[i], 1e-3);
 }
 
 TEST(LightField, SaysWhatIsWrong) {
   shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
   const std::string text = shipped::refusal("project.lightfield", in, {{"step_mm", 0.2}, {"step_deg", 0.3}});
-  EXPECT_NE(text.find("MB, but most_mb is 1024; take wider steps (step_mm, step_deg), a smaller range_deg, or the field of a fragment"), std::string::npos) << text;
+  EXPECT_NE(text.find("MB, but most_mb is 1024; take wider steps (step_mm, step_deg), a smaller range_deg, or the "
+                      "field of a fragment"),
+            std::string::npos)
+      << text;
   in["views"] = {};
-  EXPECT_EQ(shipped::refusal("project.lightfield", in), "there is no view, so it is not known about which directions to integrate; wire 'views'");
+  EXPECT_EQ(shipped::refusal("project.lightfield", in),
+            "there is no view, so it is not known about which directions to integrate; wire 'views'");
 }

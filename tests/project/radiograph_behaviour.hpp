@@ -21,15 +21,18 @@ using marrow::Volume;
 using Make = std::function<std::shared_ptr<const Projector>(const Volume&, const marrow::SignedField*)>;
 
 /// A volume of HU by position, around the frame's origin, its axes turned by `turn`.
-inline Volume volume_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& turn, const std::function<double(const Eigen::Vector3d&)>& hu) {
+inline Volume volume_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& turn,
+                        const std::function<double(const Eigen::Vector3d&)>& hu) {
   Volume volume;
   volume.grid.size = size;
   volume.grid.spacing_mm = spacing_mm;
   volume.grid.direction = turn;
-  volume.grid.origin_mm = -turn * (0.5 * Eigen::Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm));
+  volume.grid.origin_mm =
+      -turn * (0.5 * Eigen::Vector3d(size[0] - 1, size[1] - 1, size[2] - 1).cwiseProduct(spacing_mm));
   for (int z = 0; z < size[2]; ++z)
     for (int y = 0; y < size[1]; ++y)
-      for (int x = 0; x < size[0]; ++x) volume.values.push_back(float(hu(volume.grid.point_from_index({double(x), double(y), double(z)}))));
+      for (int x = 0; x < size[0]; ++x)
+        volume.values.push_back(float(hu(volume.grid.point_from_index({double(x), double(y), double(z)}))));
   return volume;
 }
 
@@ -37,7 +40,9 @@ constexpr double kWidth_mm = 8;
 
 /// A cloud whose attenuation falls off as a Gaussian from twice water's at its middle.
 inline Volume cloud(const Eigen::Matrix3d& turn = Eigen::Matrix3d::Identity()) {
-  return volume_of({90, 99, 78}, {0.8, 0.7, 1.0}, turn, [](const Eigen::Vector3d& p) { return -1000 + 2000 * std::exp(-0.5 * p.squaredNorm() / (kWidth_mm * kWidth_mm)); });
+  return volume_of({90, 99, 78}, {0.8, 0.7, 1.0}, turn, [](const Eigen::Vector3d& p) {
+    return -1000 + 2000 * std::exp(-0.5 * p.squaredNorm() / (kWidth_mm * kWidth_mm));
+  });
 }
 
 inline double distance_from_ray(const Camera& camera, const Eigen::Vector2d& pixel, const Eigen::Vector3d& point) {
@@ -45,7 +50,9 @@ inline double distance_from_ray(const Camera& camera, const Eigen::Vector2d& pix
 }
 
 /// The integral of the cloud along a line that passes its middle at this distance.
-inline double integral_mm(double distance) { return 2 * kWidth_mm * std::sqrt(2 * marrow::kPi) * std::exp(-0.5 * distance * distance / (kWidth_mm * kWidth_mm)); }
+inline double integral_mm(double distance) {
+  return 2 * kWidth_mm * std::sqrt(2 * marrow::kPi) * std::exp(-0.5 * distance * distance / (kWidth_mm * kWidth_mm));
+}
 
 inline const Camera& camera(double angle_deg) {
   static std::map<double, Camera> cameras;
@@ -57,7 +64,9 @@ inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double 
   const Eigen::Vector3d centre = pose * Eigen::Vector3d(0, 0, 0);
   for (const double angle : {0.0, 30.0, 45.0, 90.0, 200.0})
     for (const bool turned : {false, true}) {
-      const Eigen::Matrix3d turn = turned ? Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix() : Eigen::Matrix3d::Identity();
+      const Eigen::Matrix3d turn =
+          turned ? Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, -1).normalized()).toRotationMatrix()
+                 : Eigen::Matrix3d::Identity();
       const auto projector = make(cloud(turn), nullptr);
       const PixelGrid grid = projector->region(camera(angle), pose);
       ASSERT_GT(grid.count(), 1000u);
@@ -66,7 +75,8 @@ inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double 
       for (int row = 0; row < grid.rows; ++row)
         for (int column = 0; column < grid.columns; ++column) {
           const double distance = distance_from_ray(camera(angle), grid.pixel(column, row), centre);
-          const double error = std::abs(values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] - integral_mm(distance));
+          const double error = std::abs(values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] -
+                                        integral_mm(distance));
           sum += error / double(grid.count());
           worst = std::max(worst, error);
         }
@@ -77,14 +87,16 @@ inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double 
 
 /// Where the rays run at right angles through an even block, the chord is its thickness.
 inline void chord_of_a_block(const Make& make) {
-  const Volume block = volume_of({40, 30, 50}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 500; });
+  const Volume block =
+      volume_of({40, 30, 50}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 500; });
   const auto projector = make(block, nullptr);
   Camera far = camera(0);
   const double distance = 1e5;  // nearly parallel rays
   far.intrinsics(0, 0) = far.intrinsics(1, 1) = 1e5;
   far.camera_from_world.rotation.setIdentity();
   far.camera_from_world.translation_mm = {0, 0, distance};
-  const auto values = projector->radiograph(far, shapes::centred_at({0, 0, 0}), std::vector<Eigen::Vector2f>{far.intrinsics.col(2).head<2>().cast<float>()});
+  const auto values = projector->radiograph(
+      far, shapes::centred_at({0, 0, 0}), std::vector<Eigen::Vector2f>{far.intrinsics.col(2).head<2>().cast<float>()});
   EXPECT_NEAR(values.at(0), 1.5 * 50, 1e-3);
 }
 
@@ -96,7 +108,8 @@ inline void region_holds_all(const Make& make) {
   const auto values = projector->radiograph(view, pose, whole);
   for (int row = 0; row < whole.rows; ++row)
     for (int column = 0; column < whole.columns; ++column) {
-      const bool is_in = column >= region.u_px && row >= region.v_px && column < region.u_px + region.columns && row < region.v_px + region.rows;
+      const bool is_in = column >= region.u_px && row >= region.v_px && column < region.u_px + region.columns &&
+                         row < region.v_px + region.rows;
       if (is_in) continue;
       ASSERT_EQ(values[std::size_t(row) * std::size_t(whole.columns) + std::size_t(column)], 0) << column << " " << row;
     }
@@ -105,11 +118,13 @@ inline void region_holds_all(const Make& make) {
 
 /// Whole images, sub-sampled ones and single pixels agree; up to the interpolation of a whole image.
 inline void grids_and_pixels_agree(const Make& make, double limit_mm) {
-  const auto projector = make(cloud(Eigen::AngleAxisd(0.5, Eigen::Vector3d(0, 1, 1).normalized()).toRotationMatrix()), nullptr);
+  const auto projector =
+      make(cloud(Eigen::AngleAxisd(0.5, Eigen::Vector3d(0, 1, 1).normalized()).toRotationMatrix()), nullptr);
   const RigidTransform pose = shapes::centred_at({1, 2, 3});
   const PixelGrid region = projector->region(camera(15), pose);
   const PixelGrid coarse{region.u_px, region.v_px, 3, region.columns / 3, region.rows / 3};
-  const auto fine = projector->radiograph(camera(15), pose, region), few = projector->radiograph(camera(15), pose, coarse);
+  const auto fine = projector->radiograph(camera(15), pose, region),
+             few = projector->radiograph(camera(15), pose, coarse);
   std::vector<Eigen::Vector2f> pixels;
   for (int row = 0; row < coarse.rows; ++row)
     for (int column = 0; column < coarse.columns; ++column) pixels.push_back(coarse.pixel(column, row).cast<float>());
@@ -118,18 +133,25 @@ inline void grids_and_pixels_agree(const Make& make, double limit_mm) {
     for (int column = 0; column < coarse.columns; ++column) {
       const std::size_t i = std::size_t(row) * std::size_t(coarse.columns) + std::size_t(column);
       EXPECT_NEAR(few[i], single[i], limit_mm);
-      EXPECT_NEAR(fine[std::size_t(3 * row) * std::size_t(region.columns) + std::size_t(3 * column)], single[i], limit_mm);
+      EXPECT_NEAR(fine[std::size_t(3 * row) * std::size_t(region.columns) + std::size_t(3 * column)], single[i],
+                  limit_mm);
     }
 }
 
 inline void a_field_leaves_the_rest_out(const Make& make) {
-  const Volume two = volume_of({80, 30, 30}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d& p) { return std::abs(std::abs(p.x()) - 20) < 10 ? 1000 : -1000; });
+  const Volume two = volume_of({80, 30, 30}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d& p) {
+    return std::abs(std::abs(p.x()) - 20) < 10 ? 1000 : -1000;
+  });
   marrow::SignedField field{two.grid, {}};
   for (int z = 0; z < 30; ++z)
     for (int y = 0; y < 30; ++y)
-      for (int x = 0; x < 80; ++x) field.values_mm.push_back(float(two.grid.point_from_index({double(x), 0, 0}).x()));  // the left half is the fragment
+      for (int x = 0; x < 80; ++x)
+        field.values_mm.push_back(
+            float(two.grid.point_from_index({double(x), 0, 0}).x()));  // the left half is the fragment
   const auto projector = make(two, &field);
-  const auto pixels = [](double x) { return std::vector<Eigen::Vector2f>{marrow::project(camera(0), Eigen::Vector3d(x, 0, 0)).cast<float>()}; };
+  const auto pixels = [](double x) {
+    return std::vector<Eigen::Vector2f>{marrow::project(camera(0), Eigen::Vector3d(x, 0, 0)).cast<float>()};
+  };
   EXPECT_GT(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(-20)).at(0), 50);
   EXPECT_EQ(projector->radiograph(camera(0), shapes::centred_at({0, 0, 0}), pixels(20)).at(0), 0);
   field.grid.size = {2, 2, 2};
@@ -144,19 +166,24 @@ inline void refuses_nonsense(const Make& make) {
   } catch (const marrow::Error& error) {
     EXPECT_STREQ(error.what(), "the projector makes radiographs only; wire one that draws the outline of a mesh");
   }
-  const Volume air = volume_of({5, 5, 5}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return -1000; });
+  const Volume air =
+      volume_of({5, 5, 5}, {1, 1, 1}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return -1000; });
   EXPECT_EQ(make(air, nullptr)->region(camera(0), shapes::centred_at({0, 0, 0})).count(), 0u);
-  EXPECT_EQ(make(air, nullptr)->radiograph(camera(0), shapes::centred_at({0, 0, 0}), PixelGrid{0, 0, 1, 3, 2}), std::vector<float>(6, 0.0f));
+  EXPECT_EQ(make(air, nullptr)->radiograph(camera(0), shapes::centred_at({0, 0, 0}), PixelGrid{0, 0, 1, 3, 2}),
+            std::vector<float>(6, 0.0f));
   EXPECT_TRUE(make(cloud(), nullptr)->radiograph(camera(0), shapes::centred_at({0, 0, 0}), PixelGrid{}).empty());
 }
 
 /// From within the volume, and with the volume around and behind the source.
 inline void source_within(const Make& make) {
-  const Volume block = volume_of({100, 100, 100}, {2, 2, 2}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 0; });
+  const Volume block =
+      volume_of({100, 100, 100}, {2, 2, 2}, Eigen::Matrix3d::Identity(), [](const Eigen::Vector3d&) { return 0; });
   Camera view = camera(0);
   view.camera_from_world.rotation.setIdentity();
   view.camera_from_world.translation_mm.setZero();  // the source at the middle
-  const auto values = make(block, nullptr)->radiograph(view, shapes::centred_at({0, 0, 0}), PixelGrid{view.intrinsics(0, 2), view.intrinsics(1, 2), 1, 1, 1});
+  const auto values = make(block, nullptr)
+                          ->radiograph(view, shapes::centred_at({0, 0, 0}),
+                                       PixelGrid{view.intrinsics(0, 2), view.intrinsics(1, 2), 1, 1, 1});
   EXPECT_NEAR(values.at(0), 100, 1.1);
 }
 

@@ -5,7 +5,9 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) { return ray_casting(volume, field, Options{}); }
+std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) {
+  return ray_casting(volume, field, Options{});
+}
 
 }  // namespace
 

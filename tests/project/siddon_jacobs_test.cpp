@@ -5,7 +5,9 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) { return siddon_jacobs(volume, field, AttenuationOptions{}); }
+std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) {
+  return siddon_jacobs(volume, field, AttenuationOptions{});
+}
 
 }  // namespace
 

@@ -11,21 +11,11 @@ std::shared_ptr<const marrow::Projector> make(const marrow::Mesh& mesh, const ma
 
 }  // namespace
 
-TEST(SilhouetteEdges, SphereIsItsTangentCone) {
-  outline_behaviour::sphere_is_its_tangent_cone(make, 0.02, 0.01);
-}
-TEST(SilhouetteEdges, HiddenPartsAreLeftOut) {
-  outline_behaviour::hidden_parts_are_left_out(make);
-}
-TEST(SilhouetteEdges, EndsOfTheVolumeAreLeftOut) {
-  outline_behaviour::ends_of_the_volume_are_left_out(make);
-}
-TEST(SilhouetteEdges, KeepsInsideTheImage) {
-  outline_behaviour::keeps_inside_the_image(make);
-}
-TEST(SilhouetteEdges, RefusesNonsense) {
-  outline_behaviour::refuses_nonsense(make);
-}
+TEST(SilhouetteEdges, SphereIsItsTangentCone) { outline_behaviour::sphere_is_its_tangent_cone(make, 0.02, 0.01); }
+TEST(SilhouetteEdges, HiddenPartsAreLeftOut) { outline_behaviour::hidden_parts_are_left_out(make); }
+TEST(SilhouetteEdges, EndsOfTheVolumeAreLeftOut) { outline_behaviour::ends_of_the_volume_are_left_out(make); }
+TEST(SilhouetteEdges, KeepsInsideTheImage) { outline_behaviour::keeps_inside_the_image(make); }
+TEST(SilhouetteEdges, RefusesNonsense) { outline_behaviour::refuses_nonsense(make); }
 
 TEST(SilhouetteEdges, OpenSurfaceGivesItsSidesOnly) {
   marrow::Mesh mesh = shapes::cylinder(14, 100);

@@ -34,8 +34,8 @@ double pattern(const Eigen::Vector2d& pixel) {
   return 128 + 50 * std::sin(0.11 * pixel.x()) + 50 * std::cos(0.13 * pixel.y());
 }
 
-/// What the device sees of the pattern: every pixel's ideal place is searched, so nothing of the code under test is used but the
-/// forward model.
+/// What the device sees of the pattern: every pixel's ideal place is searched, so nothing of the code under test is
+/// used but the forward model.
 cv::Mat1f as_taken() {
   cv::Mat1f image(kHeight, kWidth);
   for (int v = 0; v < kHeight; ++v)
@@ -141,15 +141,18 @@ TEST(Calibration, Refusals) {
   write_image(folder / "a.tif");
   put(folder / "a.yaml", camera_text());
   put(folder / "c.yaml", calibration_text());
-  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml", 0}), "it is removed only once");
+  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml", 0}),
+              "it is removed only once");
   put(folder / "c.yaml", with(calibration_text(), "width_px: 200", "width_px: 300"));
   put(folder / "plain.yaml", with(camera_text(), "radial_distortion: [3, 10, 0]\n", ""));
   EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}),
               "the image has 200 x 160 pixels, but the calibration is of images of 300 x 160");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[-30, 0, 0]"));
-  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}), "the radial distortion folds the image");
+  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}),
+              "the radial distortion folds the image");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[3, 10]"));
-  EXPECT_SAYS(marrow::read::read_calibration_file(folder / "c.yaml"), "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
+  EXPECT_SAYS(marrow::read::read_calibration_file(folder / "c.yaml"),
+              "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
 }
 
 }  // namespace

@@ -79,9 +79,12 @@ TEST(ReadCamera, DiagnosesXmalabFaultsAtTheirLine) {
   expect(with(kXmalab, "0,-1,0", "0,-2,0"), "the matrix under 'rotation' is not a rotation");
   expect(with(kXmalab, "1000,0,320", "-1000,0,320"), "positive focal lengths");
   expect(kXmalab.substr(0, 100), "cam.txt:");
-  expect(kXmalab + kXmalab, "cam.txt:19: expected the end of the file after the translation, got 'image size', which is not read");
-  expect(kXmalab + "undistortion\n0\n0\n", "got 'undistortion', which is not read: give images that are already undistorted");
-  expect(with(with(kXmalab, "1000,0,320", "1000,0,0"), "0,0,1", "320,240,1"), "is not [f_u s u_0; 0 f_v v_0; 0 0 1], row by row; it looks transposed");
+  expect(kXmalab + kXmalab,
+         "cam.txt:19: expected the end of the file after the translation, got 'image size', which is not read");
+  expect(kXmalab + "undistortion\n0\n0\n",
+         "got 'undistortion', which is not read: give images that are already undistorted");
+  expect(with(with(kXmalab, "1000,0,320", "1000,0,0"), "0,0,1", "320,240,1"),
+         "is not [f_u s u_0; 0 f_v v_0; 0 0 1], row by row; it looks transposed");
   expect("", "expected 'image size', got ''");
   expect(std::string(100000, 'x'), "expected a camera file");
   EXPECT_SAYS(read(folder / "absent.txt"), "there is no such file");

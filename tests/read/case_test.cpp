@@ -48,7 +48,8 @@ const std::string kCamera = R"(marrow-camera: 1
 width_px: 6
 height_px: 4
 intrinsics: [[10, 0, 2.5], [0, 10, 1.5], [0, 0, 1]]
-camera_from_world: {target: camera, source: world, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [0, 0, 600]}
+camera_from_world:
+  {target: camera, source: world, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [0, 0, 600]}
 )";
 
 /// A good case whose case.yaml the tests change.

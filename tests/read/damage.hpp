@@ -19,8 +19,8 @@ namespace marrow::test {
 enum class Outcome { refused, accepted, unnamed, out_of_memory, other_exception, crashed };
 
 inline const char* name_of(Outcome outcome) {
-  static constexpr const char* kNames[] = {"refused", "accepted", "an error that does not name the file", "out of memory", "another exception",
-                                           "crashed or too long"};
+  static constexpr const char* kNames[] = {"refused",       "accepted",          "an error that does not name the file",
+                                           "out of memory", "another exception", "crashed or too long"};
   return kNames[int(outcome)];
 }
 
@@ -31,8 +31,10 @@ inline std::size_t address_space_bytes() {
   return pages * std::size_t(::sysconf(_SC_PAGESIZE));
 }
 
-/// What reading comes to in a process that may reserve only `limit` bytes more than it has, and gets 60 seconds. `said`: the error.
-inline Outcome outcome_of(const std::function<void()>& read, const std::string& file_name, std::size_t limit, std::string& said) {
+/// What reading comes to in a process that may reserve only `limit` bytes more than it has, and gets 60 seconds.
+/// `said`: the error.
+inline Outcome outcome_of(const std::function<void()>& read, const std::string& file_name, std::size_t limit,
+                          std::string& said) {
   int channel[2];
   if (::pipe(channel) != 0) throw std::runtime_error("no pipe");
   std::fflush(nullptr);
@@ -67,16 +69,17 @@ inline Outcome outcome_of(const std::function<void()>& read, const std::string& 
   ::close(channel[0]);
   int status = 0;
   ::waitpid(child, &status, 0);
-  return WIFEXITED(status) && WEXITSTATUS(status) < int(Outcome::crashed) ? Outcome(WEXITSTATUS(status)) : Outcome::crashed;
+  return WIFEXITED(status) && WEXITSTATUS(status) < int(Outcome::crashed) ? Outcome(WEXITSTATUS(status))
+                                                                          : Outcome::crashed;
 }
 
 /// A good file (its bytes), where its header ends, and what in it can lie: text or bytes to be replaced.
 struct Sample {
-  std::string name;        ///< of the file to be damaged, inside the folder
+  std::string name;  ///< of the file to be damaged, inside the folder
   std::string bytes;
   std::size_t header_bytes = 0;
   std::vector<std::pair<std::string, std::string>> lies;
-  bool is_text = false;    ///< a text that is cut off may still be whole
+  bool is_text = false;  ///< a text that is cut off may still be whole
 };
 
 struct Damaged {
@@ -91,7 +94,8 @@ inline std::vector<Damaged> damaged_copies(const Sample& sample, int cuts, int f
     // Half of the cuts anywhere, half where the header is.
     const std::size_t end = i % 2 ? std::max<std::size_t>(sample.header_bytes, 1) : sample.bytes.size();
     const std::size_t at = random() % end;
-    copies.push_back({"cut off at " + std::to_string(at) + " of " + std::to_string(sample.bytes.size()), sample.bytes.substr(0, at), !sample.is_text});
+    copies.push_back({"cut off at " + std::to_string(at) + " of " + std::to_string(sample.bytes.size()),
+                      sample.bytes.substr(0, at), !sample.is_text});
   }
   for (int i = 0; i < flips; ++i) {
     Damaged copy{"flipped", sample.bytes, false};

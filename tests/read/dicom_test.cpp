@@ -110,7 +110,8 @@ TEST(ReadDicom, AVolumeOfAnotherKindBesideTheSlicesIsRefused) {
     write_series(folder);
     marrow::test::put(folder / name, "header");
     EXPECT_SAYS(read(folder.path()), "holds both a DICOM file ('slice");
-    EXPECT_SAYS(read(folder.path()), std::string("and '") + name + "', which may be another volume; keep one volume per folder");
+    EXPECT_SAYS(read(folder.path()),
+                std::string("and '") + name + "', which may be another volume; keep one volume per folder");
   }
 }
 
@@ -152,7 +153,8 @@ TEST(ReadDicom, PixelsThatTheHeaderDoesNotTellOfAreRefused) {
   filled[0x7FE00010] = "OW:" + std::string(12, '\5');
   put_slices(folder, filled);
   EXPECT_SAYS(read(folder.path()), "its header tells of 9 bytes of pixels, but there are 12");
-  filled[0x7FE00010] = "OW:" + std::string(9, '\5') + std::string(129, '\0');  // to the end of a block, as some write it
+  filled[0x7FE00010] =
+      "OW:" + std::string(9, '\5') + std::string(129, '\0');  // to the end of a block, as some write it
   put_slices(folder, filled);
   EXPECT_EQ(read(folder.path()).at(2, 2, 2), 5 - 1024);
 }
@@ -195,7 +197,8 @@ TEST(ReadDicom, SmallStepsThatAddUpAreRefused) {
   using Place = std::array<double, 3>;
   EXPECT_EQ(series(20, [](int k) { return Place{0, k % 2 * 0.01, 3.0 * k + (k % 2) * 0.002}; }), "");
   const std::string tilted = series(60, [](int k) { return Place{0, 0.02 * k, 3.0 * k}; });
-  EXPECT_NE(tilted.find("the slices are shifted sideways, by up to 1.18 mm (a tilted gantry)"), std::string::npos) << tilted;
+  EXPECT_NE(tilted.find("the slices are shifted sideways, by up to 1.18 mm (a tilted gantry)"), std::string::npos)
+      << tilted;
   const std::string uneven = series(60, [](int k) { return Place{0, 0, 3.0 * k + (k > 30 ? 0.02 * (k - 30) : 0)}; });
   EXPECT_NE(uneven.find("the slices are unevenly spaced; some lie up to 0.29"), std::string::npos) << uneven;
 }

@@ -21,8 +21,9 @@ inline std::string little(std::uint32_t value, int width) {
 inline std::string dicom_element(std::uint32_t tag, const std::string& kind, std::string value) {
   if (value.size() % 2) value += kind == "UI" ? '\0' : ' ';
   const bool is_long = kind == "OW" || kind == "OB" || kind == "SQ" || kind == "UN";
-  return little(tag >> 16, 2) + little(tag & 0xFFFF, 2) + kind + (is_long ? little(0, 2) + little(std::uint32_t(value.size()), 4)
-                                                                          : little(std::uint32_t(value.size()), 2)) + value;
+  return little(tag >> 16, 2) + little(tag & 0xFFFF, 2) + kind +
+         (is_long ? little(0, 2) + little(std::uint32_t(value.size()), 4) : little(std::uint32_t(value.size()), 2)) +
+         value;
 }
 
 inline std::string dicom_elements(const Elements& elements) {
@@ -81,11 +82,25 @@ inline Elements fluoroscopy() {
   std::string pixels;
   for (int v = 0; v < 4; ++v)
     for (int u = 0; u < 6; ++u) pixels += little(std::uint32_t(100 * v + u), 2);
-  return {{0x00080016, "UI:1.2.840.10008.5.1.4.1.1.12.1"}, {0x00080060, "CS:XA"},
-          {0x00181110, "DS:1000"}, {0x00181111, "DS:600"}, {0x00181164, "DS:0.4\\0.3"}, {0x00181500, "CS:STATIC"},
-          {0x00181510, "DS:0"}, {0x00181511, "DS:0"}, {0x00185100, "CS:HFS"}, {0x00200020, "CS:R\\F"},
-          {0x00280002, "US:1"}, {0x00280004, "CS:MONOCHROME2"}, {0x00280010, "US:4"}, {0x00280011, "US:6"},
-          {0x00280100, "US:16"}, {0x00280101, "US:16"}, {0x00280102, "US:15"}, {0x00280103, "US:0"}, {0x7FE00010, "OW:" + pixels}};
+  return {{0x00080016, "UI:1.2.840.10008.5.1.4.1.1.12.1"},
+          {0x00080060, "CS:XA"},
+          {0x00181110, "DS:1000"},
+          {0x00181111, "DS:600"},
+          {0x00181164, "DS:0.4\\0.3"},
+          {0x00181500, "CS:STATIC"},
+          {0x00181510, "DS:0"},
+          {0x00181511, "DS:0"},
+          {0x00185100, "CS:HFS"},
+          {0x00200020, "CS:R\\F"},
+          {0x00280002, "US:1"},
+          {0x00280004, "CS:MONOCHROME2"},
+          {0x00280010, "US:4"},
+          {0x00280011, "US:6"},
+          {0x00280100, "US:16"},
+          {0x00280101, "US:16"},
+          {0x00280102, "US:15"},
+          {0x00280103, "US:0"},
+          {0x7FE00010, "OW:" + pixels}};
 }
 
 /// A CT slice of 4 x 3 pixels that hold 0 to 11.

@@ -17,9 +17,7 @@ using namespace marrow::test;
 using namespace std::string_literals;
 using Path = std::filesystem::path;
 
-marrow::Image image_at(const Path& path) {
-  return marrow::read::read_image_file(path);
-}
+marrow::Image image_at(const Path& path) { return marrow::read::read_image_file(path); }
 
 /// A frontal fluoroscopy of 48 x 32 pixels, grey values that rise and fall, of 8 or 16 bits.
 Elements image_of(int bits) {
@@ -152,15 +150,22 @@ TEST_F(HostileDicom, BytesInWordsOfTheOtherOrder) {
     if (kind == "US") value = turned(std::uint32_t(std::stoi(value)), 2);
     if (value.size() % 2) value += ' ';
     return turned(tag >> 16, 2) + turned(tag & 0xFFFF, 2) + kind +
-           (kind[0] == 'O' ? std::string(2, '\0') + turned(std::uint32_t(value.size()), 4) : turned(std::uint32_t(value.size()), 2)) + value;
+           (kind[0] == 'O' ? std::string(2, '\0') + turned(std::uint32_t(value.size()), 4)
+                           : turned(std::uint32_t(value.size()), 2)) +
+           value;
   };
   const auto file = [&](const std::string& kind) {
     const std::string meta = dicom_element(0x00020010, "UI", "1.2.840.10008.1.2.2");
     std::string bytes = std::string(128, '\0') + "DICM" +
                         dicom_element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta +
                         big(0x00080060, "CS", "XA") + big(0x00280004, "CS", "MONOCHROME2");
-    for (const auto& [tag, value] : {std::pair{0x00280002u, "1"}, {0x00280010u, "2"}, {0x00280011u, "2"}, {0x00280100u, "8"},
-                                     {0x00280101u, "8"}, {0x00280102u, "7"}, {0x00280103u, "0"}})
+    for (const auto& [tag, value] : {std::pair{0x00280002u, "1"},
+                                     {0x00280010u, "2"},
+                                     {0x00280011u, "2"},
+                                     {0x00280100u, "8"},
+                                     {0x00280101u, "8"},
+                                     {0x00280102u, "7"},
+                                     {0x00280103u, "0"}})
       bytes += big(tag, "US", value);
     return bytes + big(0x7FE00010, kind, "\1\2\3\4");
   };

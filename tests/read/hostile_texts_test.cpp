@@ -47,9 +47,12 @@ TEST_F(HostileTexts, PlyElementsWithoutProperties) {
 }
 
 TEST_F(HostileTexts, PlyStripsAreNotLost) {
-  const std::string head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
-                           "element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\nproperty list int int vertex_indices\n";
-  expect_mesh(head + "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n4 0 1 2 3\n", "has strips of triangles ('tristrips'), which are not read");
+  const std::string head =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "element face 1\nproperty list uchar int vertex_indices\nelement tristrips 1\nproperty list int int "
+      "vertex_indices\n";
+  expect_mesh(head + "end_header\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 1 2\n4 0 1 2 3\n",
+              "has strips of triangles ('tristrips'), which are not read");
 }
 
 TEST_F(HostileTexts, PlyListsThatAreTooLong) {
@@ -144,7 +147,8 @@ TEST_F(HostileTexts, YamlAliasesAreRefused) {
 }
 
 TEST_F(HostileTexts, YamlWhoseDocumentsHaveNoEnd) {
-  for (const char* text : {",", ",\na: 1\n", "a: 1\n---\nb: 2\n"}) expect_seeds(text, "expected one YAML document, got more");
+  for (const char* text : {",", ",\na: 1\n", "a: 1\n---\nb: 2\n"})
+    expect_seeds(text, "expected one YAML document, got more");
 }
 
 TEST_F(HostileTexts, ManyFaultsAreCountedNotListed) {

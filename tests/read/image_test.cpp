@@ -14,9 +14,7 @@ using marrow::test::ItkGrid;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
 
-marrow::Image read(const std::filesystem::path& path) {
-  return image({path, 0});
-}
+marrow::Image read(const std::filesystem::path& path) { return image({path, 0}); }
 
 template <class T>
 ItkGrid<T> ramp(unsigned width, unsigned height, double step) {

@@ -97,7 +97,8 @@ void write_dicom(const std::filesystem::path& path, const DicomSlice& slice) {
   write_all(*io, path, slice.values.data());
 }
 
-void compress_dicom(const std::filesystem::path& from, const std::filesystem::path& to, const std::string& transfer_syntax) {
+void compress_dicom(const std::filesystem::path& from, const std::filesystem::path& to,
+                    const std::string& transfer_syntax) {
   gdcm::ImageReader reader;
   reader.SetFileName(from.c_str());
   if (!reader.Read()) throw std::runtime_error("GDCM does not read " + from.string());

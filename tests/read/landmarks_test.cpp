@@ -11,9 +11,7 @@ namespace {
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 
-shipped::Options at(const std::filesystem::path& path) {
-  return {{"path", path.string()}};
-}
+shipped::Options at(const std::filesystem::path& path) { return {{"path", path.string()}}; }
 
 TEST(ReadLandmarks, PointsWhereTheyAreSeenAndTracked) {
   const TemporaryFolder folder;
@@ -56,18 +54,21 @@ fragments:
   proximal: {seen: {}}
 )");
   const std::string said = shipped::refusal("read.landmarks", {}, at(folder / "l.yaml"));
-  for (const char* part : {"l.yaml:4:22: fragment 'distal', points: medial: expected 3 numbers [x, y, z], got a list of 2",
-                           "l.yaml:4:51: fragment 'distal', points: key 'lateral' is already given in line 4",
-                           "l.yaml:6:25: fragment 'distal', seen, view 'frontal': the points have no 'medail'; did you mean 'medial'?",
-                           "l.yaml:6:46: fragment 'distal', seen, view 'frontal': lateral: expected 2 numbers, got a list of 3",
-                           "l.yaml:7:5: fragment 'distal': unknown key 'traked'; did you mean 'tracked'?",
-                           "l.yaml:8:24: fragment 'distal', tracked: the points have no 'patella'; give its place in the CT under 'points'",
-                           "l.yaml:9:13: fragment 'proximal': key 'points' is missing"})
+  for (const char* part :
+       {"l.yaml:4:22: fragment 'distal', points: medial: expected 3 numbers [x, y, z], got a list of 2",
+        "l.yaml:4:51: fragment 'distal', points: key 'lateral' is already given in line 4",
+        "l.yaml:6:25: fragment 'distal', seen, view 'frontal': the points have no 'medail'; did you mean 'medial'?",
+        "l.yaml:6:46: fragment 'distal', seen, view 'frontal': lateral: expected 2 numbers, got a list of 3",
+        "l.yaml:7:5: fragment 'distal': unknown key 'traked'; did you mean 'tracked'?",
+        "l.yaml:8:24: fragment 'distal', tracked: the points have no 'patella'; give its place in the CT under "
+        "'points'",
+        "l.yaml:9:13: fragment 'proximal': key 'points' is missing"})
     EXPECT_NE(said.find(part), std::string::npos) << part << "\nit said:\n" << said;
   EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 13) << "7 faults, a line of the file under each:\n" << said;
 }
 
-// Many points, none of which is known: what is wrong with the first fifty is said, without comparing all names with each other.
+// Many points, none of which is known: what is wrong with the first fifty is said, without comparing all names with
+// each other.
 TEST(ReadLandmarks, ManyNamesTakeNoLongTime) {
   const TemporaryFolder folder;
   std::string points, tracked;
@@ -76,7 +77,8 @@ TEST(ReadLandmarks, ManyNamesTakeNoLongTime) {
     points += (i ? ", p" : "p") + number + ": [1, 2, 3]";
     tracked += (i ? ", q" : "q") + number + ": [1, 2, 3]";
   }
-  put(folder / "l.yaml", "marrow-landmarks: 1\nfragments: {a: {points: {" + points + "}, tracked: {" + tracked + "}}}\n");
+  put(folder / "l.yaml",
+      "marrow-landmarks: 1\nfragments: {a: {points: {" + points + "}, tracked: {" + tracked + "}}}\n");
   const std::clock_t begin = std::clock();
   const std::string said = shipped::refusal("read.landmarks", {}, at(folder / "l.yaml"));
   EXPECT_LT(double(std::clock() - begin) / CLOCKS_PER_SEC, 20);
@@ -91,12 +93,20 @@ TEST(ReadLandmarks, RefusesFilesOfAnotherKind) {
     put(folder / "l.yaml", text);
     return shipped::refusal("read.landmarks", {}, at(folder / "l.yaml"));
   };
-  EXPECT_NE(refusal("marrow-seeds: 1\nfragments: {a: {points: {b: [1, 2, 3]}}}\n").find("key 'marrow-landmarks' is missing"), std::string::npos);
-  EXPECT_NE(refusal("marrow-landmarks: 2\nfragments: {a: {points: {b: [1, 2, 3]}}}\n").find("reads version 1, the file is of version 2"), std::string::npos);
-  EXPECT_NE(refusal("marrow-landmarks: 1\nfragments: {}\n").find("fragments: expected fragments by name, got none"), std::string::npos);
-  EXPECT_NE(refusal("marrow-landmarks: 1\nfragments: {a: {points: {}}}\n").find("fragment 'a': points: expected places [x, y, z] in mm by name, got none"),
+  EXPECT_NE(
+      refusal("marrow-seeds: 1\nfragments: {a: {points: {b: [1, 2, 3]}}}\n").find("key 'marrow-landmarks' is missing"),
+      std::string::npos);
+  EXPECT_NE(refusal("marrow-landmarks: 2\nfragments: {a: {points: {b: [1, 2, 3]}}}\n")
+                .find("reads version 1, the file is of version 2"),
             std::string::npos);
-  EXPECT_NE(refusal("marrow-landmarks: 1\nfragments: [a]\n").find("fragments: expected keys and values, got a list of 1"), std::string::npos);
+  EXPECT_NE(refusal("marrow-landmarks: 1\nfragments: {}\n").find("fragments: expected fragments by name, got none"),
+            std::string::npos);
+  EXPECT_NE(refusal("marrow-landmarks: 1\nfragments: {a: {points: {}}}\n")
+                .find("fragment 'a': points: expected places [x, y, z] in mm by name, got none"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal("marrow-landmarks: 1\nfragments: [a]\n").find("fragments: expected keys and values, got a list of 1"),
+      std::string::npos);
 }
 
 }  // namespace

@@ -43,9 +43,7 @@ class TwoPlaces : public testing::Test {
 };
 
 /// Where an element of the sform lies in the header.
-std::size_t place(std::size_t row, std::size_t column) {
-  return 280 + 16 * row + 4 * column;
-}
+std::size_t place(std::size_t row, std::size_t column) { return 280 + 16 * row + 4 * column; }
 
 // A CT of a tilted gantry: the qform cannot say it, and the last slice would lie tens of millimetres off.
 TEST_F(TwoPlaces, ShearedSformIsNotThrownAway) {

@@ -22,7 +22,8 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   marrow::Camera camera = from_file.camera;
   camera.camera_from_world.translation_mm.z() = 700;
   EXPECT_EQ(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}).camera.camera_from_world.translation_mm.z(), 700);
-  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", folder / "a.txt", {}, 0}), "give its camera either as the option");
+  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", folder / "a.txt", {}, 0}),
+              "give its camera either as the option");
   EXPECT_SAYS(view(nullptr, {"frontal", folder / "a.png", {}, {}, 0}), "give its camera either as the option");
   camera.width_px = 7;
   EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}),

@@ -11,8 +11,12 @@ namespace well {
 /// way . hessian way / 2, of the way from the bottom in degrees and mm about the frame.
 class Bowl : public marrow::Cost {
  public:
-  Bowl(marrow::RigidTransform bottom, marrow::FragmentFrame frame, const marrow::Matrix6d& hessian, double likelihood_factor = 1)
-      : bottom_(std::move(bottom)), frame_(std::move(frame)), hessian_(hessian), likelihood_factor_(likelihood_factor) {}
+  Bowl(marrow::RigidTransform bottom, marrow::FragmentFrame frame, const marrow::Matrix6d& hessian,
+       double likelihood_factor = 1)
+      : bottom_(std::move(bottom)),
+        frame_(std::move(frame)),
+        hessian_(hessian),
+        likelihood_factor_(likelihood_factor) {}
 
   double value(const marrow::RigidTransform& pose) const override {
     const marrow::Vector6d motion = way(bottom_, pose, frame_);

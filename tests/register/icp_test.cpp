@@ -13,7 +13,8 @@ struct Bone {
   Bone() {
     const auto bone = shipped::call("simulate.femur", {}, {{"resolution_mm", 2.0}}).at("bone");
     const auto phantom = shipped::call("simulate.fracture", {{"bone", bone}}).at("phantom");
-    model = *shipped::call("simulate.truth", {{"phantom", phantom}}).at("models").as_list<marrow::Mesh>().find("distal");
+    model =
+        *shipped::call("simulate.truth", {{"phantom", phantom}}).at("models").as_list<marrow::Mesh>().find("distal");
     frame = fragment_frame(model);
     exact.rotation = marrow::rotation_from_vector({0.4, -0.2, 0.3});
     exact.translation_mm = {30, -15, 700};
@@ -35,7 +36,8 @@ struct Bone {
   }
   double mtre_mm(const marrow::Pose& pose) const {
     double sum = 0;
-    for (const Vector3d& point : sample_surface(model, 500)) sum += (pose.world_from_model * point - exact * point).norm() / 500;
+    for (const Vector3d& point : sample_surface(model, 500))
+      sum += (pose.world_from_model * point - exact * point).norm() / 500;
     return sum;
   }
   marrow::Mesh model;
@@ -49,10 +51,15 @@ const Bone& bone() {
 }
 
 shipped::Outputs run(const marrow::Pose& start, const marrow::Mesh& target, const shipped::Options& options = {}) {
-  return shipped::call("register.icp", {{"initial", shipped::item(start)}, {"model", shipped::item(bone().model)}, {"target", shipped::item(target)}}, options);
+  return shipped::call(
+      "register.icp",
+      {{"initial", shipped::item(start)}, {"model", shipped::item(bone().model)}, {"target", shipped::item(target)}},
+      options);
 }
 std::string refusal(const marrow::Pose& start, const marrow::Mesh& model, const marrow::Mesh& target) {
-  return shipped::refusal("register.icp", {{"initial", shipped::item(start)}, {"model", shipped::item(model)}, {"target", shipped::item(target)}});
+  return shipped::refusal(
+      "register.icp",
+      {{"initial", shipped::item(start)}, {"model", shipped::item(model)}, {"target", shipped::item(target)}});
 }
 
 marrow::Vector6d displacement() {
@@ -65,7 +72,8 @@ TEST(Icp, BringsABoneOntoItself) {
   const marrow::Pose start = bone().start(displacement());
   const auto outputs = run(start, bone().target());
   const marrow::Pose& pose = outputs.at("pose").as<marrow::Pose>();
-  std::printf("mTRE %.2f mm at the start, %.3f mm at the end, pairs %.3f mm apart\n", bone().mtre_mm(start), bone().mtre_mm(pose), pose.cost);
+  std::printf("mTRE %.2f mm at the start, %.3f mm at the end, pairs %.3f mm apart\n", bone().mtre_mm(start),
+              bone().mtre_mm(pose), pose.cost);
   EXPECT_GT(bone().mtre_mm(start), 8);
   EXPECT_LT(bone().mtre_mm(pose), 0.03);
   EXPECT_LT(pose.cost, 0.4) << "to points of the target, not to its triangles";
@@ -86,7 +94,8 @@ TEST(Icp, OfAPartOfTheBone) {
   motion[5] = 1;
   const marrow::Pose start = bone().start(motion);
   const marrow::Pose pose = run(start, part, {{"reach_mm", 6.0}}).at("pose").as<marrow::Pose>();
-  std::printf("%.0f %% of the surface: mTRE %.2f mm at the start, %.3f mm at the end\n", 100 * share, bone().mtre_mm(start), bone().mtre_mm(pose));
+  std::printf("%.0f %% of the surface: mTRE %.2f mm at the start, %.3f mm at the end\n", 100 * share,
+              bone().mtre_mm(start), bone().mtre_mm(pose));
   EXPECT_LT(share, 0.9);
   EXPECT_LT(bone().mtre_mm(pose), 0.5);
 }
@@ -94,7 +103,8 @@ TEST(Icp, OfAPartOfTheBone) {
 TEST(Icp, IsTheSameEveryTime) {
   const marrow::Pose start = bone().start(displacement());
   const auto one = run(start, bone().target()), other = run(start, bone().target());
-  EXPECT_EQ(one.at("pose").as<marrow::Pose>().world_from_model.rotation, other.at("pose").as<marrow::Pose>().world_from_model.rotation);
+  EXPECT_EQ(one.at("pose").as<marrow::Pose>().world_from_model.rotation,
+            other.at("pose").as<marrow::Pose>().world_from_model.rotation);
 }
 
 TEST(Icp, KeepsNothingThatWasSaidOfTheStart) {
@@ -113,22 +123,32 @@ TEST(Icp, WarnsWhereItWasStoppedOrHadFewPairs) {
   const marrow::Pose start = bone().start(displacement());
   EXPECT_EQ(run(start, bone().target(), {{"max_iterations", std::int64_t(3)}}).at("pose").as<marrow::Pose>().warnings,
             std::vector<std::string>{"the pairs of points still changed after 3 iterations; raise max_iterations"});
-  const auto warnings = run(bone().start(marrow::Vector6d::Zero()), bone().target(bone().frame.origin_mm.z() - 60), {{"reach_mm", 2.0}}).at("pose").as<marrow::Pose>().warnings;
+  const auto warnings =
+      run(bone().start(marrow::Vector6d::Zero()), bone().target(bone().frame.origin_mm.z() - 60), {{"reach_mm", 2.0}})
+          .at("pose")
+          .as<marrow::Pose>()
+          .warnings;
   ASSERT_EQ(warnings.size(), 1u);
-  EXPECT_NE(warnings[0].find("of the model's points have one of the target within reach_mm; is the start far off, or the target another part?"), std::string::npos) << warnings[0];
+  EXPECT_NE(warnings[0].find("of the model's points have one of the target within reach_mm; is the start far off, or "
+                             "the target another part?"),
+            std::string::npos)
+      << warnings[0];
 }
 
 TEST(Icp, SaysWhatIsWrong) {
   const marrow::Pose start = bone().start(marrow::Vector6d::Zero());
   EXPECT_EQ(refusal(start, bone().model, bone().model),
-            "the target is in the frame 'ct', but the pose to start from leads to 'world'; the target is a surface in the world");
+            "the target is in the frame 'ct', but the pose to start from leads to 'world'; the target is a surface in "
+            "the world");
   EXPECT_EQ(refusal(start, bone().target(), bone().target()),
-            "the model is in the frame 'world', but the pose to start from takes points in 'ct'; give the model that the start is of");
+            "the model is in the frame 'world', but the pose to start from takes points in 'ct'; give the model that "
+            "the start is of");
   EXPECT_EQ(refusal(start, {}, bone().target()), "model: the surface has no triangles");
   marrow::Vector6d far = marrow::Vector6d::Zero();
   far[3] = 500;
   EXPECT_EQ(refusal(bone().start(far), bone().model, bone().target()),
-            "0 of 2000 points of the model have one of the target within 10 mm, but three at least are needed; give a better start, or raise reach_mm");
+            "0 of 2000 points of the model have one of the target within 10 mm, but three at least are needed; give a "
+            "better start, or raise reach_mm");
 }
 
 }  // namespace

@@ -28,8 +28,8 @@ marrow::Vector6d motion(double rx, double ry, double rz, double tx, double ty, d
 struct Trial {
   Trial(marrow::Mesh surface, double height_mm) : mesh(std::move(surface)), projector(outline_node(mesh)) {
     truth.frame = marrow::fragment_frame(mesh);
-    truth.world_from_model =
-        marrow::registration::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
+    truth.world_from_model = marrow::registration::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame,
+                                                                  motion(3, -5, 6, 3, -4, 5));
   }
   Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
              const marrow::registration::SearchOptions& options = {}) const {

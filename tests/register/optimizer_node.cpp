@@ -2,6 +2,4 @@
 #include "nodes.hpp"
 #include "plugins/optimizer/levenberg_marquardt.cpp"
 
-std::shared_ptr<const marrow::Optimizer> optimizer_node() {
-  return levenberg_marquardt();
-}
+std::shared_ptr<const marrow::Optimizer> optimizer_node() { return levenberg_marquardt(); }

@@ -15,7 +15,9 @@ using marrow::registration::PredictedCovariance;
 using well::Bowl;
 
 marrow::FragmentFrame frame() { return {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3})}; }
-marrow::RigidTransform bottom() { return {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)}; }
+marrow::RigidTransform bottom() {
+  return {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
+}
 
 /// Axes that differ by much, and each tied to each other.
 Matrix6d hessian() {
@@ -53,7 +55,8 @@ TEST(PredictedCovariance, IsTheInverseOfTheCurvatureTimesTheFactor) {
     const marrow::FragmentFrame about = frame();
     const PredictedCovariance predicted(cost, pose, about, factor);
     const Matrix6d expected = in_radians((factor * hessian()).inverse());
-    EXPECT_LT((predicted.covariance() - expected).norm(), 1e-6 * expected.norm()) << predicted.covariance() << "\n\n" << expected;
+    EXPECT_LT((predicted.covariance() - expected).norm(), 1e-6 * expected.norm()) << predicted.covariance() << "\n\n"
+                                                                                  << expected;
     for (int i = 0; i < 6; ++i) EXPECT_NEAR(predicted.covariance()(i, i), expected(i, i), 1e-6 * expected(i, i)) << i;
     EXPECT_EQ(predicted.evaluations(), cost.asked);
     EXPECT_TRUE(predicted.warnings(1e9, 1e9).empty());
@@ -81,39 +84,53 @@ TEST(PredictedCovariance, StepsAreSoLongThatTheCostRisesByAPartOfAPixel) {
   class Walled : public Bowl {
    public:
     using Bowl::Bowl;
-    double value(const marrow::RigidTransform& pose) const override { return Bowl::value(pose) < 0.3 ? Bowl::value(pose) : 1e3; }
+    double value(const marrow::RigidTransform& pose) const override {
+      return Bowl::value(pose) < 0.3 ? Bowl::value(pose) : 1e3;
+    }
   };
-  const Matrix6d round = 0.9 * Matrix6d::Identity();  // 0.11 px at half a degree or mm, and twice that where two axes move
+  const Matrix6d round =
+      0.9 * Matrix6d::Identity();  // 0.11 px at half a degree or mm, and twice that where two axes move
   const PredictedCovariance within(Walled(bottom(), frame(), round), pose, about, 1);
   EXPECT_LT((within.covariance() - in_radians(round.inverse())).norm(), 1e-6);
-  // Rises are measured at steps of 0.5 to 1/64 (6), 0.5 (1), 0.5 to 16 (6), 0.5 to 0.125 (3), 0.5 and 1 (2), 0.5 (1), two values
-  // each; then the bottom, and two for each pair of axes.
+  // Rises are measured at steps of 0.5 to 1/64 (6), 0.5 (1), 0.5 to 16 (6), 0.5 to 0.125 (3), 0.5 and 1 (2), 0.5 (1),
+  // two values each; then the bottom, and two for each pair of axes.
   Matrix6d many = Matrix6d::Zero();
   many.diagonal() << 1e6, 0.9, 0, 20, 0.7, 1;
-  EXPECT_EQ(PredictedCovariance(Bowl(bottom(), frame(), many), pose, about, 1).evaluations(), 2 * (6 + 1 + 6 + 3 + 2 + 1) + 1 + 2 * 15);
+  EXPECT_EQ(PredictedCovariance(Bowl(bottom(), frame(), many), pose, about, 1).evaluations(),
+            2 * (6 + 1 + 6 + 3 + 2 + 1) + 1 + 2 * 15);
 }
 
 TEST(PredictedCovariance, SaysWhichAxesTheImagesDoNotTell) {
-  // sd of 5 degrees and of 8 mm; one axis of each kind that hardly changes anything: 0.04 px at 16 degrees, nothing at 16 mm.
+  // sd of 5 degrees and of 8 mm; one axis of each kind that hardly changes anything: 0.04 px at 16 degrees, nothing at
+  // 16 mm.
   Matrix6d flat = Matrix6d::Zero();
   flat.diagonal() << 1, 1.0 / 25, 2 * 0.04 / 256, 1, 0, 1.0 / 64;
   const marrow::RigidTransform pose = bottom();
   const marrow::FragmentFrame about = frame();
   const PredictedCovariance predicted(Bowl(bottom(), frame(), flat), pose, about, 1);
-  const auto sd = [&](int axis) { return std::sqrt(predicted.covariance()(axis, axis)) * (axis < 3 ? marrow::degrees(1) : 1); };
+  const auto sd = [&](int axis) {
+    return std::sqrt(predicted.covariance()(axis, axis)) * (axis < 3 ? marrow::degrees(1) : 1);
+  };
   EXPECT_NEAR(sd(0), 1, 1e-6);
   EXPECT_NEAR(sd(1), 5, 1e-5);
   EXPECT_NEAR(sd(2), 1600, 1e-3) << "a hundred steps stand for what nothing determines";
   EXPECT_NEAR(sd(4), 1600, 1e-3);
   EXPECT_NEAR(sd(5), 8, 1e-5);
-  EXPECT_EQ(predicted.warnings(3, 5), (std::vector<std::string>{
-                                          "rotation about the lateral axis is poorly determined by these images: its predicted standard deviation is 5 degrees",
-                                          "axial rotation is not determined by these images: the cost hardly changes within 16 degrees",
-                                          "translation along the lateral axis is not determined by these images: the cost hardly changes within 16 mm",
-                                          "axial translation is poorly determined by these images: its predicted standard deviation is 8 mm"}));
+  EXPECT_EQ(
+      predicted.warnings(3, 5),
+      (std::vector<std::string>{
+          "rotation about the lateral axis is poorly determined by these images: its predicted standard deviation is 5 "
+          "degrees",
+          "axial rotation is not determined by these images: the cost hardly changes within 16 degrees",
+          "translation along the lateral axis is not determined by these images: the cost hardly changes within 16 mm",
+          "axial translation is poorly determined by these images: its predicted standard deviation is 8 mm"}));
   EXPECT_EQ(predicted.warnings(6, 9).size(), 2u);
-  EXPECT_EQ(predicted.warnings(0.9, 0.9).front(), "rotation about the frontal axis is poorly determined by these images: its predicted standard deviation is 1 degrees");
-  EXPECT_EQ(predicted.warnings(3, 0.9)[2], "translation along the frontal axis is poorly determined by these images: its predicted standard deviation is 1 mm");
+  EXPECT_EQ(predicted.warnings(0.9, 0.9).front(),
+            "rotation about the frontal axis is poorly determined by these images: its predicted standard deviation is "
+            "1 degrees");
+  EXPECT_EQ(predicted.warnings(3, 0.9)[2],
+            "translation along the frontal axis is poorly determined by these images: its predicted standard deviation "
+            "is 1 mm");
 }
 
 TEST(PredictedCovariance, OfADirectionThatOnlyTwoAxesTogetherLeaveOpen) {

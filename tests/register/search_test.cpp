@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The parts of the search: the poses it looks at first, what it asks of the optimizer, and derivatives in its coordinates.
+// The parts of the search: the poses it looks at first, what it asks of the optimizer, and derivatives in its
+// coordinates.
 #include "plugins/register/search.hpp"
 
 #include <gtest/gtest.h>
@@ -36,9 +37,13 @@ Pose truth() {
   return pose;
 }
 
-Bowl bowl(double likelihood_factor = 1) { return {truth().world_from_model, truth().frame, Matrix6d::Identity(), likelihood_factor}; }
+Bowl bowl(double likelihood_factor = 1) {
+  return {truth().world_from_model, truth().frame, Matrix6d::Identity(), likelihood_factor};
+}
 
-Vector6d from_truth(const marrow::RigidTransform& pose) { return well::way(truth().world_from_model, pose, truth().frame); }
+Vector6d from_truth(const marrow::RigidTransform& pose) {
+  return well::way(truth().world_from_model, pose, truth().frame);
+}
 
 }  // namespace
 
@@ -72,9 +77,14 @@ TEST(Scan, ScatteredPosesAreHaltons) {
   const Scan scan = marrow::registration::scattered_scan(options);
   ASSERT_EQ(scan.motions.size(), 7u);
   EXPECT_EQ(scan.motions[0], Vector6d(Vector6d::Zero()));
-  // Of 1: 1/2, 1/3, 1/5, 1/7, 1/11, 1/13. Of 6, which is 110, 20, 11, 6, 6 and 6 in these bases: 3/8, 2/9, 6/25, 6/7, 6/11, 6/13.
-  EXPECT_TRUE(scan.motions[1].isApprox(motion(4 * 0, 4 * (2.0 / 3 - 1), 6 * (2.0 / 5 - 1), 3 * (2.0 / 7 - 1), 3 * (2.0 / 11 - 1), 5 * (2.0 / 13 - 1)), 1e-12));
-  EXPECT_TRUE(scan.motions[6].isApprox(motion(4 * (6.0 / 8 - 1), 4 * (4.0 / 9 - 1), 6 * (12.0 / 25 - 1), 3 * (12.0 / 7 - 1), 3 * (12.0 / 11 - 1), 5 * (12.0 / 13 - 1)), 1e-12));
+  // Of 1: 1/2, 1/3, 1/5, 1/7, 1/11, 1/13. Of 6, which is 110, 20, 11, 6, 6 and 6 in these bases: 3/8, 2/9, 6/25, 6/7,
+  // 6/11, 6/13.
+  EXPECT_TRUE(scan.motions[1].isApprox(
+      motion(4 * 0, 4 * (2.0 / 3 - 1), 6 * (2.0 / 5 - 1), 3 * (2.0 / 7 - 1), 3 * (2.0 / 11 - 1), 5 * (2.0 / 13 - 1)),
+      1e-12));
+  EXPECT_TRUE(scan.motions[6].isApprox(motion(4 * (6.0 / 8 - 1), 4 * (4.0 / 9 - 1), 6 * (12.0 / 25 - 1),
+                                              3 * (12.0 / 7 - 1), 3 * (12.0 / 11 - 1), 5 * (12.0 / 13 - 1)),
+                                       1e-12));
   // Near is within an ellipsoid of half the ranges.
   Scan two = scan;
   const auto near = [&](const Vector6d& way) {
@@ -174,7 +184,8 @@ TEST(Search, ItsWayIsTheLeastCostSoFar) {
   const Pose start = pose_at(truth(), 0, 0, 0, 0, 0, -8);
   const SearchOptions options;
   Search search(listener, start, options, context);
-  for (const double step : {3.0, 2.0, -1.0, 1.5}) search.refine(cost, {5}, {1, 1, step, 0.1}, 0, 1);  // to -5, -3, -4 and -2.5
+  for (const double step : {3.0, 2.0, -1.0, 1.5})
+    search.refine(cost, {5}, {1, 1, step, 0.1}, 0, 1);  // to -5, -3, -4 and -2.5
   const auto steps = search.convergence(cost);
   std::vector<double> costs;
   for (const auto& step : steps) costs.push_back(step.cost);
@@ -219,23 +230,27 @@ TEST(Search, ReportsItsProgress) {
 }
 
 TEST(Derivatives, AreThoseOfTheCoordinates) {
-  // A cost with an expansion about every pose: s . q + q . A q / 2 for the shift q of a point of the model, and of its turned axis.
+  // A cost with an expansion about every pose: s . q + q . A q / 2 for the shift q of a point of the model, and of its
+  // turned axis.
   const marrow::FragmentFrame frame = truth().frame;
   const marrow::RigidTransform origin = truth().world_from_model;
   const auto value = [&](const Vector6d& deg_and_mm) {
     const marrow::RigidTransform pose = marrow::registration::moved_by_units(origin, frame, deg_and_mm);
-    return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) + (pose.rotation * Eigen::Vector3d(20, 30, -10)).dot(Eigen::Vector3d(1, 2, -1));
+    return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) +
+           (pose.rotation * Eigen::Vector3d(20, 30, -10)).dot(Eigen::Vector3d(1, 2, -1));
   };
   for (const Vector6d& at : {motion(0, 0, 0, 0, 0, 0), motion(20, -30, 15, 3, -5, 8), motion(-3, 1, 40, 0, 0, 1)}) {
     // About the pose there, in rad and mm, by differences.
     const marrow::RigidTransform there = marrow::registration::moved_by_units(origin, frame, at);
     const auto at_motion = [&](const Vector6d& small) {
       const marrow::RigidTransform pose = marrow::moved(there, frame, small);
-      return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) + (pose.rotation * Eigen::Vector3d(20, 30, -10)).dot(Eigen::Vector3d(1, 2, -1));
+      return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) +
+             (pose.rotation * Eigen::Vector3d(20, 30, -10)).dot(Eigen::Vector3d(1, 2, -1));
     };
     marrow::Cost::Expansion about;
     about.value = 3;
-    for (int i = 0; i < 6; ++i) about.gradient[i] = (at_motion(1e-5 * Vector6d::Unit(i)) - at_motion(-1e-5 * Vector6d::Unit(i))) / 2e-5;
+    for (int i = 0; i < 6; ++i)
+      about.gradient[i] = (at_motion(1e-5 * Vector6d::Unit(i)) - at_motion(-1e-5 * Vector6d::Unit(i))) / 2e-5;
     about.curvature = about.gradient * about.gradient.transpose();
     const std::vector<int> axes{4, 0, 2, 1, 5};
     const auto told = marrow::registration::in_coordinates(about, at, axes);

@@ -22,12 +22,15 @@ Pose truth() {
 struct Trial {
   Trial(const Pose& first, const Pose& second) {
     inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<const Well>(first.world_from_model, first.frame));
-    finer = std::make_shared<const Well>(second.world_from_model, second.frame, 60, 6);  // of its waves the first cost is to lead out
+    finer = std::make_shared<const Well>(second.world_from_model, second.frame, 60,
+                                         6);  // of its waves the first cost is to lead out
     inputs["finer_cost"] = marrow::Value::of<Cost>(finer);
     inputs["optimizer"] = shipped::call("optimizer.nelder_mead", {}).at("optimizer");
     inputs["initial"] = shipped::item(pose_at(truth(), 2, -2, 8, 3, -3, 9));
   }
-  shipped::Outputs run(const shipped::Options& options = {}) const { return shipped::call("register.sequence", inputs, options); }
+  shipped::Outputs run(const shipped::Options& options = {}) const {
+    return shipped::call("register.sequence", inputs, options);
+  }
   std::shared_ptr<const Well> finer;
   shipped::Inputs inputs;
 };
@@ -54,13 +57,25 @@ TEST(Sequence, TheFirstCostLeadsAndTheSecondDecides) {
   // Alone the second cost would stay in one of its waves.
   Trial alone(truth(), truth());
   alone.inputs["cost"] = alone.inputs["finer_cost"];
-  EXPECT_GT(apart(alone.run({{"scan_rotation_deg", 0.0}, {"scan_translation_mm", 0.0}, {"step_deg", std::vector<double>(3, 0.1)}, {"step_axial_deg", std::vector<double>(3, 0.1)}, {"step_mm", std::vector<double>(3, 0.1)}}).at("pose").as<Pose>(), truth()), 1);
+  EXPECT_GT(apart(alone
+                      .run({{"scan_rotation_deg", 0.0},
+                            {"scan_translation_mm", 0.0},
+                            {"step_deg", std::vector<double>(3, 0.1)},
+                            {"step_axial_deg", std::vector<double>(3, 0.1)},
+                            {"step_mm", std::vector<double>(3, 0.1)}})
+                      .at("pose")
+                      .as<Pose>(),
+                  truth()),
+            1);
 }
 
 TEST(Sequence, LevelsOfTheSecondCostComparePixelsAsTold) {
   const Trial trial(truth(), truth());
-  trial.run({{"finer_pixel_step", std::vector<double>{8, 3, 1}}, {"finer_step_deg", std::vector<double>(3, 0.3)}, {"finer_step_axial_deg", std::vector<double>(3, 0.3)},
-             {"finer_step_mm", std::vector<double>(3, 0.3)}, {"finer_step_tolerance", std::vector<double>(3, 0.1)}});
+  trial.run({{"finer_pixel_step", std::vector<double>{8, 3, 1}},
+             {"finer_step_deg", std::vector<double>(3, 0.3)},
+             {"finer_step_axial_deg", std::vector<double>(3, 0.3)},
+             {"finer_step_mm", std::vector<double>(3, 0.3)},
+             {"finer_step_tolerance", std::vector<double>(3, 0.1)}});
   std::vector<int> steps;
   for (const marrow::CostLevel& level : trial.finer->asked->levels) steps.push_back(level.pixel_step);
   EXPECT_EQ(steps, (std::vector<int>{8, 3, 1}));
@@ -69,20 +84,24 @@ TEST(Sequence, LevelsOfTheSecondCostComparePixelsAsTold) {
 TEST(Sequence, SaysWhereTheCostsDoNotAgree) {
   Trial trial(truth(), truth());
   const Pose other = pose_at(truth(), 0, 0, 0, 3.5, 0, 0);
-  trial.inputs["finer_cost"] = marrow::Value::of<Cost>(std::make_shared<const Well>(other.world_from_model, other.frame));
+  trial.inputs["finer_cost"] =
+      marrow::Value::of<Cost>(std::make_shared<const Well>(other.world_from_model, other.frame));
   const Pose pose = trial.run().at("pose").as<Pose>();
   EXPECT_LT(apart(pose, other), 0.1);
   ASSERT_EQ(pose.warnings.size(), 1u);
   EXPECT_TRUE(pose.warnings[0].starts_with("the two costs lead to poses ")) << pose.warnings[0];
-  EXPECT_TRUE(pose.warnings[0].ends_with(" and 3.5 mm apart: one of them is wrong; look at the overlays of both")) << pose.warnings[0];
+  EXPECT_TRUE(pose.warnings[0].ends_with(" and 3.5 mm apart: one of them is wrong; look at the overlays of both"))
+      << pose.warnings[0];
   EXPECT_TRUE(trial.run({{"most_apart_mm", 4.0}}).at("pose").as<Pose>().warnings.empty());
 }
 
 TEST(Sequence, SaysWhatIsWrong) {
   Trial trial(truth(), truth());
   EXPECT_EQ(shipped::refusal("register.sequence", trial.inputs, {{"finer_step_mm", std::vector<double>{1}}}),
-            "finer_step_mm has 1 numbers, but finer_pixel_step has 2; give all options that begin with finer_ as many, one for each level");
-  EXPECT_EQ(shipped::refusal("register.sequence", trial.inputs, {{"finer_step_deg", std::vector<double>{1, -1}}}), "finer_step_deg: each number must be positive");
+            "finer_step_mm has 1 numbers, but finer_pixel_step has 2; give all options that begin with finer_ as many, "
+            "one for each level");
+  EXPECT_EQ(shipped::refusal("register.sequence", trial.inputs, {{"finer_step_deg", std::vector<double>{1, -1}}}),
+            "finer_step_deg: each number must be positive");
   Pose broken = truth();
   broken.world_from_model.translation_mm.x() = std::nan("");
   trial.inputs["initial"] = shipped::item(broken);

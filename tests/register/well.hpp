@@ -11,7 +11,8 @@
 namespace well {
 
 /// From the bottom: rotations [deg] and translations [mm] about a frame.
-inline marrow::Vector6d way(const marrow::RigidTransform& bottom, const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame) {
+inline marrow::Vector6d way(const marrow::RigidTransform& bottom, const marrow::RigidTransform& pose,
+                            const marrow::FragmentFrame& frame) {
   marrow::Vector6d motion = marrow::motion_between(bottom, pose, frame);
   motion.head<3>() *= marrow::degrees(1);
   return motion;
@@ -49,7 +50,8 @@ class Well : public marrow::Cost {
 };
 
 /// A pose moved about its frame, in degrees and mm.
-inline marrow::Pose pose_at(const marrow::Pose& from, double rx, double ry, double rz, double tx, double ty, double tz) {
+inline marrow::Pose pose_at(const marrow::Pose& from, double rx, double ry, double rz, double tx, double ty,
+                            double tz) {
   marrow::Vector6d motion;
   motion << marrow::radians(rx), marrow::radians(ry), marrow::radians(rz), tx, ty, tz;
   marrow::Pose pose = from;

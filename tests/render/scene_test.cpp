@@ -39,12 +39,8 @@ marrow::List<marrow::Mesh> two_boxes() {
   return meshes;
 }
 
-bool reddish(const cv::Vec3b& pixel) {
-  return pixel[0] > pixel[2] + 40;
-}  // the first model's colour
-bool bluish(const cv::Vec3b& pixel) {
-  return pixel[2] > pixel[0] + 40;
-}  // the second model's
+bool reddish(const cv::Vec3b& pixel) { return pixel[0] > pixel[2] + 40; }  // the first model's colour
+bool bluish(const cv::Vec3b& pixel) { return pixel[2] > pixel[0] + 40; }   // the second model's
 
 TEST(Scene, DrawsEachModelAtItsPlace) {
   marrow::List<marrow::Pose> poses;

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A headless Chromium with what the report's tests need of it, from Debian's chromium, chromium-driver and python3-selenium."""
+"""A headless Chromium with what the report's tests need of it, from Debian's chromium, chromium-driver and
+python3-selenium."""
 import json
 import os
 import pathlib
@@ -25,9 +26,17 @@ class Browser:
         from selenium import webdriver
         from selenium.common.exceptions import WebDriverException
         from selenium.webdriver.chrome.service import Service
+
         options = webdriver.ChromeOptions()
         options.binary_location = shutil.which("chromium")
-        flags = ["--headless=new", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--hide-scrollbars"]
+        flags = [
+            "--headless=new",
+            "--use-gl=angle",
+            "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader",
+            "--disable-dev-shm-usage",
+            "--hide-scrollbars",
+        ]
         for flag in flags + (["--no-sandbox"] if os.geteuid() == 0 else []):
             options.add_argument(flag)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
@@ -44,11 +53,19 @@ class Browser:
         """Opens a page from disk; the seconds until it says that it is ready."""
         self.driver.get("about:blank")
         self.logs()
-        self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False})
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]})
+        self.driver.execute_cdp_cmd(
+            "Emulation.setDeviceMetricsOverride",
+            {"width": width_px, "height": height_px, "deviceScaleFactor": 1, "mobile": False},
+        )
+        self.driver.execute_cdp_cmd(
+            "Emulation.setEmulatedMedia", {"features": [{"name": "prefers-color-scheme", "value": theme}]}
+        )
         begin = time.monotonic()
         self.driver.get(pathlib.Path(path).resolve().as_uri())
-        self.wait("return document.documentElement.dataset.ready === 'true' && (!document.querySelector('#distributions') || !!document.querySelector('#distributions svg.plot .box'))")
+        self.wait(
+            "return document.documentElement.dataset.ready === 'true' && (!document.querySelector('#distributions') ||"
+            " !!document.querySelector('#distributions svg.plot .box'))"
+        )
         return time.monotonic() - begin
 
     def js(self, text, *arguments):
@@ -56,6 +73,7 @@ class Browser:
 
     def wait(self, condition, seconds=120):
         from selenium.common.exceptions import JavascriptException
+
         end = time.monotonic() + seconds
         while True:
             try:
@@ -75,13 +93,22 @@ class Browser:
     def key(self, name, selector):
         from selenium.webdriver.common.by import By
         from selenium.webdriver.common.keys import Keys
+
         self.driver.find_element(By.CSS_SELECTOR, selector).send_keys(getattr(Keys, name, name))
 
     def drag(self, selector, from_fraction, to_fraction):
         """The mouse pressed at one fraction of an element's width and let go at another."""
-        box = self.js("const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left, r.top, r.width, Math.min(r.height, innerHeight - r.top)]", selector)
+        box = self.js(
+            (
+                "const r = document.querySelector(arguments[0]).getBoundingClientRect(); return [r.left, r.top,"
+                " r.width, Math.min(r.height, innerHeight - r.top)]"
+            ),
+            selector,
+        )
         at = lambda fraction: {"x": box[0] + fraction * box[2], "y": box[1] + 0.5 * box[3]}
-        send = lambda kind, fraction, buttons: self.driver.execute_cdp_cmd("Input.dispatchMouseEvent", dict(at(fraction), type=kind, button="left", buttons=buttons, clickCount=1))
+        send = lambda kind, fraction, buttons: self.driver.execute_cdp_cmd(
+            "Input.dispatchMouseEvent", dict(at(fraction), type=kind, button="left", buttons=buttons, clickCount=1)
+        )
         send("mousePressed", from_fraction, 1)
         for i in range(1, 6):
             send("mouseMoved", from_fraction + (to_fraction - from_fraction) * i / 5, 1)
@@ -89,7 +116,9 @@ class Browser:
 
     def logs(self):
         """Since the last call: faults in the console, and addresses that were asked for and are not on this page."""
-        faults = [entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")]
+        faults = [
+            entry["message"] for entry in self.driver.get_log("browser") if entry["level"] in ("SEVERE", "WARNING")
+        ]
         asked = []
         for entry in self.driver.get_log("performance"):
             message = json.loads(entry["message"])["message"]

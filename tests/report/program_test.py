@@ -38,7 +38,17 @@ class Program(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-report-"))
         cls.environment = dict(os.environ, MARROW_CACHE=str(cls.folder / "cache"))
-        cls.marrow("run", SOURCE / "pipelines" / "simulate.yaml", "--set", "ct.spacing_mm=[1.2, 1.2, 1.5]", "--set", "ct.range_mm=[0, 300]", "--out", cls.folder / "made", "--quiet")
+        cls.marrow(
+            "run",
+            SOURCE / "pipelines" / "simulate.yaml",
+            "--set",
+            "ct.spacing_mm=[1.2, 1.2, 1.5]",
+            "--set",
+            "ct.range_mm=[0, 300]",
+            "--out",
+            cls.folder / "made",
+            "--quiet",
+        )
         cls.case = cls.folder / "made" / "outputs" / "case"
         cls.browser = browser.Browser()
 
@@ -49,7 +59,9 @@ class Program(unittest.TestCase):
 
     @classmethod
     def marrow(cls, *arguments):
-        result = subprocess.run([str(BUILD / "bin" / "marrow"), *map(str, arguments)], capture_output=True, text=True, env=cls.environment)
+        result = subprocess.run(
+            [str(BUILD / "bin" / "marrow"), *map(str, arguments)], capture_output=True, text=True, env=cls.environment
+        )
         assert result.returncode == 0, result.stderr
         return result.stdout
 
@@ -58,14 +70,21 @@ class Program(unittest.TestCase):
         faults, asked = self.browser.logs()
         self.assertEqual(faults, [])
         self.assertEqual([url for url in asked if not url.startswith("file://")], [])
-        return self.browser.js("return Array.from(document.querySelectorAll('main > section')).map(section => section.id)")
+        return self.browser.js(
+            "return Array.from(document.querySelectorAll('main > section')).map(section => section.id)"
+        )
 
     def check_scene(self):
         """The 3D view opens when it is near, and has what the node gave it: the result, the start and the truth."""
         self.browser.show("scene")
         self.browser.wait("return window.Page && !!Page.scene || typeof Page !== 'undefined' && !!Page.scene")
-        self.assertEqual(self.browser.js("return Object.values(JSON.parse(document.getElementById('data').textContent).scenes)[0].poses.map(pose => pose.name)"),
-                         ["result", "start", "truth"])
+        self.assertEqual(
+            self.browser.js(
+                "return Object.values(JSON.parse(document.getElementById('data').textContent).scenes)[0].poses.map(pose"
+                " => pose.name)"
+            ),
+            ["result", "start", "truth"],
+        )
         self.assertEqual(self.browser.logs()[0], [])
 
     def test_a_run(self):
@@ -73,8 +92,12 @@ class Program(unittest.TestCase):
         self.marrow("run", SOURCE / "pipelines" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet")
         page = self.marrow("show", run).strip()
         self.assertEqual(page, str(run / "report.html"))
-        self.assertEqual(self.open(page), ["summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"])
-        headings = self.browser.js("return Array.from(document.querySelectorAll('table.figures thead th')).map(cell => cell.textContent)")
+        self.assertEqual(
+            self.open(page), ["summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"]
+        )
+        headings = self.browser.js(
+            "return Array.from(document.querySelectorAll('table.figures thead th')).map(cell => cell.textContent)"
+        )
         self.assertEqual(headings[:5], ["Figure", "start", "axial", "final", "Unit"])
         self.check_scene()
 
@@ -85,11 +108,30 @@ class Program(unittest.TestCase):
         page = self.folder / "out" / "report.html"
         self.assertIn("report: %s" % page, answer)
         sections = self.open(page)
-        for section in ("summary", "distributions", "paired", "pictures", "scene", "convergence", "landscape", "graph", "cells", "failures", "repeat"):
+        for section in (
+            "summary",
+            "distributions",
+            "paired",
+            "pictures",
+            "scene",
+            "convergence",
+            "landscape",
+            "graph",
+            "cells",
+            "failures",
+            "repeat",
+        ):
             self.assertIn(section, sections)
         self.assertIn("no_edges", self.browser.js("return document.getElementById('failures').textContent"))
-        self.assertIn("the edge map is empty", self.browser.js("return document.getElementById('failures').textContent"))
-        self.assertEqual(self.browser.js("return Array.from(document.querySelectorAll('#graph .node.differs')).map(node => node.dataset.node)"), ["edges"])
+        self.assertIn(
+            "the edge map is empty", self.browser.js("return document.getElementById('failures').textContent")
+        )
+        self.assertEqual(
+            self.browser.js(
+                "return Array.from(document.querySelectorAll('#graph .node.differs')).map(node => node.dataset.node)"
+            ),
+            ["edges"],
+        )
         self.check_scene()
 
 

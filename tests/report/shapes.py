@@ -12,7 +12,7 @@ def bone(around=28, along=36):
     vertices, triangles = [], []
     for i in range(along):
         z = -60 + 120 * i / (along - 1)
-        flare = math.exp(-((z + 52) / 24) ** 2)
+        flare = math.exp(-(((z + 52) / 24) ** 2))
         for k in range(around):
             angle = 2 * math.pi * k / around
             radius = 13 + 17 * flare * (1 + 0.28 * math.cos(2 * angle)) + 5 * flare * math.sin(3 * angle)
@@ -39,7 +39,9 @@ def cube(half=20.0):
 
 def mesh_entry(name, mesh):
     vertices, triangles = mesh
-    pack = lambda kind, rows: base64.b64encode(struct.pack("<%d%s" % (3 * len(rows), kind), *(value for row in rows for value in row))).decode()
+    pack = lambda kind, rows: base64.b64encode(
+        struct.pack("<%d%s" % (3 * len(rows), kind), *(value for row in rows for value in row))
+    ).decode()
     return {"name": name, "vertices": pack("f", vertices), "triangles": pack("I", triangles)}
 
 
@@ -75,9 +77,13 @@ def camera(name, direction, width_px=256, height_px=256, focal_px=(900.0, 900.0)
     """A view of the world's origin: frontal (source on -y) or lateral (source on -x), z up in the image."""
     rows = {"frontal": [[1, 0, 0], [0, 0, -1], [0, 1, 0]], "lateral": [[0, -1, 0], [0, 0, -1], [1, 0, 0]]}[direction]
     centre_px = centre_px or ((width_px - 1) / 2, (height_px - 1) / 2)
-    return {"name": name, "width_px": width_px, "height_px": height_px,
-            "intrinsics": [focal_px[0], 0, centre_px[0], 0, focal_px[1], centre_px[1], 0, 0, 1],
-            "camera_from_world": flat([row + [0.0] for row in rows[:2]] + [rows[2] + [distance_mm], [0, 0, 0, 1]])}
+    return {
+        "name": name,
+        "width_px": width_px,
+        "height_px": height_px,
+        "intrinsics": [focal_px[0], 0, centre_px[0], 0, focal_px[1], centre_px[1], 0, 0, 1],
+        "camera_from_world": flat([row + [0.0] for row in rows[:2]] + [rows[2] + [distance_mm], [0, 0, 0, 1]]),
+    }
 
 
 def project(view, point):
@@ -108,7 +114,7 @@ def thickness(mesh, world_from_model, view):
 
 
 def png(width, height, pixels, channels):
-    rows = b"".join(b"\0" + bytes(pixels[channels * width * v:channels * width * (v + 1)]) for v in range(height))
+    rows = b"".join(b"\0" + bytes(pixels[channels * width * v : channels * width * (v + 1)]) for v in range(height))
     chunk = lambda kind, data: struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
     head = struct.pack(">IIBBBBB", width, height, 8, {1: 0, 3: 2}[channels], 0, 0, 0)
     data = b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(rows, 6)) + chunk(b"IEND", b"")
@@ -134,5 +140,5 @@ def overlay(grey, depths, view, colour):
         for u in range(1, width - 1):
             i = v * width + u
             if depths[i] > 0.5 and min(depths[i - 1], depths[i + 1], depths[i - width], depths[i + width]) <= 0.5:
-                pixels[3 * i:3 * i + 3] = bytes(colour)
+                pixels[3 * i : 3 * i + 3] = bytes(colour)
     return pixels

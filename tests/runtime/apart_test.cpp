@@ -72,8 +72,9 @@ TEST_F(ApartTest, GivesWhatTheNodeGives) {
 }
 
 TEST_F(ApartTest, CrashIsOneNodesErrorThatNamesTheFile) {
-  EXPECT_EQ(failure("crash"), ": to read it crashed the process that was started for it (Segmentation fault); "
-                                              "the file is damaged, or of a kind that its reader cannot take: copy or export it again");
+  EXPECT_EQ(failure("crash"),
+            ": to read it crashed the process that was started for it (Segmentation fault); "
+            "the file is damaged, or of a kind that its reader cannot take: copy or export it again");
   EXPECT_NE(failure("abort").find("(Aborted)"), std::string::npos);
   EXPECT_EQ(failure("names").substr(0, 7), "/inner:");
 }
@@ -93,7 +94,8 @@ TEST_F(ApartTest, WhatEndedAProcessIsASentence) {
             "a.ply: could not be read: the process that was started for it sent a line without end");
   end.is_late = true;
   EXPECT_EQ(marrow::failure_of("a.ply", end, limits),
-            "a.ply: to read it takes more than 45 s by the clock, which is more than a file of its size should; where the machine has "
+            "a.ply: to read it takes more than 45 s by the clock, which is more than a file of its size should; where "
+            "the machine has "
             "much other work, try again, or raise the limit with --file-seconds");
 }
 
@@ -101,16 +103,18 @@ TEST_F(ApartTest, WhatANodeRefusesIsItsOwnError) { EXPECT_EQ(failure("refuse"), 
 
 TEST_F(ApartTest, MemoryIsLimitedByTheFilesSize) {
   if (marrow::abi_stamp().sanitizers) GTEST_SKIP() << "a sanitizer itself ends a process that is out of memory";
-  EXPECT_EQ(failure("memory"), ": to read it takes more than 192 MB of memory, which is more than a file of its size should; "
-                                               "where the file is good, raise the limit with --file-memory");
+  EXPECT_EQ(failure("memory"),
+            ": to read it takes more than 192 MB of memory, which is more than a file of its size should; "
+            "where the file is good, raise the limit with --file-memory");
   EXPECT_EQ(failure("opencv"), failure("memory"));  // it has an exception of its own for that
 }
 
 TEST_F(ApartTest, TimeIsLimitedByTheFilesSize) {
   settings.file_limits.seconds = 0.2;
   const std::string limit = marrow::abi_stamp().sanitizers ? "4" : "0.2";
-  EXPECT_EQ(failure("spin"), ": to read it takes more than " + limit + " s, which is more than a file of its size should; "
-                                             "where the file is good, raise the limit with --file-seconds");
+  EXPECT_EQ(failure("spin"), ": to read it takes more than " + limit +
+                                 " s, which is more than a file of its size should; "
+                                 "where the file is good, raise the limit with --file-seconds");
 }
 
 TEST_F(ApartTest, LimitsFollowTheSize) {
@@ -150,7 +154,8 @@ TEST_F(ApartTest, FileThatChangesWhileItIsReadGivesNoResult) {
   settings.store = &store;
   EXPECT_EQ(failure("change"), " changed while it was read; run it again");
   const auto entries = store.entries();
-  EXPECT_TRUE(std::none_of(entries.begin(), entries.end(), [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
+  EXPECT_TRUE(std::none_of(entries.begin(), entries.end(),
+                           [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
 }
 
 TEST_F(ApartTest, FileThatIsAsBeforeWhenItHasBeenReadMayHaveBeenAnotherOne) {
@@ -163,9 +168,10 @@ TEST_F(ApartTest, NodesOfOneRunDoNotMixContents) {
     std::filesystem::create_directory(scratch.path / "folder");
     file = scratch.write("folder/file.txt", "one");
     marrow::Diagnostics diagnostics;
-    const auto path = scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: ") + first +
-                                                  "}}\n  r: {uses: read.test_number, in: {added: c}, with: {path: " + second +
-                                                  "}}\noutputs: {r: r, c: c}\n");
+    const auto path =
+        scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: ") + first +
+                                    "}}\n  r: {uses: read.test_number, in: {added: c}, with: {path: " + second +
+                                    "}}\noutputs: {r: r, c: c}\n");
     pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     settings.threads = 2;
@@ -177,13 +183,17 @@ TEST_F(ApartTest, NodesOfOneRunDoNotMixContents) {
     return result.nodes[1].reason;
   };
   const auto rewrite = [&] { std::ofstream(file) << "two"; };
-  const std::string changed = " was changed while the run went on: another node read something else there; run it again when nothing writes to it";
+  const std::string changed =
+      " was changed while the run went on: another node read something else there; run it again when nothing writes to "
+      "it";
   EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [] {}), "");
   EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", rewrite), file.string() + changed);
-  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [&] { std::filesystem::remove(file); }), file.string() + changed);
+  EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [&] { std::filesystem::remove(file); }),
+            file.string() + changed);
   EXPECT_EQ(run_with_edit("folder", "folder/file.txt", rewrite), file.string() + changed);
   EXPECT_EQ(run_with_edit("folder/file.txt", "folder", rewrite), file.parent_path().string() + changed);
-  EXPECT_EQ(run_with_edit("folder", "folder", [&] { scratch.write("folder/another", "x"); }), file.parent_path().string() + changed);
+  EXPECT_EQ(run_with_edit("folder", "folder", [&] { scratch.write("folder/another", "x"); }),
+            file.parent_path().string() + changed);
   EXPECT_EQ(run_with_edit("folder/file.txt", "folder/file.txt", [] {}), "") << "another run";
 }
 
@@ -192,12 +202,14 @@ TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
   std::filesystem::create_directory(scratch.path / "elsewhere");
   std::filesystem::create_directory_symlink(scratch.path / "elsewhere", scratch.path / "case" / "link");
   settings.threads = 2;
-  const auto path = scratch.write("p2.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: case}}\noutputs: {r: r}\n");
+  const auto path = scratch.write(
+      "p2.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: case}}\noutputs: {r: r}\n");
   marrow::Diagnostics diagnostics;
   pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
   const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);
   EXPECT_EQ(result.nodes[0].reason, (scratch.path / "case" / "link").string() + ": is a link to a place outside " +
-                                        std::filesystem::canonical(scratch.path / "case").string() + "; copy it into the folder");
+                                        std::filesystem::canonical(scratch.path / "case").string() +
+                                        "; copy it into the folder");
 }
 
 }  // namespace

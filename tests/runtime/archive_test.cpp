@@ -11,9 +11,7 @@
 namespace tested {
 
 enum class Side : std::int8_t { left, right };
-bool is_valid(Side side) {
-  return side == Side::left || side == Side::right;
-}
+bool is_valid(Side side) { return side == Side::left || side == Side::right; }
 
 struct Item {
   std::string name;

@@ -12,7 +12,10 @@ using marrow::List;
 using marrow::Metrics;
 using marrow::Plugin;
 
-struct Options { double size_mm = 1; std::string word = "a"; };
+struct Options {
+  double size_mm = 1;
+  std::string word = "a";
+};
 Metrics plain(const Metrics&, const Options&) { return {}; }
 List<Metrics> listed(const List<Metrics>&) { return {}; }
 std::tuple<Metrics, marrow::Pose> two() { return {}; }
@@ -28,7 +31,11 @@ std::string faults(const Plugin& plugin) {
 
 TEST(Declaration, GoodOneHasNoFaults) {
   Plugin plugin;
-  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("size_mm", &Options::size_mm, "h", marrow::at_least(0));
+  plugin.node("test.plain", plain)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("size_mm", &Options::size_mm, "h", marrow::at_least(0));
   EXPECT_EQ(faults(plugin), "");
   const marrow::NodeInfo& info = plugin.nodes.back().info;
   EXPECT_EQ(info.options[0].unit, "mm") << "read off the name";
@@ -55,20 +62,37 @@ TEST(Declaration, NoSummaryNoOutputBadName) {
 }
 TEST(Declaration, DefaultNotAmongChoices) {
   Plugin plugin;
-  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
+  plugin.node("test.plain", plain)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("word", &Options::word, "h", marrow::one_of({"x", "y"}));
   EXPECT_NE(faults(plugin).find("option 'word': its default 'a' is not one of its choices"), std::string::npos);
 }
 TEST(Declaration, OptionNamedTwice) {
   Plugin plugin;
-  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").option("word", &Options::word, "h").option("word", &Options::word, "h");
+  plugin.node("test.plain", plain)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("word", &Options::word, "h")
+      .option("word", &Options::word, "h");
   EXPECT_NE(faults(plugin).find("option 'word' is named twice"), std::string::npos);
 }
 TEST(Declaration, NumbersThatCannotBeWrittenDown) {
-  struct Odd { double x = std::numeric_limits<double>::quiet_NaN(); double y = 1; };
+  struct Odd {
+    double x = std::numeric_limits<double>::quiet_NaN();
+    double y = 1;
+  };
   Metrics (*odd)(const Metrics&, const Odd&) = [](const Metrics& metrics, const Odd&) { return metrics; };
   Plugin plugin;
-  plugin.node("test.odd", odd).summary("s").in("a", "h").out("b", "h").option("x", &Odd::x, "h")
-      .option("y", &Odd::y, "h", marrow::at_least(2), marrow::at_most(0)).option("z", &Odd::y, "h", marrow::at_most(std::numeric_limits<double>::infinity()));
+  plugin.node("test.odd", odd)
+      .summary("s")
+      .in("a", "h")
+      .out("b", "h")
+      .option("x", &Odd::x, "h")
+      .option("y", &Odd::y, "h", marrow::at_least(2), marrow::at_most(0))
+      .option("z", &Odd::y, "h", marrow::at_most(std::numeric_limits<double>::infinity()));
   EXPECT_NE(faults(plugin).find("option 'x': its default is not a finite number"), std::string::npos);
   EXPECT_NE(faults(plugin).find("option 'y': its range is empty or not finite"), std::string::npos);
   EXPECT_NE(faults(plugin).find("option 'z': its range is empty or not finite"), std::string::npos);
@@ -79,7 +103,8 @@ TEST(Declaration, TextsThatCannotBeShown) {
     plugin.node("test.plain", plain).summary(text).in("a", text).out("b", "h").option("word", &Options::word, text);
     EXPECT_NE(faults(plugin).find("summary: its texts must be UTF-8 without control characters"), std::string::npos);
     EXPECT_NE(faults(plugin).find("input 'a': its texts must be UTF-8 without control characters"), std::string::npos);
-    EXPECT_NE(faults(plugin).find("option 'word': its texts must be UTF-8 without control characters"), std::string::npos);
+    EXPECT_NE(faults(plugin).find("option 'word': its texts must be UTF-8 without control characters"),
+              std::string::npos);
   }
 }
 TEST(Declaration, PortNamedTwice) {
@@ -100,7 +125,8 @@ TEST(Declaration, UnregisteredReturnType) {
 TEST(Declaration, TruthOnlyWhereItMayBeSeen) {
   Plugin plugin;
   plugin.node("register.cheat", sees).summary("s").in("truth", "h").out("pose", "h");
-  EXPECT_NE(faults(plugin).find("input 'truth': only nodes that evaluate or render may be given the truth"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("input 'truth': only nodes that evaluate or render may be given the truth"),
+            std::string::npos);
 }
 TEST(Declaration, KindContract) {
   Plugin plugin;

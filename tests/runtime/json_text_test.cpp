@@ -23,9 +23,7 @@ std::string fault_in(const std::string& text) {
   return fault_of([&] { marrow::parse_json(text, "a.json"); });
 }
 
-std::string nested(int levels) {
-  return std::string(std::size_t(levels), '[') + std::string(std::size_t(levels), ']');
-}
+std::string nested(int levels) { return std::string(std::size_t(levels), '[') + std::string(std::size_t(levels), ']'); }
 
 TEST(JsonText, DeepNestingIsRefused) {
   EXPECT_EQ(fault_in(nested(64)), "none");

@@ -95,15 +95,16 @@ TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
   };
   node_.info.name = "kind.other";
   is_new("the node");
-  const std::vector<std::pair<std::string, marrow::OptionValue>> others{{"flag", true},
-                                                                        {"count", std::int64_t(4)},
-                                                                        {"size", std::nextafter(1.5, 2)},
-                                                                        {"word", std::string("b")},
-                                                                        {"sizes", std::vector<double>{2, 1}},
-                                                                        {"words", std::vector<std::string>{"ab", ""}},
-                                                                        {"file", write("other", "other content")},
-                                                                        {"files", std::vector<std::string>{write("first", "1"), write("third", "3")}},
-                                                                        {"folder", std::string()}};
+  const std::vector<std::pair<std::string, marrow::OptionValue>> others{
+      {"flag", true},
+      {"count", std::int64_t(4)},
+      {"size", std::nextafter(1.5, 2)},
+      {"word", std::string("b")},
+      {"sizes", std::vector<double>{2, 1}},
+      {"words", std::vector<std::string>{"ab", ""}},
+      {"file", write("other", "other content")},
+      {"files", std::vector<std::string>{write("first", "1"), write("third", "3")}},
+      {"folder", std::string()}};
   for (const auto& [name, value] : others) {
     option(name) = value;
     is_new(name.c_str());
@@ -243,7 +244,8 @@ TEST_F(Keys, OfResults) {
   }
   setenv("OPENCV_LOG_LEVEL", "INFO", 1);
   setenv("GLIBC_TUNABLES", "glibc.malloc.hugetlb=1", 1);
-  EXPECT_EQ(marrow::result_key(recipe, build, false, 1), key) << "what is printed, and where memory comes from, are none of it";
+  EXPECT_EQ(marrow::result_key(recipe, build, false, 1), key)
+      << "what is printed, and where memory comes from, are none of it";
   unsetenv("OPENCV_LOG_LEVEL");
   unsetenv("GLIBC_TUNABLES");
   EXPECT_NE(marrow::function_key(key, 0), marrow::function_key(key, 1));
@@ -261,9 +263,11 @@ TEST_F(Keys, OptionsInWords) {
   EXPECT_EQ(marrow::text_of(std::vector<double>{1, 2.5}, OptionType::numbers), "[1, 2.5]");
   EXPECT_EQ(marrow::text_of(std::vector<std::string>{"a", "b"}, OptionType::texts), "[a, b]");
   EXPECT_EQ(marrow::text_of(std::vector<std::string>{}, OptionType::texts), "[]");
-  const std::string file = write("file", "content"), content = " (content " + marrow::path_digest(file).hex().substr(0, 8) + ")";
+  const std::string file = write("file", "content"),
+                    content = " (content " + marrow::path_digest(file).hex().substr(0, 8) + ")";
   EXPECT_EQ(marrow::text_of(file, OptionType::path), file + content);
-  EXPECT_EQ(marrow::text_of(std::vector<std::string>{file, file}, OptionType::paths), "[" + file + content + ", " + file + content + "]");
+  EXPECT_EQ(marrow::text_of(std::vector<std::string>{file, file}, OptionType::paths),
+            "[" + file + content + ", " + file + content + "]");
 }
 
 TEST_F(Keys, KeptWarningsNameTheFileThatIsReadNow) {
@@ -274,7 +278,8 @@ TEST_F(Keys, KeptWarningsNameTheFileThatIsReadNow) {
   option("file") = now;
   EXPECT_EQ(marrow::warning_now(before + ": it has holes; " + before, node_, kept), now + ": it has holes; " + now);
   EXPECT_EQ(marrow::warning_now("holes", node_, kept), "holes");
-  EXPECT_EQ(marrow::warning_now(before + ": it has holes", node_, {}), before + ": it has holes") << "nothing is known of it";
+  EXPECT_EQ(marrow::warning_now(before + ": it has holes", node_, {}), before + ": it has holes")
+      << "nothing is known of it";
 }
 
 TEST_F(Keys, WhatMadeADifference) {
@@ -299,7 +304,9 @@ TEST_F(Keys, WhatMadeADifference) {
   now.inputs["image"] = {3, 3};
   now.inputs["region"] = {};
   EXPECT_EQ(marrow::difference(before, now),
-            "the plugin of edges.canny was rebuilt; option 'blur' is 1, was not there; option 'high' is 80, was 75; input 'image' changed; input 'region' changed");
+            "the plugin of edges.canny was rebuilt; option 'blur' is 1, was not there; option 'high' is 80, was 75; "
+            "input 'image' changed; input 'region' changed");
   now.node = "edges.sobel";
-  EXPECT_EQ(marrow::difference(before, now), "it uses edges.sobel, used edges.canny; input 'image' changed; input 'region' changed");
+  EXPECT_EQ(marrow::difference(before, now),
+            "it uses edges.sobel, used edges.canny; input 'image' changed; input 'region' changed");
 }

@@ -10,9 +10,9 @@
 namespace {
 
 namespace fs = std::filesystem;
-using nlohmann::json;
 using library_test::kBad;
 using library_test::kGood;
+using nlohmann::json;
 
 class LibraryTest : public library_test::LibraryTest {
  protected:
@@ -27,7 +27,8 @@ class LibraryTest : public library_test::LibraryTest {
     stream.write(reinterpret_cast<const char*>(&header), sizeof header);
     return file;
   }
-  /// The manifest of the good library with something invented in it, and with the checksum that makes it look untouched.
+  /// The manifest of the good library with something invented in it, and with the checksum that makes it look
+  /// untouched.
   fs::path copy_with_invented(const std::function<void(nlohmann::json&)>& invent) {
     const fs::path file = copy_good(true), manifest = fs::path(file).replace_extension(".json");
     nlohmann::json document = nlohmann::json::parse(text_of(manifest));
@@ -46,9 +47,9 @@ class LibraryTest : public library_test::LibraryTest {
       catalogue.load("test.constant");
       ADD_FAILURE() << "loaded, not refused: " << reason;
     } catch (const marrow::Error& error) {
-      EXPECT_EQ(std::string(error.what()),
-                file.string() + " is not what its description says: " + reason + "; run 'marrow describe " + file.string() +
-                    " --write', or remove " + fs::path(file).replace_extension(".json").string());
+      EXPECT_EQ(std::string(error.what()), file.string() + " is not what its description says: " + reason +
+                                               "; run 'marrow describe " + file.string() + " --write', or remove " +
+                                               fs::path(file).replace_extension(".json").string());
     }
   }
 };
@@ -59,21 +60,30 @@ TEST_F(LibraryTest, GoodLibraryIsDescribed) {
   EXPECT_GT(info.nodes.size(), 5u);
   EXPECT_GT(info.linked.size(), 1u);
 }
-TEST_F(LibraryTest, OtherApi) { expect_refused(kBad / "other_api.so", "was built for plugin interface 7.2, this marrow has 1.0"); }
-TEST_F(LibraryTest, DebugMode) { expect_refused(kBad / "debug_mode.so", "was built with _GLIBCXX_DEBUG (debug mode) on, this marrow with off"); }
+TEST_F(LibraryTest, OtherApi) {
+  expect_refused(kBad / "other_api.so", "was built for plugin interface 7.2, this marrow has 1.0");
+}
+TEST_F(LibraryTest, DebugMode) {
+  expect_refused(kBad / "debug_mode.so", "was built with _GLIBCXX_DEBUG (debug mode) on, this marrow with off");
+}
 TEST_F(LibraryTest, OtherEigenAlignment) {
   if (!fs::exists(kBad / "other_alignment.so")) GTEST_SKIP() << "only where -mavx changes the alignment";
   expect_refused(kBad / "other_alignment.so", "was built with EIGEN_MAX_ALIGN_BYTES 32, this marrow with 16");
 }
 TEST_F(LibraryTest, Crash) { expect_refused(kBad / "crashes.so", "crashed while being loaded (Segmentation fault)"); }
 TEST_F(LibraryTest, Throws) { expect_refused(kBad / "throws.so", "crashed while being loaded (Aborted)"); }
-TEST_F(LibraryTest, NoEntry) { expect_refused(kBad / "no_entry.so", "is no marrow plugin: it has no function marrow_plugin_entry"); }
+TEST_F(LibraryTest, NoEntry) {
+  expect_refused(kBad / "no_entry.so", "is no marrow plugin: it has no function marrow_plugin_entry");
+}
 TEST_F(LibraryTest, WrongDeclaration) {
   expect_refused(kBad / "wrong_declaration.so",
-                 "declares its nodes wrongly: edges.wrong: option 'low': its default is outside its own range; edges.wrong: input 'picture': the "
+                 "declares its nodes wrongly: edges.wrong: option 'low': its default is outside its own range; "
+                 "edges.wrong: input 'picture': the "
                  "kind 'edges' has none of that name");
 }
-TEST_F(LibraryTest, TextFile) { expect_refused(scratch.write("text.so", "hello\n"), "is not a shared library (it does not begin with an ELF header)"); }
+TEST_F(LibraryTest, TextFile) {
+  expect_refused(scratch.write("text.so", "hello\n"), "is not a shared library (it does not begin with an ELF header)");
+}
 TEST_F(LibraryTest, Truncated) {
   const fs::path file = copy_good(false);
   fs::resize_file(file, fs::file_size(file) / 2);
@@ -109,12 +119,14 @@ TEST_F(LibraryTest, EditedManifestIsNoticed) {
   std::string text = text_of(manifest);
   text.replace(text.find("Keeps a core busy"), 5, "Burns");
   std::ofstream(manifest) << text;
-  EXPECT_EQ(marrow::library_info(file, framework).note, "its manifest is not used (it was edited by hand), so it was described anew");
+  EXPECT_EQ(marrow::library_info(file, framework).note,
+            "its manifest is not used (it was edited by hand), so it was described anew");
 }
 TEST_F(LibraryTest, DamagedManifestIsNoticed) {
   const fs::path file = copy_good(true);
   std::ofstream(fs::path(file).replace_extension(".json")) << "{";
-  EXPECT_EQ(marrow::library_info(file, framework).note, "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described anew");
+  EXPECT_EQ(marrow::library_info(file, framework).note,
+            "its manifest is not used (it is damaged: its text:1:2: not valid JSON), so it was described anew");
 }
 TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   const fs::path file = copy_good(true);
@@ -125,15 +137,21 @@ TEST_F(LibraryTest, BuildIdFollowsTheLibraryAndTheFramework) {
   EXPECT_NE(before, marrow::library_info(file, framework).build_id);
 }
 
-
 TEST_F(LibraryTest, ElfHeadersThatLieAreRefused) {
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = UINT64_MAX - 100; }), "is truncated: its ELF header speaks of");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phoff = UINT64_MAX - 100; }), "is truncated: its ELF header speaks of");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phnum = 0; }), "its ELF header describes no program segments");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_CLASS] = ELFCLASS32; }), "is not a 64 bit library; build it for this machine");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_DATA] = ELFDATA2MSB; }), "has its bytes in another order than this machine");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_machine = EM_RISCV; }), "was built for RISC-V, this machine is");
-  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_type = ET_REL; }), "is not a shared library (its ELF type is 1)");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_shoff = UINT64_MAX - 100; }),
+                 "is truncated: its ELF header speaks of");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phoff = UINT64_MAX - 100; }),
+                 "is truncated: its ELF header speaks of");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_phnum = 0; }),
+                 "its ELF header describes no program segments");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_CLASS] = ELFCLASS32; }),
+                 "is not a 64 bit library; build it for this machine");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_ident[EI_DATA] = ELFDATA2MSB; }),
+                 "has its bytes in another order than this machine");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_machine = EM_RISCV; }),
+                 "was built for RISC-V, this machine is");
+  expect_refused(copy_with_header([](Elf64_Ehdr& h) { h.e_type = ET_REL; }),
+                 "is not a shared library (its ELF type is 1)");
   for (const std::uintmax_t size : {0, 3, 4, 5, 63, 64, 65, 500, 5000}) {
     const fs::path file = copy_good(false);
     fs::resize_file(file, size);
@@ -151,16 +169,23 @@ constexpr const char* kConstant = "nodes/test.constant";
 json& constant(json& j) { return j["nodes"][0]; }
 
 TEST_F(LibraryTest, InventedOptionIsFoundOut) {
-  expect_load_refused([](json& j) { constant(j)["options"][1]["type"] = "text", constant(j)["options"][1]["default"] = "x"; constant(j)["options"][1].erase("minimum"); },
-                      std::string(kConstant) + "/options/count/default: the library has 0, its description has \"x\"");
+  expect_load_refused(
+      [](json& j) {
+        constant(j)["options"][1]["type"] = "text", constant(j)["options"][1]["default"] = "x";
+        constant(j)["options"][1].erase("minimum");
+      },
+      std::string(kConstant) + "/options/count/default: the library has 0, its description has \"x\"");
 }
 TEST_F(LibraryTest, InventedDefaultIsFoundOut) {
   expect_load_refused([](json& j) { constant(j)["options"][0]["default"] = 2.0; },
                       std::string(kConstant) + "/options/value/default: the library has 1.0, its description has 2.0");
 }
 TEST_F(LibraryTest, OptionsThatTheLibraryDoesNotHave) {
-  expect_load_refused([](json& j) { constant(j)["options"].push_back(constant(j)["options"][0]), constant(j)["options"].back()["name"] = "more"; },
-                      std::string(kConstant) + "/options: the library has 7 of them, its description has 8 of them");
+  expect_load_refused(
+      [](json& j) {
+        constant(j)["options"].push_back(constant(j)["options"][0]), constant(j)["options"].back()["name"] = "more";
+      },
+      std::string(kConstant) + "/options: the library has 7 of them, its description has 8 of them");
 }
 TEST_F(LibraryTest, PortsThatTheLibraryDoesNotHave) {
   expect_load_refused([](json& j) { constant(j)["inputs"].push_back(j["nodes"][3]["inputs"][0]); },
@@ -171,11 +196,17 @@ TEST_F(LibraryTest, InventedTypeOfAnotherNodeIsFoundOut) {
                       "nodes/test.add/inputs/a/type/size: the library has 24, its description has 8");
 }
 TEST_F(LibraryTest, InventedRandomnessIsFoundOut) {
-  expect_load_refused([](json& j) { constant(j)["random"] = true; }, std::string(kConstant) + "/random: the library has false, its description has true");
+  expect_load_refused([](json& j) { constant(j)["random"] = true; },
+                      std::string(kConstant) + "/random: the library has false, its description has true");
 }
 TEST_F(LibraryTest, InventedWriterIsFoundOut) {
-  expect_load_refused([](json& j) { j["writers"].push_back({{"type", {{"id", "metrics"}, {"version", 1}, {"size", 24}, {"function", false}}}, {"extension", ".x"}, {"help", "x"}}); },
-                      "writers/metrics: the library has none, its description has it");
+  expect_load_refused(
+      [](json& j) {
+        j["writers"].push_back({{"type", {{"id", "metrics"}, {"version", 1}, {"size", 24}, {"function", false}}},
+                                {"extension", ".x"},
+                                {"help", "x"}});
+      },
+      "writers/metrics: the library has none, its description has it");
 }
 TEST_F(LibraryTest, LinkedLibraryThatIsKeptBackIsFoundOut) {
   const std::vector<marrow::LinkedLibrary> linked = marrow::describe_library(kGood).linked;
@@ -185,7 +216,9 @@ TEST_F(LibraryTest, LinkedLibraryThatIsKeptBackIsFoundOut) {
 }
 TEST_F(LibraryTest, LinkedLibraryOfTheSameSizeThatIsAnotherOneChangesTheBuildId) {
   const fs::path helper = scratch.write("libmarrow_helper.so", "first");
-  const fs::path file = copy_with_invented([&](json& j) { j["linked"].push_back({{"path", helper.string()}, {"size", 5}}); });
+  const fs::path file = copy_with_invented([&](json& j) {
+    j["linked"].push_back({{"path", helper.string()}, {"size", 5}});
+  });
   const marrow::Digest first = marrow::library_info(file, framework).build_id;
   EXPECT_EQ(marrow::library_info(file, framework).build_id, first);
   scratch.write("libmarrow_helper.so", "other");
@@ -220,7 +253,8 @@ TEST_F(LinkedLibraryTest, WhatALinkedLibraryNeedsCountsToo) {
   const marrow::Digest first = build_id();
   EXPECT_EQ(build_id(), first);
   std::set<std::string> names;
-  for (const marrow::LinkedLibrary& linked : marrow::library_info(file, framework).linked) names.insert(fs::path(linked.path).filename());
+  for (const marrow::LinkedLibrary& linked : marrow::library_info(file, framework).linked)
+    names.insert(fs::path(linked.path).filename());
   EXPECT_TRUE(names.contains("libtest_base.so"));
   EXPECT_TRUE(names.contains("libtest_deep.so")) << "only another library needs it";
   ASSERT_EQ(fs::file_size(kLinked / "libs1" / "libtest_deep.so"), fs::file_size(kLinked / "libs2" / "libtest_deep.so"));
@@ -240,7 +274,8 @@ TEST_F(LinkedLibraryTest, LibrariesThatTheLoaderFindsElsewhereCount) {
   setenv("LD_LIBRARY_PATH", (elsewhere.string() + ":").c_str(), 1);
   const marrow::LibraryInfo other = marrow::library_info(file, framework);
   EXPECT_NE(other.build_id, first);
-  EXPECT_TRUE(other.note.starts_with("its manifest is stale (LD_LIBRARY_PATH leads to " + elsewhere.string())) << other.note;
+  EXPECT_TRUE(other.note.starts_with("its manifest is stale (LD_LIBRARY_PATH leads to " + elsewhere.string()))
+      << other.note;
   EXPECT_EQ(build_id(), other.build_id) << "from the cache";
   unsetenv("LD_LIBRARY_PATH");
   EXPECT_EQ(build_id(), first);
@@ -276,7 +311,8 @@ TEST_F(LibraryTest, LibraryThatChangesAfterItWasDescribedIsNotUsed) {
   }
 }
 TEST_F(LibraryTest, WrongDescriptionInTheCacheIsForgotten) {
-  const fs::path file = copy_with_invented([](json& j) { constant(j)["random"] = true; }), folder = scratch.path / "cache" / "marrow" / "libraries";
+  const fs::path file = copy_with_invented([](json&j) { constant(j)["random"] = true; }),
+                 folder = scratch.path / "cache" / "marrow" / "libraries";
   fs::remove_all(scratch.path / "cache");
   const std::string invented = text_of(fs::path(file).replace_extension(".json"));
   fs::remove(fs::path(file).replace_extension(".json"));
@@ -290,7 +326,8 @@ TEST_F(LibraryTest, DamagedCacheIsMadeAnewWithoutAWord) {
   marrow::library_info(file, framework);
   const fs::path cached = *fs::directory_iterator(scratch.path / "cache" / "marrow" / "libraries");
   const std::string whole = text_of(cached);
-  for (const std::string& damaged : {std::string(), std::string("{"), std::string(1000000, '['), whole.substr(0, whole.size() / 2)}) {
+  for (const std::string& damaged :
+       {std::string(), std::string("{"), std::string(1000000, '['), whole.substr(0, whole.size() / 2)}) {
     std::ofstream(cached) << damaged;
     const marrow::LibraryInfo info = marrow::library_info(file, framework);
     EXPECT_EQ(info.note, "");

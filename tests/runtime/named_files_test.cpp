@@ -20,7 +20,8 @@ class NamedFilesTest : public testing::Test {
   }
   std::vector<std::string> names() {
     std::vector<std::string> names;
-    for (const marrow::NamedFile& file : marrow::files_named_by(folder)) names.push_back(file.name + (file.is_there ? "" : " (nowhere)"));
+    for (const marrow::NamedFile& file : marrow::files_named_by(folder))
+      names.push_back(file.name + (file.is_there ? "" : " (nowhere)"));
     return names;
   }
   std::string fault() {
@@ -50,7 +51,8 @@ TEST_F(NamedFilesTest, LinkInsideCountsAndOneThatLeadsNowhereIsNoFault) {
 
 TEST_F(NamedFilesTest, LinksThatLeaveOrLeadToFoldersAreRefused) {
   fs::create_symlink(scratch.write("outside.txt", "x"), folder / "out.txt");
-  EXPECT_EQ(fault(), (folder / "out.txt").string() + ": is a link to a place outside " + folder.string() + "; copy it into the folder");
+  EXPECT_EQ(fault(), (folder / "out.txt").string() + ": is a link to a place outside " + folder.string() +
+                         "; copy it into the folder");
   fs::remove(folder / "out.txt");
   fs::create_directory_symlink("sub", folder / "link");
   EXPECT_EQ(fault(), (folder / "link").string() + ": is a link to a folder; put the folder itself there");

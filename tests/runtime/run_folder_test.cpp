@@ -204,7 +204,8 @@ TEST_F(RunFolderTest, RecordHoldsTheFilesAsTheyWereRead) {
   scratch.write("folder/a", "1");
   const marrow::Pipeline pipeline = pipeline_of(
       "  c: {uses: test.constant, with: {path: file.txt}}\n  f: {uses: test.constant, with: {path: folder, value: 2}}\n"
-      "  n: {uses: test.constant, with: {path: nothing, value: 3}}\n  w: {uses: test.constant, with: {path: /proc/self/mem}}\n"
+      "  n: {uses: test.constant, with: {path: nothing, value: 3}}\n  w: {uses: test.constant, with: {path: "
+      "/proc/self/mem}}\n"
       "  d: {uses: test.work, in: {after: w}, with: {path: file.txt, value: 0}}\n",
       "c: c, f: f, n: n, w: w, d: d");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
@@ -215,8 +216,7 @@ TEST_F(RunFolderTest, RecordHoldsTheFilesAsTheyWereRead) {
     folder.write_record(pipeline, result, {}, writing_catalogue(), {}, {});
     nlohmann::json files;
     const nlohmann::json record = nlohmann::json::parse(text_of(folder.path() / "run.json"));
-    for (const nlohmann::json& node : record["nodes"])
-      files[std::string(node["id"])] = node["files"];
+    for (const nlohmann::json& node : record["nodes"]) files[std::string(node["id"])] = node["files"];
     return files;
   };
   const nlohmann::json before = files_recorded("before");

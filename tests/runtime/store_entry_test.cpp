@@ -23,9 +23,7 @@ Value value_of(T item) {
   return result;
 }
 
-Value number(double value) {
-  return value_of(Metrics{{{"value", value, "mm"}}});
-}
+Value number(double value) { return value_of(Metrics{{{"value", value, "mm"}}}); }
 
 class StoreEntryTest : public testing::Test {
  protected:

@@ -142,9 +142,9 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
   const std::string key = marrow::hash_of(1).hex(), two = key.substr(0, 2);
   const std::string dead = ".tmp-4194304-0";  // no process has that number
   put(scratch.path / "elsewhere" / "ab0123456789abcdef0123456789abcd");
-  for (const char* own : {"cases/0123456789abcdef0123456789abcdef/outputs/case/a",
-                          "cases/0123456789abcdef0123456789abcdef/content.txt",
-                          "cases/0123456789abcdef0123456789abcdef.tmp-4194304-7/x"})
+  for (const char* own :
+       {"cases/0123456789abcdef0123456789abcdef/outputs/case/a", "cases/0123456789abcdef0123456789abcdef/content.txt",
+        "cases/0123456789abcdef0123456789abcdef.tmp-4194304-7/x"})
     put(folder / own);
   put(folder / two / (key + dead));
   put(folder / "last" / (key + dead));
@@ -154,8 +154,8 @@ TEST_F(StoreFolderTest, OnlyItsOwnLayoutIsCollected) {
         "ff/" + std::string(kHex), "0123/" + std::string(kHex), two + "/" + two + std::string(30, 'A'),
         two + "/" + two + std::string(30, '0') + "/x", two + "/notes.txt", two + "/" + key + ".tmp-1x-0",
         two + "/" + key + ".tmp--0", two + "/" + key + ".tmp-0-0", "cases/" + std::string(31, '1') + "/x",
-        "cases/" + std::string(32, '4') + "/mine.txt",
-        "cases/2222222222222222" + std::string(16, '2'), std::string("last/mine.tmp-4194304-0")})
+        "cases/" + std::string(32, '4') + "/mine.txt", "cases/2222222222222222" + std::string(16, '2'),
+        std::string("last/mine.tmp-4194304-0")})
     put(folder / foreign);
   fs::create_directory_symlink(scratch.path / "elsewhere", folder / "ab");
   fs::create_directory_symlink(scratch.path / "elsewhere", folder / "cases" / std::string(32, '3'));

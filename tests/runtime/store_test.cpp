@@ -41,7 +41,9 @@ Value many(std::size_t count) {
 fs::path only_file(const fs::path& folder) {
   fs::path found;
   for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file() && entry.path().parent_path() != folder && entry.path().parent_path().filename() != "last") found = entry.path();
+    if (entry.is_regular_file() && entry.path().parent_path() != folder &&
+        entry.path().parent_path().filename() != "last")
+      found = entry.path();
   return found;
 }
 
@@ -53,7 +55,8 @@ class StoreTest : public testing::Test {
     settings.threads = 2;
     settings.store = &store;
     settings.observer = [this](const marrow::RunEvent& event) {
-      if (event.kind == marrow::RunEvent::Kind::warning || event.kind == marrow::RunEvent::Kind::failed) messages += event.text + "\n";
+      if (event.kind == marrow::RunEvent::Kind::warning || event.kind == marrow::RunEvent::Kind::failed)
+        messages += event.text + "\n";
     };
     return marrow::run_pipeline(pipeline, test_catalogue(), settings);
   }
@@ -66,7 +69,9 @@ class StoreTest : public testing::Test {
   }
   void read(const std::string& nodes, const std::string& outputs) {
     marrow::Diagnostics diagnostics;
-    pipeline = marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"), {}, test_catalogue(), diagnostics);
+    pipeline =
+        marrow::read_pipeline(scratch.write("p.yaml", "marrow: 1\nnodes:\n" + nodes + "outputs: {" + outputs + "}\n"),
+                              {}, test_catalogue(), diagnostics);
     ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
   }
   double result_of(const RunResult& result, std::size_t index = 0) {
@@ -84,8 +89,9 @@ class StoreTest : public testing::Test {
   std::string messages;
 };
 
-constexpr const char* kChain = "  c: {uses: test.constant, with: {value: 5}}\n  s: {uses: test.sides}\n  f: {uses: test.adder, in: {amount: c}}\n"
-                               "  a: {uses: test.apply, in: {adder: f, to: s.both}}\n  n: {uses: test.sum, in: {items: a}}\n";
+constexpr const char* kChain =
+    "  c: {uses: test.constant, with: {value: 5}}\n  s: {uses: test.sides}\n  f: {uses: test.adder, in: {amount: c}}\n"
+    "  a: {uses: test.apply, in: {adder: f, to: s.both}}\n  n: {uses: test.sum, in: {items: a}}\n";
 
 TEST_F(StoreTest, ValuesComeBackAsTheyWere) {
   Value list;
@@ -137,7 +143,8 @@ TEST_F(StoreTest, OnlyWhatChangedRunsAndFunctionsAreMadeForIt) {
 
 TEST_F(StoreTest, UnchangedContentStopsTheWave) {
   run("  c: {uses: test.constant, with: {value: 5, word: one}}\n  d: {uses: test.add, in: {a: c}}\n", "d: d");
-  const RunResult second = run("  c: {uses: test.constant, with: {value: 5, word: two}}\n  d: {uses: test.add, in: {a: c}}\n", "d: d");
+  const RunResult second =
+      run("  c: {uses: test.constant, with: {value: 5, word: two}}\n  d: {uses: test.add, in: {a: c}}\n", "d: d");
   EXPECT_EQ(second.nodes[0].calls, 1);
   EXPECT_EQ(second.nodes[1].calls, 0) << "the constant came out the same";
 }
@@ -151,14 +158,17 @@ TEST_F(StoreTest, ASeedMattersToRandomNodesOnly) {
 }
 
 TEST_F(StoreTest, FailuresAreNotKept) {
-  const std::string nodes = "  c: {uses: test.constant, with: {value: 9}}\n  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\n";
+  const std::string nodes =
+      "  c: {uses: test.constant, with: {value: 9}}\n  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\n";
   EXPECT_TRUE(run(nodes, "f: f").failed());
   EXPECT_TRUE(run(nodes, "f: f").failed());
 }
 
 TEST_F(StoreTest, AFailedFunctionIsNamedByWhatNeedsIt) {
-  const RunResult result = run("  c: {uses: test.constant, with: {value: 9}}\n  f: {uses: test.failing_adder, in: {amount: c}}\n"
-                               "  a: {uses: test.apply, in: {adder: f, to: c}}\n", "a: a");
+  const RunResult result =
+      run("  c: {uses: test.constant, with: {value: 9}}\n  f: {uses: test.failing_adder, in: {amount: c}}\n"
+          "  a: {uses: test.apply, in: {adder: f, to: c}}\n",
+          "a: a");
   EXPECT_TRUE(result.failed());
   EXPECT_EQ(result.nodes[1].status, marrow::NodeRecord::Status::failed);
   EXPECT_EQ(result.nodes[2].status, marrow::NodeRecord::Status::not_run);
@@ -179,8 +189,10 @@ TEST_F(StoreTest, EveryDamageIsNoticedAndMadeAgain) {
   for (std::size_t at = 0; at < good.size(); ++at)
     for (int kind = 0; kind < 2; ++kind) {
       std::string bad = good;
-      if (kind) bad.resize(at);
-      else bad[at] = char(bad[at] ^ 0x55);
+      if (kind)
+        bad.resize(at);
+      else
+        bad[at] = char(bad[at] ^ 0x55);
       std::ofstream(file, std::ios::binary) << bad;
       const RunResult result = run(nodes, "c: c");
       ASSERT_FALSE(result.failed()) << at;
@@ -197,7 +209,8 @@ TEST_F(StoreTest, DamagedInputOfANodeThatRunsIsMadeAgain) {
   stream.seekp(-1, std::ios::end);
   stream.put('x');
   stream.close();
-  const RunResult result = run("  c: {uses: test.constant, with: {value: 5}}\n  d: {uses: test.add, in: {a: c, b: c}}\n", "d: d");
+  const RunResult result =
+      run("  c: {uses: test.constant, with: {value: 5}}\n  d: {uses: test.add, in: {a: c, b: c}}\n", "d: d");
   EXPECT_EQ(result_of(result), 10);
   EXPECT_EQ(result.nodes[0].calls, 1);
 }
@@ -222,7 +235,8 @@ TEST_F(StoreTest, KilledWritersLeaveNothingHalf) {
   }
   EXPECT_GT(found, 20);
   store.collect(0);
-  EXPECT_TRUE(only_file(store.folder()).empty()) << "temporary files of killed processes are collected too: " << only_file(store.folder());
+  EXPECT_TRUE(only_file(store.folder()).empty())
+      << "temporary files of killed processes are collected too: " << only_file(store.folder());
 }
 
 /// Starts a process that claims a key, then does `work`; returns once the key is claimed.
@@ -324,7 +338,8 @@ TEST_F(StoreTest, FullDiskDoesNotEndTheRun) {
     const rlimit limit{200, 200};
     setrlimit(RLIMIT_FSIZE, &limit);
     const std::string fault = store.save(marrow::hash_of(1), {many(100000)}, {});
-    const bool told = fault.find("cannot write") != std::string::npos && fault.find("File too large") != std::string::npos;
+    const bool told =
+        fault.find("cannot write") != std::string::npos && fault.find("File too large") != std::string::npos;
     _exit(told && only_file(store.folder()).empty() ? 0 : 1);
   }
   int status = 0;
@@ -369,13 +384,15 @@ TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
   for (int i = 0; i < 2; ++i) store.save(marrow::hash_of(i), {many(1000)}, {});
   for (const char* place : {"old", "young"}) store.remember(place, {});
   const auto now = fs::file_time_type::clock::now();
-  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(), now - std::chrono::hours(72));
+  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(),
+                      now - std::chrono::hours(72));
   const std::uint64_t one = store.entries()[0].bytes;
   for (const Store::Entry& entry : store.entries())
     fs::last_write_time(store.folder() / entry.key.hex().substr(0, 2) / entry.key.hex(), now - std::chrono::hours(60));
   EXPECT_EQ(store.collect(one).entries, 1u);
   EXPECT_EQ(remembered().size(), 2u) << "the call of the result that is kept may have begun then";
-  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(), now - std::chrono::hours(90));
+  fs::last_write_time(store.folder() / "last" / marrow::hash_of(std::string("old")).hex(),
+                      now - std::chrono::hours(90));
   EXPECT_EQ(store.collect(2 * one).entries, 0u);
   EXPECT_EQ(remembered(), (std::set<std::string>{"young"}));
   EXPECT_EQ(store.collect(0).entries, 1u);
@@ -405,7 +422,8 @@ TEST_F(StoreTest, PlanSaysWhatRunsAndWhy) {
 
   store.collect(1);
   planned = plan(kChain, "n: n");
-  EXPECT_EQ(planned[0].why, "the store has no result of it: it failed, was stopped or removed, or the processor is another");
+  EXPECT_EQ(planned[0].why,
+            "the store has no result of it: it failed, was stopped or removed, or the processor is another");
 }
 
 TEST_F(StoreTest, WarningsAreRepeated) {

@@ -172,7 +172,8 @@ TEST_F(UntrustedLibraryTest, AnAccessListIsNoPrivateGroup) {
     Entry entries[5] = {{1, 7, ~0u}, {2, 7, kSomebody}, {4, 5, ~0u}, {16, 7, ~0u}, {32, 5, ~0u}};
   } list;
   expect_trusted(file);
-  if (setxattr(folder.c_str(), "system.posix_acl_access", &list, sizeof list, 0) != 0) GTEST_SKIP() << "no access lists here";
+  if (setxattr(folder.c_str(), "system.posix_acl_access", &list, sizeof list, 0) != 0)
+    GTEST_SKIP() << "no access lists here";
   ASSERT_EQ(fs::status(folder).permissions(), fs::perms(0775));
   expect_untrusted(file, "others may write to '" + folder.string() + "' (owner ");
   expect_untrusted(file, "mode 0775 and an access list); chmod go-w '" + folder.string() + "'");

@@ -66,7 +66,8 @@ TEST(Worker, AnswersOneJobAfterTheOther) {
 TEST(Worker, WhatALibraryPrintsIsNoAnswer) { EXPECT_EQ(ask({{"do", "print"}}).answer, "done"); }
 
 TEST(Worker, LinesThatAreNoPartOfTheJobEndIt) {
-  for (const char* line : {"end {}\n", "{\"job\": 2, \"end\": 1}\n", "{\"end\": 1}\n", "[1]\n", "{\"job\": \"1\", \"end\": 1}\n", "\n"}) {
+  for (const char* line :
+       {"end {}\n", "{\"job\": 2, \"end\": 1}\n", "{\"end\": 1}\n", "[1]\n", "{\"job\": \"1\", \"end\": 1}\n", "\n"}) {
     const WorkerEnd end = ask({{"do", "forge"}, {"line", line}});
     EXPECT_TRUE(end.died) << line;
     EXPECT_EQ(end.failed, "its process sent something that is no part of its job") << line;
@@ -183,11 +184,13 @@ TEST(Worker, ALowLimitOfFilesIsSaid) {
     said = error.what();
   }
   setrlimit(RLIMIT_NOFILE, &before);
-  EXPECT_EQ(said, "cannot start a process: no more than 50 files may be open at once; raise the limit (ulimit -n 1024)");
+  EXPECT_EQ(said,
+            "cannot start a process: no more than 50 files may be open at once; raise the limit (ulimit -n 1024)");
 }
 
 TEST(Worker, BytesThatAreNoTextTravelToo) {
-  for (const std::string& text : {std::string("plain"), std::string("M\xfcller"), std::string("a\0b", 3), std::string("\xff\xfe")})
+  for (const std::string& text :
+       {std::string("plain"), std::string("M\xfcller"), std::string("a\0b", 3), std::string("\xff\xfe")})
     EXPECT_EQ(marrow::bytes_of_json(json::parse(marrow::json_of_bytes(text).dump())), text);
 }
 

@@ -32,9 +32,7 @@ inline double round_cone(const Vector3d& p, const Vector3d& a, const Vector3d& b
 using Scene = std::function<double(const Vector3d&)>;
 
 /// Volume of a body with a soft rim as wide as the sub-voxels, which stands for their partial filling.
-inline double filled(double distance_mm) {
-  return std::clamp(0.5 - distance_mm / 0.4, 0.0, 1.0);
-}
+inline double filled(double distance_mm) { return std::clamp(0.5 - distance_mm / 0.4, 0.0, 1.0); }
 
 inline void blur_axis(std::vector<float>& values, const std::array<int, 3>& size, int axis, double sigma) {
   std::vector<float> kernel;

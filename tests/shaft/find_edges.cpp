@@ -4,6 +4,4 @@
 
 #include "plugins/edges/adaptive_relaxation.cpp"
 
-marrow::EdgeMap find_edges(const marrow::View& view) {
-  return adaptive_relaxation(view, Options{});
-}
+marrow::EdgeMap find_edges(const marrow::View& view) { return adaptive_relaxation(view, Options{}); }

@@ -50,9 +50,7 @@ void draw(marrow::EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vect
   }
 }
 
-marrow::EdgeMap no_edges() {
-  return {512, 512, {}};
-}
+marrow::EdgeMap no_edges() { return {512, 512, {}}; }
 const Eigen::Vector2d kLeft(-1, 0), kRight(1, 0);
 
 }  // namespace

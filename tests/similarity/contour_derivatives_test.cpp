@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The derivatives and the noise model of the contour's cost, against differences, numbers worked out by hand, and noise itself.
+// The derivatives and the noise model of the contour's cost, against differences, numbers worked out by hand, and noise
+// itself.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -22,11 +23,12 @@ using marrow::Vector6d;
 
 constexpr double kDepth_mm = 600, kFocal_px = 1000 / 0.586, kMiddle_px = 255.5;
 
-/// Three sides of a rectangle, each in a plane through the source, so that it stays a straight line of the image at any depth:
-/// left and right at -+40 mm, and the upper one at 50 mm. Of the view from the side another one.
+/// Three sides of a rectangle, each in a plane through the source, so that it stays a straight line of the image at any
+/// depth: left and right at -+40 mm, and the upper one at 50 mm. Of the view from the side another one.
 class Sides : public marrow::Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose, double spacing_px) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
+                                            double spacing_px) const override {
     std::vector<marrow::OutlinePoint> points;
     const bool frontal = camera.camera_from_world.rotation(0, 0) > 0.5;
     const auto add = [&](double across_mm, double up_mm, double depth_mm, double normal_u, double normal_v) {
@@ -49,7 +51,8 @@ class Sides : public marrow::Projector {
 marrow::EdgeMap edges_outside(double offset_px, bool frontal) {
   marrow::EdgeMap map{512, 512, {}};
   const auto px = [](double mm) { return kFocal_px * mm / kDepth_mm; };
-  const float left = float(kMiddle_px + px(frontal ? -40 : -30) - offset_px), right = float(kMiddle_px + px(frontal ? 40 : 50) + offset_px),
+  const float left = float(kMiddle_px + px(frontal ? -40 : -30) - offset_px),
+              right = float(kMiddle_px + px(frontal ? 40 : 50) + offset_px),
               top = float(kMiddle_px - px(50) - offset_px);
   for (int u = 130; u < 380; ++u) map.pixels.push_back({float(u), top, 0, -1, 1});
   for (int v = 130; v < 400; ++v) {
@@ -61,7 +64,8 @@ marrow::EdgeMap edges_outside(double offset_px, bool frontal) {
 
 /// A cost, and what it refers to.
 struct Held {
-  Held(const marrow::Projector* projector, const List<marrow::View>& views, const List<marrow::EdgeMap>& edges, const shipped::Options& options)
+  Held(const marrow::Projector* projector, const List<marrow::View>& views, const List<marrow::EdgeMap>& edges,
+       const shipped::Options& options)
       : inputs{{"projector", marrow::Value::of<marrow::Projector>(std::shared_ptr<const marrow::Projector>(projector))},
                {"views", shipped::list(views, "view")},
                {"edges", shipped::list(edges, "view")}},
@@ -100,7 +104,9 @@ Vector6d slope_by_differences(const Cost& cost, const RigidTransform& pose) {
   Vector6d slope;
   for (int axis = 0; axis < 6; ++axis) {
     const Vector6d motion = step(axis) * Vector6d::Unit(axis);
-    slope[axis] = (cost.value(marrow::moved(pose, frame(), motion)) - cost.value(marrow::moved(pose, frame(), -motion))) / (2 * step(axis));
+    slope[axis] =
+        (cost.value(marrow::moved(pose, frame(), motion)) - cost.value(marrow::moved(pose, frame(), -motion))) /
+        (2 * step(axis));
   }
   return slope;
 }
@@ -112,7 +118,8 @@ Matrix6d curvature_by_differences(const Cost& cost, const RigidTransform& pose) 
   };
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < 6; ++j)
-      curvature(i, j) = (value(i, 1, j, 1) - value(i, 1, j, -1) - value(i, -1, j, 1) + value(i, -1, j, -1)) / (4 * step(i) * step(j));
+      curvature(i, j) =
+          (value(i, 1, j, 1) - value(i, 1, j, -1) - value(i, -1, j, 1) + value(i, -1, j, -1)) / (4 * step(i) * step(j));
   return curvature;
 }
 
@@ -137,13 +144,15 @@ void expect_curvature_at_the_bottom(const Cost& cost) {
   EXPECT_NEAR(about->value, 0, 1e-6);
   const Matrix6d found = curvature_by_differences(cost, bottom);
   for (int i = 0; i < 6; ++i)
-    for (int j = 0; j < 6; ++j) EXPECT_NEAR(about->curvature(i, j), found(i, j), 0.01 * std::sqrt(found(i, i) * found(j, j))) << i << ", " << j;
+    for (int j = 0; j < 6; ++j)
+      EXPECT_NEAR(about->curvature(i, j), found(i, j), 0.01 * std::sqrt(found(i, i) * found(j, j))) << i << ", " << j;
 }
 
 }  // namespace
 
 TEST(ContourDerivatives, TheSlopeIsThatOfTheValueWithAnEdgeOffset) {
-  for (const double offset_px : {0.0, 1.5, -1.0}) expect_slope(*cost_of(0, {{"estimate_offset", false}, {"edge_offset_px", offset_px}}), 0.005);
+  for (const double offset_px : {0.0, 1.5, -1.0})
+    expect_slope(*cost_of(0, {{"estimate_offset", false}, {"edge_offset_px", offset_px}}), 0.005);
 }
 
 TEST(ContourDerivatives, TheSlopeIsThatOfTheValueWhereTheOffsetIsFound) { expect_slope(*cost_of(1.5, {}), 0.01); }
@@ -162,9 +171,11 @@ namespace {
 /// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
 class Line : public marrow::Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose, double) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
+                                            double) const override {
     std::vector<marrow::OutlinePoint> points;
-    for (int v = 50; v < camera.height_px - 50; ++v) points.push_back({float(100 + pose.translation_mm.x()), float(v), -1, 0});
+    for (int v = 50; v < camera.height_px - 50; ++v)
+      points.push_back({float(100 + pose.translation_mm.x()), float(v), -1, 0});
     return points;
   }
 };
@@ -206,14 +217,18 @@ TEST(ContourLikelihood, IsWhatOneComputesByHand) {
   // All 100 edges lie 0.5 px off, in blocks of 14, 32, 32 and 22 points.
   const double d = 0.5, root = std::sqrt(1 + d * d), blocks = 14 * 14 + 32 * 32 + 32 * 32 + 22 * 22;
   const double curvature = 1 / (root * root * root);
-  const auto expected = [&](double model_error_px) { return curvature * 100 * 100 / (blocks * (d * d + model_error_px * model_error_px) / (root * root)); };
+  const auto expected = [&](double model_error_px) {
+    return curvature * 100 * 100 / (blocks * (d * d + model_error_px * model_error_px) / (root * root));
+  };
   EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}}), expected(0), 1e-3 * expected(0));
   EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.7}}), expected(0.7), 1e-3 * expected(0.7));
   // The offset is no error: with it, the edges lie where they should, and are known to 0.05 px each.
   EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}, {"edge_offset_px", -0.5}}), 100 / (0.05 * 0.05), 1);
   // Two views tell twice as much, and less where one of them counts more.
   EXPECT_NEAR(factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}}), 2 * expected(0), 2e-3 * expected(0));
-  EXPECT_NEAR(factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}, {"weights", std::vector<double>{3, 1}}}), 1.6 * expected(0), 2e-3 * expected(0));
+  EXPECT_NEAR(
+      factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}, {"weights", std::vector<double>{3, 1}}}),
+      1.6 * expected(0), 2e-3 * expected(0));
 }
 
 TEST(ContourLikelihood, PredictsTheScatterThatNoiseMakes) {
@@ -233,7 +248,8 @@ TEST(ContourLikelihood, PredictsTheScatterThatNoiseMakes) {
     const auto value = [&](double x) { return cost->value(shifted(x)); };
     const double h = 0.2;
     double x = 0;
-    for (int round = 0; round < 4; ++round) x -= 0.5 * h * (value(x + h) - value(x - h)) / (value(x + h) - 2 * value(x) + value(x - h));
+    for (int round = 0; round < 4; ++round)
+      x -= 0.5 * h * (value(x + h) - value(x - h)) / (value(x + h) - 2 * value(x) + value(x - h));
     const double curvature = (value(x + h) - 2 * value(x) + value(x - h)) / (h * h);
     squares += x * x / kRuns;
     predicted += 1 / (*cost->likelihood_factor(shifted(x)) * curvature) / kRuns;

@@ -60,8 +60,10 @@ Options fixed_offset(double offset_px = 0) {
 const LineProjector kLine;
 
 /// Of one fragment alone.
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
-                                                     const marrow::List<marrow::EdgeMap>& edges, const Options& options) {
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
+                                                     const marrow::List<marrow::View>& views,
+                                                     const marrow::List<marrow::EdgeMap>& edges,
+                                                     const Options& options) {
   return contour_distance(projector, views, edges, nullptr, nullptr, options);
 }
 
@@ -163,7 +165,8 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
   std::vector<marrow::OutlinePoint> points;
   for (int i = 0; i < 300; ++i) {
     const double angle = 0.7 * i;
-    points.push_back({float((i * 37) % 131) - 5, float((i * 53) % 101) - 5, float(std::cos(angle)), float(std::sin(angle)), Eigen::Vector3f::Zero()});
+    points.push_back({float((i * 37) % 131) - 5, float((i * 53) % 101) - 5, float(std::cos(angle)),
+                      float(std::sin(angle)), Eigen::Vector3f::Zero()});
   }
   for (const double reach_px : {0.5, 4.0, 9.0}) {
     const NearestOutline nearest(points, 120, 90, reach_px);
@@ -175,13 +178,16 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
         int expected = -1;
         for (std::size_t i = 0; i < points.size(); ++i) {
           const double away = std::hypot(double(points[i].u_px) - u, double(points[i].v_px) - v);
-          if (away < best - 1e-6 && 0.6 * double(points[i].normal_u) + 0.8 * double(points[i].normal_v) >= 0.5) best = away, expected = int(i);
+          if (away < best - 1e-6 && 0.6 * double(points[i].normal_u) + 0.8 * double(points[i].normal_v) >= 0.5)
+            best = away, expected = int(i);
         }
         const int found = nearest.find(edge, reach_px, 0.5f);
         ASSERT_EQ(found < 0, expected < 0) << u << " " << v << " " << reach_px;
         if (found < 0) continue;
         ++within;
-        EXPECT_NEAR(std::hypot(double(points[std::size_t(found)].u_px) - u, double(points[std::size_t(found)].v_px) - v), best, 1e-4);
+        EXPECT_NEAR(
+            std::hypot(double(points[std::size_t(found)].u_px) - u, double(points[std::size_t(found)].v_px) - v), best,
+            1e-4);
       }
     EXPECT_GT(within, 5);
   }

@@ -15,11 +15,13 @@ constexpr double kWidth_px = 2.5;
 /// An upright wall at u = 100 + x that the ray crosses to the right of it, blurred by an error function.
 class WallProjector : public Projector {
  public:
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose, const marrow::PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose,
+                                const marrow::PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
       for (int column = 0; column < grid.columns; ++column)
-        values.push_back(float(20 + 20 * std::erf((grid.pixel(column, row).x() - 100 - pose.translation_mm.x()) / (std::sqrt(2.0) * kWidth_px))));
+        values.push_back(float(20 + 20 * std::erf((grid.pixel(column, row).x() - 100 - pose.translation_mm.x()) /
+                                                  (std::sqrt(2.0) * kWidth_px))));
     return values;
   }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform& pose) const override {
@@ -51,7 +53,8 @@ class ObliqueWallProjector : public Projector {
 class SquareProjector : public Projector {
  public:
   explicit SquareProjector(int around_px) : around_px_(around_px) {}
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&, const marrow::PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
+                                const marrow::PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
       for (int column = 0; column < grid.columns; ++column) {
@@ -80,7 +83,8 @@ shipped::Inputs inputs(double u, float direction = -1) {
 }
 
 double value(const shipped::Inputs& inputs, const marrow::RigidTransform& pose, std::int64_t step = 1) {
-  const marrow::Value cost = shipped::call("similarity.drr_edges", inputs, {{"pixel_step", step}, {"reach_px", 10.0}}).at("cost");
+  const marrow::Value cost =
+      shipped::call("similarity.drr_edges", inputs, {{"pixel_step", step}, {"reach_px", 10.0}}).at("cost");
   return cost.as<marrow::Cost>().value(pose);
 }
 
@@ -90,7 +94,8 @@ double loss(double distance) { return std::sqrt(1 + distance * distance) - 1; }
 
 TEST(DrrEdges, FindsTheRadiographsEdgesBetweenPixels) {
   for (const std::int64_t step : {1, 2, 3})
-    for (const double x : {-4.0, -1.3, 0.0, 0.45, 2.0}) EXPECT_NEAR(value(inputs(100.4), at(x, 0), step), loss(x - 0.4), 0.05) << step << " " << x;
+    for (const double x : {-4.0, -1.3, 0.0, 0.45, 2.0})
+      EXPECT_NEAR(value(inputs(100.4), at(x, 0), step), loss(x - 0.4), 0.05) << step << " " << x;
 }
 
 TEST(DrrEdges, DistancesAreAcrossAnObliqueEdge) {
@@ -130,7 +135,8 @@ TEST(DrrEdges, BlurReachesBeyondTheRegion) {
   const auto value_with = [](int around_px, double blur_px) {
     shipped::Inputs in = inputs(81);
     in["projector"] = marrow::Value::of<Projector>(std::make_shared<const SquareProjector>(around_px));
-    const marrow::Value cost = shipped::call("similarity.drr_edges", in, {{"blur_px", blur_px}, {"reach_px", 10.0}}).at("cost");
+    const marrow::Value cost =
+        shipped::call("similarity.drr_edges", in, {{"blur_px", blur_px}, {"reach_px", 10.0}}).at("cost");
     return cost.as<marrow::Cost>().value(at(0, 0));
   };
   for (const double blur_px : {1.5, 4.0}) EXPECT_NEAR(value_with(0, blur_px), value_with(30, blur_px), 1e-3) << blur_px;

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The measures against their formulas as the papers print them (Penney et al., IEEE Trans Med Imaging 1998), summed pixel by pixel over all of the image.
+// The measures against their formulas as the papers print them (Penney et al., IEEE Trans Med Imaging 1998), summed
+// pixel by pixel over all of the image.
 #include <algorithm>
 #include <array>
 #include <map>
@@ -41,15 +42,21 @@ double covariance(const std::vector<double>& x, const std::vector<double>& y) {
   for (std::size_t i = 0; i < x.size(); ++i) sum += (x[i] - a) * (y[i] - b);
   return sum / double(x.size());
 }
-double correlation(const std::vector<double>& x, const std::vector<double>& y) { return covariance(x, y) / std::sqrt(covariance(x, x) * covariance(y, y)); }
+double correlation(const std::vector<double>& x, const std::vector<double>& y) {
+  return covariance(x, y) / std::sqrt(covariance(x, x) * covariance(y, y));
+}
 /// Sobel's, over eight, where all nine pixels are in the image.
 std::array<std::vector<double>, 2> gradients(const std::vector<double>& image) {
   std::array<std::vector<double>, 2> g;
   const auto at = [&](int u, int v) { return image[std::size_t(v * kWidth + u)]; };
   for (int v = 1; v + 1 < kHeight; ++v)
     for (int u = 1; u + 1 < kWidth; ++u) {
-      g[0].push_back((at(u + 1, v - 1) - at(u - 1, v - 1) + 2 * (at(u + 1, v) - at(u - 1, v)) + at(u + 1, v + 1) - at(u - 1, v + 1)) / 8);
-      g[1].push_back((at(u - 1, v + 1) - at(u - 1, v - 1) + 2 * (at(u, v + 1) - at(u, v - 1)) + at(u + 1, v + 1) - at(u + 1, v - 1)) / 8);
+      g[0].push_back((at(u + 1, v - 1) - at(u - 1, v - 1) + 2 * (at(u + 1, v) - at(u - 1, v)) + at(u + 1, v + 1) -
+                      at(u - 1, v + 1)) /
+                     8);
+      g[1].push_back((at(u - 1, v + 1) - at(u - 1, v - 1) + 2 * (at(u, v + 1) - at(u, v - 1)) + at(u + 1, v + 1) -
+                      at(u + 1, v - 1)) /
+                     8);
     }
   return g;
 }
@@ -59,7 +66,8 @@ std::vector<double> difference(const Images& images, bool with_model = true) {
   const auto seen = gradients(images.seen), rendered = gradients(images.rendered);
   double products = 0, squares = 0;
   for (std::size_t k = 0; k < 2; ++k)
-    for (std::size_t i = 0; i < seen[k].size(); ++i) products += seen[k][i] * rendered[k][i], squares += rendered[k][i] * rendered[k][i];
+    for (std::size_t i = 0; i < seen[k].size(); ++i)
+      products += seen[k][i] * rendered[k][i], squares += rendered[k][i] * rendered[k][i];
   const double s = with_model ? products / squares : 0;
   std::vector<double> d;
   for (std::size_t i = 0; i < images.seen.size(); ++i) d.push_back(images.seen[i] - s * images.rendered[i]);
@@ -79,14 +87,17 @@ std::pair<double, double> range(const std::vector<double>& x) {
 /// The projector's region is only part of the image: here all of it.
 class Everywhere : public intensity_behaviour::BlobProjector {
  public:
-  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {0, 0, 1, kWidth, kHeight}; }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
+    return {0, 0, 1, kWidth, kHeight};
+  }
 };
 
 double value(const std::string& measure, double du, double dv, shipped::Options options = {}) {
   options["blur_px"] = 0.0;
   options["pixel_step"] = std::int64_t(1);
   options["margin_px"] = std::int64_t(kMargin_px);
-  const shipped::Inputs in{{"projector", marrow::Value::of<marrow::Projector>(std::make_shared<const Everywhere>())}, {"views", shipped::list(intensity_behaviour::views_of(view()), "view")}};
+  const shipped::Inputs in{{"projector", marrow::Value::of<marrow::Projector>(std::make_shared<const Everywhere>())},
+                           {"views", shipped::list(intensity_behaviour::views_of(view()), "view")}};
   const marrow::Value cost = shipped::call("similarity." + measure, in, options).at("cost");
   return cost.as<marrow::Cost>().value(intensity_behaviour::at(du, dv));
 }
@@ -106,7 +117,8 @@ TEST(Formulas, GradientCorrelation) {
   for (const auto& [du, dv] : kPlaces) {
     const Images images = images_at(du, dv);
     const auto seen = gradients(images.seen), rendered = gradients(images.rendered);
-    EXPECT_NEAR(value("gradient_correlation", du, dv), 1 - 0.5 * (correlation(rendered[0], seen[0]) + correlation(rendered[1], seen[1])), 1e-4);
+    EXPECT_NEAR(value("gradient_correlation", du, dv),
+                1 - 0.5 * (correlation(rendered[0], seen[0]) + correlation(rendered[1], seen[1])), 1e-4);
   }
 }
 
@@ -117,11 +129,14 @@ TEST(Formulas, MutualInformation) {
     const auto [b_low, b_high] = range(images.seen);
     std::map<std::pair<int, int>, int> of_a, of_b, joint;
     for (std::size_t i = 0; i < images.seen.size(); ++i) {
-      const int a = std::min(31, int(32 * (images.rendered[i] - a_low) / (a_high - a_low))), b = std::min(31, int(32 * (images.seen[i] - b_low) / (b_high - b_low)));
+      const int a = std::min(31, int(32 * (images.rendered[i] - a_low) / (a_high - a_low))),
+                b = std::min(31, int(32 * (images.seen[i] - b_low) / (b_high - b_low)));
       of_a[{a, 0}] += 1, of_b[{0, b}] += 1, joint[{a, b}] += 1;
     }
     const double n = kWidth * kHeight;
-    EXPECT_NEAR(value("mutual_information", du, dv), 2 - (entropy(of_a, n) + entropy(of_b, n)) / entropy(joint, n), 1e-3) << "a value at a bin's border may fall into either";
+    EXPECT_NEAR(value("mutual_information", du, dv), 2 - (entropy(of_a, n) + entropy(of_b, n)) / entropy(joint, n),
+                1e-3)
+        << "a value at a bin's border may fall into either";
   }
 }
 
@@ -134,7 +149,8 @@ TEST(Formulas, EntropyOfDifference) {
       for (const double x : d) histogram[{std::min(64, int(std::floor(0.5 + 64 * (x - low) / (high - low)))), 0}] += 1;
       return entropy(histogram, kWidth * kHeight);
     };
-    EXPECT_NEAR(value("entropy_of_difference", du, dv), std::min(2.0, entropy_of(difference(images)) / entropy_of(difference(images, false))), 1e-3);
+    EXPECT_NEAR(value("entropy_of_difference", du, dv),
+                std::min(2.0, entropy_of(difference(images)) / entropy_of(difference(images, false))), 1e-3);
   }
 }
 
@@ -151,13 +167,16 @@ TEST(Formulas, PatternIntensity) {
         for (int u = 0; u < kWidth; ++u)
           for (int y = -r; y <= r; ++y)
             for (int x = -r; x <= r; ++x) {
-              if (x * x + y * y > r * r || (x == 0 && y == 0) || u + x < 0 || v + y < 0 || u + x >= kWidth || v + y >= kHeight) continue;
+              if (x * x + y * y > r * r || (x == 0 && y == 0) || u + x < 0 || v + y < 0 || u + x >= kWidth ||
+                  v + y >= kHeight)
+                continue;
               const double step = d[std::size_t(v * kWidth + u)] - d[std::size_t((v + y) * kWidth + u + x)];
               sum += s2 / (s2 + step * step), pairs += 1;
             }
       return pairs - sum;
     };
-    EXPECT_NEAR(value("pattern_intensity", du, dv, {{"radius_pixels", std::int64_t(r)}, {"sigma", sigma}}), std::min(2.0, pattern(difference(images)) / pattern(difference(images, false))), 1e-4);
+    EXPECT_NEAR(value("pattern_intensity", du, dv, {{"radius_pixels", std::int64_t(r)}, {"sigma", sigma}}),
+                std::min(2.0, pattern(difference(images)) / pattern(difference(images, false))), 1e-4);
   }
 }
 
@@ -179,12 +198,20 @@ TEST(Formulas, GradientDifference) {
 }
 
 TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
-  // The same value whether all of the image is compared or only the model's surroundings: the sums are over a fixed region.
+  // The same value whether all of the image is compared or only the model's surroundings: the sums are over a fixed
+  // region.
   for (const std::string measure : {"pattern_intensity", "gradient_difference", "entropy_of_difference"}) {
     const auto near = [&](double du, double dv) {
-      const shipped::Inputs in{{"projector", marrow::Value::of<marrow::Projector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
-                               {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of(50000, 0.02, 0)), "view")}};
-      return shipped::call("similarity." + measure, in, {{"pixel_step", std::int64_t(1)}, {"blur_px", 0.0}, {"margin_px", std::int64_t(16)}}).at("cost").as<marrow::Cost>().value(intensity_behaviour::at(du, dv));
+      const shipped::Inputs in{
+          {"projector",
+           marrow::Value::of<marrow::Projector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
+          {"views",
+           shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of(50000, 0.02, 0)), "view")}};
+      return shipped::call("similarity." + measure, in,
+                           {{"pixel_step", std::int64_t(1)}, {"blur_px", 0.0}, {"margin_px", std::int64_t(16)}})
+          .at("cost")
+          .as<marrow::Cost>()
+          .value(intensity_behaviour::at(du, dv));
     };
     EXPECT_LT(near(0, 0), 0.35) << measure << ": next to nothing is left";
     EXPECT_GT(near(60, 40), 0.95) << measure << ": where the image is even, the model explains nothing";

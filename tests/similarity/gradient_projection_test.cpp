@@ -21,7 +21,8 @@ marrow::Volume ball() {
   for (int z = 0; z < 60; ++z)
     for (int y = 0; y < 60; ++y)
       for (int x = 0; x < 60; ++x) {
-        const double depth = kRadius_mm - (volume.grid.point_from_index({double(x), double(y), double(z)}) - kMiddle_mm).norm();
+        const double depth =
+            kRadius_mm - (volume.grid.point_from_index({double(x), double(y), double(z)}) - kMiddle_mm).norm();
         volume.values.push_back(float(800 * std::clamp(depth + 0.5, 0.0, 1.0)));
       }
   return volume;
@@ -44,10 +45,14 @@ marrow::View view_of(double angle) {
 shipped::Inputs inputs() {
   marrow::List<marrow::View> views;
   for (const double angle : {0.0, 90.0}) views.add(angle > 0 ? "lateral" : "frontal", view_of(angle));
-  return {{"mesh", shipped::item(shapes::sphere(kRadius_mm))}, {"volume", shipped::item(ball())}, {"views", shipped::list(views, "view")}};
+  return {{"mesh", shipped::item(shapes::sphere(kRadius_mm))},
+          {"volume", shipped::item(ball())},
+          {"views", shipped::list(views, "view")}};
 }
 
-RigidTransform shifted(double x, double y, double z) { return shapes::centred_at(kMiddle_mm - Eigen::Vector3d(x, y, z)); }
+RigidTransform shifted(double x, double y, double z) {
+  return shapes::centred_at(kMiddle_mm - Eigen::Vector3d(x, y, z));
+}
 
 }  // namespace
 
@@ -59,7 +64,10 @@ TEST(GradientProjection, IsBestAtTheTruth) {
   EXPECT_LT(best, 0.4);
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(0, 1, 0), Eigen::Vector3d(0, 0, 1)})
     for (const double side : {-1.0, 1.0}) {
-      const auto at = [&](double by) { const Eigen::Vector3d p = side * by * axis; return value(p.x(), p.y(), p.z()); };
+      const auto at = [&](double by) {
+        const Eigen::Vector3d p = side * by * axis;
+        return value(p.x(), p.y(), p.z());
+      };
       EXPECT_GT(at(1), best);
       EXPECT_GT(at(3), at(1));
       EXPECT_GT(at(6), at(3));
@@ -79,7 +87,8 @@ TEST(GradientProjection, WhatLiesBehindTheSourceIsNotSeen) {
   // Through the source the ball would be seen where it is now, upside down, with gradients that then fit a bright ball.
   const Eigen::Vector3d behind_mm = 2 * marrow::source_position_mm(views[0].camera);
   for (const double off_mm : {-3.0, 0.0, 4.0})
-    EXPECT_EQ(made.as<marrow::Cost>().value(shifted(behind_mm.x() + off_mm, behind_mm.y(), behind_mm.z() - off_mm)), 1) << off_mm;
+    EXPECT_EQ(made.as<marrow::Cost>().value(shifted(behind_mm.x() + off_mm, behind_mm.y(), behind_mm.z() - off_mm)), 1)
+        << off_mm;
 }
 
 TEST(GradientProjection, DirectionsCount) {
@@ -134,7 +143,10 @@ TEST(GradientProjection, WhatIsMaskedDoesNotCount) {
     views.add("frontal", view);
     shipped::Inputs in = inputs();
     in["views"] = shipped::list(views, "view");
-    return shipped::call("similarity.gradient_projection", in).at("cost").as<marrow::Cost>().value(shifted(0.3, 0, 0.6));
+    return shipped::call("similarity.gradient_projection", in)
+        .at("cost")
+        .as<marrow::Cost>()
+        .value(shifted(0.3, 0, 0.6));
   };
   EXPECT_LT(value(20000), 0.9) << "some of the outline is left";
   EXPECT_NEAR(value(5), value(60000), 1e-6) << "line integrals are relative to the brightest pixel";
@@ -152,7 +164,8 @@ TEST(GradientProjection, AnotherFragmentsShadowDoesNotCount) {
     }
     shipped::Inputs in = inputs();
     in["views"] = shipped::list(views, "view");
-    const marrow::Value made = shipped::call("similarity.gradient_projection", told ? fragments.with(in) : in).at("cost");
+    const marrow::Value made =
+        shipped::call("similarity.gradient_projection", told ? fragments.with(in) : in).at("cost");
     return made.as<marrow::Cost>().value(shifted(0, 0, 9));
   };
   EXPECT_GT(std::abs(value(5000, false) - value(39000, false)), 0.01);
@@ -186,7 +199,8 @@ TEST(GradientProjection, ImagesThatAreTurnedBy180DegreesGiveTheSame) {
   };
   const marrow::Value straight = cost_of(view), other = cost_of(turned);
   for (const double x : {0.0, 1.3, 4.1})
-    EXPECT_NEAR(straight.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)), other.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)), 1e-5);
+    EXPECT_NEAR(straight.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)),
+                other.as<marrow::Cost>().value(shifted(x, 0.4, 2.2)), 1e-5);
 }
 
 TEST(GradientProjection, SaysWhatIsWrong) {
@@ -194,5 +208,6 @@ TEST(GradientProjection, SaysWhatIsWrong) {
   marrow::Volume even = ball();
   even.values.assign(even.values.size(), 100);
   in["volume"] = shipped::item(even);
-  EXPECT_EQ(shipped::refusal("similarity.gradient_projection", in), "the volume has no gradient on the mesh: wire the volume that the mesh was made from");
+  EXPECT_EQ(shipped::refusal("similarity.gradient_projection", in),
+            "the volume has no gradient on the mesh: wire the volume that the mesh was made from");
 }

@@ -22,7 +22,9 @@ using Make = std::function<std::shared_ptr<const Cost>(const Projector&, const L
 
 /// Line integrals of two blobs, which move by a pixel a millimetre.
 inline double blobs(double u, double v) {
-  const auto blob = [&](double u0, double v0, double width) { return std::exp(-0.5 * ((u - u0) * (u - u0) + (v - v0) * (v - v0)) / (width * width)); };
+  const auto blob = [&](double u0, double v0, double width) {
+    return std::exp(-0.5 * ((u - u0) * (u - u0) + (v - v0) * (v - v0)) / (width * width));
+  };
   return 40 * blob(90, 80, 9) + 25 * blob(118, 96, 6);
 }
 
@@ -38,8 +40,10 @@ class BlobProjector : public Projector {
     return values;
   }
   PixelGrid region(const Camera& camera, const RigidTransform& pose) const override {
-    const double left = std::max(0.0, std::floor(50 + pose.translation_mm.x())), top = std::max(0.0, std::floor(40 + pose.translation_mm.y()));
-    const int columns = int(std::min(100.0, camera.width_px - left)), rows = int(std::min(90.0, camera.height_px - top));
+    const double left = std::max(0.0, std::floor(50 + pose.translation_mm.x())),
+                 top = std::max(0.0, std::floor(40 + pose.translation_mm.y()));
+    const int columns = int(std::min(100.0, camera.width_px - left)),
+              rows = int(std::min(90.0, camera.height_px - top));
     return columns > 0 && rows > 0 ? PixelGrid{left, top, 1, columns, rows} : PixelGrid{};
   }
 };
@@ -64,7 +68,8 @@ inline View view_of(double gain = 50000, double slope = 0.02, double noise = 100
     for (int u = 0; u < 200; ++u) {
       double sum = 0;
       for (int i = 0; i < 12; ++i) sum += double(random()) / 4294967296.0 - 0.5;
-      view.image.pixels.at<std::uint16_t>(v, u) = std::uint16_t(std::max(0.0, gain * std::exp(-slope * blobs(u, v)) + noise * sum));
+      view.image.pixels.at<std::uint16_t>(v, u) =
+          std::uint16_t(std::max(0.0, gain * std::exp(-slope * blobs(u, v)) + noise * sum));
     }
   return view;
 }
@@ -75,7 +80,8 @@ inline List<View> views_of(const View& view) {
   return views;
 }
 
-/// Best where the model is, and the worse the further it is off; some costs are best there, but have no slope to it from afar.
+/// Best where the model is, and the worse the further it is off; some costs are best there, but have no slope to it
+/// from afar.
 inline void is_best_at_the_truth(const Make& make, bool has_slope = true) {
   const BlobProjector projector;
   const auto cost = make(projector, views_of(view_of()));
@@ -92,7 +98,8 @@ inline void is_best_at_the_truth(const Make& make, bool has_slope = true) {
 
 inline void is_unmoved_by_brightness(const Make& make) {
   const BlobProjector projector;
-  const auto one = make(projector, views_of(view_of(50000, 0.02, 0))), darker = make(projector, views_of(view_of(25000, 0.02, 0)));
+  const auto one = make(projector, views_of(view_of(50000, 0.02, 0))),
+             darker = make(projector, views_of(view_of(25000, 0.02, 0)));
   EXPECT_NEAR(one->value(at(3, 2)), darker->value(at(3, 2)), 0.01);
 }
 
@@ -111,14 +118,16 @@ inline void nothing_is_the_worst(const Make& make, double worst) {
   EXPECT_TRUE(std::isfinite(make(projector, views_of(masked))->value(at(0, 0))));
   View few = masked;
   few.mask(cv::Rect(89, 79, 3, 3)).setTo(1);
-  EXPECT_EQ(make(projector, views_of(few))->value(at(0, 0)), make(projector, views_of(masked))->value(at(0, 0))) << "nine pixels say no more than none";
+  EXPECT_EQ(make(projector, views_of(few))->value(at(0, 0)), make(projector, views_of(masked))->value(at(0, 0)))
+      << "nine pixels say no more than none";
   View black = view;
   black.image.pixels = cv::Mat(170, 200, CV_16U, cv::Scalar(0));
   EXPECT_TRUE(std::isfinite(make(projector, views_of(black))->value(at(0, 0))));
   View nan = view;
   view.image.pixels.convertTo(nan.image.pixels, CV_32F);
   nan.image.pixels.at<float>(80, 90) = std::nanf("");
-  EXPECT_TRUE(std::isfinite(make(projector, views_of(nan))->value(at(0, 0)))) << "a pixel that is not a number is left out";
+  EXPECT_TRUE(std::isfinite(make(projector, views_of(nan))->value(at(0, 0))))
+      << "a pixel that is not a number is left out";
 }
 
 inline void levels_compare_fewer_pixels(const Make& make) {

@@ -34,7 +34,8 @@ struct Fragments {
 /// A square of shadow, wherever the pose is.
 class SquareProjector : public Projector {
  public:
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&, const marrow::PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
+                                const marrow::PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
       for (int column = 0; column < grid.columns; ++column) {
@@ -43,13 +44,16 @@ class SquareProjector : public Projector {
       }
     return values;
   }
-  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {95, 55, 1, 40, 40}; }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
+    return {95, 55, 1, 40, 40};
+  }
 };
 
 /// The same square as an outline, open below.
 class SquareOutline : public Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&, double spacing_px) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&,
+                                            double spacing_px) const override {
     std::vector<marrow::OutlinePoint> points;
     for (double at = 0; at < 30; at += spacing_px) {
       points.push_back({100, float(60 + at), -1, 0});

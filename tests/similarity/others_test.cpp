@@ -11,17 +11,19 @@ namespace {
 using intensity_behaviour::at;
 using marrow::Cost;
 using marrow::List;
+using marrow::Projector;
 using other_fragment::Fragments;
 using other_fragment::SquareOutline;
 using other_fragment::SquareProjector;
-using marrow::Projector;
 
 /// An upright line at u = 60 + x, facing left.
 class LineProjector : public Projector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose, double spacing_px) const override {
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
+                                            double spacing_px) const override {
     std::vector<marrow::OutlinePoint> points;
-    for (double v = 20; v < 140; v += spacing_px) points.push_back({float(60 + pose.translation_mm.x()), float(v), -1, 0});
+    for (double v = 20; v < 140; v += spacing_px)
+      points.push_back({float(60 + pose.translation_mm.x()), float(v), -1, 0});
     return points;
   }
 };
@@ -34,7 +36,8 @@ marrow::View view_with(double grey) {
   return view;
 }
 
-double value(const std::string& node, const shipped::Inputs& inputs, const marrow::RigidTransform& pose, const shipped::Options& options) {
+double value(const std::string& node, const shipped::Inputs& inputs, const marrow::RigidTransform& pose,
+             const shipped::Options& options) {
   const marrow::Value cost = shipped::call(node, inputs, options).at("cost");
   return cost.as<Cost>().value(pose);
 }
@@ -44,14 +47,19 @@ double value(const std::string& node, const shipped::Inputs& inputs, const marro
 TEST(Others, TheirShadowsDoNotCount) {
   const shipped::Options options{{"blur_px", 0.0}};
   const auto own = std::make_shared<const intensity_behaviour::BlobProjector>();
-  for (const std::shared_ptr<const Projector>& other : {std::shared_ptr<const Projector>(new SquareProjector), std::shared_ptr<const Projector>(new SquareOutline)}) {
+  for (const std::shared_ptr<const Projector>& other :
+       {std::shared_ptr<const Projector>(new SquareProjector), std::shared_ptr<const Projector>(new SquareOutline)}) {
     const Fragments fragments{own, other};
-    const auto with = [&](double grey) { return fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}}); };
-    EXPECT_NEAR(value("similarity.normalised_cross_correlation", with(9000), at(2, 1), options), value("similarity.normalised_cross_correlation", with(40000), at(2, 1), options), 1e-6);
+    const auto with = [&](double grey) {
+      return fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}});
+    };
+    EXPECT_NEAR(value("similarity.normalised_cross_correlation", with(9000), at(2, 1), options),
+                value("similarity.normalised_cross_correlation", with(40000), at(2, 1), options), 1e-6);
     shipped::Inputs alone = with(9000);
     alone.erase("others");
     alone.erase("other_projectors");
-    EXPECT_GT(value("similarity.normalised_cross_correlation", alone, at(0, 0), options), value("similarity.normalised_cross_correlation", with(9000), at(0, 0), options) + 0.05);
+    EXPECT_GT(value("similarity.normalised_cross_correlation", alone, at(0, 0), options),
+              value("similarity.normalised_cross_correlation", with(9000), at(0, 0), options) + 0.05);
   }
 }
 
@@ -65,7 +73,9 @@ TEST(Others, TheirEdgesDoNotCount) {
   List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
   const Fragments fragments{std::make_shared<const LineProjector>(), std::make_shared<const SquareOutline>()};
-  shipped::Inputs inputs = fragments.with({{"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")}, {"edges", shipped::list(edges, "view")}});
+  shipped::Inputs inputs =
+      fragments.with({{"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+                      {"edges", shipped::list(edges, "view")}});
   shipped::Options options{{"reach_px", 20.0}, {"estimate_offset", false}};
   const std::string node = "similarity.contour_distance";
   const double worst = value(node, inputs, at(500, 0), options), left_out = value(node, inputs, at(38, 0), options);
@@ -78,22 +88,25 @@ TEST(Others, TheirEdgesDoNotCount) {
 }
 
 TEST(Others, BothWaysAndWeights) {
-  // Half of the edges lie 3 px off: seen from the outline every point has an edge at 0, seen from the edges half are off.
+  // Half of the edges lie 3 px off: seen from the outline every point has an edge at 0, seen from the edges half are
+  // off.
   marrow::EdgeMap map{200, 170, {}};
   for (int v = 20; v < 140; ++v) {
     if (v % 2) map.pixels.push_back({64, float(v), -1, 0, 1});
   }
   List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
-  shipped::Inputs inputs{{"projector", marrow::Value::of<Projector>(std::make_shared<const LineProjector>())},
-                         {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
-                         {"edges", shipped::list(edges, "view")}};
+  shipped::Inputs inputs{
+      {"projector", marrow::Value::of<Projector>(std::make_shared<const LineProjector>())},
+      {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
+      {"edges", shipped::list(edges, "view")}};
   shipped::Options options{{"reach_px", 6.0}, {"estimate_offset", false}, {"contour_spacing_px", 1.0}};
   const std::string node = "similarity.contour_distance";
   const double worst = std::sqrt(37.0) - 1;
   EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0, 1e-5);
   options["symmetric"] = true;
-  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0.5 * 0.5 * worst, 0.02) << "there is only half of the edges that the outline would make";
+  EXPECT_NEAR(value(node, inputs, at(4, 0), options), 0.5 * 0.5 * worst, 0.02)
+      << "there is only half of the edges that the outline would make";
   EXPECT_NEAR(value(node, inputs, at(500, 0), options), worst, 1e-6);
 
   // A second view without the line: weighted away.

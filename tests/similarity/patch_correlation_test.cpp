@@ -13,13 +13,17 @@ using marrow::Projector;
 class FormulaProjector : public Projector {
  public:
   explicit FormulaProjector(std::function<double(double, double)> formula) : formula_(std::move(formula)) {}
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&, const marrow::PixelGrid& grid) const override {
+  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
+                                const marrow::PixelGrid& grid) const override {
     std::vector<float> values;
     for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column) values.push_back(float(formula_(grid.pixel(column, row).x(), grid.pixel(column, row).y())));
+      for (int column = 0; column < grid.columns; ++column)
+        values.push_back(float(formula_(grid.pixel(column, row).x(), grid.pixel(column, row).y())));
     return values;
   }
-  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override { return {0, 0, 1, 5, 5}; }
+  marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
+    return {0, 0, 1, 5, 5};
+  }
 
  private:
   std::function<double(double, double)> formula_;
@@ -39,9 +43,13 @@ marrow::View small_view(const std::function<double(double, double)>& formula) {
 }
 
 double value(const std::function<double(double, double)>& rendered, const std::function<double(double, double)>& seen) {
-  const shipped::Inputs inputs{{"projector", marrow::Value::of<Projector>(std::make_shared<const FormulaProjector>(rendered))},
-                               {"views", shipped::list(intensity_behaviour::views_of(small_view(seen)), "view")}};
-  const shipped::Options options{{"pixel_step", std::int64_t(1)}, {"margin_px", std::int64_t(0)}, {"blur_px", 0.0}, {"patch_pixels", std::int64_t(5)}};
+  const shipped::Inputs inputs{
+      {"projector", marrow::Value::of<Projector>(std::make_shared<const FormulaProjector>(rendered))},
+      {"views", shipped::list(intensity_behaviour::views_of(small_view(seen)), "view")}};
+  const shipped::Options options{{"pixel_step", std::int64_t(1)},
+                                 {"margin_px", std::int64_t(0)},
+                                 {"blur_px", 0.0},
+                                 {"patch_pixels", std::int64_t(5)}};
   const marrow::Value cost = shipped::call("similarity.patch_correlation", inputs, options).at("cost");
   return cost.as<marrow::Cost>().value(at(0, 0));
 }
@@ -61,7 +69,8 @@ TEST(PatchCorrelation, IsTheCorrelationOfOneSquare) {
   // u against u + v: both vary alike, so r = 1 / sqrt 2.
   EXPECT_NEAR(value(right, [](double u, double v) { return 0.2 * (u + v); }), 1 - std::sqrt(0.5), 1e-6);
   EXPECT_NEAR(value(right, [](double, double) { return 0.5; }), 1, 1e-6) << "an even image";
-  EXPECT_NEAR(value([](double, double) { return 7; }, [](double u, double) { return u; }), 2, 1e-6) << "an even radiograph";
+  EXPECT_NEAR(value([](double, double) { return 7; }, [](double u, double) { return u; }), 2, 1e-6)
+      << "an even radiograph";
 }
 
 TEST(PatchCorrelation, IsBestAtTheTruth) {

@@ -17,7 +17,9 @@ using marrow::RigidTransform;
 constexpr double kRadius_mm = 15;
 
 /// Signed distance to a ball and a smaller one, through which rays run that touch the larger; clamped as segmenters do.
-double distance_mm(const Eigen::Vector3d& p) { return std::clamp(std::min(p.norm() - kRadius_mm, (p - Eigen::Vector3d(8, 18, 20)).norm() - 8), -6.0, 6.0); }
+double distance_mm(const Eigen::Vector3d& p) {
+  return std::clamp(std::min(p.norm() - kRadius_mm, (p - Eigen::Vector3d(8, 18, 20)).norm() - 8), -6.0, 6.0);
+}
 
 marrow::SignedField field() {
   marrow::SignedField field;
@@ -25,19 +27,23 @@ marrow::SignedField field() {
   field.grid.origin_mm = {-28, -26, -28};
   for (int z = 0; z < 76; ++z)
     for (int y = 0; y < 70; ++y)
-      for (int x = 0; x < 60; ++x) field.values_mm.push_back(float(distance_mm(field.grid.point_from_index({double(x), double(y), double(z)}))));
+      for (int x = 0; x < 60; ++x)
+        field.values_mm.push_back(float(distance_mm(field.grid.point_from_index({double(x), double(y), double(z)}))));
   return field;
 }
 
 /// Pixels whose rays touch the larger ball at its place; the directions are the outline's normals.
 marrow::EdgeMap edges_of_ball(const marrow::Camera& camera) {
-  const Eigen::Vector3d source = marrow::source_position_mm(camera), n = source.normalized(), a = n.unitOrthogonal(), b = n.cross(a);
+  const Eigen::Vector3d source = marrow::source_position_mm(camera), n = source.normalized(), a = n.unitOrthogonal(),
+                        b = n.cross(a);
   const double share = kRadius_mm / source.norm();
   marrow::EdgeMap map{camera.width_px, camera.height_px, {}};
   for (int i = 0; i < 360; ++i) {
     const double angle = marrow::radians(i);
-    const Eigen::Vector3d normal = share * n + std::sqrt(1 - share * share) * (std::cos(angle) * a + std::sin(angle) * b);
-    const Eigen::Vector2d pixel = marrow::project(camera, kRadius_mm * normal), outward = (marrow::project(camera, (kRadius_mm + 0.01) * normal) - pixel).normalized();
+    const Eigen::Vector3d normal =
+        share * n + std::sqrt(1 - share * share) * (std::cos(angle) * a + std::sin(angle) * b);
+    const Eigen::Vector2d pixel = marrow::project(camera, kRadius_mm * normal),
+                          outward = (marrow::project(camera, (kRadius_mm + 0.01) * normal) - pixel).normalized();
     map.pixels.push_back({float(pixel.x()), float(pixel.y()), float(outward.x()), float(outward.y()), 100});
   }
   return map;
@@ -54,28 +60,33 @@ shipped::Inputs inputs(bool turned_edges = false) {
       for (auto& edge : map.pixels) edge.direction_u = -edge.direction_u, edge.direction_v = -edge.direction_v;
     edges.add(name, map);
   }
-  return {{"field", shipped::item(field())}, {"views", shipped::list(views, "view")}, {"edges", shipped::list(edges, "view")}};
+  return {{"field", shipped::item(field())},
+          {"views", shipped::list(views, "view")},
+          {"edges", shipped::list(edges, "view")}};
 }
 
 /// Holds the inputs that the cost refers to.
 struct Made {
   shipped::Inputs in;
   marrow::Value value;
-  explicit Made(shipped::Inputs from, const shipped::Options& options = {}) : in(std::move(from)), value(shipped::call("similarity.ray_to_surface", in, options).at("cost")) {}
+  explicit Made(shipped::Inputs from, const shipped::Options& options = {})
+      : in(std::move(from)), value(shipped::call("similarity.ray_to_surface", in, options).at("cost")) {}
   const Cost& operator*() const { return value.as<Cost>(); }
 };
 
 RigidTransform shifted(double x, double y, double z) { return shapes::centred_at({-x, -y, -z}); }
 
-double tukey(double d, double reach) { return d < reach ? reach * reach / 6 * (1 - std::pow(1 - d * d / (reach * reach), 3)) : reach * reach / 6; }
+double tukey(double d, double reach) {
+  return d < reach ? reach * reach / 6 * (1 - std::pow(1 - d * d / (reach * reach), 3)) : reach * reach / 6;
+}
 
 }  // namespace
 
 TEST(RayToSurface, IsTheDistanceThatOneComputesByHand) {
   const Made cost(inputs(), {{"ray_step", std::int64_t(1)}, {"reach_mm", 5.0}});
   EXPECT_NEAR((*cost).value(shifted(0, 0, 0)), 0, 2e-3) << "touches all rays, up to the voxels";
-  // Along the frontal view's own axis a shift changes that view little; the other sees it from the side: a ray at angle a to the shift s
-  // passes at s cos a.
+  // Along the frontal view's own axis a shift changes that view little; the other sees it from the side: a ray at angle
+  // a to the shift s passes at s cos a.
   const double s = 1.5;
   double lateral = 0, frontal = 0;
   for (int i = 0; i < 360; ++i) {
@@ -90,7 +101,8 @@ TEST(RayToSurface, WhatIsFarOrOfTheOtherDirectionIsTheWorst) {
   const Made cost(inputs());
   EXPECT_NEAR((*cost).value(shifted(200, 0, 0)), worst, 1e-12);
   EXPECT_NEAR((*cost).value(shifted(0, -2000, 0)), worst, 1e-12) << "behind a source";
-  EXPECT_NEAR((*Made(inputs(true))).value(shifted(0, 0, 0)), worst, 0.06) << "but for a few rays that touch the smaller ball from the other side";
+  EXPECT_NEAR((*Made(inputs(true))).value(shifted(0, 0, 0)), worst, 0.06)
+      << "but for a few rays that touch the smaller ball from the other side";
 }
 
 TEST(RayToSurface, KnowsItsDerivatives) {
@@ -103,7 +115,9 @@ TEST(RayToSurface, KnowsItsDerivatives) {
   EXPECT_NEAR(about->value, (*cost).value(pose), 1e-12);
   for (int k = 0; k < 6; ++k) {
     const double h = k < 3 ? 5e-3 : 0.1;
-    const auto at = [&](double by) { return (*cost).value(marrow::moved(pose, frame, by * marrow::Vector6d::Unit(k))); };
+    const auto at = [&](double by) {
+      return (*cost).value(marrow::moved(pose, frame, by * marrow::Vector6d::Unit(k)));
+    };
     EXPECT_NEAR(about->gradient[k], (at(h) - at(-h)) / (2 * h), k < 3 ? 0.08 : 0.02) << k;
   }
   EXPECT_GE(about->curvature.selfadjointView<Eigen::Lower>().eigenvalues().minCoeff(), -1e-12);
@@ -111,7 +125,9 @@ TEST(RayToSurface, KnowsItsDerivatives) {
   const auto bottom = (*cost).expansion(shifted(0, 0, 0), {});
   const double h = 0.3;
   for (int k = 3; k < 6; ++k) {
-    const auto at = [&](double by) { return (*cost).value(marrow::moved(shifted(0, 0, 0), {}, by * marrow::Vector6d::Unit(k))); };
+    const auto at = [&](double by) {
+      return (*cost).value(marrow::moved(shifted(0, 0, 0), {}, by * marrow::Vector6d::Unit(k)));
+    };
     EXPECT_NEAR(bottom->curvature(k, k), (at(h) - 2 * at(0) + at(-h)) / (h * h), 0.1 * bottom->curvature(k, k)) << k;
   }
 }
@@ -120,7 +136,8 @@ TEST(RayToSurface, LevelsUseFewerRays) {
   const Made cost(inputs());
   const auto coarse = (*cost).at_level({6, 30, 0});
   EXPECT_LT(coarse->value(shifted(0, 0, 0)), 0.01);
-  EXPECT_NEAR(coarse->value(shifted(300, 0, 0)), 6.0 * 6 / 6, 1e-9) << "30 px are 10.5 mm at the isocentre, but the field ends at 6 mm";
+  EXPECT_NEAR(coarse->value(shifted(300, 0, 0)), 6.0 * 6 / 6, 1e-9)
+      << "30 px are 10.5 mm at the isocentre, but the field ends at 6 mm";
 }
 
 TEST(RayToSurface, AnotherFragmentsEdgesDoNotCount) {
@@ -144,16 +161,19 @@ TEST(RayToSurface, AnotherFragmentsEdgesDoNotCount) {
   shipped::Inputs unknown = told;
   unknown.erase("projector");
   EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", unknown),
-            "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that draws this fragment");
+            "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that "
+            "draws this fragment");
 }
 
 TEST(RayToSurface, SaysWhatIsWrong) {
   shipped::Inputs broken = inputs();
   broken["edges"] = {};
-  EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", broken), "there are 2 views, but edge maps of 0; give the edges of each view");
+  EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", broken),
+            "there are 2 views, but edge maps of 0; give the edges of each view");
   broken = inputs();
   marrow::SignedField outside = field();
   outside.values_mm.assign(outside.values_mm.size(), 6);
   broken["field"] = shipped::item(outside);
-  EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", broken), "the field has no inside, so no ray can touch its surface; check the segmentation");
+  EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", broken),
+            "the field has no inside, so no ray can touch its surface; check the segmentation");
 }

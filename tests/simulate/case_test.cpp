@@ -51,7 +51,8 @@ TEST(SimulateCase, HoldsSeedsTruthAndViewsAndNoStart) {
     EXPECT_GE(seeds.points_mm.size(), 4u);
     for (const auto& point : seeds.points_mm) {
       const Grid& grid = result.ct.grid;
-      EXPECT_GT(sample_trilinear(grid, result.ct.values, grid.index_from_point(point)), 130) << seeds.fragment << " " << point.transpose();
+      EXPECT_GT(sample_trilinear(grid, result.ct.values, grid.index_from_point(point)), 130)
+          << seeds.fragment << " " << point.transpose();
     }
   }
 }

@@ -40,8 +40,9 @@ TEST(SimulateCt, MaterialsHaveTheirHounsfieldUnits) {
 }
 
 TEST(SimulateCt, EdgesAreAGaussianStepAlongEachAxis) {
-  // The faces of a cube lie at 0; a Gaussian point-spread function turns a step into its cumulative distribution. Along x lengths
-  // are exact; along y and z a face lies halfway between the last ray outside and the first one inside, at most 0.15 mm off.
+  // The faces of a cube lie at 0; a Gaussian point-spread function turns a step into its cumulative distribution. Along
+  // x lengths are exact; along y and z a face lies halfway between the last ray outside and the first one inside, at
+  // most 0.15 mm off.
   Phantom phantom = test::whole(test::box({0, 0, 0}, {30, 30, 30}));
   CtOptions options;
   options.noise_hu = 0;
@@ -53,7 +54,8 @@ TEST(SimulateCt, EdgesAreAGaussianStepAlongEachAxis) {
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d point(15, 15, 15);
     const double fine = raster.spacing_mm[axis];
-    const double face = axis == 0 ? 0 : raster.origin_mm[axis] + (std::ceil(-raster.origin_mm[axis] / fine) - 0.5) * fine;
+    const double face =
+        axis == 0 ? 0 : raster.origin_mm[axis] + (std::ceil(-raster.origin_mm[axis] / fine) - 0.5) * fine;
     EXPECT_LE(std::abs(face), 0.15);
     for (int i = 0; i < 20; ++i) {
       Eigen::Vector3d index = volume.grid.index_from_point(point);
@@ -61,7 +63,8 @@ TEST(SimulateCt, EdgesAreAGaussianStepAlongEachAxis) {
       index[axis] = i;
       const double distance = volume.grid.point_from_index(index)[axis];
       const double expected = -1000 + 2450 * 0.5 * std::erfc(-(distance - face) / (0.9 * std::sqrt(2.0)));
-      EXPECT_NEAR(volume.at(int(index[0]), int(index[1]), int(index[2])), expected, 6) << "axis " << axis << " at " << distance;
+      EXPECT_NEAR(volume.at(int(index[0]), int(index[1]), int(index[2])), expected, 6)
+          << "axis " << axis << " at " << distance;
     }
   }
 }
@@ -119,7 +122,8 @@ TEST(SimulateCt, BadInputIsExplained) {
   Phantom open = tube();
   open.bone.outer.triangles.pop_back();
   EXPECT_EQ(test::message_of([&] { scan(open, options, context); }),
-            "simulate.ct, outer surface: the surface is open or not consistently oriented, so it has no inside; close its holes "
+            "simulate.ct, outer surface: the surface is open or not consistently oriented, so it has no inside; close "
+            "its holes "
             "(each edge must be shared by exactly two triangles)");
   options.range_mm = {100, 200};
   EXPECT_EQ(test::message_of([&] { scan(tube(), options, context); }),
@@ -128,7 +132,9 @@ TEST(SimulateCt, BadInputIsExplained) {
   options.spacing_mm[1] = 0;
   EXPECT_EQ(test::message_of([&] { scan(tube(), options, context); }),
             "simulate.ct: spacing_mm must be positive, got 0.000000");
-  EXPECT_EQ(test::message_of([&] { scan(Phantom{tube().bone, {}, {}}, CtOptions{}, context); }),
+  EXPECT_EQ(test::message_of([&] {
+              scan(Phantom{tube().bone, {}, {}}, CtOptions{}, context);
+            }),
             "simulate.ct: the phantom has no fragments; make it with simulate.fracture");
 }
 

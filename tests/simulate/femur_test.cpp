@@ -94,7 +94,8 @@ TEST(SimulateFemur, ThinShaftIsExplained) {
   FemurOptions options = coarse();
   options.canal_diameter_mm = 26;
   EXPECT_EQ(test::message_of([&] { femur(options, context); }),
-            "simulate.femur: a canal of 26.000000 mm leaves less than 2 mm of cortex in a shaft of 28.000000 mm; make the canal narrower");
+            "simulate.femur: a canal of 26.000000 mm leaves less than 2 mm of cortex in a shaft of 28.000000 mm; make "
+            "the canal narrower");
 }
 
 }  // namespace

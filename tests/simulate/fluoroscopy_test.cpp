@@ -146,7 +146,8 @@ TEST(SimulateFluoroscopy, BlurWidensAnEdgeByItsSpread) {
   const View view = exposed(phantom, options, 1, 129);
   const auto grey = [&](int u) { return double(view.image.pixels.at<std::uint16_t>(64, u)); };
   const double air = grey(20), bone = grey(100);
-  // The edge lies at the middle of pixel 64: between its neighbours at +-2 px the Gaussian step changes by erf(1 / sqrt 2).
+  // The edge lies at the middle of pixel 64: between its neighbours at +-2 px the Gaussian step changes by erf(1 / sqrt
+  // 2).
   EXPECT_NEAR((grey(62) - grey(66)) / (air - bone), std::erf(1 / std::sqrt(2.0)), 0.03);
 }
 
@@ -155,7 +156,8 @@ TEST(SimulateFluoroscopy, BadInputIsExplained) {
   phantom.fragments[0].world_from_ct.translation_mm = {0, -600, 0};
   const std::string message = test::message_of([&] { exposed(phantom, ideal()); });
   EXPECT_EQ(message,
-            "simulate.fluoroscopy: fragment 'whole' reaches to -4.000000 mm from the X-ray source; it must lie in front of the "
+            "simulate.fluoroscopy: fragment 'whole' reaches to -4.000000 mm from the X-ray source; it must lie in "
+            "front of the "
             "source, so check the camera's distances and the fragment's translation");
   phantom = test::whole(test::box({-10, -4, -10}, {10, 6, 10}));
   phantom.fragments[0].world_from_ct.rotation *= 2;

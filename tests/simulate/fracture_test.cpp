@@ -13,11 +13,11 @@ Bone shaft() {
   Bone bone;
   // Rings of corners along the cylinder, so that its triangles are small against the fracture.
   bone.outer = simulate::polygonise(
-      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 14, std::abs(p.z()) - 100); }, {-20, -20, -104},
-      {26, 20, 104}, 1.1, 1.5);
+      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 14, std::abs(p.z()) - 100); },
+      {-20, -20, -104}, {26, 20, 104}, 1.1, 1.5);
   bone.inner = simulate::polygonise(
-      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 6, std::abs(p.z()) - 94); }, {-20, -20, -104},
-      {26, 20, 104}, 1.1, 1.5);
+      [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 6, std::abs(p.z()) - 94); },
+      {-20, -20, -104}, {26, 20, 104}, 1.1, 1.5);
   return bone;
 }
 
@@ -78,9 +78,9 @@ TEST(SimulateFracture, MotionIsAboutTheFragmentsOwnAxes) {
   const Vector6d motion = motion_between(RigidTransform{"world", "ct"}, distal.world_from_ct, distal.frame);
   const Vector6d expected = (Vector6d() << radians(2), radians(-3), radians(40), 4, 5, -6).finished();
   EXPECT_LT((motion - expected).norm(), 1e-9);
-  // The distal shaft reaches from -100 to -10 (level 0.45): its wall of 7917 mm2 around -55 and its cap of 616 mm2 at -100 have
-  // their centre at -58.2, and the gap is 2. The cut rises by tan 30 cos 30 = 0.5 along x, which moves the centre of the wall
-  // by 0.5 14^2 / (2 90) = 0.54; its share is 0.93.
+  // The distal shaft reaches from -100 to -10 (level 0.45): its wall of 7917 mm2 around -55 and its cap of 616 mm2 at
+  // -100 have their centre at -58.2, and the gap is 2. The cut rises by tan 30 cos 30 = 0.5 along x, which moves the
+  // centre of the wall by 0.5 14^2 / (2 90) = 0.54; its share is 0.93.
   EXPECT_NEAR(distal.frame.origin_mm.z(), -58.2 - 2, 0.3);
   EXPECT_NEAR(distal.frame.origin_mm.x(), 3.5 + 0.5, 0.05);
   EXPECT_NEAR(distal.frame.axes(2, 2), 1, 2e-3);
@@ -101,8 +101,10 @@ TEST(SimulateFracture, SeedsLieInTheirOwnFragmentsCortex) {
       EXPECT_GT(radius, 8);
       EXPECT_LT(radius, 12);
       const double height = in_bone.z() + 10;  // over the fracture's centre; at radius 12 it rises by 7 mm
-      if (fragment.side < 0) EXPECT_LT(height, 11);
-      else EXPECT_GT(height, -11);
+      if (fragment.side < 0)
+        EXPECT_LT(height, 11);
+      else
+        EXPECT_GT(height, -11);
     }
   }
 }
@@ -112,7 +114,8 @@ TEST(SimulateFracture, BadInputIsExplained) {
   Bone open = shaft();
   open.outer.triangles.pop_back();
   EXPECT_EQ(test::message_of([&] { fracture(open, options); }),
-            "simulate.fracture, outer surface: the surface is open or not consistently oriented, so it has no inside; close its "
+            "simulate.fracture, outer surface: the surface is open or not consistently oriented, so it has no inside; "
+            "close its "
             "holes (each edge must be shared by exactly two triangles)");
   Bone inward = shaft();
   for (auto& triangle : inward.outer.triangles) std::swap(triangle[0], triangle[1]);

@@ -18,11 +18,12 @@ namespace shape = marrow::simulate::test;
 /// Length of bone on the ray of each pixel: {cortical, inner}.
 std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera& camera) {
   const SolidRays rays(phantom, camera.width_px, camera.height_px, [&](const Fragment& fragment) {
-    return [&camera, camera_from_bone = camera.camera_from_world * fragment.world_from_bone()](const Eigen::Vector3d& p) {
-      const Eigen::Vector3d x = camera_from_bone * p;
-      const Eigen::Vector3d pixel = camera.intrinsics * x / x.z();
-      return RayVertex{pixel.x(), pixel.y(), -1 / x.z()};
-    };
+    return
+        [&camera, camera_from_bone = camera.camera_from_world * fragment.world_from_bone()](const Eigen::Vector3d& p) {
+          const Eigen::Vector3d x = camera_from_bone * p;
+          const Eigen::Vector3d pixel = camera.intrinsics * x / x.z();
+          return RayVertex{pixel.x(), pixel.y(), -1 / x.z()};
+        };
   });
   std::vector<std::array<double, 2>> result(std::size_t(camera.width_px) * std::size_t(camera.height_px), {0, 0});
   const auto crossings = rays.bundle().crossings(0, camera.height_px);
@@ -32,13 +33,15 @@ std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera&
     rays.intervals(ray, intervals);
     const Eigen::Vector3d along = camera.intrinsics.inverse() * Eigen::Vector3d(ray[0].column, ray[0].row, 1);
     for (const Interval& i : intervals)
-      result[ray[0].row * std::size_t(camera.width_px) + ray[0].column][i.cortical ? 0 : 1] += (1 / i.from - 1 / i.to) * along.norm();
+      result[ray[0].row * std::size_t(camera.width_px) + ray[0].column][i.cortical ? 0 : 1] +=
+          (1 / i.from - 1 / i.to) * along.norm();
   });
   return result;
 }
 
 /// Chord of a ray through a turned box, by slabs: another way than triangles.
-double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction, const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
+double box_chord(const Eigen::Vector3d& source, const Eigen::Vector3d& direction, const Eigen::Vector3d& low,
+                 const Eigen::Vector3d& high) {
   double from = -1e300, to = 1e300;
   for (int k = 0; k < 3; ++k) {
     const double a = (low[k] - source[k]) / direction[k], b = (high[k] - source[k]) / direction[k];
@@ -60,8 +63,9 @@ TEST(Rays, TurnedBoxHasItsChordsToAMillionth) {
   int off = 0, inside = 0;
   for (int v = 0; v < 200; ++v)
     for (int u = 0; u < 200; ++u) {
-      const double expected = box_chord(bone_from_world * source_position_mm(camera),
-                                        bone_from_world.rotation * ray_direction(camera, {double(u), double(v)}), low, high);
+      const double expected =
+          box_chord(bone_from_world * source_position_mm(camera),
+                    bone_from_world.rotation * ray_direction(camera, {double(u), double(v)}), low, high);
       const double got = measured[std::size_t(v) * 200 + std::size_t(u)][0];
       inside += expected > 0;
       // A ray that meets the silhouette within 1/4096 of a pixel may fall to either side of it.
@@ -78,10 +82,12 @@ TEST(Rays, SphereAndHollowCylinderHaveTheirChords) {
   const auto tube = lengths(shape::whole(shape::cylinder(20, -300, 300), shape::cylinder(8, -290, 290)), camera);
   for (int v = 4; v < 128; v += 9)
     for (int u = 3; u < 128; u += 7) {
-      const Eigen::Vector3d source = source_position_mm(camera), direction = ray_direction(camera, {double(u), double(v)});
+      const Eigen::Vector3d source = source_position_mm(camera),
+                            direction = ray_direction(camera, {double(u), double(v)});
       const double miss = (Eigen::Vector3d(5, 3, -8) - source).cross(direction).norm();
       if (std::abs(miss - 30) > 1) {
-        EXPECT_NEAR(ball[std::size_t(v) * 128 + std::size_t(u)][0], miss < 30 ? 2 * std::sqrt(900 - miss * miss) : 0.0, 0.08);
+        EXPECT_NEAR(ball[std::size_t(v) * 128 + std::size_t(u)][0], miss < 30 ? 2 * std::sqrt(900 - miss * miss) : 0.0,
+                    0.08);
       }
       const auto chord = [&](double radius) {
         const auto [from, to] = through_cylinder({0, 0}, radius, source, direction);

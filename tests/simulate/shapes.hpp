@@ -39,7 +39,8 @@ inline Mesh cylinder(double radius, double low, double high, int sides = 720) {
 
 inline Mesh sphere(const Eigen::Vector3d& centre, double radius, double spacing) {
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius + 3 * spacing);
-  return polygonise([=](const Eigen::Vector3d& p) { return (p - centre).norm() - radius; }, centre - reach, centre + reach, spacing, 1);
+  return polygonise([=](const Eigen::Vector3d& p) { return (p - centre).norm() - radius; }, centre - reach,
+                    centre + reach, spacing, 1);
 }
 
 /// One whole, still fragment.
@@ -60,7 +61,8 @@ inline Camera camera(double beta_deg = 0, int size_px = 512) {
   camera.intrinsics << focal, 0, middle, 0, focal, middle, 0, 0, 1;
   Eigen::Matrix3d upright;
   upright << 1, 0, 0, 0, 0, -1, 0, 1, 0;
-  camera.camera_from_world.rotation = upright * Eigen::AngleAxisd(-radians(beta_deg), Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  camera.camera_from_world.rotation =
+      upright * Eigen::AngleAxisd(-radians(beta_deg), Eigen::Vector3d::UnitZ()).toRotationMatrix();
   camera.camera_from_world.translation_mm = {0, 0, 600};
   return camera;
 }

@@ -16,20 +16,28 @@ namespace test = simulate::test;
 fs::path write_stl(const std::string& name, const Mesh& mesh, bool ascii) {
   const fs::path path = fs::path(testing::TempDir()) / name;
   std::ofstream file(path, std::ios::binary);
-  if (ascii) file << "solid bone\n";
-  else file << std::string(80, ' ');
+  if (ascii)
+    file << "solid bone\n";
+  else
+    file << std::string(80, ' ');
   const std::uint32_t count = std::uint32_t(mesh.triangles.size());
   if (!ascii) file.write(reinterpret_cast<const char*>(&count), 4);
   for (const auto& t : mesh.triangles) {
-    if (ascii) file << "facet normal 0 0 0\nouter loop\n";
-    else file.write(std::string(12, '\0').data(), 12);
+    if (ascii)
+      file << "facet normal 0 0 0\nouter loop\n";
+    else
+      file.write(std::string(12, '\0').data(), 12);
     for (std::uint32_t corner : t) {
       const Eigen::Vector3f p = mesh.vertices_mm[corner].cast<float>();
-      if (ascii) file << "vertex " << p.x() << " " << p.y() << " " << p.z() << "\n";
-      else file.write(reinterpret_cast<const char*>(p.data()), 12);
+      if (ascii)
+        file << "vertex " << p.x() << " " << p.y() << " " << p.z() << "\n";
+      else
+        file.write(reinterpret_cast<const char*>(p.data()), 12);
     }
-    if (ascii) file << "endloop\nendfacet\n";
-    else file.write("\0\0", 2);
+    if (ascii)
+      file << "endloop\nendfacet\n";
+    else
+      file.write("\0\0", 2);
   }
   if (ascii) file << "endsolid bone\n";
   return path;
@@ -67,13 +75,15 @@ TEST(SimulateSurface, BadFilesAreExplained) {
             "surface file " + (folder / "missing.stl").string() + ": cannot be read; give the path of an STL file");
   fs::create_directories(folder / "pipe");
   for (const char* none : {"pipe", "/dev/zero"})
-    EXPECT_EQ(message(reading(folder / none)), "surface file " + (folder / none).string() + ": cannot be read; give the path of an STL file");
+    EXPECT_EQ(message(reading(folder / none)),
+              "surface file " + (folder / none).string() + ": cannot be read; give the path of an STL file");
   const Mesh box = test::box({0, 0, 0}, {10, 10, 100});
   const fs::path truncated = write_stl("truncated.stl", box, false);
   fs::resize_file(truncated, 300);
   EXPECT_EQ(message(reading(truncated)),
-            "surface file " + truncated.string() + ": neither a binary STL (300 bytes, but its header promises 12 triangles, which take "
-            "684) nor an ASCII one; the file may be truncated");
+            "surface file " + truncated.string() +
+                ": neither a binary STL (300 bytes, but its header promises 12 triangles, which take "
+                "684) nor an ASCII one; the file may be truncated");
   std::ofstream(folder / "empty.stl");
   EXPECT_NE(message(reading(folder / "empty.stl")).find("neither a binary STL (0 bytes"), std::string::npos);
   std::ofstream(folder / "words.stl") << "solid x\nvertex 1 2 three\n";
@@ -83,12 +93,14 @@ TEST(SimulateSurface, BadFilesAreExplained) {
   open.triangles.pop_back();
   EXPECT_NE(message(reading(write_stl("open.stl", open, false))).find("the surface is open"), std::string::npos);
   EXPECT_EQ(message(reading(write_stl("lying.stl", test::box({0, 0, 0}, {100, 10, 10}), false))),
-            "simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends 100.000000 x 10.000000 x "
+            "simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends "
+            "100.000000 x 10.000000 x "
             "10.000000 mm; turn it with rotation_deg");
   SurfaceOptions options = reading(write_stl("good.stl", box, false));
   options.fill_at = {0, 1};
   options.fill_fraction = {0.1};
-  EXPECT_EQ(message(options), "simulate.surface: fill_at has 2 positions, but fill_fraction has 1 values; give as many of each");
+  EXPECT_EQ(message(options),
+            "simulate.surface: fill_at has 2 positions, but fill_fraction has 1 values; give as many of each");
 }
 
 TEST(SimulateSurface, RealFemurIsAHollowBone) {

@@ -105,14 +105,16 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   EXPECT_SAYS((write_case(value, path), 0), "case: two views are named 'frontal'");
   value = example_case();
   value.views.add("Frontal", example_view("Frontal", CV_8U, 0));
-  EXPECT_SAYS((write_case(value, path), 0), "case: the views 'frontal' and 'Frontal' are one file to some file systems; rename one of them");
+  EXPECT_SAYS((write_case(value, path), 0),
+              "case: the views 'frontal' and 'Frontal' are one file to some file systems; rename one of them");
   EXPECT_EQ(file_stems({"View-2", "a/b"}), (std::vector<std::string>{"View-2", "view-3"}));
   value = example_case();
   value.seeds.add("distal", {"distal", {{1, 2, 3}}, false});
   EXPECT_SAYS((write_case(value, path), 0), "case: two fragments are named 'distal'");
   value = example_case();
   value.views.add("a\nb", example_view("a\nb", CV_8U, 0));
-  EXPECT_SAYS((write_case(value, path), 0), "case: the name \"a\\x0Ab\" of a view holds a character that cannot be printed; choose another");
+  EXPECT_SAYS((write_case(value, path), 0),
+              "case: the name \"a\\x0Ab\" of a view holds a character that cannot be printed; choose another");
   value = example_case();
   value.seeds.add("", {"", {{1, 2, 3}}, false});
   EXPECT_SAYS((write_case(value, path), 0), "case: the name \"\" of a fragment is empty; choose another");

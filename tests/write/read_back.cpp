@@ -3,6 +3,4 @@
 // here.
 #include "plugins/read/case.cpp"
 
-marrow::Case read_back(const std::filesystem::path& folder) {
-  return read_case({folder});
-}
+marrow::Case read_back(const std::filesystem::path& folder) { return read_case({folder}); }

@@ -25,10 +25,12 @@ double megabytes(std::uint64_t bytes) { return double(bytes) / 1e6; }
 
 void print(const Store::Entry& entry) {
   const Provenance& from = entry.provenance;
-  std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), printable(from.node).c_str(), megabytes(entry.bytes), from.seconds,
-              from.build_id.hex().c_str());
-  for (const auto& [name, value] : from.options) std::printf("  option %-24s %s\n", printable(name).c_str(), printable(value).c_str());
-  for (const auto& [name, digest] : from.inputs) std::printf("  input  %-24s %s\n", printable(name).c_str(), digest.hex().c_str());
+  std::printf("%s: %s, %.2f MB, took %.3f s\n  build id %s\n", entry.key.hex().c_str(), printable(from.node).c_str(),
+              megabytes(entry.bytes), from.seconds, from.build_id.hex().c_str());
+  for (const auto& [name, value] : from.options)
+    std::printf("  option %-24s %s\n", printable(name).c_str(), printable(value).c_str());
+  for (const auto& [name, digest] : from.inputs)
+    std::printf("  input  %-24s %s\n", printable(name).c_str(), digest.hex().c_str());
   for (const Digest& digest : entry.outputs) std::printf("  output %s\n", digest.hex().c_str());
   if (from.random) std::printf("  seed   %llu\n", static_cast<unsigned long long>(from.seed));
   for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
@@ -47,7 +49,8 @@ std::string several(const std::string& key, const std::set<std::string>& keys) {
 }  // namespace
 
 bool can_keep_results(const std::string& fault_of_store, bool quiet) {
-  if (!fault_of_store.empty() && !quiet) std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
+  if (!fault_of_store.empty() && !quiet)
+    std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
   return fault_of_store.empty();
 }
 
@@ -62,9 +65,11 @@ int cache_info() {
       share->bytes += entry.bytes;
       share->seconds += entry.provenance.seconds;
     }
-  std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(store.folder().string()).c_str(), "node", "results", "MB", "seconds");
+  std::printf("%s\n\n%-34s %8s %12s %12s\n", printable(store.folder().string()).c_str(), "node", "results", "MB",
+              "seconds");
   const auto print = [](const std::string& name, const Share& share) {
-    std::printf("%-34s %8zu %12.2f %12.2f\n", printable(name).c_str(), share.entries, megabytes(share.bytes), share.seconds);
+    std::printf("%-34s %8zu %12.2f %12.2f\n", printable(name).c_str(), share.entries, megabytes(share.bytes),
+                share.seconds);
   };
   for (const auto& [name, share] : shares) print(name.empty() ? "(damaged or of another version)" : name, share);
   print("all", all);
@@ -72,7 +77,8 @@ int cache_info() {
 }
 
 int cache_why(const std::string& key) {
-  if (key.empty()) return code_after("the key is empty; give that of a result or of one of its outputs, or its first digits");
+  if (key.empty())
+    return code_after("the key is empty; give that of a result or of one of its outputs, or its first digits");
   const Store store;
   if (const int code = code_after(store.fault())) return code;
   std::vector<Store::Entry> meant;
@@ -84,12 +90,17 @@ int cache_why(const std::string& key) {
     for (const Digest& digest : all) keys.insert(digest.hex());
     if (!all.empty()) meant.push_back(std::move(entry));
   }
-  if (keys.empty()) return code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key + "'");
+  if (keys.empty())
+    return code_after("the store " + store.folder().string() + " holds no result with a key that begins with '" + key +
+                      "'");
   if (keys.size() > 1) return code_after(several(key, keys));
   int code = 0;
   for (const Store::Entry& entry : meant) {
-    if (!entry.provenance.node.empty()) print(entry);
-    else code = code_after("the result " + entry.key.hex() + " is damaged or of another version; it is made anew when it is needed");
+    if (!entry.provenance.node.empty())
+      print(entry);
+    else
+      code = code_after("the result " + entry.key.hex() +
+                        " is damaged or of another version; it is made anew when it is needed");
   }
   return code;
 }
@@ -97,7 +108,8 @@ int cache_why(const std::string& key) {
 int cache_collect(double keep_gb) {
   const Store store;
   const Store::Freed freed = store.collect(std::uint64_t(keep_gb * 1e9));
-  if (freed.fault.empty() || freed.entries) std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
+  if (freed.fault.empty() || freed.entries)
+    std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
   return code_after(freed.fault);
 }
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The commands of the program, a file each. Each returns the exit code: 0 done, 1 a node or a library failed, 2 the request or
-// a file is at fault, 130 stopped by Ctrl-C.
+// The commands of the program, a file each. Each returns the exit code: 0 done, 1 a node or a library failed, 2 the
+// request or a file is at fault, 130 stopped by Ctrl-C.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -34,7 +34,7 @@ struct RerunRequest {
   std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number where that is taken
   bool quiet = false;
   bool json = false;
-  FileLimits file_limits;        ///< instead of those of the run
+  FileLimits file_limits;  ///< instead of those of the run
 };
 
 int run(const RunRequest& request);
@@ -65,16 +65,18 @@ bool can_keep_results(const std::string& fault_of_store, bool quiet);
 /// Splits name=value texts. Throws Error for one without '='.
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline; prints all its faults and returns false when there are any.
-bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json = false);
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
+          bool json = false);
 
 struct RunOutcome {
   RunResult result;
   std::vector<RunFolder::Written> written;
   bool is_faulty = false;  ///< a node failed, or an output was not written
 };
-/// Runs a pipeline into a folder, showing what goes on as the request wishes; its threads and seed count, not its pipeline.
-RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
-                   RunFolder& folder);
+/// Runs a pipeline into a folder, showing what goes on as the request wishes; its threads and seed count, not its
+/// pipeline.
+RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request,
+                   const PipelineArguments& arguments, const Store* store, RunFolder& folder);
 
 /// That the pipeline reads no folder to which the run writes; an empty one is below runs/. Throws Error.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);

@@ -28,7 +28,8 @@ void print_text(const Pipeline& pipeline) {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const PipelineNode& node = pipeline.nodes[i];
     std::printf("%s  (%s)%s%s\n", node.id.c_str(), node.info.name.c_str(),
-                node.mapped_axes.empty() ? "" : ("  for each " + axes_text(node.mapped_axes)).c_str(), needed[i] ? "" : "  [not needed]");
+                node.mapped_axes.empty() ? "" : ("  for each " + axes_text(node.mapped_axes)).c_str(),
+                needed[i] ? "" : "  [not needed]");
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
@@ -38,28 +39,33 @@ void print_text(const Pipeline& pipeline) {
   std::printf("outputs\n");
   for (const PipelineOutput& output : pipeline.outputs) {
     const std::vector<std::string> axes = pipeline.axes_of(output.source);
-    std::printf("    %s <- %s%s\n", output.name.c_str(), printable(output.source.text).c_str(), axes.empty() ? "" : ("  (a list over " + axes_text(axes) + ")").c_str());
+    std::printf("    %s <- %s%s\n", output.name.c_str(), printable(output.source.text).c_str(),
+                axes.empty() ? "" : ("  (a list over " + axes_text(axes) + ")").c_str());
   }
 }
 
 void print_dot(const Pipeline& pipeline) {
-  std::printf("digraph \"%s\" {\n  rankdir=LR; node [shape=box, style=rounded, fontname=\"sans-serif\"];\n", dot_text(pipeline.name).c_str());
+  std::printf("digraph \"%s\" {\n  rankdir=LR; node [shape=box, style=rounded, fontname=\"sans-serif\"];\n",
+              dot_text(pipeline.name).c_str());
   for (const PipelineNode& node : pipeline.nodes) {
     const std::string axes = node.mapped_axes.empty() ? "" : "\\nfor each " + axes_text(node.mapped_axes);
     const std::string id = dot_text(node.id);
-    std::printf("  \"%s\" [label=\"%s\\n%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(), axes.c_str());
+    std::printf("  \"%s\" [label=\"%s\\n%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(),
+                axes.c_str());
   }
   const auto edge = [&](const Reference& source, const std::string& target, const std::string& port) {
     const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
     const PortInfo& output = from.info.outputs[std::size_t(source.output)];
     // Functions travel along dashed edges, data along solid ones.
-    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", dot_text(from.id).c_str(), dot_text(target).c_str(), dot_text(port).c_str(), output.type.is_function ? ", style=dashed" : "");
+    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", dot_text(from.id).c_str(), dot_text(target).c_str(),
+                dot_text(port).c_str(), output.type.is_function ? ", style=dashed" : "");
   };
   for (const PipelineNode& node : pipeline.nodes)
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) edge(source, node.id, node.info.inputs[std::size_t(wire.port)].name);
   for (const PipelineOutput& output : pipeline.outputs) {
-    std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", dot_text(output.name).c_str(), dot_text(output.name).c_str());
+    std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", dot_text(output.name).c_str(),
+                dot_text(output.name).c_str());
     edge(output.source, "output " + output.name, "");
   }
   std::printf("}\n");
@@ -71,8 +77,10 @@ int graph(const PipelineRequest& request, bool dot) {
   const Catalogue catalogue;
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, false)) return 2;
-  if (dot) print_dot(pipeline);
-  else print_text(pipeline);
+  if (dot)
+    print_dot(pipeline);
+  else
+    print_text(pipeline);
   return 0;
 }
 

@@ -27,12 +27,14 @@ bool is_read(const std::string& text, T& value) {
 
 }  // namespace
 
-std::uint64_t whole_number(const std::string& option, const std::string& text, std::uint64_t least, std::uint64_t most) {
+std::uint64_t whole_number(const std::string& option, const std::string& text, std::uint64_t least,
+                           std::uint64_t most) {
   std::uint64_t value = 0;
   const bool has_leading_zero = text.size() > 1 && text[0] == '0';
   if (!is_read(text, value) || has_leading_zero || value < least || value > most)
-    refuse(option, text, "a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
-                             (has_leading_zero ? ", in decimal digits without leading zeros" : ""));
+    refuse(option, text,
+           "a whole number from " + std::to_string(least) + " to " + std::to_string(most) +
+               (has_leading_zero ? ", in decimal digits without leading zeros" : ""));
   return value;
 }
 

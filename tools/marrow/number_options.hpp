@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Options that take a number. The text must be the number and nothing else: decimal, finite and within its bounds, for a
-// number that is taken for another one changes results without a word.
+// Options that take a number. The text must be the number and nothing else: decimal, finite and within its bounds, for
+// a number that is taken for another one changes results without a word.
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <limits>
@@ -11,7 +11,8 @@ namespace marrow::cli {
 
 /// Throws CLI::ValidationError for anything but digits without leading zeros, from `least` to `most`.
 std::uint64_t whole_number(const std::string& option, const std::string& text, std::uint64_t least, std::uint64_t most);
-/// Throws CLI::ValidationError for anything but a decimal number from `least` to `most`. `unit` and `end` are for the sentence.
+/// Throws CLI::ValidationError for anything but a decimal number from `least` to `most`. `unit` and `end` are for the
+/// sentence.
 double number(const std::string& option, const std::string& text, double least, double most, const std::string& unit,
               const std::string& end = "");
 

@@ -22,7 +22,11 @@ std::vector<std::pair<std::string, std::string>> pairs(const std::vector<std::st
 void print_json(const Diagnostics& diagnostics) {
   nlohmann::json list = nlohmann::json::array();
   for (const Diagnostic& item : diagnostics.sorted())
-    list.push_back({{"file", item.place.file}, {"line", item.place.line}, {"column", item.place.column}, {"message", item.message}, {"hint", item.hint}});
+    list.push_back({{"file", item.place.file},
+                    {"line", item.place.line},
+                    {"column", item.place.column},
+                    {"message", item.message},
+                    {"hint", item.hint}});
   std::printf("%s\n", list.dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
@@ -35,13 +39,15 @@ PipelineArguments arguments_of(const PipelineRequest& request) {
   return arguments;
 }
 
-bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required, bool json) {
+bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
+          bool json) {
   Diagnostics diagnostics;
   pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
   if (json) print_json(diagnostics);
   if (diagnostics.empty()) return true;
   if (!json)
-    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(), diagnostics.size() == 1 ? "" : "s");
+    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
+                 diagnostics.size() == 1 ? "" : "s");
   return false;
 }
 
@@ -50,7 +56,8 @@ int check(const PipelineRequest& request, bool json) {
   Pipeline pipeline;
   if (!load(request, catalogue, pipeline, false, json)) return 2;
   if (json) return 0;
-  std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(), pipeline.outputs.size());
+  std::printf("%s: good; %zu nodes, %zu outputs\n", printable(request.file.string()).c_str(), pipeline.nodes.size(),
+              pipeline.outputs.size());
   for (const PipelineNode& node : pipeline.nodes) {
     std::string axes;
     for (const std::string& axis : node.mapped_axes) axes += (axes.empty() ? "" : " and ") + axis;

@@ -11,11 +11,16 @@ using What = PlannedNode::What;
 
 std::string text_of(const PlannedNode& node) {
   switch (node.what) {
-    case What::not_needed: return "not needed";
-    case What::cached: return "cached";
-    case What::function: return "a function, made again when a node that runs needs it";
-    case What::runs: return "runs: " + node.why;
-    case What::depends: break;
+    case What::not_needed:
+      return "not needed";
+    case What::cached:
+      return "cached";
+    case What::function:
+      return "a function, made again when a node that runs needs it";
+    case What::runs:
+      return "runs: " + node.why;
+    case What::depends:
+      break;
   }
   std::string names;
   for (const std::string& name : node.waits_for) names += (names.empty() ? "'" : ", '") + name + "'";
@@ -38,7 +43,8 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   int counts[5] = {};
   double seconds = 0;
   for (std::size_t i = 0; i < planned.size(); ++i) {
-    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), printable(text_of(planned[i])).c_str());
+    std::printf("%-16s %-34s %s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
+                printable(text_of(planned[i])).c_str());
     ++counts[int(planned[i].what)];
     seconds += planned[i].seconds;
   }

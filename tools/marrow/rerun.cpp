@@ -12,7 +12,8 @@ int rerun(const RerunRequest& request) {
   Pipeline pipeline;
   if (!load({request.run / "pipeline.yaml", {}, {}}, catalogue, pipeline, true)) return 2;
   expect_good_place(pipeline, request.folder, nullptr);
-  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / (pipeline.name + "-rerun"), pipeline)
+  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(
+                                                  std::filesystem::path("runs") / (pipeline.name + "-rerun"), pipeline)
                                             : RunFolder(request.folder, pipeline);
   RunRequest how;
   how.seed = before.seed;
@@ -21,15 +22,18 @@ int rerun(const RerunRequest& request) {
   if (request.file_limits.memory_mb > 0) how.file_limits.memory_mb = request.file_limits.memory_mb;
   if (request.file_limits.seconds > 0) how.file_limits.seconds = request.file_limits.seconds;
   how.quiet = request.quiet || request.json;
-  // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the first one.
+  // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the
+  // first one.
   const RunOutcome outcome = execute(pipeline, catalogue, how, before.arguments, nullptr, folder);
   if (outcome.result.cancelled()) return 130;
   KnownValues values;
   for (const NodeRecord& node : outcome.result.nodes)
     for (const Value& output : node.outputs) values.add(output);
   const Findings findings = find_differences(std::move(before), read_run(folder.path()), values);
-  if (request.json) std::printf("%s\n", json_of(findings).dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
-  else print(findings);
+  if (request.json)
+    std::printf("%s\n", json_of(findings).dump(1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  else
+    print(findings);
   return findings.identical() && !outcome.is_faulty ? 0 : 1;
 }
 

@@ -13,30 +13,38 @@ void print_pose(const std::string& name, const Pose& pose) {
   const RigidTransform& t = pose.world_from_model;
   std::printf("%s: %s_from_%s\n", printable(name).c_str(), printable(t.target).c_str(), printable(t.source).c_str());
   for (int row = 0; row < 3; ++row)
-    std::printf("    %10.6f %10.6f %10.6f   %10.4f mm\n", t.rotation(row, 0), t.rotation(row, 1), t.rotation(row, 2), t.translation_mm[row]);
+    std::printf("    %10.6f %10.6f %10.6f   %10.4f mm\n", t.rotation(row, 0), t.rotation(row, 1), t.rotation(row, 2),
+                t.translation_mm[row]);
   if (pose.covariance) {
     const Vector6d sd = pose.covariance->diagonal().cwiseMax(0).cwiseSqrt();
-    std::printf("    predicted standard deviation about and along the frontal, lateral and long axes: %.3f %.3f %.3f deg, %.3f %.3f %.3f mm\n",
-                degrees(sd[0]), degrees(sd[1]), degrees(sd[2]), sd[3], sd[4], sd[5]);
+    std::printf(
+        "    predicted standard deviation about and along the frontal, lateral and long axes: %.3f %.3f %.3f deg, %.3f "
+        "%.3f %.3f mm\n",
+        degrees(sd[0]), degrees(sd[1]), degrees(sd[2]), sd[3], sd[4], sd[5]);
   }
   for (const std::string& warning : pose.warnings) std::printf("    warning: %s\n", printable_lines(warning).c_str());
 }
 
 /// One row a figure, one column an item: the stages of a registration stand side by side.
-void print_metrics(const std::string& name, const std::vector<std::string>& columns, const std::vector<const Metrics*>& items) {
+void print_metrics(const std::string& name, const std::vector<std::string>& columns,
+                   const std::vector<const Metrics*>& items) {
   std::vector<const Metric*> rows;  // the first of each name
   for (const Metrics* item : items)
     for (const Metric& metric : item->items)
-      if (std::none_of(rows.begin(), rows.end(), [&](const Metric* row) { return row->name == metric.name; })) rows.push_back(&metric);
+      if (std::none_of(rows.begin(), rows.end(), [&](const Metric* row) { return row->name == metric.name; }))
+        rows.push_back(&metric);
   std::printf("%-34s", (printable(name) + ":").c_str());
   for (const std::string& column : columns) std::printf(" %10s", printable(column).c_str());
   std::printf("\n");
   for (const Metric* row : rows) {
     std::printf("    %-30s", printable(row->name).c_str());
     for (const Metrics* item : items) {
-      const auto found = std::find_if(item->items.begin(), item->items.end(), [&](const Metric& metric) { return metric.name == row->name; });
-      if (found == item->items.end()) std::printf(" %10s", "");
-      else std::printf(" %10.4f", found->value);
+      const auto found = std::find_if(item->items.begin(), item->items.end(),
+                                      [&](const Metric& metric) { return metric.name == row->name; });
+      if (found == item->items.end())
+        std::printf(" %10s", "");
+      else
+        std::printf(" %10.4f", found->value);
     }
     std::printf(" %s\n", printable(row->unit).c_str());
   }

@@ -22,24 +22,38 @@ using Kind = RunEvent::Kind;
 /// Shows a run's events: lines that stay for what has ended, one that is rewritten for what goes on.
 class Progress {
  public:
-  Progress(const RunRequest& request, RunFolder& folder) : request_(request), folder_(folder), is_terminal_(isatty(STDERR_FILENO)) {}
+  Progress(const RunRequest& request, RunFolder& folder)
+      : request_(request), folder_(folder), is_terminal_(isatty(STDERR_FILENO)) {}
 
   void operator()(const RunEvent& event) {
     const std::string where = printable(event.item.empty() ? event.node : event.node + " (" + event.item + ")");
     if (request_.json) print_json(event);
     switch (event.kind) {
-      case Kind::finished: line(where, seconds_text(event.seconds)); break;
-      case Kind::skipped: line(where, "skipped: " + event.text); break;
-      case Kind::failed: error_line("error: " + event.text); break;
-      case Kind::warning: line(where, "warning: " + event.text); break;
+      case Kind::finished:
+        line(where, seconds_text(event.seconds));
+        break;
+      case Kind::skipped:
+        line(where, "skipped: " + event.text);
+        break;
+      case Kind::failed:
+        error_line("error: " + event.text);
+        break;
+      case Kind::warning:
+        line(where, "warning: " + event.text);
+        break;
       case Kind::waiting:
       case Kind::waited:
         if (!event.text.empty()) line(where, event.text);
         break;
-      case Kind::message: folder_.append_log(where + ": " + event.text); break;
-      case Kind::progress: moving_line(where, event); break;
+      case Kind::message:
+        folder_.append_log(where + ": " + event.text);
+        break;
+      case Kind::progress:
+        moving_line(where, event);
+        break;
       case Kind::started:
-      case Kind::cached: break;
+      case Kind::cached:
+        break;
     }
   }
 
@@ -72,15 +86,17 @@ class Progress {
   /// On a terminal at most ten times a second; in a log file every five seconds.
   void moving_line(const std::string& where, const RunEvent& event) {
     const auto now = std::chrono::steady_clock::now();
-    if (silent() || now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))) return;
+    if (silent() || now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)))
+      return;
     last_ = now;
     clear();
-    std::fprintf(stderr, "  %-32s %3.0f %% %s%s", where.c_str(), 100 * event.fraction, printable(event.text).c_str(), is_terminal_ ? "" : "\n");
+    std::fprintf(stderr, "  %-32s %3.0f %% %s%s", where.c_str(), 100 * event.fraction, printable(event.text).c_str(),
+                 is_terminal_ ? "" : "\n");
   }
 
   static void print_json(const RunEvent& event) {
-    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed", "skipped", "message", "warning", "cached",
-                                             "waiting", "waited"};
+    static constexpr const char* kNames[] = {"started", "progress", "finished", "failed",  "skipped",
+                                             "message", "warning",  "cached",   "waiting", "waited"};
     json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
     if (!event.item.empty()) j["item"] = event.item;
     if (!event.text.empty()) j["text"] = event.text;
@@ -99,18 +115,22 @@ class Progress {
 std::string status_text(const NodeRecord& record) {
   if (record.status != NodeRecord::Status::done || !record.cached) return status_name(record.status);
   char text[64];
-  if (record.calls) std::snprintf(text, sizeof text, "done, %d cached", record.cached);
-  else std::snprintf(text, sizeof text, "cached (took %.3f s)", record.cached_seconds);
+  if (record.calls)
+    std::snprintf(text, sizeof text, "done, %d cached", record.cached);
+  else
+    std::snprintf(text, sizeof text, "cached (took %.3f s)", record.cached_seconds);
   return text;
 }
 
-void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
+                   const RunFolder& folder) {
   std::printf("\n%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed) continue;
-    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls,
-                status_text(record).c_str(), record.reason.empty() ? "" : ": ", printable_lines(record.reason).c_str());
+    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
+                record.seconds, record.calls, status_text(record).c_str(), record.reason.empty() ? "" : ": ",
+                printable_lines(record.reason).c_str());
   }
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);
@@ -121,18 +141,24 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
   }
 }
 
-void print_json_summary(const RunResult& result, const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+void print_json_summary(const RunResult& result, const std::vector<RunFolder::Written>& written,
+                        const RunFolder& folder) {
   json files = json::object();
   for (const RunFolder::Written& output : written) files[output.output] = output.files;
-  const json end = {{"event", "ended"}, {"status", result.cancelled() ? "cancelled" : result.failed() ? "failed" : "done"},
-                    {"seconds", result.seconds}, {"folder", folder.path().string()}, {"files", files}};
+  const json end = {{"event", "ended"},
+                    {"status", result.cancelled() ? "cancelled"
+                               : result.failed()  ? "failed"
+                                                  : "done"},
+                    {"seconds", result.seconds},
+                    {"folder", folder.path().string()},
+                    {"files", files}};
   std::printf("%s\n", end.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 
 }  // namespace
 
-RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request, const PipelineArguments& arguments, const Store* store,
-                   RunFolder& folder) {
+RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request,
+                   const PipelineArguments& arguments, const Store* store, RunFolder& folder) {
   Progress progress(request, folder);
   RunSettings settings;
   settings.seed = request.seed;
@@ -146,8 +172,10 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   };
   for (const std::string& text : pipeline.notes) note(text);
   const std::string fault = store ? store->prepare() : "";
-  if (!fault.empty()) note("results are not kept: " + fault);
-  else settings.store = store;
+  if (!fault.empty())
+    note("results are not kept: " + fault);
+  else
+    settings.store = store;
   RunOutcome outcome;
   outcome.result = run_pipeline(pipeline, catalogue, settings);
   progress.clear();
@@ -158,10 +186,14 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   outcome.is_faulty = outcome.result.failed();
   for (const RunFolder::Written& output : outcome.written) {
     if (output.fault.empty()) continue;
-    if (!output.fault.starts_with("not made")) std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
+    if (!output.fault.starts_with("not made"))
+      std::fprintf(stderr, "marrow: error: output '%s': %s\n", output.output.c_str(),
+                   printable_lines(output.fault).c_str());
     outcome.is_faulty = true;
   }
-  if (outcome.result.cancelled()) std::fprintf(stderr, "marrow: %s; what was done is in %s\n", stopped_text().c_str(), printable(folder.path().string()).c_str());
+  if (outcome.result.cancelled())
+    std::fprintf(stderr, "marrow: %s; what was done is in %s\n", stopped_text().c_str(),
+                 printable(folder.path().string()).c_str());
   if (!folder.log_fault().empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(folder.log_fault()).c_str());
   return outcome;
 }
@@ -169,7 +201,8 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store) {
   expect_nothing_reads(pipeline, folder.empty() ? "runs" : folder, "the output folder", "choose another with --out");
   if (store && store->fault().empty())
-    expect_nothing_reads(pipeline, store->folder(), "the store of results", "set MARROW_CACHE to another folder, or give --no-cache");
+    expect_nothing_reads(pipeline, store->folder(), "the store of results",
+                         "set MARROW_CACHE to another folder, or give --no-cache");
 }
 
 int run(const RunRequest& request) {
@@ -183,10 +216,15 @@ int run(const RunRequest& request) {
   }
   const Store store;
   expect_good_place(pipeline, request.folder, request.no_cache ? nullptr : &store);
-  RunFolder folder = request.folder.empty() ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline) : RunFolder(request.folder, pipeline);
-  const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline), request.no_cache ? nullptr : &store, folder);
-  if (request.json) print_json_summary(outcome.result, outcome.written, folder);
-  else if (!request.quiet) print_summary(pipeline, outcome.result, outcome.written, folder);
+  RunFolder folder = request.folder.empty()
+                         ? RunFolder::with_free_name(std::filesystem::path("runs") / pipeline.name, pipeline)
+                         : RunFolder(request.folder, pipeline);
+  const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline),
+                                     request.no_cache ? nullptr : &store, folder);
+  if (request.json)
+    print_json_summary(outcome.result, outcome.written, folder);
+  else if (!request.quiet)
+    print_summary(pipeline, outcome.result, outcome.written, folder);
   return outcome.result.cancelled() ? 130 : outcome.is_faulty ? 1 : 0;
 }
 

@@ -47,7 +47,8 @@ nlohmann::json read_record(const fs::path& folder) {
   }
   if (!record.is_object()) refuse_record(folder, "it holds no object");
   for (const char* list : {"nodes", "outputs", "plugins"})
-    if (record.contains(list) && !record[list].is_array()) refuse_record(folder, std::string("its '") + list + "' is no list");
+    if (record.contains(list) && !record[list].is_array())
+      refuse_record(folder, std::string("its '") + list + "' is no list");
   return record;
 }
 
@@ -65,7 +66,8 @@ bool leads_outside(const fs::path& folder, const std::string& name) {
 
 void refuse_outside(const fs::path& folder, const std::string& name) {
   if (leads_outside(folder, name))
-    throw Error((folder / name).string() + " is a link to a file outside of the folder, of which nothing is shown; copy it there");
+    throw Error((folder / name).string() +
+                " is a link to a file outside of the folder, of which nothing is shown; copy it there");
 }
 
 RgbPixels read_png(const fs::path& file) {

@@ -16,11 +16,19 @@ json scalar_schema(const OptionInfo& option) {
   const json name = {{"type", "string"}, {"pattern", "\\$"}};
   json value;
   switch (option.type) {
-    case OptionType::boolean: value = {{"type", "boolean"}}; break;
-    case OptionType::integer: value = {{"type", "integer"}}; break;
+    case OptionType::boolean:
+      value = {{"type", "boolean"}};
+      break;
+    case OptionType::integer:
+      value = {{"type", "integer"}};
+      break;
     case OptionType::number:
-    case OptionType::numbers: value = {{"type", "number"}}; break;
-    default: value = {{"type", {"string", "number", "boolean"}}}; break;
+    case OptionType::numbers:
+      value = {{"type", "number"}};
+      break;
+    default:
+      value = {{"type", {"string", "number", "boolean"}}};
+      break;
   }
   if (option.minimum) value["minimum"] = *option.minimum;
   if (option.maximum) value["maximum"] = *option.maximum;
@@ -76,26 +84,29 @@ json pipeline_schema(const Catalogue& catalogue) {
   const json node = {{"type", "object"},
                      {"required", {"uses"}},
                      {"additionalProperties", false},
-                     {"properties", {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
-                                     {"with", {{"type", "object"}, {"description", "options"}}},
-                                     {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}}}},
+                     {"properties",
+                      {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
+                       {"with", {{"type", "object"}, {"description", "options"}}},
+                       {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}}}},
                      {"allOf", conditions}};
   const json input = {{"type", "object"},
                       {"additionalProperties", false},
-                      {"properties", {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},
-                                      {"default", {{"type", {"string", "number", "boolean"}}}},
-                                      {"help", {{"type", "string"}}}}}};
+                      {"properties",
+                       {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},
+                        {"default", {{"type", {"string", "number", "boolean"}}}},
+                        {"help", {{"type", "string"}}}}}};
   return {{"$schema", "http://json-schema.org/draft-07/schema#"},
           {"title", "marrow pipeline"},
           {"type", "object"},
           {"required", {"marrow", "nodes", "outputs"}},
           {"additionalProperties", false},
-          {"properties", {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
-                          {"name", {{"type", "string"}}},
-                          {"help", {{"type", "string"}}},
-                          {"inputs", {{"type", "object"}, {"additionalProperties", input}}},
-                          {"nodes", {{"type", "object"}, {"additionalProperties", node}}},
-                          {"outputs", {{"type", "object"}, {"additionalProperties", {{"type", "string"}}}}}}}};
+          {"properties",
+           {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
+            {"name", {{"type", "string"}}},
+            {"help", {{"type", "string"}}},
+            {"inputs", {{"type", "object"}, {"additionalProperties", input}}},
+            {"nodes", {{"type", "object"}, {"additionalProperties", node}}},
+            {"outputs", {{"type", "object"}, {"additionalProperties", {{"type", "string"}}}}}}}};
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds what a changed file changes, runs the tests near it, and puts everything back: sources, objects, programs, with their times."""
+"""Builds what a changed file changes, runs the tests near it, and puts everything back: sources, objects, programs,
+with their times."""
 import filecmp
 import json
 import os
@@ -15,9 +16,36 @@ from graph import Graph
 
 # The tests near a folder, by the beginnings of their programs' or of their own names.
 NEAR = {
-    "framework/domain": ["domain_", "fracture_", "evaluate_targets", "evaluate_pose_error", "evaluate_shapes", "register_", "camera_", "mesh_", "read_camera", "read_pose",
-                         "initial_axis", "runtime_"],
-    "framework/runtime": ["runtime_", "domain_hash", "compare_experiment", "cli_bad", "cli_ca", "cli_co", "cli_d", "cli_mu", "cli_na", "cli_nu", "cli_pl", "cli_r", "cli_sc", "cli_w"],
+    "framework/domain": [
+        "domain_",
+        "fracture_",
+        "evaluate_targets",
+        "evaluate_pose_error",
+        "evaluate_shapes",
+        "register_",
+        "camera_",
+        "mesh_",
+        "read_camera",
+        "read_pose",
+        "initial_axis",
+        "runtime_",
+    ],
+    "framework/runtime": [
+        "runtime_",
+        "domain_hash",
+        "compare_experiment",
+        "cli_bad",
+        "cli_ca",
+        "cli_co",
+        "cli_d",
+        "cli_mu",
+        "cli_na",
+        "cli_nu",
+        "cli_pl",
+        "cli_r",
+        "cli_sc",
+        "cli_w",
+    ],
     "framework/compare": ["compare_", "cli_compare", "cli_commands"],
     "plugins/camera": ["camera_", "conformance_camera", "cli_schema"],
     "plugins/evaluate": ["evaluate_", "cli_schema"],
@@ -61,7 +89,9 @@ class Bench:
         self.tests = self.read_tests()
 
     def read_tests(self):
-        text = subprocess.run(["ctest", "--test-dir", str(self.build), "--show-only=json-v1"], capture_output=True, text=True, check=True).stdout
+        text = subprocess.run(
+            ["ctest", "--test-dir", str(self.build), "--show-only=json-v1"], capture_output=True, text=True, check=True
+        ).stdout
         tests = {}
         for test in json.loads(text)["tests"]:
             command = test.get("command")
@@ -86,8 +116,15 @@ class Bench:
         scratch.mkdir()
         environment = dict(os.environ, TMPDIR=str(scratch), MARROW_CACHE=str(scratch / "cache"))
         with open(self.own / "output.txt", "w+", errors="replace") as output:
-            process = subprocess.Popen(test.command, cwd=self.build / test.folder, stdout=output, stderr=subprocess.STDOUT, env=environment, start_new_session=True,
-                                       preexec_fn=limit_resources)
+            process = subprocess.Popen(
+                test.command,
+                cwd=self.build / test.folder,
+                stdout=output,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+                preexec_fn=limit_resources,
+            )
             try:
                 code = process.wait(limit_s)
             except subprocess.TimeoutExpired:
@@ -101,14 +138,22 @@ class Bench:
             return None
         failed = re.search(r"^\[  FAILED  \] ([\w./]+)|^(?:FAIL|ERROR): (\w+)", text, re.M)
         name = "%s (%s)" % (test.name, failed.group(1) or failed.group(2)) if failed else test.name
-        return name if failed else "%s, %s" % (name, "time limit" if code is None else "signal %d" % -code if code < 0 else "exit code %d" % code)
+        return (
+            name
+            if failed
+            else "%s, %s"
+            % (name, "time limit" if code is None else "signal %d" % -code if code < 0 else "exit code %d" % code)
+        )
 
     def ninja(self, targets):
         names = [os.path.relpath(target, self.build) for target in targets]
-        return subprocess.run(["ninja", "-C", str(self.build), "-j", str(self.jobs), *names], capture_output=True, text=True)
+        return subprocess.run(
+            ["ninja", "-C", str(self.build), "-j", str(self.jobs), *names], capture_output=True, text=True
+        )
 
     def measure(self, tests):
-        """Times the tests as the sources are; a test that fails so tells nothing. Times are kept until a program is another."""
+        """Times the tests as the sources are; a test that fails so tells nothing. Times are kept until a program is
+        another."""
         programs = {test.command[0] for test in tests if test.command[0].startswith(str(self.build))}
         built = self.ninja(programs | {str(self.build / "bin/marrow")})
         if built.returncode:
@@ -127,14 +172,17 @@ class Bench:
             test.seconds = times[test.name][1]
 
     def try_change(self, path, text, tests):
-        """What catches the file with another text; None where nothing does. Everything is put back. A test that then fails as well tells nothing."""
+        """What catches the file with another text; None where nothing does. Everything is put back. A test that then
+        fails as well tells nothing."""
         source = self.root / path
         made = self.graph.made_from(source)
         self.save([str(source), *made])
         self.last = None
         try:
             source.write_text(text)
-            caught = self.first_failure(sorted(tests, key=lambda test: (test.command[0] not in made, test.seconds)), made)
+            caught = self.first_failure(
+                sorted(tests, key=lambda test: (test.command[0] not in made, test.seconds)), made
+            )
         finally:
             self.put_back()
         without = self.run(self.last, self.last.limit_s()) if caught and self.last else None

@@ -18,7 +18,14 @@ class Graph:
         for line in re.findall(r"^build (.*)$", text, re.M):
             outputs, _, inputs = line.replace("$:", "\0").partition(": ")
             inputs = inputs.partition(" || ")[0]  # what is only made before it does not count
-            names = [[name.replace("\0", ":").replace("$ ", " ") for name in re.split(r"(?<!\$) +", part) if name and name != "|"] for part in (outputs, inputs)]
+            names = [
+                [
+                    name.replace("\0", ":").replace("$ ", " ")
+                    for name in re.split(r"(?<!\$) +", part)
+                    if name and name != "|"
+                ]
+                for part in (outputs, inputs)
+            ]
             if names[1][0] == "phony":
                 continue
             for source in names[1][1:]:
@@ -26,7 +33,9 @@ class Graph:
 
     def read_headers(self):
         made = None
-        for line in subprocess.run(["ninja", "-C", self.build, "-t", "deps"], capture_output=True, text=True, check=True).stdout.splitlines():
+        for line in subprocess.run(
+            ["ninja", "-C", self.build, "-t", "deps"], capture_output=True, text=True, check=True
+        ).stdout.splitlines():
             if line.startswith(" "):
                 self.users.setdefault(self.full(line.strip()), set()).add(made)
             elif line:
@@ -36,7 +45,8 @@ class Graph:
         return os.path.normpath(os.path.join(self.build, name))
 
     def made_from(self, source):
-        """All that is made from a file, through any number of steps; what is only linked against the framework's shared library is not."""
+        """All that is made from a file, through any number of steps; what is only linked against the framework's shared
+        library is not."""
         made, left = set(), [os.path.abspath(source)]
         while left:
             for user in self.users.get(left.pop(), ()):

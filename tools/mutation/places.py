@@ -3,7 +3,8 @@
 import re
 from dataclasses import dataclass, field
 
-TOKEN = re.compile(r"""
+TOKEN = re.compile(
+    r"""
     (?P<space>\s+)
   | (?P<comment>//(?:\\.|[^\n\\])*|/\*.*?\*/)
   | (?P<directive>(?<![^\n])\#(?:\\.|[^\n\\])*)
@@ -12,15 +13,60 @@ TOKEN = re.compile(r"""
   | (?P<character>'(?:\\.|[^'\\\n])+')
   | (?P<word>[A-Za-z_]\w*)
   | (?P<sign><=>|->|\+\+|--|<<=|>>=|<<|>>|<=|>=|==|!=|&&|\|\||\+=|-=|\*=|/=|%=|&=|\|=|\^=|::|\.\.\.|.)
-""", re.X | re.S)
+""",
+    re.X | re.S,
+)
 
-OPERATORS = {"+": ["-"], "-": ["+"], "*": ["/"], "/": ["*"], "+=": ["-="], "-=": ["+="], "*=": ["/="], "/=": ["*="], "<": ["<=", ">="], "<=": ["<", ">"],
-             ">": [">=", "<="], ">=": [">", "<"], "==": ["!="], "!=": ["=="], "&&": ["||"], "||": ["&&"]}
+OPERATORS = {
+    "+": ["-"],
+    "-": ["+"],
+    "*": ["/"],
+    "/": ["*"],
+    "+=": ["-="],
+    "-=": ["+="],
+    "*=": ["/="],
+    "/=": ["*="],
+    "<": ["<=", ">="],
+    "<=": ["<", ">"],
+    ">": [">=", "<="],
+    ">=": [">", "<"],
+    "==": ["!="],
+    "!=": ["=="],
+    "&&": ["||"],
+    "||": ["&&"],
+}
 CLOSING = {"(": ")", "[": "]", "{": "}"}
 ASSIGNMENTS = {"=", "+=", "-=", "*=", "/=", "%=", "&=", "|=", "^=", "++", "--"}
 NOT_AN_OPERAND = {"return", "case", "else", "co_return", "throw", "in"}
-NO_EXPRESSION = {"return", "using", "typedef", "delete", "static_assert", "goto", "case", "default", "if", "for", "while", "do", "switch", "else", "try", "catch",
-                 "namespace", "struct", "class", "enum", "template", "public", "private", "protected", "operator", "friend", "MARROW_PLUGIN"}
+NO_EXPRESSION = {
+    "return",
+    "using",
+    "typedef",
+    "delete",
+    "static_assert",
+    "goto",
+    "case",
+    "default",
+    "if",
+    "for",
+    "while",
+    "do",
+    "switch",
+    "else",
+    "try",
+    "catch",
+    "namespace",
+    "struct",
+    "class",
+    "enum",
+    "template",
+    "public",
+    "private",
+    "protected",
+    "operator",
+    "friend",
+    "MARROW_PLUGIN",
+}
 
 
 @dataclass
@@ -39,6 +85,7 @@ class Token:
 @dataclass
 class Place:
     """What may be written instead of text[start:end]."""
+
     path: str
     line: int
     column: int
@@ -87,7 +134,8 @@ def end_of_statement(tokens, i):
 
 
 def silent_tokens(tokens):
-    """Indices where a change is none of behaviour, or cannot be compiled: messages, static_assert, sizes of types and of buffers for text, reserve()."""
+    """Indices where a change is none of behaviour, or cannot be compiled: messages, static_assert, sizes of types and
+    of buffers for text, reserve()."""
     silent = set()
     for i, token in enumerate(tokens):
         following = tokens[i + 1].text if i + 1 < len(tokens) else ""
@@ -131,7 +179,8 @@ def in_registration(tokens):
 
 
 def changed_number(text):
-    """Other numbers to write instead: one more or less, twice or half, and three orders where it is written with an exponent."""
+    """Other numbers to write instead: one more or less, twice or half, and three orders where it is written with an
+    exponent."""
     match = re.fullmatch(r"(0[xX][0-9a-fA-F']+|[0-9.']+(?:[eE][+-]?\d+)?)([a-zA-Z]*)", text)
     if not match:
         return []
@@ -155,8 +204,15 @@ def holds_code(tokens, i):
     if before.text in (")", "]", ";", "{", "}", "else", "do", "try", "const", "noexcept", "override", "mutable"):
         if before.text not in ("const", ")", "]"):
             return True
-        return before.text != "]" or tokens[before.partner - 1].text in ("(", ",", "=", "return") or tokens[before.partner - 1].kind != "word"
-    return any(token.text == "->" and tokens[i - back - 1].text == ")" for back, token in ((b, tokens[i - b]) for b in range(1, min(i, 9))))
+        return (
+            before.text != "]"
+            or tokens[before.partner - 1].text in ("(", ",", "=", "return")
+            or tokens[before.partner - 1].kind != "word"
+        )
+    return any(
+        token.text == "->" and tokens[i - back - 1].text == ")"
+        for back, token in ((b, tokens[i - b]) for b in range(1, min(i, 9)))
+    )
 
 
 def is_expression(tokens, i, end):
@@ -208,8 +264,18 @@ class Finder:
         if token.kind != "sign" or not i or i + 1 >= len(self.tokens):
             return
         before, after = self.tokens[i - 1], self.tokens[i + 1]
-        operand = before.kind in ("word", "number", "character") and before.text not in NOT_AN_OPERAND or before.text in (")", "]", "}")
-        if token.text in OPERATORS and operand and token.spaced and after.spaced and "string" not in (before.kind, after.kind):
+        operand = (
+            before.kind in ("word", "number", "character")
+            and before.text not in NOT_AN_OPERAND
+            or before.text in (")", "]", "}")
+        )
+        if (
+            token.text in OPERATORS
+            and operand
+            and token.spaced
+            and after.spaced
+            and "string" not in (before.kind, after.kind)
+        ):
             self.add(token.start, token.end, OPERATORS[token.text])
         elif token.text in ("-", "!") and not operand and not after.spaced and before.text != "operator":
             self.add(token.start, token.end, [""])
@@ -219,8 +285,10 @@ class Finder:
         if token.text not in ("if", "while", "for") or i + 1 >= len(self.tokens) or self.tokens[i + 1].text != "(":
             return
         first, last = i + 2, self.tokens[i + 1].partner
-        while (semicolon := end_of_statement(self.tokens[:last], first)) >= 0:  # if (x = ...; condition), for (...; condition; ...)
-            if token.text == "for" and any(t.text == ";" for t in self.tokens[i + 2:first]):
+        while (
+            semicolon := end_of_statement(self.tokens[:last], first)
+        ) >= 0:  # if (x = ...; condition), for (...; condition; ...)
+            if token.text == "for" and any(t.text == ";" for t in self.tokens[i + 2 : first]):
                 last = semicolon
                 break
             first = semicolon + 1
@@ -229,7 +297,9 @@ class Finder:
                 return  # over a range
         if first >= last or any(t.text == "=" for t in self.tokens[first:last]):
             return
-        self.add(self.tokens[first].start, self.tokens[last - 1].end, ["true", "false"] if token.text == "if" else ["false"])
+        self.add(
+            self.tokens[first].start, self.tokens[last - 1].end, ["true", "false"] if token.text == "if" else ["false"]
+        )
 
     def statements(self, opening):
         """Single statements of a block, and the one that follows an if, for or while without braces."""
@@ -248,7 +318,11 @@ class Finder:
                 end = end_of_statement(self.tokens[:closing], i)
                 if end < 0:
                     return
-                if end > i and is_expression(self.tokens, i, end) and not any(t.text == "reserve" for t in self.tokens[i:end]):
+                if (
+                    end > i
+                    and is_expression(self.tokens, i, end)
+                    and not any(t.text == "reserve" for t in self.tokens[i:end])
+                ):
                     lines = self.text.count("\n", self.tokens[i].start, self.tokens[end].start)
                     self.add(self.tokens[i].start, self.tokens[end].start, ["\n" * lines])
                 i = end + 1

@@ -5,8 +5,8 @@
     tools/report/assemble.py data.json report.html
     tools/report/assemble.py --page page.html          # without data, as the program carries it
 
-Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is replaced by the
-file or the data that it names, so the template also says in which order the scripts come.
+Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is
+replaced by the file or the data that it names, so the template also says in which order the scripts come.
 """
 import argparse
 import json
@@ -26,13 +26,17 @@ def script(path):
 
 
 def assemble(data, three=THREE):
-    """The page's text; its marker for data stays where `data` is None. Without three.js the page says what is missing and shows all but the 3D view."""
+    """The page's text; its marker for data stays where `data` is None. Without three.js the page says what is missing
+    and shows all but the 3D view."""
+
     def part(marker):
         kind, name = marker.group(1), marker.group(2)
         if kind == "data" and data is None:
             return marker.group(0)
         if kind == "data":
-            return '<script type="application/json" id="data">%s</script>' % json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+            return '<script type="application/json" id="data">%s</script>' % json.dumps(
+                data, separators=(",", ":"), allow_nan=False
+            ).replace("<", "\\u003c")
         if kind == "style":
             return "<style>\n%s</style>" % (FOLDER / name).read_text()
         path = three if name == "three.min.js" else FOLDER / name
@@ -51,7 +55,11 @@ def main():
     if not arguments.page and not arguments.report:
         parser.error("give data and report, or --page")
     if not arguments.three.exists():
-        print("%s is missing: reports will have no 3D view. Install the Debian package libjs-three or give --three." % arguments.three, file=sys.stderr)
+        print(
+            "%s is missing: reports will have no 3D view. Install the Debian package libjs-three or give --three."
+            % arguments.three,
+            file=sys.stderr,
+        )
     data = None if arguments.page else json.loads(arguments.data.read_text())
     (arguments.page or arguments.report).write_text(assemble(data, arguments.three))
 

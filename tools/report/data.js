@@ -8,11 +8,12 @@
 //     starts_protocol, success_rule, time_rule}                       sentences
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
-//   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it, success_above; the first is the main one
-//   cases: ["case-01", ...], starts: ["0", ...]
-//   summary: [per variant {runs, failed, success: {count, of, rate, low, high},
+//   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it,
+//   success_above; the first is the main one cases: ["case-01", ...], starts: ["0", ...] summary: [per variant {runs,
+//   failed, success: {count, of, rate, low, high},
 //     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median},
-//     capture: {range, is_open (no bin fails), unknown_starts (runs left out), bins: [{from, to, count, of, low, high}]}}]       mm; may be missing
+//     capture: {range, is_open (no bin fails), unknown_starts (runs left out), bins: [{from, to, count, of, low,
+//     high}]}}]       mm; may be missing
 //   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
 //   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
 //     initial_mtre_mm, seconds, evaluations, cached_nodes, values: [number | null per metric],
@@ -24,16 +25,18 @@
 //     poses: [{mesh: index, name: "result" | "truth" | "start", world_from_model: [16]}],
 //     views: [{name, width_px, height_px, intrinsics: [9], camera_from_world: [16], image: picture id}]}}
 //   graph: {nodes: [{id, uses, options: {}, differs: {variant name: text}}], edges: [{from, to, port}]}
-// A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray source.
-// "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene may be missing.
-"use strict";
+// A camera is OpenCV's pinhole: +z to the detector, u right, v down, integer at pixel centres, origin at the X-ray
+// source. "summary" and "comparisons" are left out where kind is "run"; any of pictures, convergence, landscape, scene
+// may be missing.
+'use strict';
 
 const Data = (() => {
   const FORMAT = 1;
 
   function complete(data) {
-    for (const name of ["figures", "variants", "metrics", "cases", "starts", "summary", "comparisons", "cells"]) data[name] = data[name] || [];
-    for (const name of ["experiment", "pictures", "scenes", "geometries"]) data[name] = data[name] || {};
+    for (const name of ['figures', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells'])
+      data[name] = data[name] || [];
+    for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
     for (const variant of data.variants) variant.options = variant.options || {};
     for (const cell of data.cells) {
       cell.values = cell.values || [];
@@ -45,15 +48,15 @@ const Data = (() => {
 
   // Cells by variant, case and start, and the (case, start) pairs of which anything can be looked at.
   function index(data) {
-    const key = (caseIndex, start) => caseIndex + "/" + start;
-    data.is_run = data.kind === "run";
+    const key = (caseIndex, start) => caseIndex + '/' + start;
+    data.is_run = data.kind === 'run';
     data.baseline = data.variants.findIndex((variant) => variant.is_baseline);
     data.pairs = [];
     const byKey = new Map();
     for (const cell of data.cells) {
       const name = key(cell.case, cell.start);
       if (!byKey.has(name)) {
-        byKey.set(name, { case: cell.case, start: cell.start, cells: [] });
+        byKey.set(name, {case: cell.case, start: cell.start, cells: []});
         data.pairs.push(byKey.get(name));
       }
       byKey.get(name).cells[cell.variant] = cell;
@@ -61,40 +64,45 @@ const Data = (() => {
     data.pairOf = (cell) => byKey.get(key(cell.case, cell.start));
     data.lookedAt = data.pairs.filter((pair) => pair.cells.some(hasMaterial));
     data.byId = new Map(data.cells.map((cell) => [String(cell.id), cell]));
-    data.variantIndex = (variant) => (typeof variant === "number" ? variant : data.variants.findIndex((item) => item.name === variant));
+    data.variantIndex = (variant) =>
+        (typeof variant === 'number' ? variant : data.variants.findIndex((item) => item.name === variant));
     return data;
   }
 
-  const hasMaterial = (cell) => Boolean(cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
+  const hasMaterial = (cell) => Boolean(
+      cell && (cell.pictures.length || cell.scene || (cell.convergence || []).length || (cell.landscape || []).length));
 
   function load() {
-    const data = JSON.parse(document.getElementById("data").textContent);
+    const data = JSON.parse(document.getElementById('data').textContent);
     if (!(data.format <= FORMAT)) {
-      throw new Error("This page reads format " + FORMAT + " of a report's data, the data are in format " + data.format + ": make the report again with one version of marrow.");
+      throw new Error(
+          'This page reads format ' + FORMAT + ' of a report\'s data, the data are in format ' + data.format +
+          ': make the report again with one version of marrow.');
     }
     return index(complete(data));
   }
 
   // What became of a cell: a failed one gave no pose; a missed one gave a pose that is not a success.
   function outcome(cell) {
-    if (cell.status === "failed") return "failed";
-    if (cell.success === true) return "success";
-    return cell.success === false ? "missed" : "done";
+    if (cell.status === 'failed') return 'failed';
+    if (cell.success === true) return 'success';
+    return cell.success === false ? 'missed' : 'done';
   }
 
   // The limit of success: below it, or above it where higher is better.
   const limit = (metric) => [metric.success_above, metric.success_below].find(Number.isFinite) ?? null;
-  const limitText = (metric) => (metric.higher_is_better ? "above " : "below ") + Dom.withUnit(limit(metric), metric.unit);
+  const limitText = (metric) =>
+      (metric.higher_is_better ? 'above ' : 'below ') + Dom.withUnit(limit(metric), metric.unit);
 
   const isBetter = (metric, value, base) => (metric.higher_is_better ? value > base : value < base);
 
   // Wilson's 95 % interval of a proportion.
   function wilson(count, of) {
-    if (!of) return { count, of, rate: null, low: null, high: null };
+    if (!of) return {count, of, rate: null, low: null, high: null};
     const z = 1.959964, rate = count / of, shrink = 1 + z * z / of;
     const centre = (rate + z * z / (2 * of)) / shrink;
     const half = z * Math.sqrt(rate * (1 - rate) / of + z * z / (4 * of * of)) / shrink;
-    return { count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half) };
+    return {count, of, rate, low: Math.max(0, centre - half), high: Math.min(1, centre + half)};
   }
 
   // Quantile of sorted numbers, linear between the two neighbours.
@@ -106,19 +114,37 @@ const Data = (() => {
 
   // The finite values of a metric, one variant's, with their cells.
   function valuesOf(data, variant, metric) {
-    return data.cells.filter((cell) => cell.variant === variant && cell.status !== "failed" && Number.isFinite(cell.values[metric]))
-      .map((cell) => ({ value: cell.values[metric], cell }));
+    return data.cells
+        .filter((cell) => cell.variant === variant && cell.status !== 'failed' && Number.isFinite(cell.values[metric]))
+        .map((cell) => ({value: cell.values[metric], cell}));
   }
 
   // Variant against baseline: the (case, start) pairs in which both gave a value.
   function pairedValues(data, variant, metric) {
-    const finite = (cell) => cell && cell.status !== "failed" && Number.isFinite(cell.values[metric]);
+    const finite = (cell) => cell && cell.status !== 'failed' && Number.isFinite(cell.values[metric]);
     return data.pairs.filter((pair) => finite(pair.cells[variant]) && finite(pair.cells[data.baseline]))
-      .map((pair) => ({ base: pair.cells[data.baseline].values[metric], value: pair.cells[variant].values[metric], cell: pair.cells[variant] }));
+        .map((pair) => ({
+               base: pair.cells[data.baseline].values[metric],
+               value: pair.cells[variant].values[metric],
+               cell: pair.cells[variant]
+             }));
   }
 
-  const pairName = (data, pair) => data.cases[pair.case] + ", start " + data.starts[pair.start];
-  const cellName = (data, cell) => data.variants[cell.variant].name + ", " + pairName(data, cell);
+  const pairName = (data, pair) => data.cases[pair.case] + ', start ' + data.starts[pair.start];
+  const cellName = (data, cell) => data.variants[cell.variant].name + ', ' + pairName(data, cell);
 
-  return { load, outcome, limit, limitText, isBetter, wilson, quantile, valuesOf, pairedValues, hasMaterial, pairName, cellName };
+  return {
+    load,
+    outcome,
+    limit,
+    limitText,
+    isBetter,
+    wilson,
+    quantile,
+    valuesOf,
+    pairedValues,
+    hasMaterial,
+    pairName,
+    cellName
+  };
 })();

@@ -1,75 +1,127 @@
 // SPDX-License-Identifier: Apache-2.0
 // Puts the page together when it has been read.
-"use strict";
+'use strict';
 
 const Page = (() => {
-  const { el } = Dom;
+  const {el} = Dom;
 
   // A section with a heading, entered in the list of contents. Parts that are null are left out.
   function section(id, title, intro, ...parts) {
-    const node = el("section", { id, "aria-labelledby": id + "-title" }, el("h2", { id: id + "-title" }, title), intro && el("p", { class: "intro" }, intro), parts);
-    document.getElementById("contents").append(el("a", { href: "#" + id }, title));
+    const node =
+        el('section', {id, 'aria-labelledby': id + '-title'}, el('h2', {id: id + '-title'}, title),
+           intro && el('p', {class: 'intro'}, intro), parts);
+    document.getElementById('contents').append(el('a', {href: '#' + id}, title));
     return node;
   }
 
   // Where a tenth of the runs end far off, a linear scale would press the others together.
   function skewed(data) {
-    const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value)).sort((a, b) => a - b);
+    const values = data.variants.flatMap((_, variant) => Data.valuesOf(data, variant, 0).map((item) => item.value))
+                       .sort((a, b) => a - b);
     return values[0] > 0 && Data.quantile(values, 0.9) > 6 * Data.quantile(values, 0.25);
   }
 
   // A figure over all cells: choice of metric and scale, legend, and the drawing.
   function metricFigure(data, kinds, extra, draw) {
-    const state = { metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0] };
+    const state = {metric: 0, kind: kinds[skewed(data) ? 1 : 0][0], extra: extra && extra.options[0][0]};
     const place = Plots.responsive((width) => draw(state, width)), again = () => place.redraw();
-    const toolbar = el("div", { class: "toolbar" }, data.metrics.length > 1 && Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => { state.metric = Number(i); again(); }),
-      extra && Dom.choice(extra.label, extra.options, state.extra, (value) => { state.extra = value; again(); }), Dom.choice("Scale", kinds, state.kind, (kind) => { state.kind = kind; again(); }));
-    return el("div", {}, toolbar, place);
+    const toolbar = el(
+        'div', {class: 'toolbar'},
+        data.metrics.length > 1 && Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => {
+          state.metric = Number(i);
+          again();
+        }), extra && Dom.choice(extra.label, extra.options, state.extra, (value) => {
+          state.extra = value;
+          again();
+        }), Dom.choice('Scale', kinds, state.kind, (kind) => {
+          state.kind = kind;
+          again();
+        }));
+    return el('div', {}, toolbar, place);
   }
 
   function distributions(data) {
-    return section("distributions", "Distributions", "A mark a run; the box spans the quartiles, its bar the median, the whiskers the 5th to the 95th percentile. Click a mark to open its run.",
-      metricFigure(data, [["linear", "linear"], ["log", "log"]], null, (state, width) => Figures.drawDistribution(data, state.metric, state.kind, width)));
+    return section(
+        'distributions', 'Distributions',
+        'A mark a run; the box spans the quartiles, its bar the median, the whiskers the 5th to the 95th percentile. ' +
+            'Click a mark to open its run.',
+        metricFigure(
+            data, [['linear', 'linear'], ['log', 'log']], null,
+            (state, width) => Figures.drawDistribution(data, state.metric, state.kind, width)));
   }
 
   function paired(data) {
     if (data.baseline < 0 || data.variants.length < 2) return null;
-    const draw = (state, width) => (state.extra === "pairs" ? Figures.drawPairs(data, state.metric, state.kind === "signed" ? "log" : "linear", width) : Figures.drawDifferences(data, state.metric, state.kind, width));
-    return section("paired", "Against the baseline", "Each case and start, run with a variant and with " + data.variants[data.baseline].name + ". Left of zero the variant is better; right of zero for figures of which higher is better. The black bar is the estimated difference with its 95 % interval.",
-      metricFigure(data, [["linear", "linear"], ["signed", "log"]], { label: "Show", options: [["differences", "Differences"], ["pairs", "Pairs"]] }, draw), Summary.comparisonTable(data));
+    const draw = (state, width) =>
+        (state.extra === 'pairs' ?
+             Figures.drawPairs(data, state.metric, state.kind === 'signed' ? 'log' : 'linear', width) :
+             Figures.drawDifferences(data, state.metric, state.kind, width));
+    return section(
+        'paired', 'Against the baseline',
+        'Each case and start, run with a variant and with ' + data.variants[data.baseline].name +
+            '. Left of zero the variant is better; right of zero for figures of which higher is better. ' +
+            'The black bar is the estimated difference with its 95 % interval.',
+        metricFigure(
+            data, [['linear', 'linear'], ['signed', 'log']],
+            {label: 'Show', options: [['differences', 'Differences'], ['pairs', 'Pairs']]}, draw),
+        Summary.comparisonTable(data));
   }
 
   function capture(data) {
     const bins = Figures.captureBins(data);
     if (!bins.length || !bins[0].length) return null;
-    const ranges = el("ul", { class: "verdicts" }, data.variants.map((variant, i) => el("li", { style: "--mark: " + Plots.colour(i) }, variant.name + ": " + Figures.captureRange(data, i))));
-    return section("capture", "Capture range", "How far from the truth a start may lie: up to the given mTRE, each bin of starts has a success rate of 95 % or more. Bars are Wilson’s 95 % intervals, failed runs count as no success.",
-      ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)), el("details", {}, el("summary", {}, "The counts"), Figures.captureTable(data, bins)));
+    const ranges =
+        el('ul', {class: 'verdicts'},
+           data.variants.map(
+               (variant, i) => el(
+                   'li', {style: '--mark: ' + Plots.colour(i)}, variant.name + ': ' + Figures.captureRange(data, i))));
+    return section(
+        'capture', 'Capture range',
+        'How far from the truth a start may lie: up to the given mTRE, each bin of starts ' +
+            'has a success rate of 95 % or more. ' +
+            'Bars are Wilson’s 95 % intervals, failed runs count as no success.',
+        ranges, Plots.legend(data.variants), Plots.responsive((width) => Figures.drawCapture(data, bins, width)),
+        el('details', {}, el('summary', {}, 'The counts'), Figures.captureTable(data, bins)));
   }
 
   function byCase(data) {
     if (data.cases.length < 2) return null;
-    const place = el("div", {}, Summary.caseTable(data, 0));
-    return section("by-case", "Case by case", "The median over a case’s starts, and how many of them end in success. Sort by a column to find the hard cases.",
-      data.metrics.length > 1 && el("div", { class: "toolbar" }, Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))), place);
+    const place = el('div', {}, Summary.caseTable(data, 0));
+    return section(
+        'by-case', 'Case by case',
+        'The median over a case’s starts, and how many of them end in success. ' +
+            'Sort by a column to find the hard cases.',
+        data.metrics.length > 1 &&
+            el('div', {class: 'toolbar'},
+               Dom.select(
+                   'Metric', data.metrics.map((metric, i) => [i, metric.label]), 0,
+                   (i) => place.replaceChildren(Summary.caseTable(data, Number(i))))),
+        place);
   }
 
   // Pictures, 3D view, convergence and landscapes of one case and start, chosen once for all of them.
   function closer(data) {
     if (!data.lookedAt.length) return [];
-    const places = { pictures: el("div"), scene: el("div"), convergence: el("div"), landscape: el("div") };
-    const state = { at: 0, each: false };
+    const places = {pictures: el('div'), scene: el('div'), convergence: el('div'), landscape: el('div')};
+    const state = {at: 0, each: false};
     const pickers = [];
     const picker = () => {
-      const box = Dom.select("Case and start", data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0, (i) => show(Number(i)));
+      const box = Dom.select(
+          'Case and start', data.lookedAt.map((pair, i) => [i, Data.pairName(data, pair)]), 0, (i) => show(Number(i)));
       pickers.push(box.box);
-      return data.lookedAt.length < 2 ? null : el("div", { class: "toolbar picker" }, box, Dom.button("Previous", () => show(state.at - 1)), Dom.button("Next", () => show(state.at + 1)));
+      return data.lookedAt.length < 2 ?
+          null :
+          el('div', {class: 'toolbar picker'}, box, Dom.button('Previous', () => show(state.at - 1)),
+             Dom.button('Next', () => show(state.at + 1)));
     };
-    const each = () => (data.variants.length > 1 ? Dom.checkbox("each scaled to 0–1", false, (on) => { state.each = on; curves(); }) : null);
+    const each = () => (data.variants.length > 1 ? Dom.checkbox('each scaled to 0–1', false, (on) => {
+      state.each = on;
+      curves();
+    }) : null);
     const curves = () => {
       const cells = data.lookedAt[state.at].cells;
-      places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || nothing("curve"));
-      places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || nothing("landscape"));
+      places.convergence.replaceChildren(Curves.convergence(data, cells, state.each) || nothing('curve'));
+      places.landscape.replaceChildren(Curves.landscapes(data, cells, state.each) || nothing('landscape'));
     };
     let comparer = null, scene = null;
     const show = (at) => {
@@ -78,74 +130,134 @@ const Page = (() => {
       const pair = data.lookedAt[state.at];
       if (comparer) comparer.dispose();
       comparer = pair.cells.some((cell) => cell && cell.pictures.length) ? new Pictures.Comparer(data, pair) : null;
-      places.pictures.replaceChildren(comparer ? comparer.element : nothing("picture"));
+      places.pictures.replaceChildren(comparer ? comparer.element : nothing('picture'));
       Page.comparer = comparer;
       curves();
-      const entries = pair.cells.filter((cell) => cell && cell.scene).map((cell) => ({ label: data.variants[cell.variant].name, scene: cell.scene }));
+      const entries = pair.cells.filter((cell) => cell && cell.scene)
+                          .map((cell) => ({label: data.variants[cell.variant].name, scene: cell.scene}));
       if (scene) scene.dispose();
       scene = null;
-      places.scene.replaceChildren(nothing("3D scene"));
-      const open = () => { Page.scene = scene = new SceneView(data, entries); places.scene.replaceChildren(scene.element); };
+      places.scene.replaceChildren(nothing('3D scene'));
+      const open = () => {
+        Page.scene = scene = new SceneView(data, entries);
+        places.scene.replaceChildren(scene.element);
+      };
       if (entries.length) whenNear(places.scene, () => data.lookedAt[state.at] === pair && !scene && open());
     };
-    Detail.lookAt = (cell) => { show(data.lookedAt.indexOf(data.pairOf(cell))); document.getElementById("pictures").scrollIntoView(); };
+    Detail.lookAt = (cell) => {
+      show(data.lookedAt.indexOf(data.pairOf(cell)));
+      document.getElementById('pictures').scrollIntoView();
+    };
     const many = data.variants.length > 1;
     const has = (test) => data.cells.some(test);
     const sections = [
-      has((cell) => cell.pictures.length) && section("pictures", "Pictures", many ? "Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches." : "Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.", picker(), places.pictures,
-        data.is_run && data.cells[0] && el("details", { open: true }, el("summary", {}, "All pictures"), Pictures.gallery(data, data.cells[0]))),
-      has((cell) => cell.scene) && section("scene", "3D view", "The model in the pose that was found, in the true one and at the start, among the X-rays or through the eye of one.", picker(), places.scene),
-      has((cell) => (cell.convergence || []).length) && section("convergence", "Convergence", "The cost that the optimizer had reached, against the evaluations it took.", picker(), el("div", { class: "toolbar" }, each()), many && Plots.legend(data.variants), places.convergence),
-      has((cell) => (cell.landscape || []).length) && section("landscape", "Cost landscapes", "The cost about the result along each axis; the mark is the lowest. A mark off zero, a second valley or a flat floor says where the cost misleads.", picker(), el("div", { class: "toolbar" }, each()), many && Plots.legend(data.variants), places.landscape),
+      has((cell) => cell.pictures.length) &&
+          section(
+              'pictures', 'Pictures',
+              many ? 'Two variants on the same X-ray. Arrow keys move the wipe; in a blink the space bar switches.' :
+                     'Two pictures on each other. Arrow keys move the wipe; in a blink the space bar switches.',
+              picker(), places.pictures,
+              data.is_run && data.cells[0] &&
+                  el('details', {open: true}, el('summary', {}, 'All pictures'),
+                     Pictures.gallery(data, data.cells[0]))),
+      has((cell) => cell.scene) &&
+          section(
+              'scene', '3D view',
+              'The model in the pose that was found, in the true one and at the start, ' +
+                  'among the X-rays or through the eye of one.',
+              picker(), places.scene),
+      has((cell) => (cell.convergence || []).length) &&
+          section(
+              'convergence', 'Convergence', 'The cost that the optimizer had reached, against the evaluations it took.',
+              picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.convergence),
+      has((cell) => (cell.landscape || []).length) &&
+          section(
+              'landscape', 'Cost landscapes',
+              'The cost about the result along each axis; the mark is the lowest. ' +
+                  'A mark off zero, a second valley or a flat floor says where the cost misleads.',
+              picker(), el('div', {class: 'toolbar'}, each()), many && Plots.legend(data.variants), places.landscape),
     ].filter(Boolean);
     show(0);
     return sections;
   }
 
-  const nothing = (what) => el("p", { class: "note" }, "Of this case and start no " + what + " was kept.");
+  const nothing = (what) => el('p', {class: 'note'}, 'Of this case and start no ' + what + ' was kept.');
 
   function whenNear(place, action) {
-    const observer = new IntersectionObserver((entries) => entries.some((entry) => entry.isIntersecting) && (observer.disconnect(), action()), { rootMargin: "300px" });
+    const observer = new IntersectionObserver(
+        (entries) => entries.some((entry) => entry.isIntersecting) && (observer.disconnect(), action()),
+        {rootMargin: '300px'});
     observer.observe(place);
   }
 
-  const file = (title, text) => (text ? el("details", {}, el("summary", {}, title), el("pre", { class: "file", tabindex: 0 }, text)) : null);
+  const file = (title, text) =>
+      (text ? el('details', {}, el('summary', {}, title), el('pre', {class: 'file', tabindex: 0}, text)) : null);
 
   function repeat(data) {
-    const { experiment } = data, machine = experiment.machine || {};
-    const lines = [["Seed", experiment.seed], ["Started", experiment.started], ["Finished", experiment.finished], ["Folder", experiment.folder], ["marrow", data.marrow],
-      ["Machine", [machine.cpu, machine.cores && machine.cores + " cores", machine.cpu_level].filter(Boolean).join(", ")]].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== "");
-    return section("repeat", "Repeat it", null, experiment.command && Dom.command(experiment.command),
-      el("div", { class: "scroll" }, el("table", { class: "values" }, el("tbody", {}, lines.map(([name, value]) => el("tr", {}, el("th", { scope: "row" }, name), el("td", {}, String(value))))))),
-      file(data.is_run ? "The run’s settings" : "The experiment’s file", experiment.text), file("The pipeline’s file", experiment.pipeline_text),
-      (experiment.plugins || []).length > 0 && el("details", {}, el("summary", {}, "Plugins and their build ids"), el("div", { class: "scroll" }, el("table", {}, el("tbody", {}, experiment.plugins.map((plugin) => el("tr", {}, el("th", { scope: "row" }, plugin.file), el("td", {}, el("code", {}, plugin.build_id)))))))));
+    const {experiment} = data, machine = experiment.machine || {};
+    const lines = [
+      ['Seed', experiment.seed], ['Started', experiment.started], ['Finished', experiment.finished],
+      ['Folder', experiment.folder], ['marrow', data.marrow],
+      [
+        'Machine',
+        [machine.cpu, machine.cores && machine.cores + ' cores', machine.cpu_level].filter(Boolean).join(', ')
+      ]
+    ].filter((line) => line[1] !== undefined && line[1] !== null && line[1] !== '');
+    return section(
+        'repeat', 'Repeat it', null, experiment.command && Dom.command(experiment.command),
+        el('div', {class: 'scroll'},
+           el('table', {class: 'values'},
+              el('tbody', {},
+                 lines.map(
+                     ([name, value]) => el('tr', {}, el('th', {scope: 'row'}, name), el('td', {}, String(value))))))),
+        file(data.is_run ? 'The run’s settings' : 'The experiment’s file', experiment.text),
+        file('The pipeline’s file', experiment.pipeline_text),
+        (experiment.plugins || []).length > 0 &&
+            el('details', {}, el('summary', {}, 'Plugins and their build ids'),
+               el('div', {class: 'scroll'},
+                  el('table', {},
+                     el('tbody', {},
+                        experiment.plugins.map(
+                            (plugin) =>
+                                el('tr', {}, el('th', {scope: 'row'}, plugin.file),
+                                   el('td', {}, el('code', {}, plugin.build_id)))))))));
   }
 
   function summary(data) {
-    const { experiment } = data, cell = data.cells[0];
-    const head = section("summary", data.is_run ? "Result" : "Result", null,
-      ...(data.is_run ? (cell ? [Detail.reason(cell), Detail.values(data, cell), ...Detail.figures(data)] : []) : [Summary.verdicts(data), Summary.table(data)]), Summary.rules(data));
-    return [el("div", { class: "head" }, el("p", { class: "kicker" }, data.is_run ? "Run" : "Comparison"), el("h1", {}, experiment.name || "Unnamed"), experiment.help && el("p", { class: "lead" }, experiment.help),
-      !data.is_run && el("p", { class: "facts" }, Summary.facts(data))), head];
+    const {experiment} = data, cell = data.cells[0];
+    const head = section(
+        'summary', data.is_run ? 'Result' : 'Result', null,
+        ...(data.is_run ? (cell ? [Detail.reason(cell), Detail.values(data, cell), ...Detail.figures(data)] : []) :
+                          [Summary.verdicts(data), Summary.table(data)]),
+        Summary.rules(data));
+    return [
+      el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
+         el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
+         !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
+      head
+    ];
   }
 
   function build(data) {
-    const { experiment } = data, many = !data.is_run, main = document.getElementById("top");
-    document.title = (experiment.name || "marrow report") + " · marrow";
-    const add = (...parts) => main.append(...parts.flat(2).filter(Boolean)); // at once: figures need their width
+    const {experiment} = data, many = !data.is_run, main = document.getElementById('top');
+    document.title = (experiment.name || 'marrow report') + ' · marrow';
+    const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
     add(summary(data));
     if (many && data.metrics.length) add(distributions(data), paired(data), capture(data), byCase(data));
     add(closer(data));
     if (data.graph && (data.graph.nodes || []).length) {
-      add(section("graph", "Pipeline", data.variants.length > 1 ? "Framed nodes differ between the variants." : null, Graph.draw(data.graph)));
+      add(section(
+          'graph', 'Pipeline', data.variants.length > 1 ? 'Framed nodes differ between the variants.' : null,
+          Graph.draw(data.graph)));
     }
     if (many) {
       Page.table = new Cells.Table(data);
-      add(section("cells", "All runs", "Click a row for all of one run.", Page.table.element), section("failures", "Failures", null, Cells.failures(data)));
+      add(section('cells', 'All runs', 'Click a row for all of one run.', Page.table.element),
+          section('failures', 'Failures', null, Cells.failures(data)));
     }
     add(repeat(data));
-    document.addEventListener("click", (event) => {
-      const mark = event.target.closest && event.target.closest("[data-cell]");
+    document.addEventListener('click', (event) => {
+      const mark = event.target.closest && event.target.closest('[data-cell]');
       if (mark) Detail.open(data, data.byId.get(mark.dataset.cell));
     });
     const asked = /^#cell=(.+)$/.exec(location.hash), wanted = asked && data.byId.get(decodeURIComponent(asked[1]));
@@ -153,33 +265,43 @@ const Page = (() => {
   }
 
   function startTheme() {
-    const button = document.getElementById("theme"), root = document.documentElement;
-    const stored = () => { try { return localStorage.getItem("marrow-theme"); } catch (error) { return null; } };
-    const dark = () => (root.dataset.theme ? root.dataset.theme === "dark" : matchMedia("(prefers-color-scheme: dark)").matches);
-    const label = () => (button.textContent = dark() ? "Light" : "Dark");
-    button.setAttribute("aria-label", "Change between light and dark");
+    const button = document.getElementById('theme'), root = document.documentElement;
+    const stored = () => {
+      try {
+        return localStorage.getItem('marrow-theme');
+      } catch (error) {
+        return null;
+      }
+    };
+    const dark = () =>
+        (root.dataset.theme ? root.dataset.theme === 'dark' : matchMedia('(prefers-color-scheme: dark)').matches);
+    const label = () => (button.textContent = dark() ? 'Light' : 'Dark');
+    button.setAttribute('aria-label', 'Change between light and dark');
     if (stored()) root.dataset.theme = stored();
-    button.addEventListener("click", () => {
-      root.dataset.theme = dark() ? "light" : "dark";
-      try { localStorage.setItem("marrow-theme", root.dataset.theme); } catch (error) { /* from disk some browsers keep nothing */ }
+    button.addEventListener('click', () => {
+      root.dataset.theme = dark() ? 'light' : 'dark';
+      try {
+        localStorage.setItem('marrow-theme', root.dataset.theme);
+      } catch (error) { /* from disk some browsers keep nothing */
+      }
       label();
     });
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", label);
+    matchMedia('(prefers-color-scheme: dark)').addEventListener('change', label);
     label();
   }
 
   // The link of the section that is being read stands out in the list of contents.
   function followScroll() {
-    const links = new Map([...document.querySelectorAll("#contents a")].map((link) => [link.hash.slice(1), link]));
+    const links = new Map([...document.querySelectorAll('#contents a')].map((link) => [link.hash.slice(1), link]));
     const seen = new IntersectionObserver((entries) => {
       for (const entry of entries.filter((item) => item.isIntersecting)) {
-        links.forEach((link) => link.removeAttribute("aria-current"));
+        links.forEach((link) => link.removeAttribute('aria-current'));
         const link = links.get(entry.target.id), bar = link.parentElement;
-        link.setAttribute("aria-current", "true");
+        link.setAttribute('aria-current', 'true');
         bar.scrollLeft = link.offsetLeft - bar.offsetLeft - bar.clientWidth / 2 + link.offsetWidth / 2;
       }
-    }, { rootMargin: "-20% 0px -70% 0px" });
-    document.querySelectorAll("main > section").forEach((node) => seen.observe(node));
+    }, {rootMargin: '-20% 0px -70% 0px'});
+    document.querySelectorAll('main > section').forEach((node) => seen.observe(node));
   }
 
   function start() {
@@ -189,13 +311,14 @@ const Page = (() => {
       build(Data.load());
       followScroll();
     } catch (error) {
-      document.getElementById("top").prepend(el("p", { class: "fault", role: "alert" }, "This report cannot be shown whole: " + error.message));
+      document.getElementById('top').prepend(
+          el('p', {class: 'fault', role: 'alert'}, 'This report cannot be shown whole: ' + error.message));
       console.error(error);
     }
-    document.documentElement.dataset.ready = "true";
+    document.documentElement.dataset.ready = 'true';
   }
 
-  return { start };
+  return {start};
 })();
 
-document.addEventListener("DOMContentLoaded", Page.start);
+document.addEventListener('DOMContentLoaded', Page.start);

@@ -1,38 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
 // Turning, shifting and zooming a 3D view by mouse, touch and keys. Free: about a target, the world's z (to the head)
 // up. Looking through an X-ray: shifting and zooming in the image's plane only.
-"use strict";
+'use strict';
 
 class Orbit {
   constructor(canvas, changed) {
-    Object.assign(this, { canvas, changed, locked: false, pointers: new Map() });
-    this.reset({ target: [0, 0, 0], distance: 500, azimuth_deg: -65 });
-    canvas.addEventListener("pointerdown", (event) => this.down(event));
-    canvas.addEventListener("pointermove", (event) => this.move(event));
-    for (const name of ["pointerup", "pointercancel"]) canvas.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
-    canvas.addEventListener("contextmenu", (event) => event.preventDefault());
-    canvas.addEventListener("wheel", (event) => this.wheel(event), { passive: false });
-    canvas.addEventListener("keydown", (event) => this.key(event));
+    Object.assign(this, {canvas, changed, locked: false, pointers: new Map()});
+    this.reset({target: [0, 0, 0], distance: 500, azimuth_deg: -65});
+    canvas.addEventListener('pointerdown', (event) => this.down(event));
+    canvas.addEventListener('pointermove', (event) => this.move(event));
+    for (const name of ['pointerup', 'pointercancel'])
+      canvas.addEventListener(name, (event) => this.pointers.delete(event.pointerId));
+    canvas.addEventListener('contextmenu', (event) => event.preventDefault());
+    canvas.addEventListener('wheel', (event) => this.wheel(event), {passive: false});
+    canvas.addEventListener('keydown', (event) => this.key(event));
   }
 
-  reset({ target, distance, azimuth_deg }) {
-    this.home = { target: [...target], distance, azimuth_deg };
-    Object.assign(this, { target: [...target], distance, azimuth_deg, elevation_deg: 14 });
+  reset({target, distance, azimuth_deg}) {
+    this.home = {target: [...target], distance, azimuth_deg};
+    Object.assign(this, {target: [...target], distance, azimuth_deg, elevation_deg: 14});
     this.resetFlat();
   }
 
   resetFlat() {
-    this.flat = { zoom: 1, x: 0, y: 0 }; // shift in units of half the canvas
+    this.flat = {zoom: 1, x: 0, y: 0};  // shift in units of half the canvas
     this.changed();
   }
 
   again() {
-    if (this.locked) this.resetFlat();
-    else this.reset(this.home);
+    if (this.locked)
+      this.resetFlat();
+    else
+      this.reset(this.home);
   }
 
   down(event) {
-    this.canvas.focus({ preventScroll: true });
+    this.canvas.focus({preventScroll: true});
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, [event.clientX, event.clientY]);
   }
@@ -46,8 +49,10 @@ class Orbit {
       const length = (point) => Math.hypot(point[0] - others[0][0], point[1] - others[0][1]);
       this.zoom(length(now) / Math.max(1, length(before)));
       this.shift(dx / 2, dy / 2);
-    } else if (this.locked || event.shiftKey || event.buttons & 6) this.shift(dx, dy);
-    else this.turn(-0.4 * dx, 0.4 * dy);
+    } else if (this.locked || event.shiftKey || event.buttons & 6)
+      this.shift(dx, dy);
+    else
+      this.turn(-0.4 * dx, 0.4 * dy);
     this.pointers.set(event.pointerId, now);
   }
 
@@ -59,13 +64,19 @@ class Orbit {
   }
 
   key(event) {
-    const arrow = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1] }[event.key];
-    if (arrow && (this.locked || event.shiftKey)) this.shift(20 * arrow[0], 20 * arrow[1]);
-    else if (arrow) this.turn(-5 * arrow[0], 5 * arrow[1]);
-    else if (event.key === "+" || event.key === "=") this.zoom(1.15);
-    else if (event.key === "-") this.zoom(1 / 1.15);
-    else if (event.key === "0") this.again();
-    else return;
+    const arrow = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, -1], ArrowDown: [0, 1]}[event.key];
+    if (arrow && (this.locked || event.shiftKey))
+      this.shift(20 * arrow[0], 20 * arrow[1]);
+    else if (arrow)
+      this.turn(-5 * arrow[0], 5 * arrow[1]);
+    else if (event.key === '+' || event.key === '=')
+      this.zoom(1.15);
+    else if (event.key === '-')
+      this.zoom(1 / 1.15);
+    else if (event.key === '0')
+      this.again();
+    else
+      return;
     event.preventDefault();
   }
 
@@ -79,17 +90,18 @@ class Orbit {
   zoom(factor) {
     if (this.locked) {
       const zoom = Math.max(0.5, Math.min(40, this.flat.zoom * factor)), change = zoom / this.flat.zoom;
-      this.flat = { zoom, x: this.flat.x * change, y: this.flat.y * change };
-    } else this.distance = Math.max(0.02 * this.home.distance, Math.min(20 * this.home.distance, this.distance / factor));
+      this.flat = {zoom, x: this.flat.x * change, y: this.flat.y * change};
+    } else
+      this.distance = Math.max(0.02 * this.home.distance, Math.min(20 * this.home.distance, this.distance / factor));
     this.changed();
   }
 
   shift(dx_px, dy_px) {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const {clientWidth: width, clientHeight: height} = this.canvas;
     if (this.locked) {
-      this.flat = { ...this.flat, x: this.flat.x + 2 * dx_px / width, y: this.flat.y - 2 * dy_px / height };
+      this.flat = {...this.flat, x: this.flat.x + 2 * dx_px / width, y: this.flat.y - 2 * dy_px / height};
     } else {
-      const { right, up } = this.axes(), size = 2 * this.distance * Math.tan(Orbit.HALF_FIELD) / height;
+      const {right, up} = this.axes(), size = 2 * this.distance * Math.tan(Orbit.HALF_FIELD) / height;
       this.target = this.target.map((value, i) => value + size * (dy_px * up[i] - dx_px * right[i]));
     }
     this.changed();
@@ -98,15 +110,19 @@ class Orbit {
   // Directions of the free view: from the target to the eye, to the right, and up.
   axes() {
     const azimuth = this.azimuth_deg * Math.PI / 180, elevation = this.elevation_deg * Math.PI / 180;
-    const back = [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
+    const back =
+        [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
     const right = [-Math.sin(azimuth), Math.cos(azimuth), 0];
-    const up = [back[1] * right[2] - back[2] * right[1], back[2] * right[0] - back[0] * right[2], back[0] * right[1] - back[1] * right[0]];
-    return { back, right, up };
+    const up = [
+      back[1] * right[2] - back[2] * right[1], back[2] * right[0] - back[0] * right[2],
+      back[0] * right[1] - back[1] * right[0]
+    ];
+    return {back, right, up};
   }
 
   eye() {
-    const { back } = this.axes();
+    const {back} = this.axes();
     return this.target.map((value, i) => value + this.distance * back[i]);
   }
 }
-Orbit.HALF_FIELD = 15 * Math.PI / 180; // half the vertical angle of the free view
+Orbit.HALF_FIELD = 15 * Math.PI / 180;  // half the vertical angle of the free view

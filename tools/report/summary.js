@@ -1,118 +1,233 @@
 // SPDX-License-Identifier: Apache-2.0
 // The head of the page: what was compared, what came out in a sentence each, and the table of the variants.
-"use strict";
+'use strict';
 
 const Summary = (() => {
-  const { el, number, percent, probability, withUnit } = Dom;
+  const {el, number, percent, probability, withUnit} = Dom;
 
-  const plural = (count, word) => count + " " + word + (count === 1 ? "" : "s");
+  const plural = (count, word) => count + ' ' + word + (count === 1 ? '' : 's');
 
   function facts(data) {
-    const failed = data.cells.filter((cell) => cell.status === "failed").length;
-    const parts = [plural(data.variants.length, "variant"), plural(data.cases.length, "case"), plural(data.starts.length, "start")];
-    return parts.join(" × ") + ": " + plural(data.cells.length, "run") + (failed ? ", " + failed + " failed" : ", none failed") + ".";
+    const failed = data.cells.filter((cell) => cell.status === 'failed').length;
+    const parts = [
+      plural(data.variants.length, 'variant'), plural(data.cases.length, 'case'), plural(data.starts.length, 'start')
+    ];
+    return parts.join(' × ') + ': ' + plural(data.cells.length, 'run') +
+        (failed ? ', ' + failed + ' failed' : ', none failed') + '.';
   }
 
   // The main metric's sentences; where it has none, all.
   function verdicts(data) {
     const main = data.metrics[0] && data.comparisons.filter((item) => item.metric === data.metrics[0].name);
     const shown = (main && main.length ? main : data.comparisons).filter((item) => item.sentence);
-    return shown.length ? el("ul", { class: "verdicts" }, shown.map((item) => el("li", { style: "--mark: " + Plots.colour(data.variantIndex(item.variant)) }, item.sentence))) : null;
+    return shown.length ?
+        el('ul', {class: 'verdicts'},
+           shown.map(
+               (item) =>
+                   el('li', {style: '--mark: ' + Plots.colour(data.variantIndex(item.variant))}, item.sentence))) :
+        null;
   }
 
   function rateBar(success) {
-    if (!success || !Number.isFinite(success.rate)) return "–";
-    const text = success.count + " of " + success.of + " = " + percent(success.rate) + ", 95 % interval " + percent(success.low) + " to " + percent(success.high);
-    const at = (fraction) => (100 * fraction).toFixed(2) + "%";
-    return el("div", { class: "rate", "data-tip": text },
-      el("span", { class: "rate-bar", role: "img", "aria-label": text }, el("span", { class: "rate-fill", style: "width: " + at(success.rate) }),
-        el("span", { class: "rate-interval", style: "left: " + at(success.low) + "; width: " + at(success.high - success.low) })),
-      el("span", { class: "rate-text" }, percent(success.rate), " ", el("small", {}, success.count + "/" + success.of)));
+    if (!success || !Number.isFinite(success.rate)) return '–';
+    const text = success.count + ' of ' + success.of + ' = ' + percent(success.rate) + ', 95 % interval ' +
+        percent(success.low) + ' to ' + percent(success.high);
+    const at = (fraction) => (100 * fraction).toFixed(2) + '%';
+    return el(
+        'div', {class: 'rate', 'data-tip': text},
+        el('span', {class: 'rate-bar', role: 'img', 'aria-label': text},
+           el('span', {class: 'rate-fill', style: 'width: ' + at(success.rate)}), el('span', {
+             class: 'rate-interval',
+             style: 'left: ' + at(success.low) + '; width: ' + at(success.high - success.low)
+           })),
+        el('span', {class: 'rate-text'}, percent(success.rate), ' ',
+           el('small', {}, success.count + '/' + success.of)));
   }
 
-  const spread = (item, unit) => (item && Number.isFinite(item.median) ? [number(item.median), " ", el("small", {}, "[" + number(item.q1) + ", " + number(item.q3) + "]")] : "–");
+  const spread = (item, unit) =>
+      (item && Number.isFinite(item.median) ?
+           [number(item.median), ' ', el('small', {}, '[' + number(item.q1) + ', ' + number(item.q3) + ']')] :
+           '–');
 
   function variantName(data, i) {
     const variant = data.variants[i], options = Object.entries(variant.options);
-    return el("div", { class: "variant-name" }, Plots.swatch(i), el("div", {}, el("strong", {}, variant.name), variant.is_baseline && el("span", { class: "tag" }, "baseline"),
-      options.map(([name, value]) => el("code", { class: "option" }, name + " = " + (typeof value === "string" ? value : JSON.stringify(value))))));
+    return el(
+        'div', {class: 'variant-name'}, Plots.swatch(i),
+        el('div', {}, el('strong', {}, variant.name), variant.is_baseline && el('span', {class: 'tag'}, 'baseline'),
+           options.map(
+               ([name, value]) =>
+                   el('code', {class: 'option'},
+                      name + ' = ' + (typeof value === 'string' ? value : JSON.stringify(value))))));
   }
 
   function columns(data, metric) {
     const of = (i) => data.summary[i] || {}, found = (i) => (of(i).metrics || {})[metric.name] || {};
     return [
-      { title: "Variant", key: (i) => data.variants[i].name, cell: (i) => variantName(data, i) },
-      { title: "Success", key: (i) => -(of(i).success || {}).rate, cell: (i) => rateBar(of(i).success) },
-      { title: "Median [quartiles]", unit: metric.unit, key: (i) => found(i).median, cell: (i) => spread(found(i)), number: true },
-      { title: "95th percentile", unit: metric.unit, key: (i) => found(i).p95, cell: (i) => number(found(i).p95), number: true },
-      { title: "Worst", unit: metric.unit, key: (i) => found(i).worst, cell: (i) => number(found(i).worst), number: true },
-      { title: "Failed", key: (i) => of(i).failed, cell: (i) => String(of(i).failed ?? "–"), number: true },
-      { title: "Time [quartiles]", unit: "s", key: (i) => (of(i).seconds || {}).median, cell: (i) => spread(of(i).seconds), number: true },
-      { title: "Evaluations", key: (i) => (of(i).evaluations || {}).median, cell: (i) => number((of(i).evaluations || {}).median), number: true },
+      {title: 'Variant', key: (i) => data.variants[i].name, cell: (i) => variantName(data, i)},
+      {title: 'Success', key: (i) => -(of(i).success || {}).rate, cell: (i) => rateBar(of(i).success)},
+      {
+        title: 'Median [quartiles]',
+        unit: metric.unit,
+        key: (i) => found(i).median,
+        cell: (i) => spread(found(i)),
+        number: true
+      },
+      {
+        title: '95th percentile',
+        unit: metric.unit,
+        key: (i) => found(i).p95,
+        cell: (i) => number(found(i).p95),
+        number: true
+      },
+      {
+        title: 'Worst',
+        unit: metric.unit,
+        key: (i) => found(i).worst,
+        cell: (i) => number(found(i).worst),
+        number: true
+      },
+      {title: 'Failed', key: (i) => of(i).failed, cell: (i) => String(of(i).failed ?? '–'), number: true},
+      {
+        title: 'Time [quartiles]',
+        unit: 's',
+        key: (i) => (of(i).seconds || {}).median,
+        cell: (i) => spread(of(i).seconds),
+        number: true
+      },
+      {
+        title: 'Evaluations',
+        key: (i) => (of(i).evaluations || {}).median,
+        cell: (i) => number((of(i).evaluations || {}).median),
+        number: true
+      },
     ];
   }
 
   // A table whose columns sort: rows are indices, a column {title, unit, key, cell, number}.
   function sortable(rows, all, state, caption) {
-    const compare = (a, b) => (typeof a === "string" ? a.localeCompare(b, undefined, { numeric: true }) : (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
-    const body = el("tbody");
-    const heads = all.map((column, i) => el("th", { scope: "col", class: column.number ? "number" : null }, Dom.button([column.title, column.unit && el("small", {}, " " + column.unit)].filter(Boolean), () => {
-      state.down = state.column === i ? !state.down : false;
-      state.column = i;
-      fill();
-    }, { class: "sort" })));
+    const compare = (a, b) =>
+        (typeof a === 'string' ? a.localeCompare(b, undefined, {numeric: true}) :
+                                 (Number.isFinite(a) ? a : Infinity) - (Number.isFinite(b) ? b : Infinity) || 0);
+    const body = el('tbody');
+    const heads = all.map(
+        (column, i) =>
+            el('th', {scope: 'col', class: column.number ? 'number' : null},
+               Dom.button([column.title, column.unit && el('small', {}, ' ' + column.unit)].filter(Boolean), () => {
+                 state.down = state.column === i ? !state.down : false;
+                 state.column = i;
+                 fill();
+               }, {class: 'sort'})));
     const fill = () => {
       const sorted = [...rows];
-      if (state.column !== undefined) sorted.sort((a, b) => (state.down ? -1 : 1) * compare(all[state.column].key(a), all[state.column].key(b)));
-      heads.forEach((head, i) => head.setAttribute("aria-sort", state.column !== i ? "none" : state.down ? "descending" : "ascending"));
-      body.replaceChildren(...sorted.map((row) => el("tr", { "data-row": row }, all.map((column) => el("td", { class: column.number ? "number" : null }, column.cell(row))))));
+      if (state.column !== undefined)
+        sorted.sort((a, b) => (state.down ? -1 : 1) * compare(all[state.column].key(a), all[state.column].key(b)));
+      heads.forEach(
+          (head, i) => head.setAttribute(
+              'aria-sort',
+              state.column !== i ? 'none' :
+                  state.down     ? 'descending' :
+                                   'ascending'));
+      body.replaceChildren(...sorted.map(
+          (row) =>
+              el('tr', {'data-row': row},
+                 all.map((column) => el('td', {class: column.number ? 'number' : null}, column.cell(row))))));
     };
     fill();
-    return el("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": caption }, el("table", { class: "sortable" }, el("caption", { class: "hidden" }, caption), el("thead", {}, el("tr", {}, heads)), body));
+    return el(
+        'div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
+        el('table', {class: 'sortable'}, el('caption', {class: 'hidden'}, caption),
+           el('thead', {}, el('tr', {}, heads)), body));
   }
 
   function table(data) {
-    const place = el("div"), state = {};
-    const show = (metric) => place.replaceChildren(sortable(data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state, "Variants: " + data.metrics[metric].label));
+    const place = el('div'), state = {};
+    const show = (metric) => place.replaceChildren(sortable(
+        data.variants.map((_, i) => i), columns(data, data.metrics[metric]), state,
+        'Variants: ' + data.metrics[metric].label));
     if (!data.metrics.length) return null;
     show(0);
-    return el("div", {}, data.metrics.length > 1 && el("div", { class: "toolbar" }, Dom.select("Metric", data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))), place);
+    return el(
+        'div', {},
+        data.metrics.length > 1 &&
+            el('div', {class: 'toolbar'},
+               Dom.select('Metric', data.metrics.map((metric, i) => [i, metric.label]), 0, (i) => show(Number(i)))),
+        place);
   }
 
   // Which cases are hard: each case's median and successes, a column a variant.
   function caseTable(data, metric) {
-    const cells = data.variants.map((_, variant) => data.cases.map((_, place) => data.cells.filter((cell) => cell.variant === variant && cell.case === place)));
-    const median = (list) => Data.quantile(list.filter((cell) => cell.status !== "failed").map((cell) => cell.values[metric]).filter(Number.isFinite).sort((a, b) => a - b), 0.5);
-    const good = (list) => list.filter((cell) => Data.outcome(cell) === "success").length;
-    const of = (list) => (list.length ? el("span", { "data-tip": good(list) + " of " + list.length + " starts end in success" }, el("span", { class: "share", style: "--part: " + Math.round(100 * good(list) / list.length) + "%" }),
-      number(median(list)), " ", el("small", {}, good(list) + "/" + list.length)) : "–");
-    const all = [{ title: "Case", key: (i) => data.cases[i], cell: (i) => data.cases[i] },
-      ...data.variants.map((variant, v) => ({ title: variant.name, unit: data.metrics[metric].unit, key: (i) => median(cells[v][i]), cell: (i) => of(cells[v][i]), number: true }))];
-    return sortable(data.cases.map((_, i) => i), all, {}, "Medians and successes of each case: " + data.metrics[metric].label);
+    const cells = data.variants.map(
+        (_, variant) =>
+            data.cases.map((_, place) => data.cells.filter((cell) => cell.variant === variant && cell.case === place)));
+    const median = (list) => Data.quantile(
+        list.filter((cell) => cell.status !== 'failed')
+            .map((cell) => cell.values[metric])
+            .filter(Number.isFinite)
+            .sort((a, b) => a - b),
+        0.5);
+    const good = (list) => list.filter((cell) => Data.outcome(cell) === 'success').length;
+    const of = (list) =>
+        (list.length ?
+             el('span', {'data-tip': good(list) + ' of ' + list.length + ' starts end in success'},
+                el('span', {class: 'share', style: '--part: ' + Math.round(100 * good(list) / list.length) + '%'}),
+                number(median(list)), ' ', el('small', {}, good(list) + '/' + list.length)) :
+             '–');
+    const all = [
+      {title: 'Case', key: (i) => data.cases[i], cell: (i) => data.cases[i]},
+      ...data.variants.map((variant, v) => ({
+                             title: variant.name,
+                             unit: data.metrics[metric].unit,
+                             key: (i) => median(cells[v][i]),
+                             cell: (i) => of(cells[v][i]),
+                             number: true
+                           }))
+    ];
+    return sortable(
+        data.cases.map((_, i) => i), all, {}, 'Medians and successes of each case: ' + data.metrics[metric].label);
   }
 
   // Every comparison with its interval and p: the numbers behind the figure of the pairs.
   function comparisonTable(data) {
-    const label = (item) => (data.metrics.find((metric) => metric.name === item.metric) || { label: item.metric }).label;
+    const label = (item) => (data.metrics.find((metric) => metric.name === item.metric) || {label: item.metric}).label;
     const unit = (item) => (data.metrics.find((metric) => metric.name === item.metric) || {}).unit;
-    const list = data.comparisons, name = (item) => (data.variants[data.variantIndex(item.variant)] || { name: item.variant }).name;
+    const list = data.comparisons,
+          name = (item) => (data.variants[data.variantIndex(item.variant)] || {name: item.variant}).name;
     const all = [
-      { title: "Variant", key: (i) => name(list[i]), cell: (i) => el("strong", {}, name(list[i])) },
-      { title: "Metric", key: (i) => label(list[i]), cell: (i) => label(list[i]) },
-      { title: "Difference", key: (i) => list[i].difference, cell: (i) => withUnit(list[i].difference, unit(list[i])), number: true },
-      { title: "95 % interval", key: (i) => list[i].low, cell: (i) => "[" + number(list[i].low) + ", " + number(list[i].high) + "]", number: true },
-      { title: "p", key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true },
-      { title: "p (Holm)", key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true },
-      { title: "Pairs", key: (i) => list[i].pairs, cell: (i) => String(list[i].pairs ?? "–"), number: true },
-      { title: "In words", key: (i) => list[i].sentence || "", cell: (i) => el("span", { class: "words" }, list[i].sentence || "") },
+      {title: 'Variant', key: (i) => name(list[i]), cell: (i) => el('strong', {}, name(list[i]))},
+      {title: 'Metric', key: (i) => label(list[i]), cell: (i) => label(list[i])},
+      {
+        title: 'Difference',
+        key: (i) => list[i].difference,
+        cell: (i) => withUnit(list[i].difference, unit(list[i])),
+        number: true
+      },
+      {
+        title: '95 % interval',
+        key: (i) => list[i].low,
+        cell: (i) => '[' + number(list[i].low) + ', ' + number(list[i].high) + ']',
+        number: true
+      },
+      {title: 'p', key: (i) => list[i].p, cell: (i) => probability(list[i].p), number: true},
+      {title: 'p (Holm)', key: (i) => list[i].p_holm, cell: (i) => probability(list[i].p_holm), number: true},
+      {title: 'Pairs', key: (i) => list[i].pairs, cell: (i) => String(list[i].pairs ?? '–'), number: true},
+      {
+        title: 'In words',
+        key: (i) => list[i].sentence || '',
+        cell: (i) => el('span', {class: 'words'}, list[i].sentence || '')
+      },
     ];
-    return list.length ? sortable(list.map((_, i) => i), all, {}, "Comparisons with the baseline") : null;
+    return list.length ? sortable(list.map((_, i) => i), all, {}, 'Comparisons with the baseline') : null;
   }
 
   function rules(data) {
-    const lines = [["Starts", data.experiment.starts_protocol], ["Success", data.experiment.success_rule], ["Time", data.experiment.time_rule]].filter((line) => line[1]);
-    return lines.length ? el("dl", { class: "rules" }, lines.map(([name, text]) => el("div", {}, el("dt", {}, name), el("dd", {}, text)))) : null;
+    const lines = [
+      ['Starts', data.experiment.starts_protocol], ['Success', data.experiment.success_rule],
+      ['Time', data.experiment.time_rule]
+    ].filter((line) => line[1]);
+    return lines.length ?
+        el('dl', {class: 'rules'}, lines.map(([name, text]) => el('div', {}, el('dt', {}, name), el('dd', {}, text)))) :
+        null;
   }
 
-  return { facts, verdicts, table, comparisonTable, caseTable, rules, sortable, rateBar };
+  return {facts, verdicts, table, comparisonTable, caseTable, rules, sortable, rateBar};
 })();

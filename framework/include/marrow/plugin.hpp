@@ -18,8 +18,8 @@
 //   const T*          an optional input          const List<T>*   an optional list
 //   Context&          seed, cancel, progress, log
 //   const Options&    the one struct that is no registered value type: the options
-// Returned: a value, std::optional of one, List<T>, std::shared_ptr<const Interface> for a function, a std::tuple, or a struct
-// whose members are named with .out("port", &Struct::member, "help").
+// Returned: a value, std::optional of one, List<T>, std::shared_ptr<const Interface> for a function, a std::tuple, or a
+// struct whose members are named with .out("port", &Struct::member, "help").
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
@@ -43,11 +43,21 @@
 namespace marrow {
 
 // Attributes of ports and options.
-struct Over { std::string axis; };
-struct Unit { std::string text; };
-struct Minimum { double value; };
-struct Maximum { double value; };
-struct Choices { std::vector<std::string> names; };
+struct Over {
+  std::string axis;
+};
+struct Unit {
+  std::string text;
+};
+struct Minimum {
+  double value;
+};
+struct Maximum {
+  double value;
+};
+struct Choices {
+  std::vector<std::string> names;
+};
 struct Required {};
 
 /// The axis along which a list port runs.
@@ -71,13 +81,21 @@ struct IsTuple : std::false_type {};
 template <class... T>
 struct IsTuple<std::tuple<T...>> : std::true_type {};
 template <class T>
-struct OptionalItem { using type = void; };
+struct OptionalItem {
+  using type = void;
+};
 template <class T>
-struct OptionalItem<std::optional<T>> { using type = T; };
+struct OptionalItem<std::optional<T>> {
+  using type = T;
+};
 template <class T>
-struct SharedItem { using type = void; };
+struct SharedItem {
+  using type = void;
+};
 template <class T>
-struct SharedItem<std::shared_ptr<const T>> { using type = T; };
+struct SharedItem<std::shared_ptr<const T>> {
+  using type = T;
+};
 
 enum class Role { input, optional_input, list, optional_list, context, options };
 
@@ -87,16 +105,22 @@ struct Argument {
   using Plain = std::remove_cv_t<std::remove_pointer_t<std::remove_reference_t<A>>>;
   static constexpr bool kPointer = std::is_pointer_v<std::remove_reference_t<A>>;
   static constexpr Role role() {
-    if constexpr (std::is_same_v<Plain, Context>) return Role::context;
-    else if constexpr (IsList<Plain>::value) return kPointer ? Role::optional_list : Role::list;
-    else if constexpr (Registered<Plain>) return kPointer ? Role::optional_input : Role::input;
-    else return Role::options;
+    if constexpr (std::is_same_v<Plain, Context>)
+      return Role::context;
+    else if constexpr (IsList<Plain>::value)
+      return kPointer ? Role::optional_list : Role::list;
+    else if constexpr (Registered<Plain>)
+      return kPointer ? Role::optional_input : Role::input;
+    else
+      return Role::options;
   }
   static constexpr bool kPort = role() != Role::context && role() != Role::options;
 };
 
 template <class... Args>
-struct OptionsOf { using type = void; };
+struct OptionsOf {
+  using type = void;
+};
 template <class A, class... Rest>
 struct OptionsOf<A, Rest...> {
   using type = std::conditional_t<Argument<A>::role() == Role::options, typename Argument<A>::Plain,
@@ -114,10 +138,14 @@ struct Returned {
   static constexpr bool kShared = !std::is_void_v<Shared>;
   static constexpr bool kList = IsList<M>::value;
   static auto item() {
-    if constexpr (kOptional) return std::type_identity<Optional>{};
-    else if constexpr (kShared) return std::type_identity<Shared>{};
-    else if constexpr (kList) return std::type_identity<typename M::value_type>{};
-    else return std::type_identity<M>{};
+    if constexpr (kOptional)
+      return std::type_identity<Optional>{};
+    else if constexpr (kShared)
+      return std::type_identity<Shared>{};
+    else if constexpr (kList)
+      return std::type_identity<typename M::value_type>{};
+    else
+      return std::type_identity<M>{};
   }
   using Item = typename decltype(item())::type;
 
@@ -140,12 +168,18 @@ struct Returned {
 
 template <class M>
 OptionValue to_option_value(const M& member) {
-  if constexpr (std::is_same_v<M, bool>) return member;
-  else if constexpr (std::is_integral_v<M>) return std::int64_t(member);
-  else if constexpr (std::is_floating_point_v<M>) return double(member);
-  else if constexpr (std::is_same_v<M, std::string>) return member;
-  else if constexpr (std::is_same_v<M, std::filesystem::path>) return member.string();
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>) return member;
+  if constexpr (std::is_same_v<M, bool>)
+    return member;
+  else if constexpr (std::is_integral_v<M>)
+    return std::int64_t(member);
+  else if constexpr (std::is_floating_point_v<M>)
+    return double(member);
+  else if constexpr (std::is_same_v<M, std::string>)
+    return member;
+  else if constexpr (std::is_same_v<M, std::filesystem::path>)
+    return member.string();
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    return member;
   else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
     std::vector<std::string> texts;
     for (const auto& path : member) texts.push_back(path.string());
@@ -157,40 +191,57 @@ OptionValue to_option_value(const M& member) {
 
 template <class M>
 void from_option_value(M& member, const OptionValue& value) {
-  if constexpr (std::is_same_v<M, bool>) member = std::get<bool>(value);
-  else if constexpr (std::is_integral_v<M>) member = M(std::get<std::int64_t>(value));
-  else if constexpr (std::is_floating_point_v<M>) member = M(std::get<double>(value));
+  if constexpr (std::is_same_v<M, bool>)
+    member = std::get<bool>(value);
+  else if constexpr (std::is_integral_v<M>)
+    member = M(std::get<std::int64_t>(value));
+  else if constexpr (std::is_floating_point_v<M>)
+    member = M(std::get<double>(value));
   else if constexpr (std::is_same_v<M, std::string> || std::is_same_v<M, std::filesystem::path>)
     member = std::get<std::string>(value);
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>) member = std::get<std::vector<std::string>>(value);
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    member = std::get<std::vector<std::string>>(value);
   else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
     member.clear();
     for (const auto& text : std::get<std::vector<std::string>>(value)) member.emplace_back(text);
   } else {
     const auto& numbers = std::get<std::vector<double>>(value);
-    if constexpr (std::is_same_v<M, std::vector<double>>) member = numbers;
-    else for (std::size_t i = 0; i < numbers.size(); ++i) member[i] = numbers[i];
+    if constexpr (std::is_same_v<M, std::vector<double>>)
+      member = numbers;
+    else
+      for (std::size_t i = 0; i < numbers.size(); ++i) member[i] = numbers[i];
   }
 }
 
 template <class M>
 constexpr OptionType option_type() {
-  if constexpr (std::is_same_v<M, bool>) return OptionType::boolean;
-  else if constexpr (std::is_integral_v<M>) return OptionType::integer;
-  else if constexpr (std::is_floating_point_v<M>) return OptionType::number;
-  else if constexpr (std::is_same_v<M, std::string>) return OptionType::text;
-  else if constexpr (std::is_same_v<M, std::filesystem::path>) return OptionType::path;
-  else if constexpr (std::is_same_v<M, std::vector<std::string>>) return OptionType::texts;
-  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) return OptionType::paths;
-  else return OptionType::numbers;
+  if constexpr (std::is_same_v<M, bool>)
+    return OptionType::boolean;
+  else if constexpr (std::is_integral_v<M>)
+    return OptionType::integer;
+  else if constexpr (std::is_floating_point_v<M>)
+    return OptionType::number;
+  else if constexpr (std::is_same_v<M, std::string>)
+    return OptionType::text;
+  else if constexpr (std::is_same_v<M, std::filesystem::path>)
+    return OptionType::path;
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    return OptionType::texts;
+  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>)
+    return OptionType::paths;
+  else
+    return OptionType::numbers;
 }
 
 /// The number of numbers that a fixed-size list option takes; 0 for std::vector.
 template <class M>
 constexpr std::size_t option_length() {
-  if constexpr (requires { std::tuple_size<M>::value; }) return std::tuple_size<M>::value;
-  else if constexpr (requires { M::SizeAtCompileTime; }) return std::size_t(M::SizeAtCompileTime);
-  else return 0;
+  if constexpr (requires { std::tuple_size<M>::value; })
+    return std::tuple_size<M>::value;
+  else if constexpr (requires { M::SizeAtCompileTime; })
+    return std::size_t(M::SizeAtCompileTime);
+  else
+    return 0;
 }
 
 /// A whole number that the member cannot hold is out of the option's range.
@@ -221,7 +272,8 @@ class NodeBuilder {
     (add_port<Args>(), ...);
     ports_ = node_.info.inputs.size();
     node_.make_options = [] { return std::make_shared<Options>(); };
-    node_.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options, Context& context) {
+    node_.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options,
+                                                Context& context) {
       return call(function, *outputs, inputs, options, context, std::index_sequence_for<Args...>{});
     };
   }
@@ -233,16 +285,23 @@ class NodeBuilder {
     detail::check_declaration(node_);
   }
 
-  NodeBuilder& summary(std::string text) { node_.info.summary = std::move(text); return *this; }
+  NodeBuilder& summary(std::string text) {
+    node_.info.summary = std::move(text);
+    return *this;
+  }
   /// The node draws from Context::seed(); its results then depend on the run's seed.
-  NodeBuilder& random() { node_.info.random = true; return *this; }
+  NodeBuilder& random() {
+    node_.info.random = true;
+    return *this;
+  }
 
   NodeBuilder& in(std::string name, std::string help, Over axis = {}) {
     if (named_inputs_ < ports_) {
       PortInfo& port = node_.info.inputs[named_inputs_];
       if (axis.axis.empty() != port.axis.empty()) {
         std::string fault = "input '" + name;
-        node_.faults.push_back(fault.append(axis.axis.empty() ? "': a List needs over(\"axis\")" : "': over() is for List inputs"));
+        node_.faults.push_back(
+            fault.append(axis.axis.empty() ? "': a List needs over(\"axis\")" : "': over() is for List inputs"));
       }
       port.name = std::move(name);
       port.help = std::move(help);
@@ -256,12 +315,12 @@ class NodeBuilder {
   NodeBuilder& out(std::string name, std::string help, Over axis = {}) {
     const std::size_t index = outputs_->size();
     if constexpr (detail::IsTuple<R>::value) {
-      add_tuple_output(index, std::move(name), std::move(help), std::move(axis), std::make_index_sequence<std::tuple_size_v<R>>{});
+      add_tuple_output(index, std::move(name), std::move(help), std::move(axis),
+                       std::make_index_sequence<std::tuple_size_v<R>>{});
     } else if constexpr (Registered<typename detail::Returned<R>::Item>) {
-      add_output<R>(std::move(name), std::move(help), axis,
-                    [axis = axis.axis](const std::shared_ptr<const R>& whole) {
-                      return detail::Returned<R>::value(whole, *whole, axis);
-                    });
+      add_output<R>(std::move(name), std::move(help), axis, [axis = axis.axis](const std::shared_ptr<const R>& whole) {
+        return detail::Returned<R>::value(whole, *whole, axis);
+      });
     } else {
       node_.faults.push_back("output '" + name + "': the returned type is not registered with MARROW_VALUE_TYPE");
     }
@@ -322,7 +381,8 @@ class NodeBuilder {
   NodeBuilder& add_output(std::string name, std::string help, const Over& axis, Output output) {
     using Returned = detail::Returned<M>;
     if (axis.axis.empty() == Returned::kList)
-      node_.faults.push_back("output '" + name + "': " + (Returned::kList ? "a List needs over(\"axis\")" : "over() is for a List"));
+      node_.faults.push_back("output '" + name +
+                             "': " + (Returned::kList ? "a List needs over(\"axis\")" : "over() is for a List"));
     node_.info.outputs.push_back({std::move(name), std::move(help), TypeInfo::of<typename Returned::Item>(),
                                   Returned::kOptional || Returned::kList, axis.axis});
     outputs_->push_back(std::move(output));
@@ -332,10 +392,13 @@ class NodeBuilder {
   template <std::size_t... I>
   void add_tuple_output(std::size_t index, std::string name, std::string help, Over axis, std::index_sequence<I...>) {
     const bool found = ((I == index && (add_output<std::tuple_element_t<I, R>>(
-                             name, help, axis,
-                             [axis = axis.axis](const std::shared_ptr<const R>& whole) {
-                               return detail::Returned<std::tuple_element_t<I, R>>::value(whole, std::get<I>(*whole), axis);
-                             }), true)) || ...);
+                                            name, help, axis,
+                                            [axis = axis.axis](const std::shared_ptr<const R>& whole) {
+                                              return detail::Returned<std::tuple_element_t<I, R>>::value(
+                                                  whole, std::get<I>(*whole), axis);
+                                            }),
+                                        true)) ||
+                        ...);
     if (!found) node_.faults.push_back("output '" + name + "': the returned tuple has fewer items");
   }
 
@@ -366,12 +429,18 @@ class NodeBuilder {
       if constexpr (detail::IsList<Plain>::value) list_ = value_->template as_list<typename Plain::value_type>();
     }
     A get() {
-      if constexpr (kRole == detail::Role::context) return context_;
-      else if constexpr (kRole == detail::Role::options) return *static_cast<const Plain*>(options_);
-      else if constexpr (kRole == detail::Role::list) return list_;
-      else if constexpr (kRole == detail::Role::optional_list) return value_->is_absent() ? nullptr : &list_;
-      else if constexpr (kRole == detail::Role::optional_input) return static_cast<const Plain*>(value_->data.get());
-      else return *static_cast<const Plain*>(value_->data.get());
+      if constexpr (kRole == detail::Role::context)
+        return context_;
+      else if constexpr (kRole == detail::Role::options)
+        return *static_cast<const Plain*>(options_);
+      else if constexpr (kRole == detail::Role::list)
+        return list_;
+      else if constexpr (kRole == detail::Role::optional_list)
+        return value_->is_absent() ? nullptr : &list_;
+      else if constexpr (kRole == detail::Role::optional_input)
+        return static_cast<const Plain*>(value_->data.get());
+      else
+        return *static_cast<const Plain*>(value_->data.get());
     }
     const void* options_;
     Context& context_;
@@ -380,8 +449,9 @@ class NodeBuilder {
   };
 
   template <std::size_t... I>
-  static std::vector<Value> call(R (*function)(Args...), const std::vector<Output>& outputs, const std::vector<Value>& inputs,
-                                 [[maybe_unused]] const void* options, Context& context, std::index_sequence<I...>) {
+  static std::vector<Value> call(R (*function)(Args...), const std::vector<Output>& outputs,
+                                 const std::vector<Value>& inputs, [[maybe_unused]] const void* options,
+                                 Context& context, std::index_sequence<I...>) {
     std::tuple<Holder<Args>...> holders{Holder<Args>(inputs, port_index<I>(), options, context)...};
     const auto whole = std::make_shared<const R>(function(std::get<I>(holders).get()...));
     std::vector<Value> values;
@@ -407,8 +477,9 @@ class Plugin {
   /// `extension` (an empty extension means a folder). It throws Error when it cannot.
   template <Registered T>
   void writer(std::string extension, void (*function)(const T&, const std::string& path), std::string help) {
-    writers.push_back({{TypeInfo::of<T>(), std::move(extension), std::move(help)},
-                       [function](const void* value, const std::string& path) { function(*static_cast<const T*>(value), path); }});
+    writers.push_back(
+        {{TypeInfo::of<T>(), std::move(extension), std::move(help)},
+         [function](const void* value, const std::string& path) { function(*static_cast<const T*>(value), path); }});
   }
 
   std::deque<NodeDefinition> nodes;
@@ -416,14 +487,17 @@ class Plugin {
 };
 
 /// Opens the one function that makes a shared library a plugin.
-#define MARROW_PLUGIN(plugin)                                                                                     \
-  static void marrow_register_nodes(::marrow::Plugin& plugin);                                                    \
-  extern "C" __attribute__((visibility("default"))) const ::marrow::PluginEntry* marrow_plugin_entry() {          \
-    static constexpr ::marrow::PluginEntry kEntry{{'m', 'a', 'r', 'r', 'o', 'w', '!', 0}, sizeof(::marrow::PluginEntry), \
-                                                  MARROW_API_MAJOR, MARROW_API_MINOR, ::marrow::abi_stamp(),      \
-                                                  &marrow_register_nodes};                                        \
-    return &kEntry;                                                                                               \
-  }                                                                                                               \
+#define MARROW_PLUGIN(plugin)                                                                            \
+  static void marrow_register_nodes(::marrow::Plugin& plugin);                                           \
+  extern "C" __attribute__((visibility("default"))) const ::marrow::PluginEntry* marrow_plugin_entry() { \
+    static constexpr ::marrow::PluginEntry kEntry{{'m', 'a', 'r', 'r', 'o', 'w', '!', 0},                \
+                                                  sizeof(::marrow::PluginEntry),                         \
+                                                  MARROW_API_MAJOR,                                      \
+                                                  MARROW_API_MINOR,                                      \
+                                                  ::marrow::abi_stamp(),                                 \
+                                                  &marrow_register_nodes};                               \
+    return &kEntry;                                                                                      \
+  }                                                                                                      \
   static void marrow_register_nodes(::marrow::Plugin& plugin)
 
 }  // namespace marrow

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain check of cameras against points, five that are wrong in one way each, and a camera that is none: the suite must catch each.
+// A plain check of cameras against points, five that are wrong in one way each, and a camera that is none: the suite
+// must catch each.
 #include <atomic>
 #include <cmath>
 #include <cstdio>
@@ -22,7 +23,8 @@ double worst_px(const marrow::View& view, const std::filesystem::path& file, boo
   for (std::string line; std::getline(stream, line);) {
     Eigen::Vector3d at;
     Eigen::Vector2d seen[2];
-    if (std::sscanf(line.c_str(), " - {at_mm: [%lf, %lf, %lf], seen_px: {a: [%lf, %lf], b: [%lf, %lf]}}", &at[0], &at[1], &at[2], &seen[0][0], &seen[0][1], &seen[1][0], &seen[1][1]) != 7)
+    if (std::sscanf(line.c_str(), " - {at_mm: [%lf, %lf, %lf], seen_px: {a: [%lf, %lf], b: [%lf, %lf]}}", &at[0],
+                    &at[1], &at[2], &seen[0][0], &seen[0][1], &seen[1][0], &seen[1][1]) != 7)
       continue;
     const double off = (marrow::project(view.camera, at) - seen[second]).norm();
     worst = std::max(worst, std::isfinite(off) || fault == Fault::trusting ? off : INFINITY);

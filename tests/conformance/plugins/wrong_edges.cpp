@@ -10,9 +10,12 @@ enum class Fault { none, shifted, turned, changing, unsorted, crashing };
 
 float value_at(const cv::Mat& pixels, int v, int u) {
   switch (pixels.depth()) {
-    case CV_8U: return pixels.at<std::uint8_t>(v, u);
-    case CV_16U: return pixels.at<std::uint16_t>(v, u);
-    default: return pixels.at<float>(v, u);
+    case CV_8U:
+      return pixels.at<std::uint8_t>(v, u);
+    case CV_16U:
+      return pixels.at<std::uint16_t>(v, u);
+    default:
+      return pixels.at<float>(v, u);
   }
 }
 
@@ -72,7 +75,9 @@ marrow::EdgeMap extract(const marrow::View& view) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) { plugin.node(name, function).summary("For a test of the suite").in("view", "X-ray view").out("edges", "edge pixels"); };
+  const auto add = [&](const char* name, auto* function) {
+    plugin.node(name, function).summary("For a test of the suite").in("view", "X-ray view").out("edges", "edge pixels");
+  };
   add("edges.plain", extract<Fault::none>);
   add("edges.shifted", extract<Fault::shifted>);
   add("edges.turned", extract<Fault::turned>);

@@ -15,14 +15,16 @@ class Tetrahedra {
   explicit Tetrahedra(const marrow::SignedField& field) : field_(field) {}
 
   marrow::Mesh mesh() {
-    static constexpr int kCorners[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
+    static constexpr int kCorners[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7},
+                                           {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
     const auto& size = field_.grid.size;
     for (int z = -1; z < size[2]; ++z)
       for (int y = -1; y < size[1]; ++y)
         for (int x = -1; x < size[0]; ++x)
           for (const auto& corners : kCorners) {
             std::array<std::array<int, 3>, 4> at;
-            for (int k = 0; k < 4; ++k) at[std::size_t(k)] = {x + (corners[k] & 1), y + (corners[k] >> 1 & 1), z + (corners[k] >> 2 & 1)};
+            for (int k = 0; k < 4; ++k)
+              at[std::size_t(k)] = {x + (corners[k] & 1), y + (corners[k] >> 1 & 1), z + (corners[k] >> 2 & 1)};
             add(at);
           }
     return mesh_;
@@ -32,7 +34,9 @@ class Tetrahedra {
   using Corner = std::array<int, 3>;
 
   double value(const Corner& c) const {
-    const double inside = field_.at(std::clamp(c[0], 0, field_.grid.size[0] - 1), std::clamp(c[1], 0, field_.grid.size[1] - 1), std::clamp(c[2], 0, field_.grid.size[2] - 1));
+    const double inside =
+        field_.at(std::clamp(c[0], 0, field_.grid.size[0] - 1), std::clamp(c[1], 0, field_.grid.size[1] - 1),
+                  std::clamp(c[2], 0, field_.grid.size[2] - 1));
     const double value = field_.grid.contains(c[0], c[1], c[2]) ? inside : std::abs(inside);
     return std::abs(value) < 1e-6 ? 1e-6 : value;
   }
@@ -51,7 +55,8 @@ class Tetrahedra {
   /// The triangle, turned so that its normal points from inside to outside.
   void triangle(std::uint32_t a, std::uint32_t b, std::uint32_t c, const Corner& outside) {
     const auto& v = mesh_.vertices_mm;
-    const Eigen::Vector3d normal = (v[b] - v[a]).cross(v[c] - v[a]), out = field_.grid.point_from_index(Eigen::Vector3d(outside[0], outside[1], outside[2]));
+    const Eigen::Vector3d normal = (v[b] - v[a]).cross(v[c] - v[a]),
+                          out = field_.grid.point_from_index(Eigen::Vector3d(outside[0], outside[1], outside[2]));
     if (normal.dot(out - v[a]) < 0) std::swap(b, c);
     mesh_.triangles.push_back({a, b, c});
   }
@@ -61,7 +66,8 @@ class Tetrahedra {
     for (const Corner& corner : at) (value(corner) < 0 ? in : out).push_back(corner);
     if (in.empty() || out.empty()) return;
     if (in.size() == 2) {
-      const std::uint32_t a = crossing(in[0], out[0]), b = crossing(in[0], out[1]), c = crossing(in[1], out[1]), d = crossing(in[1], out[0]);
+      const std::uint32_t a = crossing(in[0], out[0]), b = crossing(in[0], out[1]), c = crossing(in[1], out[1]),
+                          d = crossing(in[1], out[0]);
       triangle(a, b, c, out[0]);
       triangle(a, c, d, out[0]);
     } else {
@@ -78,7 +84,8 @@ class Tetrahedra {
 
 template <Fault fault>
 marrow::Mesh polygonise(const marrow::SignedField& field) {
-  if (field.grid.count() == 0 || field.values_mm.size() != field.grid.count()) throw marrow::Error("the field is empty or not complete");
+  if (field.grid.count() == 0 || field.values_mm.size() != field.grid.count())
+    throw marrow::Error("the field is empty or not complete");
   for (const float value : field.values_mm)
     if (!std::isfinite(value)) throw marrow::Error("a value of the field is not finite");
   marrow::SignedField changed = field;
@@ -104,7 +111,12 @@ marrow::Mesh polygonise(const marrow::SignedField& field) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) { plugin.node(name, function).summary("For a test of the suite").in("field", "signed distance").out("mesh", "surface"); };
+  const auto add = [&](const char* name, auto* function) {
+    plugin.node(name, function)
+        .summary("For a test of the suite")
+        .in("field", "signed distance")
+        .out("mesh", "surface");
+  };
   add("mesh.plain", polygonise<Fault::none>);
   add("mesh.inward", polygonise<Fault::inward>);
   add("mesh.open", polygonise<Fault::open>);

@@ -43,12 +43,16 @@ class Search : public marrow::Optimizer {
 };
 
 template <Fault fault>
-std::shared_ptr<const marrow::Optimizer> make() { return std::make_shared<Search<fault>>(); }
+std::shared_ptr<const marrow::Optimizer> make() {
+  return std::make_shared<Search<fault>>();
+}
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) { plugin.node(name, function).summary("For a test of the suite").out("optimizer", "minimiser"); };
+  const auto add = [&](const char* name, auto* function) {
+    plugin.node(name, function).summary("For a test of the suite").out("optimizer", "minimiser");
+  };
   add("optimizer.plain", make<Fault::none>);
   add("optimizer.lazy", make<Fault::lazy>);
   add("optimizer.spending", make<Fault::spending>);

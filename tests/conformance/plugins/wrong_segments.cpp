@@ -34,7 +34,8 @@ std::vector<bool> grow(const Volume& volume, const Seeds& seeds) {
   };
   for (const Eigen::Vector3d& point : seeds.points_mm) {
     const Eigen::Vector3d index = volume.grid.index_from_point(point);
-    if (!index.allFinite() || index.cwiseAbs().maxCoeff() > 1e6) throw marrow::Error("a seed of '" + seeds.fragment + "' is no point of the volume");
+    if (!index.allFinite() || index.cwiseAbs().maxCoeff() > 1e6)
+      throw marrow::Error("a seed of '" + seeds.fragment + "' is no point of the volume");
     const int x = int(std::lround(index.x())), y = int(std::lround(index.y())), z = int(std::lround(index.z()));
     if (volume.grid.contains(x, y, z)) add(x, y, z);
   }
@@ -54,7 +55,8 @@ std::vector<bool> fattened(const marrow::Grid& grid, const std::vector<bool>& ow
     for (int y = 0; y < grid.size[1]; ++y)
       for (int x = 0; x < grid.size[0]; ++x)
         if (owned[grid.offset(x, y, z)])
-          for_neighbours(grid, x, y, z, [&](int i, int j, int k) { fat[grid.offset(i, j, k)] = fat[grid.offset(i, j, k)] || k == z; });
+          for_neighbours(grid, x, y, z,
+                         [&](int i, int j, int k) { fat[grid.offset(i, j, k)] = fat[grid.offset(i, j, k)] || k == z; });
   return fat;
 }
 
@@ -66,10 +68,13 @@ SignedField field_of(const Volume& volume, const std::vector<bool>& owned) {
       for (int x = 0; x < size[0]; ++x) {
         const std::size_t at = volume.grid.offset(x, y, z);
         bool beside = false;
-        for_neighbours(volume.grid, x, y, z, [&](int i, int j, int k) { beside = beside || owned[volume.grid.offset(i, j, k)]; });
+        for_neighbours(volume.grid, x, y, z,
+                       [&](int i, int j, int k) { beside = beside || owned[volume.grid.offset(i, j, k)]; });
         const float distance = std::clamp((kSurface_hu - volume.values[at]) / kSlope_hu_per_mm, -kFar_mm, kFar_mm);
-        if (owned[at]) field.values_mm[at] = std::min(distance, -0.01f);
-        else if (beside) field.values_mm[at] = std::max(distance, 0.01f);
+        if (owned[at])
+          field.values_mm[at] = std::min(distance, -0.01f);
+        else if (beside)
+          field.values_mm[at] = std::max(distance, 0.01f);
       }
   return field;
 }
@@ -101,7 +106,11 @@ List<SignedField> segment(const Volume& volume, const List<Seeds>& seeds) {
 
 MARROW_PLUGIN(plugin) {
   const auto add = [&](const char* name, auto* function) {
-    plugin.node(name, function).summary("For a test of the suite").in("volume", "CT").in("seeds", "points in each fragment", marrow::over("fragment")).out("field", "signed distances", marrow::over("fragment"));
+    plugin.node(name, function)
+        .summary("For a test of the suite")
+        .in("volume", "CT")
+        .in("seeds", "points in each fragment", marrow::over("fragment"))
+        .out("field", "signed distances", marrow::over("fragment"));
   };
   add("segment.plain", segment<Fault::none>);
   add("segment.fat", segment<Fault::fat>);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain cost, 1 - correlation of grey values, and others that are wrong in one way each: the suite must catch each of them.
+// A plain cost, 1 - correlation of grey values, and others that are wrong in one way each: the suite must catch each of
+// them.
 #include <atomic>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -11,7 +12,8 @@ enum class Fault { none, shifted, careless, moved, changing, unordered, unmasked
 template <Fault fault>
 class Plain : public marrow::Cost {
  public:
-  Plain(const marrow::Projector& projector, const marrow::List<marrow::View>& views, int step) : projector_(projector), views_(views), step_(step) {}
+  Plain(const marrow::Projector& projector, const marrow::List<marrow::View>& views, int step)
+      : projector_(projector), views_(views), step_(step) {}
 
   double value(const marrow::RigidTransform& world_from_model) const override {
     static std::atomic<int> calls{0};
@@ -32,7 +34,8 @@ class Plain : public marrow::Cost {
     if (fault == Fault::levels) return std::make_shared<Plain>(projector_, views_, 1000 * level.pixel_step);
     return std::make_shared<Plain>(projector_, views_, level.pixel_step > 0 ? level.pixel_step : step_);
   }
-  std::optional<Expansion> expansion(const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame) const override {
+  std::optional<Expansion> expansion(const marrow::RigidTransform& pose,
+                                     const marrow::FragmentFrame& frame) const override {
     Expansion about;
     about.value = value(pose);
     for (int k = 0; k < 6; ++k) {
@@ -59,7 +62,8 @@ class Plain : public marrow::Cost {
       for (int column = 0; column < grid.columns; ++column) {
         const int u = int(grid.pixel(column, row).x()), v = int(grid.pixel(column, row).y());
         if (fault != Fault::unmasked && !view.mask.empty() && !view.mask.at<std::uint8_t>(v, u)) continue;
-        const double y = -std::log(std::max(pixels.at<float>(v, u), 1.0f)), x = double(rendered[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)]);
+        const double y = -std::log(std::max(pixels.at<float>(v, u), 1.0f)),
+                     x = double(rendered[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)]);
         if (!std::isfinite(y)) continue;
         n += 1, a += x, b += y, aa += x * x, bb += y * y, ab += x * y, squares += std::pow(0.02 * x - y - 9.5, 2);
       }
@@ -75,8 +79,9 @@ class Plain : public marrow::Cost {
 };
 
 template <Fault fault>
-std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views, const marrow::List<marrow::Pose>* others,
-    const marrow::List<marrow::Projector>* other_projectors) {
+std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+                                         const marrow::List<marrow::Pose>* others,
+                                         const marrow::List<marrow::Projector>* other_projectors) {
   if (views.size() == 0) throw marrow::Error("there is no view");
   marrow::List<marrow::View> own;
   for (marrow::View view : views) {
@@ -85,8 +90,11 @@ std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, con
     for (std::size_t i = 0; other_projectors && others && i < other_projectors->size(); ++i) {
       const marrow::Projector& other = (*other_projectors)[i];
       if (&other == &projector && fault != Fault::alone) continue;
-      const std::vector<float> shadow = other.radiograph(view.camera, (*others)[i].world_from_model, marrow::PixelGrid{0, 0, 1, view.camera.width_px, view.camera.height_px});
-      cv::Mat mask = view.mask.empty() ? cv::Mat(view.camera.height_px, view.camera.width_px, CV_8U, cv::Scalar(255)) : view.mask.clone();
+      const std::vector<float> shadow =
+          other.radiograph(view.camera, (*others)[i].world_from_model,
+                           marrow::PixelGrid{0, 0, 1, view.camera.width_px, view.camera.height_px});
+      cv::Mat mask = view.mask.empty() ? cv::Mat(view.camera.height_px, view.camera.width_px, CV_8U, cv::Scalar(255))
+                                       : view.mask.clone();
       for (std::size_t k = 0; k < shadow.size(); ++k)
         if (shadow[k] > 0) mask.data[k] = 0;
       view.mask = mask;

@@ -13,24 +13,46 @@ def chunk(name, data):
 def png(bits=8, colour=0, width=6, height=5, interlaced=0, extra=b""):
     channels = {0: 1, 2: 3, 3: 1, 4: 2, 6: 4}[colour]
     row = (width * bits * channels + 7) // 8
-    data = b"".join(bytes([y % 5 if not interlaced else 0]) + bytes((x * 31 + y * 17) % 256 for x in range(row)) for y in range(height * (3 if interlaced else 1)))
-    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlaced)) + extra +
-            chunk(b"IDAT", zlib.compress(data)) + chunk(b"IEND", b""))
+    data = b"".join(
+        bytes([y % 5 if not interlaced else 0]) + bytes((x * 31 + y * 17) % 256 for x in range(row))
+        for y in range(height * (3 if interlaced else 1))
+    )
+    return (
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlaced))
+        + extra
+        + chunk(b"IDAT", zlib.compress(data))
+        + chunk(b"IEND", b"")
+    )
 
 
 def seeds():
     palette = chunk(b"PLTE", bytes(range(48)))
     files = {
-        "png": png(), "png_16": png(16), "png_1": png(1), "png_4": png(4), "png_colour": png(8, 2), "png_palette": png(4, 3, extra=palette),
-        "png_alpha": png(8, 4), "png_interlaced": png(8, interlaced=1), "png_text": png(extra=chunk(b"tEXt", b"Title\0a") + chunk(b"gAMA", struct.pack(">I", 45455))),
+        "png": png(),
+        "png_16": png(16),
+        "png_1": png(1),
+        "png_4": png(4),
+        "png_colour": png(8, 2),
+        "png_palette": png(4, 3, extra=palette),
+        "png_alpha": png(8, 4),
+        "png_interlaced": png(8, interlaced=1),
+        "png_text": png(extra=chunk(b"tEXt", b"Title\0a") + chunk(b"gAMA", struct.pack(">I", 45455))),
         "png_transparent": png(8, 3, extra=chunk(b"PLTE", bytes(range(256)) * 3) + chunk(b"tRNS", bytes(range(16)))),
     }
     result = {name: b"1c" + content for name, content in files.items()}
     result["png_as_it_is"] = b"1p" + png()
     tiffs = {
-        "tif": tiff([(6, 5)]), "tif_8": tiff([(6, 5)], bits=8), "tif_float": tiff([(6, 5)], bits=32, kind=3), "tif_signed": tiff([(6, 5)], kind=2),
-        "tif_big_endian": tiff([(6, 5)], order=">"), "tif_packed": tiff([(6, 5)], compression=32773), "tif_deflate": tiff([(6, 5)], compression=8),
-        "tif_big": tiff([(6, 5)], big=True), "tif_1": tiff([(8, 5)], bits=1), "tif_colour": tiff([(4, 3)], bits=8, samples=3),
+        "tif": tiff([(6, 5)]),
+        "tif_8": tiff([(6, 5)], bits=8),
+        "tif_float": tiff([(6, 5)], bits=32, kind=3),
+        "tif_signed": tiff([(6, 5)], kind=2),
+        "tif_big_endian": tiff([(6, 5)], order=">"),
+        "tif_packed": tiff([(6, 5)], compression=32773),
+        "tif_deflate": tiff([(6, 5)], compression=8),
+        "tif_big": tiff([(6, 5)], big=True),
+        "tif_1": tiff([(8, 5)], bits=1),
+        "tif_colour": tiff([(4, 3)], bits=8, samples=3),
         "tif_spacing": tiff([(6, 5)], extra=[(296, 3, 3)]),
     }
     result.update({name: b"1t" + content for name, content in tiffs.items()})

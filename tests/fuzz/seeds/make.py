@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""Writes the inputs that the fuzz targets begin with: make.py FOLDER. Each is small, whole and made here; a byte in front says which
-format it is where a target reads several."""
+"""Writes the inputs that the fuzz targets begin with: make.py FOLDER. Each is small, whole and made here; a byte in
+front says which format it is where a target reads several."""
 import pathlib
 import sys
 
@@ -12,10 +12,20 @@ import surfaces
 import texts
 import volumes
 
-SEEDS = {"volume": volumes.seeds, "image": images.seeds, "dicom": dicom.seeds, "mesh": surfaces.seeds, "case": texts.case_seeds,
-         "pipeline": texts.pipeline_seeds, "experiment": texts.experiment_seeds, "store": records.store_seeds,
-         "manifest": records.manifest_seeds, "run_record": records.run_seeds,
-         "worker": records.worker_seeds, "names": records.name_seeds}
+SEEDS = {
+    "volume": volumes.seeds,
+    "image": images.seeds,
+    "dicom": dicom.seeds,
+    "mesh": surfaces.seeds,
+    "case": texts.case_seeds,
+    "pipeline": texts.pipeline_seeds,
+    "experiment": texts.experiment_seeds,
+    "store": records.store_seeds,
+    "manifest": records.manifest_seeds,
+    "run_record": records.run_seeds,
+    "worker": records.worker_seeds,
+    "names": records.name_seeds,
+}
 
 
 def main():

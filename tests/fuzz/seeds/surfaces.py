@@ -14,14 +14,21 @@ def stl_bytes(name=b"a surface", count=4):
 def stl_text():
     lines = ["solid a"]
     for face in FACES:
-        lines += ["facet normal 0 0 0", "outer loop"] + ["vertex {} {} {}".format(*POINTS[i]) for i in face] + ["endloop", "endfacet"]
+        lines += (
+            ["facet normal 0 0 0", "outer loop"]
+            + ["vertex {} {} {}".format(*POINTS[i]) for i in face]
+            + ["endloop", "endfacet"]
+        )
     return "\n".join(lines + ["endsolid a", ""]).encode()
 
 
 def ply_header(kind, vertices="float x y z", faces="list uchar int vertex_indices", more=""):
     type_, *names = vertices.split()
-    return (f"ply\nformat {kind} 1.0\ncomment made here\nelement vertex 4\n" + "".join(f"property {type_} {name}\n" for name in names) +
-            f"element face 4\nproperty {faces}\n{more}end_header\n").encode()
+    return (
+        f"ply\nformat {kind} 1.0\ncomment made here\nelement vertex 4\n"
+        + "".join(f"property {type_} {name}\n" for name in names)
+        + f"element face 4\nproperty {faces}\n{more}end_header\n"
+    ).encode()
 
 
 def ply_text(more=""):
@@ -39,9 +46,17 @@ def ply_bytes(order="<", vertices="float x y z", code="f", faces="list uchar int
 
 def seeds():
     return {
-        "stl": b"s" + stl_bytes(), "stl_solid": b"s" + stl_bytes(b"solid"), "stl_text": b"s" + stl_text(), "stl_short": b"s" + stl_bytes(count=5),
-        "ply_text": b"p" + ply_text(), "ply": b"p" + ply_bytes(), "ply_big_endian": b"p" + ply_bytes(">"),
-        "ply_double": b"p" + ply_bytes(vertices="double x y z nx ny nz", code="d"), "ply_uint": b"p" + ply_bytes(faces="list uint uint vertex_index", face_code="II"),
-        "ply_short": b"p" + ply_bytes(faces="list uchar short vertex_indices", face_code="Bh"), "ply_quality": b"p" + ply_bytes(vertices="float x y z quality"),
-        "ply_empty_element": b"p" + ply_text(more="element empty 1000000000\n"), "ply_edges": b"p" + ply_text(more="element edge 1\nproperty int v1\nproperty int v2\n") + b"0 1\n",
+        "stl": b"s" + stl_bytes(),
+        "stl_solid": b"s" + stl_bytes(b"solid"),
+        "stl_text": b"s" + stl_text(),
+        "stl_short": b"s" + stl_bytes(count=5),
+        "ply_text": b"p" + ply_text(),
+        "ply": b"p" + ply_bytes(),
+        "ply_big_endian": b"p" + ply_bytes(">"),
+        "ply_double": b"p" + ply_bytes(vertices="double x y z nx ny nz", code="d"),
+        "ply_uint": b"p" + ply_bytes(faces="list uint uint vertex_index", face_code="II"),
+        "ply_short": b"p" + ply_bytes(faces="list uchar short vertex_indices", face_code="Bh"),
+        "ply_quality": b"p" + ply_bytes(vertices="float x y z quality"),
+        "ply_empty_element": b"p" + ply_text(more="element empty 1000000000\n"),
+        "ply_edges": b"p" + ply_text(more="element edge 1\nproperty int v1\nproperty int v2\n") + b"0 1\n",
     }

@@ -4,7 +4,8 @@
 CAMERA = """width_px: 4
 height_px: 4
 intrinsics: [[1000, 0, 2], [0, 1001, 2], [0, 0, 1]]
-camera_from_world: {target: camera, source: world, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [1, 2, 900]}
+camera_from_world: {target: camera, source: world, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+  translation_mm: [1, 2, 900]}
 """
 MATRIX = "matrix: [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]]"
 PLACE = "{target: world, source: ct, rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]], translation_mm: [0, 0, -15]}"
@@ -14,7 +15,9 @@ VIEWS = """views:
     image: a.png
     mask: a.png
     camera:
-""" + "".join("      " + line + "\n" for line in CAMERA.splitlines())
+""" + "".join(
+    "      " + line + "\n" for line in CAMERA.splitlines()
+)
 CASE = f"""marrow-case: 1
 ct: ct.mha
 {VIEWS}fragments:
@@ -24,7 +27,10 @@ ct: ct.mha
     start: {PLACE}
     truth: {{target: world, source: ct, {MATRIX}}}
 """
-XMALAB = "image size\n640,480\n\ncamera matrix\n1000,0,320\n0,1000,240\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n900\n"
+XMALAB = (
+    "image size\n640,480\n\ncamera"
+    " matrix\n1000,0,320\n0,1000,240\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n900\n"
+)
 CALIBRATION = """marrow-calibration: 1
 width_px: 640
 height_px: 480
@@ -54,7 +60,10 @@ fragments:
     seen: {frontal: {medial: [10, 20], lateral: [30, 40]}}
     tracked: {medial: [1, 2, 3], notch: [3, 2, 1]}
 """
-SEEDS = "marrow-seeds: 1\nfragments:\n  radius: {seeds: [[12.68, 31.3038, 18.75], [1, 2, 3]]}\n  ulna: {seeds: [[0, 0, 0]], register: false}\n"
+SEEDS = (
+    "marrow-seeds: 1\nfragments:\n  radius: {seeds: [[12.68, 31.3038, 18.75], [1, 2, 3]]}\n  ulna: {seeds: [[0, 0, 0]],"
+    " register: false}\n"
+)
 POSE = f"""marrow-pose: 1
 target: world
 source: ct
@@ -74,7 +83,8 @@ inputs:
   amount: {type: number, default: 2, help: how much}
   file: {type: path, default: a.yaml}
 nodes:
-  one: {uses: test.constant, with: {value: $amount, count: 3, flag: true, word: two, numbers: [1, 2.5], point: [1, 2, 3], path: $file}}
+  one: {uses: test.constant, with: {value: $amount, count: 3, flag: true, word: two, numbers: [1, 2.5],
+    point: [1, 2, 3], path: $file}}
   sides: {uses: test.sides, with: {names: [a, b, "c d"]}}
   sum: {uses: test.add, in: {a: one, b: sides.both}}
   total: {uses: test.sum, in: {items: sum}}
@@ -113,7 +123,8 @@ timed_cells: 1
 SIMULATED = """experiment: 1
 pipeline: pipeline.yaml
 cases:
-  simulate: {pipeline: simulate.yaml, seeds: 1..5, seed_input: [seed], draw: {shift: [-10, 10]}, inputs: {}, set: {one.flag: true}}
+  simulate: {pipeline: simulate.yaml, seeds: 1..5, seed_input: [seed], draw: {shift: [-10, 10]}, inputs: {},
+    set: {one.flag: true}}
   input: case
 variants: {plain: {}}
 metrics: [errors.value]
@@ -122,28 +133,73 @@ metrics: [errors.value]
 
 def case_seeds():
     bomb = "a0: &a0 [x, x]\n" + "".join(f"a{i}: &a{i} [" + ", ".join([f"*a{i - 1}"] * 9) + "]\n" for i in range(1, 8))
-    files = {"c_case": CASE, "c_ct_map": CASE.replace("ct: ct.mha", "ct: {file: ct.mha, voxel_size_mm: [1, 1, 1], flip: [z], value_offset_hu: -1024}"),
-             "c_outside": CASE.replace("ct.mha", "../a.yaml"), "m_camera": "marrow-camera: 1\n" + CAMERA,
-             "m_distorted": "marrow-camera: 1\nradial_distortion: [0.1, 0, 0]\n" + CAMERA, "m_aliases": bomb, "m_deep": "intrinsics: " + "[" * 2000,
-             "x_xmalab": XMALAB, "k_calibration": CALIBRATION, "b_board": BOARD, "p_points": POINTS, "l_landmarks": LANDMARKS, "s_seeds": SEEDS, "o_pose": POSE,
-             "m_unknown_keys": "marrow-camera: 1\n" + CAMERA + "".join(f"key{i}: {i}\n" for i in range(300)),
-             "l_many": "marrow-landmarks: 1\nfragments:\n  f:\n    points:\n" + "".join(f"      p{i}: [1, 2, {i}]\n" for i in range(300)) +
-                       "    tracked:\n" + "".join(f"      q{i}: [1, 2, 3]\n" for i in range(300))}
+    files = {
+        "c_case": CASE,
+        "c_ct_map": CASE.replace(
+            "ct: ct.mha", "ct: {file: ct.mha, voxel_size_mm: [1, 1, 1], flip: [z], value_offset_hu: -1024}"
+        ),
+        "c_outside": CASE.replace("ct.mha", "../a.yaml"),
+        "m_camera": "marrow-camera: 1\n" + CAMERA,
+        "m_distorted": "marrow-camera: 1\nradial_distortion: [0.1, 0, 0]\n" + CAMERA,
+        "m_aliases": bomb,
+        "m_deep": "intrinsics: " + "[" * 2000,
+        "x_xmalab": XMALAB,
+        "k_calibration": CALIBRATION,
+        "b_board": BOARD,
+        "p_points": POINTS,
+        "l_landmarks": LANDMARKS,
+        "s_seeds": SEEDS,
+        "o_pose": POSE,
+        "m_unknown_keys": "marrow-camera: 1\n" + CAMERA + "".join(f"key{i}: {i}\n" for i in range(300)),
+        "l_many": (
+            "marrow-landmarks: 1\nfragments:\n  f:\n    points:\n"
+            + "".join(f"      p{i}: [1, 2, {i}]\n" for i in range(300))
+            + "    tracked:\n"
+            + "".join(f"      q{i}: [1, 2, 3]\n" for i in range(300))
+        ),
+    }
     return {name: (name[0] + text).encode() for name, text in files.items()}
 
 
 def pipeline_seeds():
-    files = {"all": PIPELINE, "small": SMALL, "overrides": PIPELINE + "\0amount=7\none.value=3\none.uses=test.draw\nsum.in.b=sides.right\nsides.names=[x, y]\n",
-             "faults": PIPELINE.replace("count: 3", "count: -1").replace("test.sum", "test.sun").replace("b: sides.both", "c: sides.bot"),
-             "circle": "marrow: 1\nnodes:\n  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {a: a}\n",
-             "unclosed": SMALL.replace("}", ""), "merge": "marrow: 1\n<<: {nodes: {}}\n", "name": SMALL + "name: ../../x\n", "quotes": SMALL.replace("one", '"o: \\x1b[31m\\n"'),
-             "truth": "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  e: {uses: evaluate.test, in: {of: t, truth: t}}\n  s: {uses: test.add, in: {a: t}}\noutputs: {e: e}\n"}
+    files = {
+        "all": PIPELINE,
+        "small": SMALL,
+        "overrides": (
+            PIPELINE + "\0amount=7\none.value=3\none.uses=test.draw\nsum.in.b=sides.right\nsides.names=[x, y]\n"
+        ),
+        "faults": (
+            PIPELINE.replace("count: 3", "count: -1")
+            .replace("test.sum", "test.sun")
+            .replace("b: sides.both", "c: sides.bot")
+        ),
+        "circle": (
+            "marrow: 1\nnodes:\n  a: {uses: test.add, in: {a: b}}\n  b: {uses: test.add, in: {a: a}}\noutputs: {a: a}\n"
+        ),
+        "unclosed": SMALL.replace("}", ""),
+        "merge": "marrow: 1\n<<: {nodes: {}}\n",
+        "name": SMALL + "name: ../../x\n",
+        "quotes": SMALL.replace("one", '"o: \\x1b[31m\\n"'),
+        "truth": (
+            "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  e: {uses: evaluate.test, in: {of: t, truth: t}}\n  s: {uses:"
+            " test.add, in: {a: t}}\noutputs: {e: e}\n"
+        ),
+    }
     return {name: text.encode() for name, text in files.items()}
 
 
 def experiment_seeds():
-    files = {"all": EXPERIMENT, "simulated": SIMULATED, "seeds": SIMULATED.replace(SIMULATED[SIMULATED.index("  simulate"):SIMULATED.index("variants")], "  seeds: [1, 2, 9]\n"),
-             "many_seeds": SIMULATED.replace("1..5", "1..100000"), "many_starts": EXPERIMENT.replace("count: 3", "count: 1000000"),
-             "wide_matrix": EXPERIMENT.replace("one.word: [one, two]", "\n  ".join(f"one.n{i}: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]" for i in range(8))),
-             "outside": EXPERIMENT.replace("plain: {}", "../../x: {}").replace("name: sums", "name: ../x")}
+    files = {
+        "all": EXPERIMENT,
+        "simulated": SIMULATED,
+        "seeds": SIMULATED.replace(
+            SIMULATED[SIMULATED.index("  simulate") : SIMULATED.index("variants")], "  seeds: [1, 2, 9]\n"
+        ),
+        "many_seeds": SIMULATED.replace("1..5", "1..100000"),
+        "many_starts": EXPERIMENT.replace("count: 3", "count: 1000000"),
+        "wide_matrix": EXPERIMENT.replace(
+            "one.word: [one, two]", "\n  ".join(f"one.n{i}: [0, 1, 2, 3, 4, 5, 6, 7, 8, 9]" for i in range(8))
+        ),
+        "outside": EXPERIMENT.replace("plain: {}", "../../x: {}").replace("name: sums", "name: ../x"),
+    }
     return {name: text.encode() for name, text in files.items()}

@@ -36,8 +36,12 @@ Metrics misbehave(const Metrics& a, const Options& options) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("test.misbehave", misbehave).summary("Fails as it is told").in("a", "number").out("number", "a + value")
-      .option("how", &Options::how, "what goes wrong", marrow::one_of({"none", "crash", "exit", "error", "nan", "hang", "memory", "elsewhere"}))
+  plugin.node("test.misbehave", misbehave)
+      .summary("Fails as it is told")
+      .in("a", "number")
+      .out("number", "a + value")
+      .option("how", &Options::how, "what goes wrong",
+              marrow::one_of({"none", "crash", "exit", "error", "nan", "hang", "memory", "elsewhere"}))
       .option("value", &Options::value, "added")
       .option("text", &Options::text, "of the error");
 }

@@ -9,4 +9,6 @@ struct Options {};
 marrow::Metrics number(const Options&) { return {{{"value", double(base_number()), ""}}}; }
 }  // namespace
 
-MARROW_PLUGIN(plugin) { plugin.node("test.linked", number).summary("A number of another library").out("number", "the number"); }
+MARROW_PLUGIN(plugin) {
+  plugin.node("test.linked", number).summary("A number of another library").out("number", "the number");
+}

@@ -41,10 +41,14 @@ struct Sides {
   List<Metrics> both;
   std::optional<Metrics> maybe;
 };
-struct SidesOptions { std::vector<std::string> names{"a", "b"}; bool with_maybe = false; };
+struct SidesOptions {
+  std::vector<std::string> names{"a", "b"};
+  bool with_maybe = false;
+};
 Sides sides(const SidesOptions& options) {
   Sides result{number(1), number(2), {}, {}};
-  for (std::size_t i = 0; i < options.names.size(); ++i) result.both.add(options.names[i], number(10.0 * double(i + 1)));
+  for (std::size_t i = 0; i < options.names.size(); ++i)
+    result.both.add(options.names[i], number(10.0 * double(i + 1)));
   if (options.with_maybe) result.maybe = number(5);
   return result;
 }
@@ -85,12 +89,17 @@ Metrics warn(marrow::Context& context) {
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
-struct DisplacedOptions { std::array<double, 3> rotation_deg{}, translation_mm{}; double distance_mm = 0; };
+struct DisplacedOptions {
+  std::array<double, 3> rotation_deg{}, translation_mm{};
+  double distance_mm = 0;
+};
 Metrics displaced(const DisplacedOptions& options) { return number(options.translation_mm[0]); }
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("test.constant", constant).summary("A number").out("number", "the number")
+  plugin.node("test.constant", constant)
+      .summary("A number")
+      .out("number", "the number")
       .option("value", &ConstantOptions::value, "the number", marrow::at_least(-1000), marrow::at_most(1000))
       .option("count", &ConstantOptions::count, "an integer", marrow::at_least(0))
       .option("flag", &ConstantOptions::flag, "true or false")
@@ -98,25 +107,50 @@ MARROW_PLUGIN(plugin) {
       .option("numbers", &ConstantOptions::numbers, "numbers")
       .option("point", &ConstantOptions::point, "a point")
       .option("path", &ConstantOptions::path, "a file that counts by its content");
-  plugin.node("test.sides", sides).summary("Several outputs").out("left", &Sides::left, "1").out("right", &Sides::right, "2")
-      .out("both", &Sides::both, "10, 20, ...", marrow::over("side")).out("maybe", &Sides::maybe, "5 or nothing")
-      .option("names", &SidesOptions::names, "names along the axis").option("with_maybe", &SidesOptions::with_maybe, "make 'maybe'");
+  plugin.node("test.sides", sides)
+      .summary("Several outputs")
+      .out("left", &Sides::left, "1")
+      .out("right", &Sides::right, "2")
+      .out("both", &Sides::both, "10, 20, ...", marrow::over("side"))
+      .out("maybe", &Sides::maybe, "5 or nothing")
+      .option("names", &SidesOptions::names, "names along the axis")
+      .option("with_maybe", &SidesOptions::with_maybe, "make 'maybe'");
   plugin.node("test.letters", letters).summary("A list").out("letters", "100, 200, 300", marrow::over("letter"));
   plugin.node("test.add", add).summary("Adds").in("a", "first").in("b", "second").out("sum", "a + b");
-  plugin.node("test.sum", sum).summary("Adds a list").in("items", "numbers", marrow::over("side")).out("sum", "their sum");
-  plugin.node("test.fail_above", fail_above).summary("Fails").in("a", "number").out("number", "the same")
+  plugin.node("test.sum", sum)
+      .summary("Adds a list")
+      .in("items", "numbers", marrow::over("side"))
+      .out("sum", "their sum");
+  plugin.node("test.fail_above", fail_above)
+      .summary("Fails")
+      .in("a", "number")
+      .out("number", "the same")
       .option("value", &ConstantOptions::value, "largest number that passes");
   plugin.node("test.draw", draw).summary("Random").random().out("number", "from the seed");
-  plugin.node("test.work", work).summary("Keeps a core busy").in("after", "waits for it").out("number", "1")
+  plugin.node("test.work", work)
+      .summary("Keeps a core busy")
+      .in("after", "waits for it")
+      .out("number", "1")
       .option("value", &ConstantOptions::value, "seconds")
       .option("path", &ConstantOptions::path, "a file that counts by its content");
   plugin.node("test.adder", adder).summary("A function").in("amount", "what it adds").out("adder", "adds");
   plugin.node("test.failing_adder", failing_adder).summary("Fails").in("amount", "anything").out("adder", "none");
   plugin.node("test.warn", warn).summary("Warns").out("number", "1");
-  plugin.node("test.apply", apply).summary("Calls a function").in("adder", "function").in("to", "number").out("number", "result");
-  plugin.node("test.displaced", displaced).summary("Takes a displacement").out("number", "its first part")
-      .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation").option("translation_mm", &DisplacedOptions::translation_mm, "translation")
+  plugin.node("test.apply", apply)
+      .summary("Calls a function")
+      .in("adder", "function")
+      .in("to", "number")
+      .out("number", "result");
+  plugin.node("test.displaced", displaced)
+      .summary("Takes a displacement")
+      .out("number", "its first part")
+      .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation")
+      .option("translation_mm", &DisplacedOptions::translation_mm, "translation")
       .option("distance_mm", &DisplacedOptions::distance_mm, "distance");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
-  plugin.node("evaluate.test", judge).summary("Sees the truth").in("of", "number").in("truth", "truth").out("number", "the same");
+  plugin.node("evaluate.test", judge)
+      .summary("Sees the truth")
+      .in("of", "number")
+      .in("truth", "truth")
+      .out("number", "the same");
 }

@@ -37,7 +37,8 @@ Metrics number(const Options& options, const Metrics* added, marrow::Context& co
   if (word == "shout") std::puts("{\"job\": 1, \"end\": 7}"), std::fflush(stdout);
   if (word == "change") std::ofstream(options.path, std::ios::app) << "more";
   if (word == "change_back") {
-    std::this_thread::sleep_for(std::chrono::milliseconds(50));  // the time of a change comes in steps of some milliseconds
+    std::this_thread::sleep_for(
+        std::chrono::milliseconds(50));  // the time of a change comes in steps of some milliseconds
     std::ofstream(options.path, std::ios::app) << "more";
     std::filesystem::resize_file(options.path, word.size());
   }

@@ -2,11 +2,16 @@
 #include <marrow/plugin.hpp>
 
 namespace {
-struct Options { double low = 50; };
+struct Options {
+  double low = 50;
+};
 marrow::EdgeMap find(const marrow::View&, const Options&) { return {}; }
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("edges.wrong", find).summary("Wrong in three places").in("picture", "view").out("edges", "edges")
+  plugin.node("edges.wrong", find)
+      .summary("Wrong in three places")
+      .in("picture", "view")
+      .out("edges", "edges")
       .option("low", &Options::low, "threshold", marrow::at_least(60));
 }

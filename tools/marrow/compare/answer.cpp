@@ -53,7 +53,8 @@ VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
     evaluations.push_back(row.evaluations);
   }
   if (summary.runs) summary.success = compare::wilson_interval(summary.successes, summary.runs);
-  for (std::size_t i = 0; i < values.size(); ++i) summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
   summary.seconds = figure_of(seconds);
   summary.evaluations = figure_of(evaluations);
   return summary;
@@ -75,7 +76,8 @@ void add_capture(const Experiment& experiment, const Rows& rows, const StartErro
     const CellRow& row = *one;
     const auto known = errors.find({row.case_name, row.start});
     if (row.initial_error || known != errors.end())
-      outcomes.push_back({std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment)});
+      outcomes.push_back(
+          {std::abs(row.initial_error ? *row.initial_error : known->second), row.is_success(experiment)});
     else
       ++summary.unknown_starts;
   }
@@ -90,7 +92,8 @@ std::vector<compare::Pair> pairs_of(const Rows& baseline, const Rows& variant, s
   std::vector<compare::Pair> pairs;
   for (const CellRow* row : variant) {
     const auto found = reference.find({row->case_name, row->start});
-    if (row->failed.empty() && row->values[metric] && found != reference.end()) pairs.push_back({row->case_name, found->second, *row->values[metric]});
+    if (row->failed.empty() && row->values[metric] && found != reference.end())
+      pairs.push_back({row->case_name, found->second, *row->values[metric]});
   }
   return pairs;
 }
@@ -130,16 +133,19 @@ std::string capture_text(const Experiment& experiment, const Answer& answer) {
       const auto& all = answer.variants[v].capture.bins;
       if (b >= all.size() || !all[b].runs) return "-";
       char cell[100];
-      std::snprintf(cell, sizeof cell, "%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs, 100 * all[b].success.lower, 100 * all[b].success.upper);
+      std::snprintf(cell, sizeof cell, "%zu/%zu (%.0f to %.0f %%)", all[b].successes, all[b].runs,
+                    100 * all[b].success.lower, 100 * all[b].success.upper);
       return cell;
     });
   }
   row("95 % or more to", [&](std::size_t v) -> std::string {
     char cell[100];
-    std::snprintf(cell, sizeof cell, answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f", answer.variants[v].capture.range);
+    std::snprintf(cell, sizeof cell, answer.variants[v].capture.is_open ? "at least %.1f" : "%.1f",
+                  answer.variants[v].capture.range);
     return cell;
   });
-  if (unknown) text += std::to_string(unknown) + " runs failed before the error of their start was known, and do not count here\n";
+  if (unknown)
+    text += std::to_string(unknown) + " runs failed before the error of their start was known, and do not count here\n";
   return text;
 }
 
@@ -168,7 +174,9 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
     Finding& finding = answer.findings[i];
     finding.p_holm = corrected[i];
     finding.sentence = compare::sentence(experiment.variants[finding.variant].name,
-                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric], experiment.metrics[finding.metric].higher_is_better()}, finding.comparison, finding.p_holm);
+                                         {experiment.metrics[finding.metric].label, answer.units[finding.metric],
+                                          experiment.metrics[finding.metric].higher_is_better()},
+                                         finding.comparison, finding.p_holm);
   }
   return answer;
 }
@@ -178,28 +186,33 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   char line[400];
   std::size_t width = 10;
   for (const compare::Variant& variant : experiment.variants) width = std::max(width, variant.name.size() + 2);
-  std::snprintf(line, sizeof line, "%-*s %5s %6s  %-22s %9s %12s\n", int(width), "variant", "runs", "failed", "success (95 % interval)", "s", "evaluations");
+  std::snprintf(line, sizeof line, "%-*s %5s %6s  %-22s %9s %12s\n", int(width), "variant", "runs", "failed",
+                "success (95 % interval)", "s", "evaluations");
   out << line;
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
     char success[60];
-    std::snprintf(success, sizeof success, "%5.1f %% (%.1f to %.1f)", summary.runs ? 100.0 * double(summary.successes) / double(summary.runs) : 0.0,
+    std::snprintf(success, sizeof success, "%5.1f %% (%.1f to %.1f)",
+                  summary.runs ? 100.0 * double(summary.successes) / double(summary.runs) : 0.0,
                   100 * summary.success.lower, 100 * summary.success.upper);
     std::snprintf(line, sizeof line, "%-*s %5zu %6zu  %-22s %9.3f %12.0f\n", int(width),
-                  (experiment.variants[v].name + (v == experiment.baseline ? " *" : "")).c_str(), summary.runs, summary.failed, success,
-                  summary.seconds.summary.median, summary.evaluations.summary.median);
+                  (experiment.variants[v].name + (v == experiment.baseline ? " *" : "")).c_str(), summary.runs,
+                  summary.failed, success, summary.seconds.summary.median, summary.evaluations.summary.median);
     out << line;
   }
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
     const compare::MetricChoice& metric = experiment.metrics[m];
-    const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") + (metric.label == metric.path ? "" : ", " + metric.path);
-    std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s\n", int(width), "", "median", "25 %", "75 %", "95 %", "worst");
+    const std::string title = metric.label + (answer.units[m].empty() ? "" : " [" + answer.units[m] + "]") +
+                              (metric.label == metric.path ? "" : ", " + metric.path);
+    std::snprintf(line, sizeof line, "%-*s %9s %9s %9s %9s %9s\n", int(width), "", "median", "25 %", "75 %", "95 %",
+                  "worst");
     out << '\n' << printable(title) << '\n' << line;
     for (std::size_t v = 0; v < answer.variants.size(); ++v) {
       const VariantFigure& figure = answer.variants[v].figures[m];
       if (figure.count)
-        std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f\n", int(width), experiment.variants[v].name.c_str(), figure.summary.median,
-                      figure.summary.lower_quartile, figure.summary.upper_quartile, figure.summary.percentile_95, figure.summary.worst);
+        std::snprintf(line, sizeof line, "%-*s %9.4f %9.4f %9.4f %9.4f %9.4f\n", int(width),
+                      experiment.variants[v].name.c_str(), figure.summary.median, figure.summary.lower_quartile,
+                      figure.summary.upper_quartile, figure.summary.percentile_95, figure.summary.worst);
       else
         std::snprintf(line, sizeof line, "%-*s no cell is done\n", int(width), experiment.variants[v].name.c_str());
       out << line;
@@ -207,7 +220,8 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
   }
   out << capture_text(experiment, answer);
   out << "\n* the baseline";
-  if (experiment.variants.size() > 1) out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
+  if (experiment.variants.size() > 1)
+    out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";
   for (const Finding& finding : answer.findings) out << "  " << printable(finding.sentence) << "\n";
   return out.str();
 }

@@ -26,7 +26,8 @@ bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment&
   Diagnostics diagnostics;
   experiment = compare::read_experiment(request.file, catalogue, diagnostics);
   if (diagnostics.empty()) return true;
-  std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(), diagnostics.size() == 1 ? "" : "s");
+  std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
+               diagnostics.size() == 1 ? "" : "s");
   return false;
 }
 
@@ -41,11 +42,13 @@ void expect_outside_cases(const Experiment& experiment, const fs::path& folder, 
     if (!one.folder.empty()) cases.push_back(one.folder);
   const auto expect = [&](const std::string& what, const fs::path& place, const std::string& advice) {
     if (const auto holder = folder_that_holds(cases, place))
-      throw Error(what + " " + place.string() + " lies in the case " + holder->string() + ", which would change while its cells run; " + advice);
+      throw Error(what + " " + place.string() + " lies in the case " + holder->string() +
+                  ", which would change while its cells run; " + advice);
   };
   expect("the output folder", folder, "choose another with --out");
   const Store store;
-  if (!no_cache && store.fault().empty()) expect("the store of results", store.folder(), "set MARROW_CACHE to another folder, or give --no-cache");
+  if (!no_cache && store.fault().empty())
+    expect("the store of results", store.folder(), "set MARROW_CACHE to another folder, or give --no-cache");
 }
 
 /// The part of a cell's name that is none of the experiment's, and what is near.
@@ -59,7 +62,8 @@ std::string fault_of_part(const std::string& what, const std::string& part, cons
 
 std::string fault_of_id(const Experiment& experiment, const std::string& id) {
   const std::size_t first = id.find('/'), second = id.find('/', first + 1);
-  if (first == std::string::npos || second == std::string::npos) return "write it as VARIANT/CASE/START, for example " + compare::cell_id(experiment, {0, 0, 0});
+  if (first == std::string::npos || second == std::string::npos)
+    return "write it as VARIANT/CASE/START, for example " + compare::cell_id(experiment, {0, 0, 0});
   std::string fault = fault_of_part("variant", id.substr(0, first), experiment.variants);
   if (fault.empty()) fault = fault_of_part("case", id.substr(first + 1, second - first - 1), experiment.cases);
   if (fault.empty()) fault = fault_of_part("start", id.substr(second + 1), experiment.starts);
@@ -93,7 +97,8 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   if (!load(request, catalogue, experiment)) return 2;
   const auto cell = compare::cell_of(experiment, id);
   if (!cell) {
-    std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(), printable(fault_of_id(experiment, id)).c_str());
+    std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(),
+                 printable(fault_of_id(experiment, id)).c_str());
     return 2;
   }
   const fs::path folder = folder_of(request, experiment);
@@ -105,14 +110,16 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   CellRunner runner(experiment, catalogue, is_kept ? &store : nullptr, folder, request.threads, request.file_limits);
   const long without_process = calls_without_process();
   CellRow row = runner.run(*cell);
-  if (!row.failed.empty() && calls_without_process() != without_process) throw Error(row.failed);  // no failure of the cell's
+  if (!row.failed.empty() && calls_without_process() != without_process)
+    throw Error(row.failed);  // no failure of the cell's
   runner.write(*cell, row);
   std::printf("%s\n", compare::to_json(row).c_str());
   if (!row.failed.empty()) return 1;
   try {
     runner.draw(*cell);
   } catch (const std::exception& error) {
-    std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable_lines(error.what()).c_str());
+    std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(),
+                 printable_lines(error.what()).c_str());
   }
   return 0;
 }

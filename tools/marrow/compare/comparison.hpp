@@ -19,7 +19,7 @@ struct CompareRequest {
   int threads = 1;               ///< of each cell
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
-  std::size_t shown = 8;         ///< cases and starts with pictures in the report
+  std::size_t shown = 8;  ///< cases and starts with pictures in the report
   bool dry_run = false, no_cache = false, quiet = false;
   FileLimits file_limits;
 };
@@ -29,14 +29,17 @@ int compare_variants(const CompareRequest& request);
 int run_cell(const CompareRequest& request, const std::string& id);
 int worker(const CompareRequest& request);
 /// All cells that are not there yet, then times, tables, pictures and the report. The folder is the experiment's own.
-int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment, const std::filesystem::path& folder);
+int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
+                   const std::filesystem::path& folder);
 
-/// Cells whose pictures are worth a look, all variants of at most `most` cases and starts: those where a variant was worst,
-/// best or nearest to its median in the first metric, those that failed, then the first.
-std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, std::size_t most);
+/// Cells whose pictures are worth a look, all variants of at most `most` cases and starts: those where a variant was
+/// worst, best or nearest to its median in the first metric, those that failed, then the first.
+std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
+                                              const std::vector<compare::CellRow>& rows, std::size_t most);
 
 /// Prints what a comparison would do, and calls no node.
-void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store, const std::filesystem::path& folder);
+void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
+                const std::filesystem::path& folder);
 
 /// A figure of merit of one variant, over its cells that are done.
 struct VariantFigure {
@@ -48,7 +51,8 @@ struct VariantSummary {
   compare::Interval success;
   std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
   compare::CaptureRange capture;       ///< without bins where the experiment names no initial_error
-  std::size_t unknown_starts = 0;      ///< runs that failed before any variant knew the error of their start: not in `capture`
+  std::size_t unknown_starts =
+      0;  ///< runs that failed before any variant knew the error of their start: not in `capture`
   VariantFigure seconds, evaluations;
 };
 /// A variant against the baseline in one figure.
@@ -64,14 +68,15 @@ struct Answer {
   std::vector<std::string> units;  ///< of the metrics; empty where no cell is done
 };
 
-/// `rows` may be of unfinished comparisons. Failed cells have no figures; the pairs of a finding are the cells that both did.
+/// `rows` may be of unfinished comparisons. Failed cells have no figures; the pairs of a finding are the cells that
+/// both did.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
 /// For the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
 /// {experiment, variants, comparisons}: all of the answer.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
 /// cells.csv, cells.jsonl and comparison.json.
-void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
-                  const std::filesystem::path& folder);
+void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
+                  const Answer& answer, const std::filesystem::path& folder);
 
 }  // namespace marrow::cli

@@ -99,9 +99,7 @@ ComparisonFolder::ComparisonFolder(const fs::path& folder, const compare::Experi
   }
 }
 
-ComparisonFolder::~ComparisonFolder() {
-  close(marker_);
-}
+ComparisonFolder::~ComparisonFolder() { close(marker_); }
 
 void ComparisonFolder::take_cell(const std::string& id) {
   if (!lock(kCells + long(hash_of(id).low >> 2), F_WRLCK, false))

@@ -14,7 +14,8 @@ using compare::CellIndex;
 using compare::CellRunner;
 using compare::Experiment;
 
-/// Reading a cell's pipeline takes some milliseconds: of more cells than these, some are looked at and stand for the others.
+/// Reading a cell's pipeline takes some milliseconds: of more cells than these, some are looked at and stand for the
+/// others.
 constexpr std::size_t kMostCells = 1000;
 
 /// Some of a number of things, evenly spread.
@@ -25,7 +26,8 @@ struct Sample {
 };
 
 std::pair<Sample, Sample> cases_and_starts(const Experiment& experiment) {
-  Sample cases{experiment.cases.size(), experiment.cases.size()}, starts{experiment.starts.size(), experiment.starts.size()};
+  Sample cases{experiment.cases.size(), experiment.cases.size()},
+      starts{experiment.starts.size(), experiment.starts.size()};
   const std::size_t places = std::max<std::size_t>(1, kMostCells / experiment.variants.size());
   if (cases.all * starts.all > places) {
     cases.taken = std::min(cases.all, std::max(std::size_t(std::sqrt(double(places))), places / starts.all));
@@ -49,7 +51,10 @@ bool makes_functions(const PipelineNode& node) {
 class Plan {
  public:
   Plan(const Experiment& experiment, const Catalogue& catalogue, const Store* store, const fs::path& folder)
-      : experiment_(experiment), catalogue_(catalogue), store_(store), runner_(experiment, catalogue, store, folder, 1),
+      : experiment_(experiment),
+        catalogue_(catalogue),
+        store_(store),
+        runner_(experiment, catalogue, store, folder, 1),
         samples_(cases_and_starts(experiment)) {
     const auto& [cases, starts] = samples_;
     for (std::size_t c = 0; c < cases.taken; ++c) {
@@ -57,7 +62,8 @@ class Plan {
       const bool is_there = place.empty() || fs::exists(place);
       if (experiment.cases[cases.at(c)].is_simulated && !is_there) cases_to_make_ += cases.weight();
       for (std::size_t s = 0; s < starts.taken; ++s)
-        for (std::size_t v = 0; v < experiment.variants.size(); ++v) count_cell({v, cases.at(c), starts.at(s)}, place, is_there);
+        for (std::size_t v = 0; v < experiment.variants.size(); ++v)
+          count_cell({v, cases.at(c), starts.at(s)}, place, is_there);
     }
   }
 
@@ -81,13 +87,16 @@ class Plan {
     for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
       if (!needed[i] || makes_functions(pipeline.nodes[i])) continue;
       const double all = cases.weight() * starts.weight();
-      const double alike = (dependences[i].on_case ? cases.weight() : 1) * (dependences[i].on_start ? starts.weight() : 1);
+      const double alike =
+          (dependences[i].on_case ? cases.weight() : 1) * (dependences[i].on_start ? starts.weight() : 1);
       counts_.all += all;
       counts_.shared += all;
       if (!seen_.insert(keys[i]).second) continue;
       counts_.shared -= alike;
-      if (!planned.empty() && planned[i].what == PlannedNode::What::cached) counts_.cached += alike;
-      else counts_.to_make[pipeline.nodes[i].info.name] += alike;
+      if (!planned.empty() && planned[i].what == PlannedNode::What::cached)
+        counts_.cached += alike;
+      else
+        counts_.to_make[pipeline.nodes[i].info.name] += alike;
     }
   }
 
@@ -119,15 +128,21 @@ void Plan::print() const {
   for (const auto& [node, count] : counts_.to_make) {
     to_make += count;
     const auto known = before.find(node);
-    if (known == before.end()) unknown += count;
-    else seconds += known->second * count;
+    if (known == before.end())
+      unknown += count;
+    else
+      seconds += known->second * count;
   }
   const auto& [cases, starts] = samples_;
   const bool is_sample = cases.taken < cases.all || starts.taken < starts.all;
-  std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(), cases.all, starts.all);
-  if (is_sample) std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken, starts.taken);
+  std::printf("%zu cells: %zu variants, %zu cases, %zu starts\n", experiment_.cell_count(), experiment_.variants.size(),
+              cases.all, starts.all);
+  if (is_sample)
+    std::printf("looked at: %zu cases and %zu starts, evenly spread; by them there are about\n", cases.taken,
+                starts.taken);
   if (cases_to_make_ > 0) std::printf("%.0f cases to simulate\n", cases_to_make_);
-  std::printf("%.0f evaluations of nodes: %.0f shared, %.0f cached, %.0f to make\n", counts_.all, counts_.shared, counts_.cached, to_make);
+  std::printf("%.0f evaluations of nodes: %.0f shared, %.0f cached, %.0f to make\n", counts_.all, counts_.shared,
+              counts_.cached, to_make);
   if (to_make > 0) std::printf("estimate from earlier runs: %.1f s of work", seconds);
   if (unknown > 0) std::printf(", without %.0f evaluations of nodes that never ran", unknown);
   if (to_make > 0) std::printf("\n");

@@ -38,7 +38,9 @@ struct Member {
 class Pool {
  public:
   Pool(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended)
-      : waiting_(std::make_move_iterator(jobs.begin()), std::make_move_iterator(jobs.end())), settings_(settings), ended_(ended),
+      : waiting_(std::make_move_iterator(jobs.begin()), std::make_move_iterator(jobs.end())),
+        settings_(settings),
+        ended_(ended),
         most_(std::size_t(std::max(1, settings.workers))) {}
 
   bool run() {
@@ -62,7 +64,8 @@ class Pool {
   }
 
   void give_work() {
-    // What failed by its process is tried again when nothing else runs that could have been the cause, or suffer from it.
+    // What failed by its process is tried again when nothing else runs that could have been the cause, or suffer from
+    // it.
     const bool alone = waiting_.empty();
     if (alone && is_busy()) return;
     std::deque<Job>& source = alone ? again_ : waiting_;
@@ -106,13 +109,16 @@ class Pool {
     waiting_.push_front(std::move(job));
   }
 
-  /// A job of the group that the worker was at; else of one that no other worker is at; else of one whose first job is done:
-  /// until then the others would only make once more what the group has in common.
+  /// A job of the group that the worker was at; else of one that no other worker is at; else of one whose first job is
+  /// done: until then the others would only make once more what the group has in common.
   std::optional<Job> next_for(const Member& member, std::deque<Job>& source) {
     std::string& mine = groups_[&member];
-    auto chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return job.group == mine && may_start(job); });
-    if (chosen == source.end()) chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return !is_at_work(job.group); });
-    if (chosen == source.end()) chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return may_start(job); });
+    auto chosen =
+        std::find_if(source.begin(), source.end(), [&](const Job& job) { return job.group == mine && may_start(job); });
+    if (chosen == source.end())
+      chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return !is_at_work(job.group); });
+    if (chosen == source.end())
+      chosen = std::find_if(source.begin(), source.end(), [&](const Job& job) { return may_start(job); });
     if (chosen == source.end()) return std::nullopt;
     Job job = std::move(*chosen);
     source.erase(chosen);
@@ -122,12 +128,14 @@ class Pool {
 
   bool may_start(const Job& job) const { return begun_.contains(job.group) || !is_at_work(job.group); }
   bool is_at_work(const std::string& group) const {
-    return std::any_of(members_.begin(), members_.end(), [&](const auto& member) { return member->job && member->job->group == group; });
+    return std::any_of(members_.begin(), members_.end(),
+                       [&](const auto& member) { return member->job && member->job->group == group; });
   }
 
   void look_after(Member& member) {
     auto end = member.worker.take([&](const nlohmann::json& report) {
-      if (report["say"] == "waits long" && settings_.waits && member.job) settings_.waits(*member.job, member.worker.at());
+      if (report["say"] == "waits long" && settings_.waits && member.job)
+        settings_.waits(*member.job, member.worker.at());
     });
     if (!end) end = member.worker.check({settings_.time_limit_s, settings_.memory_limit_mb});
     if (!end || !member.job) return;
@@ -135,8 +143,10 @@ class Pool {
     if (end->answer.is_object() && end->answer.contains(kNoProcess))
       return lacks_process(member, std::move(job), end->answer[kNoProcess].get<std::string>());
     begun_.insert(job.group);
-    if (end->died && job.tries < 2) again_.push_back(std::move(job));
-    else ended_(job, {std::move(end->answer), end->failed, job.tries});
+    if (end->died && job.tries < 2)
+      again_.push_back(std::move(job));
+    else
+      ended_(job, {std::move(end->answer), end->failed, job.tries});
   }
 
   std::deque<Job> waiting_, again_;
@@ -144,13 +154,14 @@ class Pool {
   const std::function<void(const Job&, const JobEnd&)>& ended_;
   std::vector<std::unique_ptr<Member>> members_;
   std::map<const Member*, std::string> groups_;
-  std::size_t most_;  ///< workers at once
+  std::size_t most_;             ///< workers at once
   std::set<std::string> begun_;  ///< groups of which a job has ended
 };
 
 }  // namespace
 
-bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended) {
+bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings,
+              const std::function<void(const Job&, const JobEnd&)>& ended) {
   return Pool(std::move(jobs), settings, ended).run();
 }
 

@@ -20,10 +20,11 @@ struct Job {
 struct PoolSettings {
   std::vector<std::string> command;  ///< that starts a worker
   int workers = 2;
-  double time_limit_s = 600;         ///< of one job
-  double memory_limit_mb = 4000;     ///< of one worker
+  double time_limit_s = 600;      ///< of one job
+  double memory_limit_mb = 4000;  ///< of one worker
   const std::atomic<bool>* cancelled = nullptr;
-  std::function<void(const Job&, const std::string& where)> waits = {};  ///< told when a job waits for another process's result
+  std::function<void(const Job&, const std::string& where)> waits =
+      {};  ///< told when a job waits for another process's result
 };
 
 /// How a job ended: the worker's answer, or why there is none.
@@ -36,10 +37,11 @@ struct JobEnd {
 /// The name under which a worker answers, instead of with what it made, why the system granted it no process or thread.
 inline constexpr const char* kNoProcess = "no_process";
 
-/// Gives the jobs to worker processes, each of which takes many. A worker that crashes, takes too long or too much memory is
-/// replaced; its job is tried once more, alone, after all others. Where the system grants no further process, the jobs
-/// are done by fewer workers; throws Error where not even one can do its job. `ended` is called by the calling thread. Returns false when
-/// it was cancelled.
-bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended);
+/// Gives the jobs to worker processes, each of which takes many. A worker that crashes, takes too long or too much
+/// memory is replaced; its job is tried once more, alone, after all others. Where the system grants no further process,
+/// the jobs are done by fewer workers; throws Error where not even one can do its job. `ended` is called by the calling
+/// thread. Returns false when it was cancelled.
+bool run_jobs(std::vector<Job> jobs, const PoolSettings& settings,
+              const std::function<void(const Job&, const JobEnd&)>& ended);
 
 }  // namespace marrow::cli

@@ -33,11 +33,14 @@ class Progress {
   Progress(std::size_t all, bool quiet) : all_(all), quiet_(quiet), is_terminal_(isatty(STDERR_FILENO)) {}
   void done(std::size_t number, const std::string& what) {
     const auto now = std::chrono::steady_clock::now();
-    if (quiet_ || (number < all_ && now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)))) return;
+    if (quiet_ || (number < all_ &&
+                   now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000))))
+      return;
     last_ = now;
     const double seconds = std::chrono::duration<double>(now - start_).count();
-    std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number, all_, seconds,
-                 number ? seconds * double(all_ - number) / double(number) : 0.0, printable(what).c_str(), is_terminal_ && number < all_ ? "" : "\n");
+    std::fprintf(stderr, "%s  %zu of %zu, %.0f s, about %.0f s to go: %s%s", is_terminal_ ? "\r\033[K" : "", number,
+                 all_, seconds, number ? seconds * double(all_ - number) / double(number) : 0.0,
+                 printable(what).c_str(), is_terminal_ && number < all_ ? "" : "\n");
   }
 
  private:
@@ -59,20 +62,33 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
   pool.memory_limit_mb = request.memory_limit_mb;
   pool.cancelled = &stop_on_signals();
   pool.waits = [](const Job&, const std::string& where) {
-    std::fprintf(stderr, "  %s waits for another run that is making the same result\n", where.empty() ? "a cell" : printable(where).c_str());
+    std::fprintf(stderr, "  %s waits for another run that is making the same result\n",
+                 where.empty() ? "a cell" : printable(where).c_str());
   };
-  pool.command = {fs::read_symlink("/proc/self/exe").string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads", std::to_string(threads)};
+  pool.command = {fs::read_symlink("/proc/self/exe").string(),
+                  "worker",
+                  fs::absolute(request.file).string(),
+                  "--out",
+                  folder.string(),
+                  "--threads",
+                  std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
-  for (const auto& [name, value] : {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
+  for (const auto& [name, value] :
+       {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})
     if (value > 0) pool.command.insert(pool.command.end(), {name, exact_text(value)});
   return pool;
 }
 
 class Comparison {
  public:
-  Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder)
-      : request_(request), experiment_(experiment), folder_(folder), cells_(compare::cells_of(experiment)),
-        rows_(cells_.size()), keys_(cells_.size()),
+  Comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
+             const fs::path& folder)
+      : request_(request),
+        experiment_(experiment),
+        folder_(folder),
+        cells_(compare::cells_of(experiment)),
+        rows_(cells_.size()),
+        keys_(cells_.size()),
         runner_(experiment, catalogue, request.no_cache ? nullptr : &store_, folder_, request.threads) {
     runner_.keep_dependencies();
   }
@@ -89,12 +105,14 @@ class Comparison {
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
     const std::string untidy = request_.no_cache ? "" : store_.tidy();
-    if (!untidy.empty()) std::fprintf(stderr, "marrow: note: the store of results is not tidied up: %s\n", untidy.c_str());
+    if (!untidy.empty())
+      std::fprintf(stderr, "marrow: note: the store of results is not tidied up: %s\n", untidy.c_str());
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
     std::printf("\n%s", table_text(experiment_, answer).c_str());
     print_failures(rows);
-    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n", printable(folder_.string()).c_str(),
+    std::printf("\ntables in %s: cells.csv, cells.jsonl, comparison.json\nreport: %s\n",
+                printable(folder_.string()).c_str(),
                 printable(fs::absolute(folder_ / "report.html").lexically_normal().string()).c_str());
     return 0;
   }
@@ -107,7 +125,9 @@ class Comparison {
 
   Job job_of(const char* what, const CellIndex& cell, std::string group) const {
     const std::size_t number = number_of(cell);
-    return {{{"do", what}, {"cell", compare::cell_id(experiment_, cell)}, {"key", keys_[number]}}, std::move(group), number};
+    return {{{"do", what}, {"cell", compare::cell_id(experiment_, cell)}, {"key", keys_[number]}},
+            std::move(group),
+            number};
   }
 
   bool make_cases() {
@@ -122,7 +142,8 @@ class Comparison {
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string& name = experiment_.cases[job.number].name;
       if (!end.failed.empty())
-        case_faults_[job.number] = end.failed.starts_with("case '") ? end.failed : "case '" + name + "' cannot be made: " + end.failed;
+        case_faults_[job.number] =
+            end.failed.starts_with("case '") ? end.failed : "case '" + name + "' cannot be made: " + end.failed;
       progress.done(++done, "case " + name);
     });
   }
@@ -132,11 +153,12 @@ class Comparison {
     for (std::size_t i = 0; i < cells_.size(); ++i) {
       const CellIndex& cell = cells_[i];
       const auto fault = case_faults_.find(cell.case_index);
-      if (fault != case_faults_.end()) rows_[i] = compare::failed_row(experiment_, cell, fault->second, 1);
-      else rows_[i] = runner_.finished(cell, keys_[i] = runner_.key_of(cell));
+      if (fault != case_faults_.end())
+        rows_[i] = compare::failed_row(experiment_, cell, fault->second, 1);
+      else
+        rows_[i] = runner_.finished(cell, keys_[i] = runner_.key_of(cell));
       found_ += rows_[i] && fault == case_faults_.end();
-      if (!rows_[i])
-        jobs.push_back(job_of("cell", cell, experiment_.cases[cell.case_index].name));
+      if (!rows_[i]) jobs.push_back(job_of("cell", cell, experiment_.cases[cell.case_index].name));
     }
     Progress progress(jobs.size(), request_.quiet);
     std::size_t done = 0;
@@ -151,7 +173,8 @@ class Comparison {
 
   /// The same cases and starts for all variants, spread over all that there are, one run at a time on all threads.
   bool measure_times(std::vector<CellRow>& rows) {
-    const std::size_t variants = experiment_.variants.size(), places = rows.size() / variants, count = std::min(places, experiment_.timed_cells);
+    const std::size_t variants = experiment_.variants.size(), places = rows.size() / variants,
+                      count = std::min(places, experiment_.timed_cells);
     std::vector<Job> jobs;
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t v = 0; v < variants; ++v) {
@@ -176,7 +199,8 @@ class Comparison {
     std::size_t done = 0;
     return run_jobs(jobs, pool_of(request_, folder_, request_.threads), [&](const Job& job, const JobEnd& end) {
       const std::string id = compare::cell_id(experiment_, cells_[job.number]);
-      if (!end.failed.empty()) std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable(end.failed).c_str());
+      if (!end.failed.empty())
+        std::fprintf(stderr, "marrow: no pictures of %s: %s\n", printable(id).c_str(), printable(end.failed).c_str());
       if (!end.failed.empty()) remove_old_pictures(cells_[job.number]);
       progress.done(++done, "pictures of " + id);
     });
@@ -219,15 +243,17 @@ class Comparison {
         made += calls.made;
         cached += calls.cached;
       }
-    std::printf("\n%zu cells: %zu variants, %zu cases, %zu starts; %zu were there already\n", rows.size(), experiment_.variants.size(), experiment_.cases.size(),
-                experiment_.starts.size(), found_);
+    std::printf("\n%zu cells: %zu variants, %zu cases, %zu starts; %zu were there already\n", rows.size(),
+                experiment_.variants.size(), experiment_.cases.size(), experiment_.starts.size(), found_);
     std::printf("calls of nodes: %ld made, %ld shared or read back\n", made, cached);
   }
 
   static void print_failures(const std::vector<CellRow>& rows) {
     std::size_t count = 0;
     for (const CellRow& row : rows)
-      if (!row.failed.empty() && ++count <= 20) std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", printable(row.id).c_str(), printable(row.failed).c_str());
+      if (!row.failed.empty() && ++count <= 20)
+        std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", printable(row.id).c_str(),
+                    printable(row.failed).c_str());
     if (count > 20) std::printf("  and %zu more, in cells.csv\n", count - 20);
   }
 
@@ -245,7 +271,8 @@ class Comparison {
 
 }  // namespace
 
-int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment, const fs::path& folder) {
+int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const Experiment& experiment,
+                   const fs::path& folder) {
   const Unchanged unchanged(experiment);
   Comparison comparison(request, catalogue, experiment, folder);
   const int code = comparison.run();

@@ -14,7 +14,8 @@ class Chooser {
  public:
   explicit Chooser(std::size_t most) : most_(most) {}
   void add(const Place& place) {
-    if (places_.size() < most_ && std::find(places_.begin(), places_.end(), place) == places_.end()) places_.push_back(place);
+    if (places_.size() < most_ && std::find(places_.begin(), places_.end(), place) == places_.end())
+      places_.push_back(place);
   }
   std::vector<Place> sorted() {
     std::sort(places_.begin(), places_.end());
@@ -28,7 +29,8 @@ class Chooser {
 
 }  // namespace
 
-std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, std::size_t most) {
+std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
+                                              const std::vector<compare::CellRow>& rows, std::size_t most) {
   const std::size_t variants = experiment.variants.size(), starts = experiment.starts.size();
   const auto place_of = [&](std::size_t row) { return Place{row / variants / starts, row / variants % starts}; };
   std::vector<std::vector<std::size_t>> by_value(variants);  // rows of each variant that have a value, the best first
@@ -36,7 +38,8 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
     if (rows[i].failed.empty() && rows[i].values.at(0)) by_value[i % variants].push_back(i);
   for (auto& order : by_value)
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
-      return experiment.metrics[0].higher_is_better() ? *rows[a].values[0] > *rows[b].values[0] : *rows[a].values[0] < *rows[b].values[0];
+      return experiment.metrics[0].higher_is_better() ? *rows[a].values[0] > *rows[b].values[0]
+                                                      : *rows[a].values[0] < *rows[b].values[0];
     });
 
   Chooser chooser(most);

@@ -22,15 +22,16 @@ bool is_number(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// RFC 4180: quoted where it has to be. A text that a spreadsheet would compute, as a reason that begins with "=", is marked
-/// as a text. Control characters, which a terminal would obey, are written out; lines stay.
+/// RFC 4180: quoted where it has to be. A text that a spreadsheet would compute, as a reason that begins with "=", is
+/// marked as a text. Control characters, which a terminal would obey, are written out; lines stay.
 std::string field(const std::string& raw) {
   std::string text;
   for (std::size_t begin = 0, end = 0; begin <= raw.size(); begin = end + 1) {
     end = std::min(raw.find('\n', begin), raw.size());
     text += (begin ? "\n" : "") + printable(raw.substr(begin, end - begin));
   }
-  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !is_number(text)) text = "'" + text;
+  if (!text.empty() && std::string("=+-@\t\r\n").find(text[0]) != std::string::npos && !is_number(text))
+    text = "'" + text;
   if (text.find_first_of(",\"\n\r") == std::string::npos) return text;
   std::string quoted = "\"";
   for (char c : text) quoted += c == '"' ? "\"\"" : std::string(1, c);
@@ -68,11 +69,13 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
   text += ",initial_error,seconds,evaluations\n";
   for (const CellRow& row : rows) {
-    text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," + (row.failed.empty() ? "done" : "failed") + "," +
-            field(row.failed) + "," + (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries);
+    text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
+            (row.failed.empty() ? "done" : "failed") + "," + field(row.failed) + "," +
+            (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries);
     for (const std::string& option : options) text += "," + field(option_of(experiment, row.variant, option));
     for (const auto& value : row.values) text += "," + number_text(value);
-    text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," + std::to_string(row.evaluations) + "\n";
+    text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
+            std::to_string(row.evaluations) + "\n";
   }
   return text;
 }
@@ -83,8 +86,10 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
     json j = json::parse(compare::to_json(row));
     j["success"] = row.is_success(experiment);
     j["options"] = json::object();
-    for (const std::string& option : changed_options(experiment)) j["options"][option] = option_of(experiment, row.variant, option);
-    for (std::size_t i = 0; i < experiment.metrics.size(); ++i) j[experiment.metrics[i].path] = row.values[i] ? json(*row.values[i]) : json();
+    for (const std::string& option : changed_options(experiment))
+      j["options"][option] = option_of(experiment, row.variant, option);
+    for (std::size_t i = 0; i < experiment.metrics.size(); ++i)
+      j[experiment.metrics[i].path] = row.values[i] ? json(*row.values[i]) : json();
     text += j.dump(-1, ' ', false, json::error_handler_t::replace) + "\n";
   }
   return text;
@@ -92,14 +97,24 @@ std::string jsonl(const Experiment& experiment, const std::vector<CellRow>& rows
 
 json of(const VariantFigure& figure) {
   if (!figure.count) return {{"count", 0}};
-  return {{"count", figure.count}, {"median", figure.summary.median}, {"q1", figure.summary.lower_quartile}, {"q3", figure.summary.upper_quartile},
-          {"p95", figure.summary.percentile_95}, {"worst", figure.summary.worst}, {"mean", figure.summary.mean}};
+  return {{"count", figure.count},
+          {"median", figure.summary.median},
+          {"q1", figure.summary.lower_quartile},
+          {"q3", figure.summary.upper_quartile},
+          {"p95", figure.summary.percentile_95},
+          {"worst", figure.summary.worst},
+          {"mean", figure.summary.mean}};
 }
 
 json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
   json bins = json::array();
   for (const compare::CaptureRange::Bin& bin : capture.bins)
-    bins.push_back({{"from", bin.from}, {"to", bin.to}, {"count", bin.successes}, {"of", bin.runs}, {"low", bin.success.lower}, {"high", bin.success.upper}});
+    bins.push_back({{"from", bin.from},
+                    {"to", bin.to},
+                    {"count", bin.successes},
+                    {"of", bin.runs},
+                    {"low", bin.success.lower},
+                    {"high", bin.success.upper}});
   return {{"range", capture.range}, {"is_open", capture.is_open}, {"unknown_starts", unknown_starts}, {"bins", bins}};
 }
 
@@ -110,25 +125,43 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
   for (std::size_t v = 0; v < answer.variants.size(); ++v) {
     const VariantSummary& summary = answer.variants[v];
     json figures = json::object();
-    for (std::size_t m = 0; m < experiment.metrics.size(); ++m) figures[experiment.metrics[m].path] = of(summary.figures[m]);
-    variants.push_back({{"name", experiment.variants[v].name}, {"is_baseline", v == experiment.baseline}, {"runs", summary.runs}, {"failed", summary.failed},
-                        {"success", {{"count", summary.successes}, {"of", summary.runs}, {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
-                                     {"low", summary.success.lower}, {"high", summary.success.upper}}},
-                        {"metrics", figures}, {"seconds", of(summary.seconds)}, {"evaluations", of(summary.evaluations)}});
+    for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
+      figures[experiment.metrics[m].path] = of(summary.figures[m]);
+    variants.push_back({{"name", experiment.variants[v].name},
+                        {"is_baseline", v == experiment.baseline},
+                        {"runs", summary.runs},
+                        {"failed", summary.failed},
+                        {"success",
+                         {{"count", summary.successes},
+                          {"of", summary.runs},
+                          {"rate", summary.runs ? double(summary.successes) / double(summary.runs) : 0.0},
+                          {"low", summary.success.lower},
+                          {"high", summary.success.upper}}},
+                        {"metrics", figures},
+                        {"seconds", of(summary.seconds)},
+                        {"evaluations", of(summary.evaluations)}});
     if (!experiment.initial_error.empty()) variants.back()["capture"] = of(summary.capture, summary.unknown_starts);
   }
   for (const Finding& finding : answer.findings)
-    findings.push_back({{"variant", experiment.variants[finding.variant].name}, {"metric", experiment.metrics[finding.metric].path},
-                        {"pairs", finding.comparison.pairs}, {"cases", finding.comparison.cases}, {"difference", finding.comparison.median_difference},
-                        {"low", finding.comparison.interval.lower}, {"high", finding.comparison.interval.upper}, {"p", finding.comparison.test.p},
-                        {"p_holm", finding.p_holm}, {"sentence", finding.sentence}});
+    findings.push_back({{"variant", experiment.variants[finding.variant].name},
+                        {"metric", experiment.metrics[finding.metric].path},
+                        {"pairs", finding.comparison.pairs},
+                        {"cases", finding.comparison.cases},
+                        {"difference", finding.comparison.median_difference},
+                        {"low", finding.comparison.interval.lower},
+                        {"high", finding.comparison.interval.upper},
+                        {"p", finding.comparison.test.p},
+                        {"p_holm", finding.p_holm},
+                        {"sentence", finding.sentence}});
   return {{"experiment", experiment.name}, {"variants", variants}, {"comparisons", findings}};
 }
 
-void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const std::filesystem::path& folder) {
+void write_tables(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer,
+                  const std::filesystem::path& folder) {
   write_text_file(folder / "cells.csv", csv(experiment, rows));
   write_text_file(folder / "cells.jsonl", jsonl(experiment, rows));
-  write_text_file(folder / "comparison.json", answer_json(experiment, answer).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
+  write_text_file(folder / "comparison.json",
+                  answer_json(experiment, answer).dump(1, ' ', false, json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace marrow::cli

@@ -21,8 +21,8 @@ using nlohmann::json;
   throw Error(what + " changed while the comparison ran; run it again");
 }
 
-/// Between the asking process's look at the experiment and this one's, cases may have come and gone, and files have changed:
-/// the cell is asked for by its name and by the key of all that it depends on.
+/// Between the asking process's look at the experiment and this one's, cases may have come and gone, and files have
+/// changed: the cell is asked for by its name and by the key of all that it depends on.
 CellIndex cell_in(CellRunner& runner, const json& asked) {
   const std::string id = asked.at("cell");
   const auto cell = compare::cell_of(runner.experiment(), id);
@@ -78,7 +78,8 @@ int worker(const CompareRequest& request) {
   const Experiment experiment = compare::read_experiment(request.file, catalogue, diagnostics);
   if (!diagnostics.empty()) throw Error("the experiment has faults:\n" + diagnostics.text());
   const Store store;
-  CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads, request.file_limits);
+  CellRunner runner(experiment, catalogue, request.no_cache ? nullptr : &store, request.folder, request.threads,
+                    request.file_limits);
   return serve_worker({
       {"case",
        [&](const json& asked, WorkerReports&) {

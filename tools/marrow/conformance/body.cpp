@@ -10,7 +10,9 @@ namespace marrow::conformance {
 namespace {
 
 /// In the space where the ellipsoid is the unit ball.
-Eigen::Vector3d as_ball(const Ellipsoid& e, const Eigen::Vector3d& vector) { return (e.axes.transpose() * vector).cwiseQuotient(e.radii_mm); }
+Eigen::Vector3d as_ball(const Ellipsoid& e, const Eigen::Vector3d& vector) {
+  return (e.axes.transpose() * vector).cwiseQuotient(e.radii_mm);
+}
 
 double chord_mm(const Ellipsoid& e, const Eigen::Vector3d& start, const Eigen::Vector3d& direction) {
   const Eigen::Vector3d p = as_ball(e, start - e.centre_mm), d = as_ball(e, direction);
@@ -20,9 +22,11 @@ double chord_mm(const Ellipsoid& e, const Eigen::Vector3d& start, const Eigen::V
   return std::max(0.0, to - from);
 }
 
-/// The nearest point of the surface is q = r^2 p / (t + r^2) with sum (r p / (t + r^2))^2 = 1, by Newton's steps from below.
+/// The nearest point of the surface is q = r^2 p / (t + r^2) with sum (r p / (t + r^2))^2 = 1, by Newton's steps from
+/// below.
 double signed_distance_mm(const Ellipsoid& e, const Eigen::Vector3d& point, double band) {
-  const Eigen::Array3d p = (e.axes.transpose() * (point - e.centre_mm)).array().abs() + 1e-7, r = e.radii_mm.array(), r2 = r * r;
+  const Eigen::Array3d p = (e.axes.transpose() * (point - e.centre_mm)).array().abs() + 1e-7, r = e.radii_mm.array(),
+                       r2 = r * r;
   const double scale = (p / r).matrix().norm(), least = r.minCoeff();
   if ((scale - 1) * least > band) return band;
   if ((1 - scale) * least > band) return -band;
@@ -43,7 +47,8 @@ void fill(const Grid& grid, std::vector<float>& values, const Value& value) {
   values.reserve(grid.count());
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) values.push_back(float(value(grid.point_from_index({double(x), double(y), double(z)}))));
+      for (int x = 0; x < grid.size[0]; ++x)
+        values.push_back(float(value(grid.point_from_index({double(x), double(y), double(z)}))));
 }
 
 /// Where rays from the source touch an ellipsoid: a circle of the unit ball.
@@ -102,7 +107,9 @@ Mesh mesh_of(const Body& body) {
   Mesh mesh;
   for (const Ellipsoid& e : body) {
     const auto first = std::uint32_t(mesh.vertices_mm.size());
-    const auto add = [&](const Eigen::Vector3d& p) { mesh.vertices_mm.push_back(e.centre_mm + e.axes * p.cwiseProduct(e.radii_mm)); };
+    const auto add = [&](const Eigen::Vector3d& p) {
+      mesh.vertices_mm.push_back(e.centre_mm + e.axes * p.cwiseProduct(e.radii_mm));
+    };
     add({0, 0, -1});
     add({0, 0, 1});
     for (int i = 1; i < kRings; ++i)
@@ -138,7 +145,8 @@ RigidTransform moved_by(const Eigen::Vector3d& turn_rad, const Eigen::Vector3d& 
   return {"world", "ct", rotation_from_vector(turn_rad), shift_mm};
 }
 
-std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const RigidTransform& world_from_model, double spacing_px) const {
+std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const RigidTransform& world_from_model,
+                                                 double spacing_px) const {
   constexpr int kCount = 1440;
   const RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
   const Eigen::Vector3d source = inverse(camera_from_model).translation_mm;
@@ -152,7 +160,8 @@ std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const Rig
     double passed = spacing_px;
     bool is_first = true;
     for (const Eigen::Vector3d& q : touching_circle(e, source, kCount)) {
-      const Eigen::Vector3d at = e.centre_mm + e.axes * q.cwiseProduct(e.radii_mm), seen = camera.intrinsics * (camera_from_model * at);
+      const Eigen::Vector3d at = e.centre_mm + e.axes * q.cwiseProduct(e.radii_mm),
+                            seen = camera.intrinsics * (camera_from_model * at);
       if (!(seen.z() > 0)) continue;
       const Eigen::Vector2d pixel = seen.hnormalized();
       passed += is_first ? 0 : (pixel - last).norm();
@@ -160,7 +169,8 @@ std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const Rig
       is_first = false;
       if (passed < spacing_px) continue;
       passed = std::fmod(passed, spacing_px);
-      const bool is_inside = pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width_px - 1 && pixel.y() <= camera.height_px - 1;
+      const bool is_inside =
+          pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= camera.width_px - 1 && pixel.y() <= camera.height_px - 1;
       if (!is_inside || chord_mm(rest, source, (at - source).normalized()) > 0) continue;
       const Eigen::Vector2d normal = (line_from_normal * (e.axes * q.cwiseQuotient(e.radii_mm))).head<2>().normalized();
       points.push_back({float(pixel.x()), float(pixel.y()), float(normal.x()), float(normal.y()), at.cast<float>()});
@@ -169,20 +179,23 @@ std::vector<OutlinePoint> BodyProjector::outline(const Camera& camera, const Rig
   return points;
 }
 
-std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model, const PixelGrid& grid) const {
+std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                             const PixelGrid& grid) const {
   std::vector<Eigen::Vector2f> pixels;
   for (int row = 0; row < grid.rows; ++row)
     for (int column = 0; column < grid.columns; ++column) pixels.push_back(grid.pixel(column, row).cast<float>());
   return radiograph(camera, world_from_model, pixels);
 }
 
-std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model, const std::vector<Eigen::Vector2f>& pixels) const {
+std::vector<float> BodyProjector::radiograph(const Camera& camera, const RigidTransform& world_from_model,
+                                             const std::vector<Eigen::Vector2f>& pixels) const {
   const RigidTransform model_from_camera = inverse(camera.camera_from_world * world_from_model);
   const Eigen::Matrix3d ray_from_pixel = model_from_camera.rotation * camera.intrinsics.inverse();
   std::vector<float> values;
   values.reserve(pixels.size());
   for (const Eigen::Vector2f& pixel : pixels) {
-    const Eigen::Vector3d direction = (ray_from_pixel * Eigen::Vector3d(double(pixel.x()), double(pixel.y()), 1)).normalized();
+    const Eigen::Vector3d direction =
+        (ray_from_pixel * Eigen::Vector3d(double(pixel.x()), double(pixel.y()), 1)).normalized();
     values.push_back(float(density_ * chord_mm(body_, model_from_camera.translation_mm, direction)));
   }
   return values;
@@ -193,13 +206,16 @@ PixelGrid BodyProjector::region(const Camera& camera, const RigidTransform& worl
   Eigen::Vector2d low(1e9, 1e9), high(-1e9, -1e9);
   for (const Ellipsoid& e : body_)
     for (const Eigen::Vector3d& q : touching_circle(e, source, 360)) {
-      const Eigen::Vector2d pixel = project(camera, world_from_model * (e.centre_mm + e.axes * q.cwiseProduct(e.radii_mm)));
+      const Eigen::Vector2d pixel =
+          project(camera, world_from_model * (e.centre_mm + e.axes * q.cwiseProduct(e.radii_mm)));
       if (!pixel.allFinite()) continue;
       low = low.cwiseMin(pixel);
       high = high.cwiseMax(pixel);
     }
-  const int left = int(std::floor(std::clamp(low.x() - 1, 0.0, 1e6))), top = int(std::floor(std::clamp(low.y() - 1, 0.0, 1e6)));
-  const int right = int(std::ceil(std::clamp(high.x() + 1, -1.0, camera.width_px - 1.0))), bottom = int(std::ceil(std::clamp(high.y() + 1, -1.0, camera.height_px - 1.0)));
+  const int left = int(std::floor(std::clamp(low.x() - 1, 0.0, 1e6))),
+            top = int(std::floor(std::clamp(low.y() - 1, 0.0, 1e6)));
+  const int right = int(std::ceil(std::clamp(high.x() + 1, -1.0, camera.width_px - 1.0))),
+            bottom = int(std::ceil(std::clamp(high.y() + 1, -1.0, camera.height_px - 1.0)));
   if (right < left || bottom < top) return {};
   return {double(left), double(top), 1, right - left + 1, bottom - top + 1};
 }

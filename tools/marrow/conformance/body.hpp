@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A body of ellipsoids that do not touch: what the suites of projectors and of costs know exactly, as a volume, a field, a surface,
-// an outline and a radiograph.
+// A body of ellipsoids that do not touch: what the suites of projectors and of costs know exactly, as a volume, a
+// field, a surface, an outline and a radiograph.
 #include <vector>
 
 #include "marrow/domain/functions.hpp"
@@ -21,7 +21,8 @@ double chord_mm(const Body& body, const Eigen::Vector3d& start_mm, const Eigen::
 /// Distance to the surface, negative inside, clamped to +-band.
 double signed_distance_mm(const Body& body, const Eigen::Vector3d& point_mm, double band_mm);
 
-Grid grid_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm, const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity());
+Grid grid_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm,
+             const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity());
 /// `inside_hu` within, `outside_hu` around, in between by the part of a voxel that lies inside.
 Volume volume_of(const Body& body, const Grid& grid, double inside_hu, double outside_hu);
 SignedField field_of(const Body& body, const Grid& grid, double band_mm);
@@ -35,9 +36,11 @@ RigidTransform moved_by(const Eigen::Vector3d& turn_rad, const Eigen::Vector3d& 
 class BodyProjector : public Projector {
  public:
   explicit BodyProjector(Body body, double density = 1) : body_(std::move(body)), density_(density) {}
-  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform& world_from_model, double spacing_px) const override;
+  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform& world_from_model,
+                                    double spacing_px) const override;
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
-  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const std::vector<Eigen::Vector2f>& pixels) const override;
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
+                                const std::vector<Eigen::Vector2f>& pixels) const override;
   PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
 
  private:

@@ -29,15 +29,14 @@ std::string little(std::uint32_t value, int width) {
 std::string element(std::uint32_t tag, const std::string& kind, std::string value) {
   if (value.size() % 2) value += kind == "UI" ? '\0' : ' ';
   const bool is_long = kind == "OW" || kind == "OB";
-  const std::string length = is_long ? little(0, 2) + little(std::uint32_t(value.size()), 4) : little(std::uint32_t(value.size()), 2);
+  const std::string length =
+      is_long ? little(0, 2) + little(std::uint32_t(value.size()), 4) : little(std::uint32_t(value.size()), 2);
   return little(tag >> 16, 2) + little(tag & 0xFFFF, 2) + kind + length + value;
 }
 
 }  // namespace
 
-void write_files_to(const std::filesystem::path& folder) {
-  files_folder = folder;
-}
+void write_files_to(const std::filesystem::path& folder) { files_folder = folder; }
 
 const std::vector<Bead>& board_beads() {
   static const std::vector<Bead> kBeads = [] {
@@ -80,7 +79,8 @@ std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrore
     text << "[" << (mirrored ? camera.width_px - 1 - pixel.x() : pixel.x()) << ", " << pixel.y() << "]";
   };
   for (const Bead& bead : board_beads()) {
-    text << "  - {at_mm: [" << bead.centre_mm.x() << ", " << bead.centre_mm.y() << ", " << bead.centre_mm.z() << "], seen_px: {a: ";
+    text << "  - {at_mm: [" << bead.centre_mm.x() << ", " << bead.centre_mm.y() << ", " << bead.centre_mm.z()
+         << "], seen_px: {a: ";
     place(a, bead.centre_mm);
     text << ", b: ";
     place(b, bead.centre_mm);
@@ -92,13 +92,19 @@ std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrore
 std::filesystem::path xray_file(const std::string& name, double primary_deg, double secondary_deg) {
   const auto us = [](std::uint32_t tag, std::uint32_t value) { return element(tag, "US", little(value, 2)); };
   const auto ds = [](std::uint32_t tag, double value) { return element(tag, "DS", std::to_string(value)); };
-  const std::string meta = element(0x00020001, "OB", std::string("\0\1", 2)) + element(0x00020010, "UI", "1.2.840.10008.1.2.1");
-  const std::string header = element(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.12.1") + element(0x00080060, "CS", "XA") + ds(0x00181110, 1000) + ds(0x00181111, 600) +
-                             element(0x00181164, "DS", "0.3\\0.4") + element(0x00181500, "CS", "STATIC") + ds(0x00181510, primary_deg) + ds(0x00181511, secondary_deg) +
+  const std::string meta =
+      element(0x00020001, "OB", std::string("\0\1", 2)) + element(0x00020010, "UI", "1.2.840.10008.1.2.1");
+  const std::string header = element(0x00080016, "UI", "1.2.840.10008.5.1.4.1.1.12.1") +
+                             element(0x00080060, "CS", "XA") + ds(0x00181110, 1000) + ds(0x00181111, 600) +
+                             element(0x00181164, "DS", "0.3\\0.4") + element(0x00181500, "CS", "STATIC") +
+                             ds(0x00181510, primary_deg) + ds(0x00181511, secondary_deg) +
                              element(0x00185100, "CS", "HFS");
-  const std::string image = us(0x00280002, 1) + element(0x00280004, "CS", "MONOCHROME2") + us(0x00280010, 48) + us(0x00280011, 64) + us(0x00280100, 16) +
-                            us(0x00280101, 16) + us(0x00280102, 15) + us(0x00280103, 0) + element(0x7FE00010, "OW", std::string(2 * 64 * 48, '\1'));
-  return written(name + ".dcm", std::string(128, '\0') + "DICM" + element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta + header + image);
+  const std::string image = us(0x00280002, 1) + element(0x00280004, "CS", "MONOCHROME2") + us(0x00280010, 48) +
+                            us(0x00280011, 64) + us(0x00280100, 16) + us(0x00280101, 16) + us(0x00280102, 15) +
+                            us(0x00280103, 0) + element(0x7FE00010, "OW", std::string(2 * 64 * 48, '\1'));
+  return written(name + ".dcm", std::string(128, '\0') + "DICM" +
+                                    element(0x00020000, "UL", little(std::uint32_t(meta.size()), 4)) + meta + header +
+                                    image);
 }
 
 }  // namespace marrow::conformance

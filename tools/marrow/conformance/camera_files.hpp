@@ -21,9 +21,11 @@ void write_files_to(const std::filesystem::path& folder);
 
 /// The board in a file (docs/case.md).
 std::filesystem::path board_file();
-/// Where these views, called a and b, show the board's beads; `mirrored` as an image shows them that is turned left to right.
+/// Where these views, called a and b, show the board's beads; `mirrored` as an image shows them that is turned left to
+/// right.
 std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrored);
-/// An XA file of the DICOM standard: 64 x 48 pixels of 0.4 x 0.3 mm (columns, rows), source to detector 1000 mm, to the isocentre 600 mm.
+/// An XA file of the DICOM standard: 64 x 48 pixels of 0.4 x 0.3 mm (columns, rows), source to detector 1000 mm, to the
+/// isocentre 600 mm.
 std::filesystem::path xray_file(const std::string& name, double primary_deg, double secondary_deg);
 
 }  // namespace marrow::conformance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// marrow conformance: runs the suite of a node's kind in a worker, so that a node that crashes or hangs fails that check and no
-// other.
+// marrow conformance: runs the suite of a node's kind in a worker, so that a node that crashes or hangs fails that
+// check and no other.
 #include <stdlib.h>
 
 #include <algorithm>
@@ -48,7 +48,8 @@ std::string measured(const NodeDefinition& node, const OptionValues& options, co
   try {
     const double figure = check.measure(conformance::Subject(node, options));
     if (check.unit.empty()) return "+";
-    const std::string text = conformance::digits(figure) + " " + check.unit + ", limit " + conformance::digits(check.limit);
+    const std::string text =
+        conformance::digits(figure) + " " + check.unit + ", limit " + conformance::digits(check.limit);
     return (figure <= check.limit ? "+" : "-") + text;
   } catch (const conformance::NotApplicable& missing) {
     return std::string("~does not apply: ") + missing.what();
@@ -123,12 +124,15 @@ std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string&
   };
   std::vector<std::string> names;
   for (const std::string& name : catalogue.node_names())
-    if (name == what || name.substr(0, name.find('.')) == what || is_meant(*catalogue.library_of(name))) names.push_back(name);
+    if (name == what || name.substr(0, name.find('.')) == what || is_meant(*catalogue.library_of(name)))
+      names.push_back(name);
   for (const LibraryInfo& library : catalogue.libraries()) {
     if (!library.refused.empty() && is_meant(library))
       throw Error("the library " + library.file.string() + " is not used: " + library.refused);
   }
-  if (names.empty()) throw Error("there is no node, kind or library '" + what + "'; " + suggestion(what, catalogue.node_names()) + "; marrow doctor shows the folders searched");
+  if (names.empty())
+    throw Error("there is no node, kind or library '" + what + "'; " + suggestion(what, catalogue.node_names()) +
+                "; marrow doctor shows the folders searched");
   return names;
 }
 
@@ -139,7 +143,8 @@ void print_limits(const NodeInfo& node) {
   if (!suite) return;
   std::printf("\nConformance (marrow conformance %s)\n", node.name.c_str());
   for (const Check& check : conformance::checks_of(*suite)) {
-    const std::string limit = check.unit.empty() ? "" : ": at most " + conformance::digits(check.limit) + " " + check.unit;
+    const std::string limit =
+        check.unit.empty() ? "" : ": at most " + conformance::digits(check.limit) + " " + check.unit;
     std::printf("  %-26s %s%s\n", check.name.c_str(), check.what.c_str(), limit.c_str());
   }
 }
@@ -158,7 +163,8 @@ int check_worker(const std::filesystem::path& files_folder) {
 
 namespace {
 
-/// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is searched as well.
+/// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is
+/// searched as well.
 void search_folders_of(const std::vector<std::string>& subjects) {
   for (const std::string& subject : subjects) {
     std::error_code error;

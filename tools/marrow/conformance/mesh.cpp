@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshers, on signed fields of known shape: a sphere, a torus, smooth bodies without symmetry, and fields of noise, on grids with
-// non-cubic voxels and turned axes. Nodes that make a mesh of a mesh are given the same shapes as meshes.
+// Meshers, on signed fields of known shape: a sphere, a torus, smooth bodies without symmetry, and fields of noise, on
+// grids with non-cubic voxels and turned axes. Nodes that make a mesh of a mesh are given the same shapes as meshes.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -25,23 +25,30 @@ Grid grid_of(bool turned) {
   return grid;
 }
 
-Eigen::Vector3d middle(const Grid& grid) { return grid.point_from_index(0.5 * Eigen::Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) + Eigen::Vector3d(0.31, -0.17, 0.23)); }
+Eigen::Vector3d middle(const Grid& grid) {
+  return grid.point_from_index(0.5 * Eigen::Vector3d(grid.size[0] - 1, grid.size[1] - 1, grid.size[2] - 1) +
+                               Eigen::Vector3d(0.31, -0.17, 0.23));
+}
 
 SignedField field_of(const Grid& grid, const Distance& distance) {
   SignedField field;
   field.grid = grid;
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y)
-      for (int x = 0; x < grid.size[0]; ++x) field.values_mm.push_back(float(std::clamp(distance(grid.point_from_index({double(x), double(y), double(z)})), -5.0, 5.0)));
+      for (int x = 0; x < grid.size[0]; ++x)
+        field.values_mm.push_back(
+            float(std::clamp(distance(grid.point_from_index({double(x), double(y), double(z)})), -5.0, 5.0)));
   return field;
 }
 
 /// A closed surface from a map of the unit square, periodic in both directions (`poles`: the ends of v are points).
-Mesh surface_of(const std::function<Eigen::Vector3d(double u, double v)>& point, std::uint32_t around, std::uint32_t along, bool poles) {
+Mesh surface_of(const std::function<Eigen::Vector3d(double u, double v)>& point, std::uint32_t around,
+                std::uint32_t along, bool poles) {
   Mesh mesh;
   const std::uint32_t rings = poles ? along - 1 : along;
   for (std::uint32_t j = 0; j < rings; ++j)
-    for (std::uint32_t i = 0; i < around; ++i) mesh.vertices_mm.push_back(point(double(i) / around, double(poles ? j + 1 : j) / along));
+    for (std::uint32_t i = 0; i < around; ++i)
+      mesh.vertices_mm.push_back(point(double(i) / around, double(poles ? j + 1 : j) / along));
   const auto at = [&](std::uint32_t i, std::uint32_t j) { return j % rings * around + i % around; };
   for (std::uint32_t j = 0; j + (poles ? 1 : 0) < rings; ++j)
     for (std::uint32_t i = 0; i < around; ++i) {
@@ -71,11 +78,19 @@ Shape sphere(bool turned = false) {
   const Grid grid = grid_of(turned);
   const Eigen::Vector3d centre = middle(grid);
   const double r = kSphereRadius_mm;
-  Shape shape{[=](const Eigen::Vector3d& p) { return (p - centre).norm() - r; }, {}, 4 * kPi * r * r, 4.0 / 3 * kPi * r * r * r, 2};
+  Shape shape{[=](const Eigen::Vector3d& p) { return (p - centre).norm() - r; },
+              {},
+              4 * kPi * r * r,
+              4.0 / 3 * kPi * r * r * r,
+              2};
   shape.inputs["field"] = item(field_of(grid, shape.distance));
-  shape.inputs["mesh"] = item(surface_of([=](double u, double v) {
-    return Eigen::Vector3d(centre + r * Eigen::Vector3d(std::sin(kPi * v) * std::cos(2 * kPi * u), std::sin(kPi * v) * std::sin(2 * kPi * u), -std::cos(kPi * v)));
-  }, 240, 120, true));
+  shape.inputs["mesh"] = item(surface_of(
+      [=](double u, double v) {
+        return Eigen::Vector3d(centre + r * Eigen::Vector3d(std::sin(kPi * v) * std::cos(2 * kPi * u),
+                                                            std::sin(kPi * v) * std::sin(2 * kPi * u),
+                                                            -std::cos(kPi * v)));
+      },
+      240, 120, true));
   return shape;
 }
 
@@ -86,12 +101,19 @@ Shape torus() {
   Shape shape{[=](const Eigen::Vector3d& p) {
                 const Eigen::Vector3d d = p - centre;
                 return std::hypot(d.head<2>().norm() - R, d.z()) - r;
-              }, {}, 4 * kPi * kPi * R * r, 2 * kPi * kPi * R * r * r, 0};
+              },
+              {},
+              4 * kPi * kPi * R * r,
+              2 * kPi * kPi * R * r * r,
+              0};
   shape.inputs["field"] = item(field_of(grid, shape.distance));
-  shape.inputs["mesh"] = item(surface_of([=](double u, double v) {
-    const double across = R + r * std::cos(2 * kPi * v);
-    return Eigen::Vector3d(centre + Eigen::Vector3d(across * std::cos(2 * kPi * u), across * std::sin(2 * kPi * u), r * std::sin(2 * kPi * v)));
-  }, 240, 120, false));
+  shape.inputs["mesh"] = item(surface_of(
+      [=](double u, double v) {
+        const double across = R + r * std::cos(2 * kPi * v);
+        return Eigen::Vector3d(centre + Eigen::Vector3d(across * std::cos(2 * kPi * u), across * std::sin(2 * kPi * u),
+                                                        r * std::sin(2 * kPi * v)));
+      },
+      240, 120, false));
   return shape;
 }
 
@@ -127,13 +149,18 @@ double topology(const Subject& subject, const Shape& shape) {
 
 double distance_95(const Subject& subject, const Shape& shape) {
   std::vector<double> distances;
-  for (const Eigen::Vector3d& point : sample_surface(mesh_of(subject, shape.inputs), 20000)) distances.push_back(std::abs(shape.distance(point)));
+  for (const Eigen::Vector3d& point : sample_surface(mesh_of(subject, shape.inputs), 20000))
+    distances.push_back(std::abs(shape.distance(point)));
   std::sort(distances.begin(), distances.end());
   return distances[distances.size() * 95 / 100];
 }
 
-double area_error(const Subject& subject, const Shape& shape) { return 100 * std::abs(surface_area_mm2(mesh_of(subject, shape.inputs)) / shape.area_mm2 - 1); }
-double volume_error(const Subject& subject, const Shape& shape) { return 100 * std::abs(enclosed_volume_mm3(mesh_of(subject, shape.inputs)) / shape.volume_mm3 - 1); }
+double area_error(const Subject& subject, const Shape& shape) {
+  return 100 * std::abs(surface_area_mm2(mesh_of(subject, shape.inputs)) / shape.area_mm2 - 1);
+}
+double volume_error(const Subject& subject, const Shape& shape) {
+  return 100 * std::abs(enclosed_volume_mm3(mesh_of(subject, shape.inputs)) / shape.volume_mm3 - 1);
+}
 
 /// A smooth shape without symmetry: a chain of round bodies that run into each other, well resolved by the grid.
 Shape blobs(unsigned seed) {
@@ -144,7 +171,8 @@ Shape blobs(unsigned seed) {
   std::vector<Eigen::Vector3d> centres{Eigen::Vector3d::Zero()};
   while (centres.size() < 9) {
     const Eigen::Vector3d step(uniform(), uniform(), uniform());
-    if (step.norm() > 0.1) centres.push_back((centres.back() + 1.4 * kWidth_mm * step.normalized()).cwiseMax(-11).cwiseMin(11));
+    if (step.norm() > 0.1)
+      centres.push_back((centres.back() + 1.4 * kWidth_mm * step.normalized()).cwiseMax(-11).cwiseMin(11));
   }
   const auto level = [=, middle = middle(grid)](const Eigen::Vector3d& p, Eigen::Vector3d& slope) {
     double sum = 0;
@@ -161,13 +189,18 @@ Shape blobs(unsigned seed) {
                 Eigen::Vector3d slope;
                 const double value = level(p, slope);
                 return value / std::max(slope.norm(), 0.02);  // a distance, close to the surface
-              }, {}, 0, 0, 0};
+              },
+              {},
+              0,
+              0,
+              0};
   shape.inputs["field"] = item(field_of(grid, shape.distance));
   Grid fine = grid;
   for (std::size_t axis = 0; axis < 3; ++axis) fine.size[axis] *= 2;
   fine.spacing_mm /= 2;
   const SignedField samples = field_of(fine, shape.distance);
-  shape.volume_mm3 = fine.spacing_mm.prod() * double(std::count_if(samples.values_mm.begin(), samples.values_mm.end(), [](float v) { return v < 0; }));
+  shape.volume_mm3 = fine.spacing_mm.prod() * double(std::count_if(samples.values_mm.begin(), samples.values_mm.end(),
+                                                                   [](float v) { return v < 0; }));
   return shape;
 }
 
@@ -177,8 +210,8 @@ double worst_of_blobs(const Subject& subject, double (*figure)(const Subject&, c
   return worst;
 }
 
-/// How many of the fields the node refuses. What it does not refuse it must close: a field may be too rough for a method, but
-/// no field is a reason for a hole.
+/// How many of the fields the node refuses. What it does not refuse it must close: a field may be too rough for a
+/// method, but no field is a reason for a hole.
 double refused(const Subject& subject, const std::vector<SignedField>& fields) {
   int count = 0;
   for (const SignedField& field : fields) {
@@ -200,7 +233,8 @@ std::vector<SignedField> random_fields() {
   for (int round = 0; round < 20; ++round) {
     Grid grid;
     grid.size = {9, 8, 10};
-    fields.push_back(field_of(grid, [&](const Eigen::Vector3d&) { return double(random()) / 4294967296.0 - (round % 2 ? 0.5 : 0.3); }));
+    fields.push_back(field_of(
+        grid, [&](const Eigen::Vector3d&) { return double(random()) / 4294967296.0 - (round % 2 ? 0.5 : 0.3); }));
   }
   return fields;
 }
@@ -241,12 +275,14 @@ std::vector<Trial> trials() {
           {"nothing_inside", constant(12, 3)},
           {"all_inside", constant(12, -3)},
           {"zero_everywhere", constant(12, 0)},
-          {"too_few_values", [] {
+          {"too_few_values",
+           [] {
              SignedField field = field_of(grid_of(false), [](const Eigen::Vector3d&) { return 1.0; });
              field.values_mm.pop_back();
              return Inputs{{"field", item(field)}};
            }},
-          {"nan_value", [] {
+          {"nan_value",
+           [] {
              Inputs inputs = sphere().inputs;
              SignedField field = inputs["field"].as<SignedField>();
              field.values_mm[field.grid.offset(20, 20, 20)] = std::nanf("");
@@ -254,14 +290,19 @@ std::vector<Trial> trials() {
              mesh.vertices_mm[7].x() = std::nan("");
              return Inputs{{"field", item(field)}, {"mesh", item(mesh)}};
            }},
-          {"cut_by_the_border", [] {
+          {"cut_by_the_border",
+           [] {
              const Grid grid = grid_of(false);
-             return Inputs{{"field", item(field_of(grid, [=](const Eigen::Vector3d& p) { return (p - grid.origin_mm).norm() - 20; }))}};
+             return Inputs{{"field", item(field_of(grid, [=](const Eigen::Vector3d& p) {
+                              return (p - grid.origin_mm).norm() - 20;
+                            }))}};
            }},
           {"large_field", [] {
              Grid grid;
              grid.size = {128, 128, 128};
-             return Inputs{{"field", item(field_of(grid, [](const Eigen::Vector3d& p) { return (p - Eigen::Vector3d(64, 64, 64)).norm() - 50; }))}};
+             return Inputs{{"field", item(field_of(grid, [](const Eigen::Vector3d& p) {
+                              return (p - Eigen::Vector3d(64, 64, 64)).norm() - 50;
+                            }))}};
            }}};
 }
 
@@ -269,19 +310,30 @@ std::vector<Trial> trials() {
 
 Suite mesh_suite() {
   Suite suite{"mesh", [] { return sphere().inputs; }, validate, trials(), {}};
-  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit, std::function<double(const Subject&)> measure) {
+  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
+                       std::function<double(const Subject&)> measure) {
     suite.accuracy.push_back({name, what, limit, unit, std::move(measure)});
   };
   const std::string voxels = " at 0.9 x 0.9 x 1.2 mm";
-  add("random_fields", "fields of noise: closed, without a pinch, or refused in words", 20, "of 20 refused", [](const Subject& subject) { return refused(subject, random_fields()); });
-  add("all_patterns", "the sign patterns of a cell: closed, without a pinch, or refused in words", 512, "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
-  add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm", [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
-  add("blobs_volume", "error of their volume" + voxels, 1.5, "%", [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
-  for (const auto& [name, make] : {std::pair<std::string, std::function<Shape()>>{"sphere", [] { return sphere(); }}, {"turned_sphere", [] { return sphere(true); }}, {"torus", torus}}) {
-    add(name + "_topology", "closed, oriented, its Euler number", 0, "", [make = make](const Subject& subject) { return topology(subject, make()); });
-    add(name + "_distance", "95th percentile of the distance to it" + voxels, 0.15, "mm", [make = make](const Subject& subject) { return distance_95(subject, make()); });
-    add(name + "_area", "error of its area" + voxels, 1.5, "%", [make = make](const Subject& subject) { return area_error(subject, make()); });
-    add(name + "_volume", "error of its volume" + voxels, 1.5, "%", [make = make](const Subject& subject) { return volume_error(subject, make()); });
+  add("random_fields", "fields of noise: closed, without a pinch, or refused in words", 20, "of 20 refused",
+      [](const Subject& subject) { return refused(subject, random_fields()); });
+  add("all_patterns", "the sign patterns of a cell: closed, without a pinch, or refused in words", 512,
+      "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
+  add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm",
+      [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
+  add("blobs_volume", "error of their volume" + voxels, 1.5, "%",
+      [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
+  for (const auto& [name, make] : {std::pair<std::string, std::function<Shape()>>{"sphere", [] { return sphere(); }},
+                                   {"turned_sphere", [] { return sphere(true); }},
+                                   {"torus", torus}}) {
+    add(name + "_topology", "closed, oriented, its Euler number", 0, "",
+        [make = make](const Subject& subject) { return topology(subject, make()); });
+    add(name + "_distance", "95th percentile of the distance to it" + voxels, 0.15, "mm",
+        [make = make](const Subject& subject) { return distance_95(subject, make()); });
+    add(name + "_area", "error of its area" + voxels, 1.5, "%",
+        [make = make](const Subject& subject) { return area_error(subject, make()); });
+    add(name + "_volume", "error of its volume" + voxels, 1.5, "%",
+        [make = make](const Subject& subject) { return volume_error(subject, make()); });
   }
   return suite;
 }

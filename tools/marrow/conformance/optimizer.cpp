@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optimizers, on functions of six numbers whose least value is known: a bowl, a long bowl, a bent valley, and for those that call
-// themselves global one with many local minima. 1500 evaluations each, from ten starts.
+// Optimizers, on functions of six numbers whose least value is known: a bowl, a long bowl, a bent valley, and for those
+// that call themselves global one with many local minima. 1500 evaluations each, from ten starts.
 #include <algorithm>
 #include <cmath>
 #include <random>
@@ -26,7 +26,8 @@ double ellipsoid(const Eigen::VectorXd& x) {
 }
 double rosenbrock(const Eigen::VectorXd& x) {
   double sum = 0;
-  for (Eigen::Index i = 0; i + 1 < x.size(); ++i) sum += 10 * std::pow(x[i + 1] + 1 - (x[i] + 1) * (x[i] + 1), 2) + x[i] * x[i];
+  for (Eigen::Index i = 0; i + 1 < x.size(); ++i)
+    sum += 10 * std::pow(x[i + 1] + 1 - (x[i] + 1) * (x[i] + 1), 2) + x[i] * x[i];
   return sum;
 }
 double rastrigin(const Eigen::VectorXd& x) {
@@ -66,8 +67,10 @@ MinimisationProblem problem_of(const std::function<double(const Eigen::VectorXd&
 void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>& outputs) {
   const MinimisationProblem problem = problem_of(sphere, 0);
   const MinimisationResult result = optimizer_of(outputs).minimise(problem);
-  expect(result.x.size() == kSize && result.x.allFinite() && std::isfinite(result.value), "its result is not finite, or of another size");
-  expect(std::abs(sphere(result.x) - result.value) <= 1e-12 * (1 + result.value), "the value that it gives is not that of the point that it gives");
+  expect(result.x.size() == kSize && result.x.allFinite() && std::isfinite(result.value),
+         "its result is not finite, or of another size");
+  expect(std::abs(sphere(result.x) - result.value) <= 1e-12 * (1 + result.value),
+         "the value that it gives is not that of the point that it gives");
   expect(!result.stopped_because.empty(), "it does not say why it stopped");
 }
 
@@ -88,10 +91,16 @@ double evaluations_over_budget(const Subject& subject) {
   int worst = 0;
   for (const int budget : {1, 7, 100}) {
     int calls = 0;
-    MinimisationProblem problem = problem_of([&](const Eigen::VectorXd& x) { ++calls; return rosenbrock(x); }, 0);
+    MinimisationProblem problem = problem_of(
+        [&](const Eigen::VectorXd& x) {
+          ++calls;
+          return rosenbrock(x);
+        },
+        0);
     problem.max_evaluations = budget;
     const MinimisationResult result = (*optimizer).minimise(problem);
-    expect(result.evaluations == calls, "it counts " + std::to_string(result.evaluations) + " evaluations of " + std::to_string(calls));
+    expect(result.evaluations == calls,
+           "it counts " + std::to_string(result.evaluations) + " evaluations of " + std::to_string(calls));
     worst = std::max(worst, calls - budget);
   }
   return worst;
@@ -103,9 +112,11 @@ double beyond_bounds(const Subject& subject) {
   double beyond = 0;
   MinimisationProblem problem = problem_of(
       [&](const Eigen::VectorXd& x) {
-        beyond = std::max({beyond, (Eigen::VectorXd::Constant(kSize, 0.5) - x).maxCoeff(), (x - Eigen::VectorXd::Constant(kSize, 3)).maxCoeff()});
+        beyond = std::max({beyond, (Eigen::VectorXd::Constant(kSize, 0.5) - x).maxCoeff(),
+                           (x - Eigen::VectorXd::Constant(kSize, 3)).maxCoeff()});
         return sphere(x);
-      }, 0);
+      },
+      0);
   problem.start = Eigen::VectorXd::Constant(kSize, 2);
   problem.lower = Eigen::VectorXd::Constant(kSize, 0.5);
   problem.upper = Eigen::VectorXd::Constant(kSize, 3);
@@ -117,13 +128,15 @@ double beyond_bounds(const Subject& subject) {
 double noise_left(const Subject& subject) {
   const Made optimizer = made(subject);
   std::mt19937 random(9);
-  const MinimisationProblem problem = problem_of([&](const Eigen::VectorXd& x) { return sphere(x) + 0.05 * double(random()) / 4294967296.0; }, 2);
+  const MinimisationProblem problem =
+      problem_of([&](const Eigen::VectorXd& x) { return sphere(x) + 0.05 * double(random()) / 4294967296.0; }, 2);
   return 100 * sphere((*optimizer).minimise(problem).x) / sphere(problem.start);
 }
 
 double nan_left(const Subject& subject) {
   const Made optimizer = made(subject);
-  const MinimisationProblem problem = problem_of([](const Eigen::VectorXd& x) { return x[0] > 1.95 || x[1] < -2.2 ? std::nan("") : sphere(x); }, 3);
+  const MinimisationProblem problem =
+      problem_of([](const Eigen::VectorXd& x) { return x[0] > 1.95 || x[1] < -2.2 ? std::nan("") : sphere(x); }, 3);
   const MinimisationResult result = (*optimizer).minimise(problem);
   expect(result.x.allFinite() && std::isfinite(result.value), "it ends in what is not a number");
   return 100 * sphere(result.x) / sphere(problem.start);
@@ -135,7 +148,8 @@ double differing_results(const Subject& subject) {
   const Eigen::VectorXd expected = (*optimizer).minimise(problem_of(rosenbrock, 1)).x;
   std::vector<Eigen::VectorXd> found(4);
   std::vector<std::thread> threads;
-  for (Eigen::VectorXd& one : found) threads.emplace_back([&] { one = (*optimizer).minimise(problem_of(rosenbrock, 1)).x; });
+  for (Eigen::VectorXd& one : found)
+    threads.emplace_back([&] { one = (*optimizer).minimise(problem_of(rosenbrock, 1)).x; });
   for (std::thread& thread : threads) thread.join();
   return double(std::count_if(found.begin(), found.end(), [&](const Eigen::VectorXd& one) { return one != expected; }));
 }
@@ -143,7 +157,12 @@ double differing_results(const Subject& subject) {
 double lost_exceptions(const Subject& subject) {
   const Made optimizer = made(subject);
   int calls = 0;
-  const MinimisationProblem problem = problem_of([&](const Eigen::VectorXd& x) { if (++calls == 5) throw Cancelled(); return sphere(x); }, 0);
+  const MinimisationProblem problem = problem_of(
+      [&](const Eigen::VectorXd& x) {
+        if (++calls == 5) throw Cancelled();
+        return sphere(x);
+      },
+      0);
   try {
     (*optimizer).minimise(problem);
   } catch (const Cancelled&) {
@@ -154,7 +173,8 @@ double lost_exceptions(const Subject& subject) {
 
 bool is_global(const Subject& subject) {
   const auto& outputs = subject.info().outputs;
-  return std::any_of(outputs.begin(), outputs.end(), [](const PortInfo& port) { return port.help.find("global") != std::string::npos; });
+  return std::any_of(outputs.begin(), outputs.end(),
+                     [](const PortInfo& port) { return port.help.find("global") != std::string::npos; });
 }
 
 }  // namespace
@@ -162,12 +182,15 @@ bool is_global(const Subject& subject) {
 Suite optimizer_suite() {
   Suite suite{"optimizer", [] { return Inputs{}; }, validate, {}, {}};
   const std::string six = " of six numbers, 1500 evaluations, eight of ten starts: what is left of the start's value";
-  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit, const std::function<double(const Subject&)>& measure) {
+  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
+                       const std::function<double(const Subject&)>& measure) {
     suite.accuracy.push_back({name, what, limit, unit, measure});
   };
   add("sphere", "a bowl" + six, 10, "%", [](const Subject& subject) { return left_percent(subject, sphere); });
-  add("ellipsoid", "a bowl 10 times as long as wide" + six, 10, "%", [](const Subject& subject) { return left_percent(subject, ellipsoid); });
-  add("rosenbrock", "a bent valley" + six, 20, "%", [](const Subject& subject) { return left_percent(subject, rosenbrock); });
+  add("ellipsoid", "a bowl 10 times as long as wide" + six, 10, "%",
+      [](const Subject& subject) { return left_percent(subject, ellipsoid); });
+  add("rosenbrock", "a bent valley" + six, 20, "%",
+      [](const Subject& subject) { return left_percent(subject, rosenbrock); });
   add("rastrigin", "many local minima" + six, 25, "%", [](const Subject& subject) {
     if (!is_global(subject)) throw NotApplicable("it does not call its search global");
     return left_percent(subject, rastrigin);

@@ -21,7 +21,10 @@ double chord_mm(const PlaneSolid& solid, const Eigen::Vector3d& start, const Eig
   return std::max(0.0, to - from);
 }
 
-PlaneSolid box_between(const Eigen::Vector3d& half) { return {Eigen::Vector3d::UnitX() / half.x(), Eigen::Vector3d::UnitY() / half.y(), Eigen::Vector3d::UnitZ() / half.z()}; }
+PlaneSolid box_between(const Eigen::Vector3d& half) {
+  return {Eigen::Vector3d::UnitX() / half.x(), Eigen::Vector3d::UnitY() / half.y(),
+          Eigen::Vector3d::UnitZ() / half.z()};
+}
 
 PlaneSolid octahedron_between(const Eigen::Vector3d& half) {
   PlaneSolid normals;
@@ -38,8 +41,10 @@ Volume volume_of(const PlaneSolid& solid, const Grid& grid, double hu) {
         int inside = 0;
         for (int i = 0; i < kParts * kParts * kParts; ++i) {
           const Eigen::Vector3d part(i % kParts, i / kParts % kParts, i / kParts / kParts);
-          const Eigen::Vector3d p = grid.point_from_index(Eigen::Vector3d(x, y, z) + (part + Eigen::Vector3d::Constant(0.5 - 0.5 * kParts)) / kParts);
-          inside += std::all_of(solid.begin(), solid.end(), [&](const Eigen::Vector3d& n) { return std::abs(n.dot(p)) <= 1; });
+          const Eigen::Vector3d p = grid.point_from_index(
+              Eigen::Vector3d(x, y, z) + (part + Eigen::Vector3d::Constant(0.5 - 0.5 * kParts)) / kParts);
+          inside += std::all_of(solid.begin(), solid.end(),
+                                [&](const Eigen::Vector3d& n) { return std::abs(n.dot(p)) <= 1; });
         }
         volume.values.push_back(float(-1000 + (hu + 1000) * inside / (kParts * kParts * kParts)));
       }

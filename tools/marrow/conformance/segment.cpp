@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Segmenters, on a hollow bone broken in two: a tube of cortical bone around marrow, in soft tissue, cut obliquely with a gap of
-// 1.2 mm, sampled on the grid of a CT with its blur and noise.
+// Segmenters, on a hollow bone broken in two: a tube of cortical bone around marrow, in soft tissue, cut obliquely with
+// a gap of 1.2 mm, sampled on the grid of a CT with its blur and noise.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -67,7 +67,8 @@ Value seeds_of(const Tube& tube) {
   const double middle = 0.5 * (kOuter_mm + kInner_mm);
   for (const auto& [name, z] : {std::pair<std::string, double>{"proximal", 16}, {"distal", -16}}) {
     Seeds seeds{name, {}, true};
-    for (const double angle : {0.3, 2.4, 4.5}) seeds.points_mm.push_back(ct_from_tube * Eigen::Vector3d(middle * std::cos(angle), middle * std::sin(angle), z));
+    for (const double angle : {0.3, 2.4, 4.5})
+      seeds.points_mm.push_back(ct_from_tube * Eigen::Vector3d(middle * std::cos(angle), middle * std::sin(angle), z));
     list.add(name, seeds);
   }
   return Value::of<Seeds>(list, "fragment");
@@ -78,7 +79,9 @@ Mesh template_of(const Tube& tube) {
   const RigidTransform ct_from_tube = inverse(tube.tube_from_ct);
   constexpr int kAround = 64, kRings = 33;
   Mesh mesh;
-  const auto add = [&](double radius, double angle, double z) { mesh.vertices_mm.push_back(ct_from_tube * Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z)); };
+  const auto add = [&](double radius, double angle, double z) {
+    mesh.vertices_mm.push_back(ct_from_tube * Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), z));
+  };
   for (int ring = 0; ring < kRings; ++ring)
     for (int i = 0; i < kAround; ++i) add(kOuter_mm, 2 * M_PI * i / kAround, -32 + 2.0 * ring);
   add(0, 0, -32);
@@ -96,12 +99,15 @@ Mesh template_of(const Tube& tube) {
   return mesh;
 }
 
-Inputs inputs_of(const Tube& tube) { return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}, {"template", item(template_of(tube))}}; }
+Inputs inputs_of(const Tube& tube) {
+  return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}, {"template", item(template_of(tube))}};
+}
 
 /// A template is of an unbroken bone: where the fracture is cannot be asked of a node that takes one.
 void needs_the_fracture(const Subject& subject) {
   for (const PortInfo& port : subject.info().inputs)
-    if (port.name == "template" && !port.optional) throw NotApplicable("a template knows no fracture, and such a node cannot find one");
+    if (port.name == "template" && !port.optional)
+      throw NotApplicable("a template knows no fracture, and such a node cannot find one");
 }
 
 void validate(const Inputs& inputs, const std::vector<PortInfo>&, const std::vector<Value>& outputs) {
@@ -109,9 +115,13 @@ void validate(const Inputs& inputs, const std::vector<PortInfo>&, const std::vec
   expect(outputs.size() == 1 && outputs[0].is_list(), "it gives no list of fields");
   for (const Value& output : outputs[0].items) {
     const SignedField& field = output.as<SignedField>();
-    expect(field.grid.size == volume.grid.size && field.grid.direction == volume.grid.direction && field.values_mm.size() == volume.grid.count(), "a field lies on another grid than the CT");
+    expect(field.grid.size == volume.grid.size && field.grid.direction == volume.grid.direction &&
+               field.values_mm.size() == volume.grid.count(),
+           "a field lies on another grid than the CT");
     const auto [low, high] = std::minmax_element(field.values_mm.begin(), field.values_mm.end());
-    expect(std::all_of(field.values_mm.begin(), field.values_mm.end(), [](float value) { return std::isfinite(value); }), "a field is not finite");
+    expect(
+        std::all_of(field.values_mm.begin(), field.values_mm.end(), [](float value) { return std::isfinite(value); }),
+        "a field is not finite");
     expect(*low < 0 && *high > 0, "a field has no inside or no outside");
   }
   const auto wanted = inputs.find("seeds");
@@ -125,7 +135,8 @@ List<SignedField> fields_of(const Subject& subject, const Tube& tube) {
   return fields.as_list<SignedField>();
 }
 
-/// Calls visit(point in the tube, proximal field, distal field) for each voxel outside the canal and away from the volume's ends.
+/// Calls visit(point in the tube, proximal field, distal field) for each voxel outside the canal and away from the
+/// volume's ends.
 template <class Visit>
 void for_voxels(const Subject& subject, const Tube& tube, const Visit& visit) {
   const List<SignedField> fields = fields_of(subject, tube);
@@ -143,7 +154,8 @@ double dice_error(const Subject& subject, const Tube& tube) {
   long both[2] = {0, 0}, sum[2] = {0, 0};
   for_voxels(subject, tube, [&](const Eigen::Vector3d& p, float proximal, float distal) {
     const bool solid = p.head<2>().norm() < kOuter_mm;
-    const bool truth[2] = {solid && over_cut_mm(p) > 0.5 * kGap_mm, solid && over_cut_mm(p) < -0.5 * kGap_mm}, found[2] = {proximal < 0, distal < 0};
+    const bool truth[2] = {solid && over_cut_mm(p) > 0.5 * kGap_mm, solid && over_cut_mm(p) < -0.5 * kGap_mm},
+               found[2] = {proximal < 0, distal < 0};
     for (int f = 0; f < 2; ++f) {
       both[f] += truth[f] && found[f];
       sum[f] += truth[f] + found[f];
@@ -154,7 +166,8 @@ double dice_error(const Subject& subject, const Tube& tube) {
 
 double overlap(const Subject& subject, const Tube& tube) {
   long both = 0;
-  for_voxels(subject, tube, [&](const Eigen::Vector3d&, float proximal, float distal) { both += proximal < 0 && distal < 0; });
+  for_voxels(subject, tube,
+             [&](const Eigen::Vector3d&, float proximal, float distal) { both += proximal < 0 && distal < 0; });
   return double(both);
 }
 
@@ -171,7 +184,8 @@ double leak_percent(const Subject& subject, const Tube& tube) {
   return 100.0 * double(leaked) / double(all);
 }
 
-/// Distances of the fields' zero level to the true wall, along the grid's x axis, at least 4 mm from the cut; positive: too fat.
+/// Distances of the fields' zero level to the true wall, along the grid's x axis, at least 4 mm from the cut; positive:
+/// too fat.
 std::vector<double> wall_distances(const Subject& subject, const Tube& tube) {
   const List<SignedField> fields = fields_of(subject, tube);
   std::vector<double> distances;
@@ -186,7 +200,8 @@ std::vector<double> wall_distances(const Subject& subject, const Tube& tube) {
         const double radius = tube.in_tube({x + a / (a - b), double(y), double(z)}).head<2>().norm();
         if (radius > 0.5 * (kInner_mm + kOuter_mm)) distances.push_back(radius - kOuter_mm);
       }
-  expect(distances.size() > 300, "its surface crosses the wall " + std::to_string(distances.size()) + " times, some 1000 expected");
+  expect(distances.size() > 300,
+         "its surface crosses the wall " + std::to_string(distances.size()) + " times, some 1000 expected");
   return distances;
 }
 
@@ -209,7 +224,8 @@ Inputs changed(const std::function<void(Volume&, List<Seeds>&)>& change) {
   Volume volume = volume_of(bone);
   List<Seeds> seeds = seeds_of(bone).as_list<Seeds>();
   change(volume, seeds);
-  return {{"volume", item(volume)}, {"seeds", Value::of<Seeds>(seeds, "fragment")}, {"template", item(template_of(bone))}};
+  return {
+      {"volume", item(volume)}, {"seeds", Value::of<Seeds>(seeds, "fragment")}, {"template", item(template_of(bone))}};
 }
 
 std::vector<Trial> trials() {
@@ -229,37 +245,40 @@ std::vector<Trial> trials() {
       });
     };
   };
-  return {{"empty_volume", filled(0, 0)},
-          {"one_voxel", filled(1, 1000)},
-          {"constant_air", filled(40, -1000)},
-          {"constant_bone", filled(40, 1000)},
-          {"nan_voxel", [] { return changed([](Volume& volume, List<Seeds>&) { volume.values[12345] = std::nanf(""); }); }},
-          {"too_few_values", [] { return changed([](Volume& volume, List<Seeds>&) { volume.values.pop_back(); }); }},
-          {"no_seeds", [] { return changed([](Volume&, List<Seeds>& seeds) { seeds = {}; }); }},
-          {"no_points", [] {
-             return changed([](Volume&, List<Seeds>& seeds) {
-               seeds = {};
-               seeds.add("distal", Seeds{"distal", {}, true});
-             });
-           }},
-          {"seed_outside", seeds_at({1e4, 0, 0})},
-          {"nan_seed", seeds_at({std::nan(""), 0, 0})},
-          {"seed_in_tissue", [] {
-             return changed([](Volume& volume, List<Seeds>& seeds) {
-               seeds = {};
-               seeds.add("distal", Seeds{"distal", {volume.grid.point_from_index({2, 2, 20})}, true});
-             });
-           }},
-          {"cut_by_the_border", [] {
-             return changed([](Volume& volume, List<Seeds>&) {
-               const Volume whole = volume;
-               volume.grid.size[0] = 22;  // half a tube
-               volume.values.clear();
-               for (int z = 0; z < 64; ++z)
-                 for (int y = 0; y < 44; ++y)
-                   for (int x = 0; x < 22; ++x) volume.values.push_back(whole.at(x, y, z));
-             });
-           }}};
+  return {
+      {"empty_volume", filled(0, 0)},
+      {"one_voxel", filled(1, 1000)},
+      {"constant_air", filled(40, -1000)},
+      {"constant_bone", filled(40, 1000)},
+      {"nan_voxel", [] { return changed([](Volume& volume, List<Seeds>&) { volume.values[12345] = std::nanf(""); }); }},
+      {"too_few_values", [] { return changed([](Volume& volume, List<Seeds>&) { volume.values.pop_back(); }); }},
+      {"no_seeds", [] { return changed([](Volume&, List<Seeds>& seeds) { seeds = {}; }); }},
+      {"no_points",
+       [] {
+         return changed([](Volume&, List<Seeds>& seeds) {
+           seeds = {};
+           seeds.add("distal", Seeds{"distal", {}, true});
+         });
+       }},
+      {"seed_outside", seeds_at({1e4, 0, 0})},
+      {"nan_seed", seeds_at({std::nan(""), 0, 0})},
+      {"seed_in_tissue",
+       [] {
+         return changed([](Volume& volume, List<Seeds>& seeds) {
+           seeds = {};
+           seeds.add("distal", Seeds{"distal", {volume.grid.point_from_index({2, 2, 20})}, true});
+         });
+       }},
+      {"cut_by_the_border", [] {
+         return changed([](Volume& volume, List<Seeds>&) {
+           const Volume whole = volume;
+           volume.grid.size[0] = 22;  // half a tube
+           volume.values.clear();
+           for (int z = 0; z < 64; ++z)
+             for (int y = 0; y < 44; ++y)
+               for (int x = 0; x < 22; ++x) volume.values.push_back(whole.at(x, y, z));
+         });
+       }}};
 }
 
 }  // namespace
@@ -270,8 +289,10 @@ Suite segment_suite() {
   const std::string ct = "broken tube, 0.8 x 0.8 x 1 mm, noise 30 HU";
   for (const bool turned : {false, true}) {
     const std::string prefix = turned ? "turned_" : "", of = ct + (turned ? ", turned axes: " : ": ");
-    const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit, double (*measure)(const Subject&, const Tube&)) {
-      suite.accuracy.push_back({prefix + name, of + what, limit, unit, [=](const Subject& subject) { return measure(subject, tube(turned)); }});
+    const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
+                         double (*measure)(const Subject&, const Tube&)) {
+      suite.accuracy.push_back({prefix + name, of + what, limit, unit,
+                                [=](const Subject& subject) { return measure(subject, tube(turned)); }});
     };
     add("dice", "100 (1 - Dice) of the worse fragment", 12, "%", dice_error);
     add("wall_bias", "mean signed distance to the outer wall", 0.6, "mm", wall_bias);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shaft nodes, on the exact lines of a hollow cylinder in soft tissue: edge pixels with errors of position and direction, gaps
-// and clutter, in an image of the same cylinder.
+// Shaft nodes, on the exact lines of a hollow cylinder in soft tissue: edge pixels with errors of position and
+// direction, gaps and clutter, in an image of the same cylinder.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -14,7 +14,8 @@ namespace {
 
 constexpr int kWidth = 480, kHeight = 512;
 constexpr double kFocal_px = 1700, kDistance_mm = 600, kThigh_mm = 70;
-constexpr double kPosition_px = 0.6, kDirection_deg = 6, kFound = 0.85;  // errors of edge pixels, and how many are there
+constexpr double kPosition_px = 0.6, kDirection_deg = 6,
+                 kFound = 0.85;  // errors of edge pixels, and how many are there
 
 /// A straight hollow bone in a round thigh, as one view sees it.
 struct Bone {
@@ -34,15 +35,17 @@ double noise(std::mt19937& random) {  // a normal number: the sum of twelve unif
   for (int i = 0; i < 12; ++i) sum += double(random()) / 4294967296.0;
   return sum;
 }
-double uniform(std::mt19937& random, double from, double to) { return from + (to - from) * double(random()) / 4294967296.0; }
+double uniform(std::mt19937& random, double from, double to) {
+  return from + (to - from) * double(random()) / 4294967296.0;
+}
 
 std::vector<Bone> bones() {
   std::mt19937 random(3);
   std::vector<Bone> list;
   for (int i = 0; i < 8; ++i)
     list.push_back({Eigen::Vector3d(uniform(random, -20, 20), uniform(random, -20, 20), uniform(random, -15, 15)),
-                    Eigen::Vector3d(uniform(random, -0.5, 0.5), 1, uniform(random, -0.2, 0.2)).normalized(), uniform(random, 25, 33),
-                    uniform(random, 9, 15)});
+                    Eigen::Vector3d(uniform(random, -0.5, 0.5), 1, uniform(random, -0.2, 0.2)).normalized(),
+                    uniform(random, 25, 33), uniform(random, 9, 15)});
   return list;
 }
 
@@ -65,7 +68,8 @@ std::array<Line, 2> tangents(const Bone& bone, double diameter_mm) {
   const double sine = 0.5 * diameter_mm / to_axis.norm(), cosine = std::sqrt(1 - sine * sine);
   std::array<Line, 2> lines;
   for (int side = 0; side < 2; ++side) {
-    const Eigen::Vector3d normal = (side ? -cosine : cosine) * d.cross(to_axis.normalized()) - sine * to_axis.normalized();
+    const Eigen::Vector3d normal =
+        (side ? -cosine : cosine) * d.cross(to_axis.normalized()) - sine * to_axis.normalized();
     const Eigen::Vector3d line = view.intrinsics.inverse().transpose() * (view.camera_from_world.rotation * normal);
     const double scale = line.head<2>().norm();
     lines[std::size_t(side)] = {line.head<2>() / scale, -line.z() / scale};
@@ -73,11 +77,11 @@ std::array<Line, 2> tangents(const Bone& bone, double diameter_mm) {
   return lines;
 }
 
-Line turned(Line line) {
-  return {-line.normal, -line.rho};
-}
+Line turned(Line line) { return {-line.normal, -line.rho}; }
 
-EdgePixel pixel_of(const Eigen::Vector2d& at, double angle) { return {float(at.x()), float(at.y()), float(std::cos(angle)), float(std::sin(angle)), 300}; }
+EdgePixel pixel_of(const Eigen::Vector2d& at, double angle) {
+  return {float(at.x()), float(at.y()), float(std::cos(angle)), float(std::sin(angle)), 300};
+}
 
 void draw(const Line& line, std::mt19937& random, std::vector<EdgePixel>& pixels) {
   const Eigen::Vector2d along(-line.normal.y(), line.normal.x()), middle(0.5 * kWidth, 0.5 * kHeight);
@@ -86,7 +90,8 @@ void draw(const Line& line, std::mt19937& random, std::vector<EdgePixel>& pixels
     const double off = kPosition_px * noise(random), turn = radians(kDirection_deg) * noise(random);
     const bool found = uniform(random, 0, 1) < kFound;
     const Eigen::Vector2d at = s * along + (line.rho + off) * line.normal;
-    if (found && at.x() > 0 && at.y() > 0 && at.x() < kWidth - 1 && at.y() < kHeight - 1) pixels.push_back(pixel_of(at, angle + turn));
+    if (found && at.x() > 0 && at.y() > 0 && at.x() < kWidth - 1 && at.y() < kHeight - 1)
+      pixels.push_back(pixel_of(at, angle + turn));
   }
 }
 
@@ -95,7 +100,9 @@ void scatter(int count, std::mt19937& random, std::vector<EdgePixel>& pixels) {
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector2d at(uniform(random, 1, kWidth - 12), uniform(random, 1, kHeight - 12));
     const double angle = uniform(random, -kPi, kPi);
-    for (int k = 0; k < 6; ++k) pixels.push_back(pixel_of(at + 1.3 * k * Eigen::Vector2d(std::abs(std::sin(angle)), std::abs(std::cos(angle))), angle));
+    for (int k = 0; k < 6; ++k)
+      pixels.push_back(
+          pixel_of(at + 1.3 * k * Eigen::Vector2d(std::abs(std::sin(angle)), std::abs(std::cos(angle))), angle));
   }
 }
 
@@ -130,7 +137,8 @@ EdgeMap edges_of(const Bone& bone, const Shown& shown = {}) {
 double chord_mm(const Eigen::Vector3d& source, const Eigen::Vector3d& ray, const Bone& bone, double diameter_mm) {
   const Eigen::Vector3d across = ray - bone.direction * ray.dot(bone.direction), from = source - bone.point,
                         start = from - bone.direction * from.dot(bone.direction);
-  const double a = across.squaredNorm(), b = across.dot(start), c = start.squaredNorm() - 0.25 * diameter_mm * diameter_mm;
+  const double a = across.squaredNorm(), b = across.dot(start),
+               c = start.squaredNorm() - 0.25 * diameter_mm * diameter_mm;
   return 2 * std::sqrt(std::max(0.0, b * b - a * c)) / a;
 }
 
@@ -143,19 +151,25 @@ View view_of(const Bone& bone) {
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u) {
       const Eigen::Vector3d ray = ray_direction(view.camera, Eigen::Vector2d(u, v));
-      const double path = 0.024 * chord_mm(source, ray, thigh, 2 * kThigh_mm) + 0.056 * chord_mm(source, ray, bone, bone.outer_mm) -
+      const double path = 0.024 * chord_mm(source, ray, thigh, 2 * kThigh_mm) +
+                          0.056 * chord_mm(source, ray, bone, bone.outer_mm) -
                           0.059 * chord_mm(source, ray, bone, bone.canal_mm);
       const double mean = 60000 * std::exp(-path);
-      view.image.pixels.at<std::uint16_t>(v, u) = std::uint16_t(std::clamp(mean + 4 * std::sqrt(mean) * noise(random), 0.0, 65535.0));
+      view.image.pixels.at<std::uint16_t>(v, u) =
+          std::uint16_t(std::clamp(mean + 4 * std::sqrt(mean) * noise(random), 0.0, 65535.0));
     }
   return view;
 }
 
-Inputs inputs_of(const Bone& bone, EdgeMap edges) { return {{"edges", item(std::move(edges))}, {"view", item(view_of(bone))}}; }
+Inputs inputs_of(const Bone& bone, EdgeMap edges) {
+  return {{"edges", item(std::move(edges))}, {"view", item(view_of(bone))}};
+}
 Inputs inputs_of(const Bone& bone, const Shown& shown = {}) { return inputs_of(bone, edges_of(bone, shown)); }
 
 bool is_inside(const LineSegment& segment) {
-  const auto inside = [](const Eigen::Vector2d& p) { return p.allFinite() && p.x() > -9 && p.y() > -9 && p.x() < kWidth + 9 && p.y() < kHeight + 9; };
+  const auto inside = [](const Eigen::Vector2d& p) {
+    return p.allFinite() && p.x() > -9 && p.y() > -9 && p.x() < kWidth + 9 && p.y() < kHeight + 9;
+  };
   return inside(segment.from_px) && inside(segment.to_px);
 }
 
@@ -167,11 +181,13 @@ void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Val
   expect(left.norm() > 1 && right.norm() > 1, "a border has no length");
   expect(left.dot(right) > 0, "its borders do not run the same way");
   const Eigen::Vector2d to_left(left.y(), -left.x());  // v runs down
-  expect(to_left.dot(lines.left.from_px + lines.left.to_px - lines.right.from_px - lines.right.to_px) > 0, "its left border is not on the left when looking from 'from' to 'to'");
+  expect(to_left.dot(lines.left.from_px + lines.left.to_px - lines.right.from_px - lines.right.to_px) > 0,
+         "its left border is not on the left when looking from 'from' to 'to'");
   expect(std::isfinite(lines.width_mm) && lines.width_mm > 0, "its width is not a positive number");
   expect(std::isfinite(lines.width_deviation_mm) && lines.width_deviation_mm > 0, "its width has no uncertainty");
   expect(std::isfinite(lines.log_likelihood), "its likelihood is not finite");
-  for (const ShaftLines::Rejected& pair : lines.rejected) expect(pair.reason.size() > 10, "a pair is rejected without saying why: '" + pair.reason + "'");
+  for (const ShaftLines::Rejected& pair : lines.rejected)
+    expect(pair.reason.size() > 10, "a pair is rejected without saying why: '" + pair.reason + "'");
 }
 
 /// How far a border is from a true line: in the middle of its length, and in direction.
@@ -194,7 +210,9 @@ Offness error_of(const LineSegment& left, const LineSegment& right, const std::a
   return a.middle_mm < b.middle_mm ? a : b;
 }
 
-ShaftLines lines_of(const Subject& subject, const Bone& bone) { return subject.output(inputs_of(bone), "lines").as<ShaftLines>(); }
+ShaftLines lines_of(const Subject& subject, const Bone& bone) {
+  return subject.output(inputs_of(bone), "lines").as<ShaftLines>();
+}
 
 /// The largest over all bones.
 double largest(const Subject& subject, const std::function<double(const Bone&, const ShaftLines&)>& figure) {
@@ -217,7 +235,8 @@ double canal_unseen_percent(const Subject& subject) {
   for (const Bone& bone : bones()) {
     const auto canal = tangents(bone, bone.canal_mm);
     const ShaftLines lines = lines_of(subject, bone);
-    unseen += std::none_of(lines.rejected.begin(), lines.rejected.end(), [&](const auto& pair) { return error_of(pair.left, pair.right, canal).middle_mm < 1.5; });
+    unseen += std::none_of(lines.rejected.begin(), lines.rejected.end(),
+                           [&](const auto& pair) { return error_of(pair.left, pair.right, canal).middle_mm < 1.5; });
   }
   return 100.0 * unseen / double(bones().size());
 }
@@ -231,7 +250,9 @@ double width_error(const Subject& subject) {
 }
 
 double length_missed(const Subject& subject) {
-  return largest(subject, [](const Bone&, const ShaftLines& lines) { return 100 * std::max(0.0, 1 - (lines.left.to_px - lines.left.from_px).norm() / (kHeight - 60)); });
+  return largest(subject, [](const Bone&, const ShaftLines& lines) {
+    return 100 * std::max(0.0, 1 - (lines.left.to_px - lines.left.from_px).norm() / (kHeight - 60));
+  });
 }
 
 double refuses(const Subject& subject, const Shown& shown) {
@@ -250,30 +271,37 @@ std::vector<Trial> trials() {
   };
   return {{"empty_map", with([](EdgeMap& edges) { edges.pixels.clear(); })},
           {"one_pixel", with([](EdgeMap& edges) { edges.pixels.resize(1); })},
-          {"all_clutter", [] { return inputs_of(bones()[0], {false, false, false, 1500}); }},
+          {"all_clutter",
+           [] {
+             return inputs_of(bones()[0], {false, false, false, 1500});
+           }},
           {"nan_pixel", with([](EdgeMap& edges) { edges.pixels[40].u_px = std::nanf(""); })},
           {"nan_direction", with([](EdgeMap& edges) { edges.pixels[40].direction_v = std::nanf(""); })},
           {"other_size", with([](EdgeMap& edges) { edges.width_px = 100; })},
           {"pixel_far_outside", with([](EdgeMap& edges) { edges.pixels[40].v_px = 1e9f; })},
-          {"all_in_one_place", with([](EdgeMap& edges) { std::fill(edges.pixels.begin(), edges.pixels.end(), edges.pixels[40]); })},
+          {"all_in_one_place",
+           with([](EdgeMap& edges) { std::fill(edges.pixels.begin(), edges.pixels.end(), edges.pixels[40]); })},
           {"huge_map", with([](EdgeMap& edges) {
              std::vector<EdgePixel> pixels = edges.pixels;
              std::mt19937 random(5);
              scatter(15000, random, pixels);
              edges = map_of(std::move(pixels));
            })},
-          {"constant_image", [] {
+          {"constant_image",
+           [] {
              View view = view_of(bones()[0]);
              view.image.pixels = 1000;
              return Inputs{{"edges", item(edges_of(bones()[0]))}, {"view", item(view)}};
            }},
-          {"nan_image", [] {
+          {"nan_image",
+           [] {
              View view = view_of(bones()[0]);
              view.image.pixels.convertTo(view.image.pixels, CV_32F);
              view.image.pixels.rowRange(200, 260) = std::nanf("");
              return Inputs{{"edges", item(edges_of(bones()[0]))}, {"view", item(view)}};
            }},
-          {"empty_image", [] {
+          {"empty_image",
+           [] {
              View view{"frontal", {}, {}, {}};
              return Inputs{{"edges", item(EdgeMap())}, {"view", item(view)}};
            }},
@@ -289,22 +317,31 @@ std::vector<Trial> trials() {
 Suite shaft_suite() {
   Suite suite{"shaft", [] { return inputs_of(bones()[0]); }, validate, trials(), {}};
   const std::string of = "8 hollow cylinders in soft tissue, edges off by 0.6 px, 15 % missing, clutter: ";
-  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit, std::function<double(const Subject&)> measure) {
+  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
+                       std::function<double(const Subject&)> measure) {
     suite.accuracy.push_back({name, what, limit, unit, std::move(measure)});
   };
-  const auto error = [](const Bone& bone, const ShaftLines& lines) { return error_of(lines.left, lines.right, tangents(bone, bone.outer_mm)); };
+  const auto error = [](const Bone& bone, const ShaftLines& lines) {
+    return error_of(lines.left, lines.right, tangents(bone, bone.outer_mm));
+  };
   add("right_pair", of + "pairs that are not the outer borders", 0, "%", wrong_percent);
   add("angle", of + "largest angle of a border to the true one", 0.15, "deg", [=](const Subject& subject) {
     return largest(subject, [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).angle_deg; });
   });
-  add("offset", of + "largest distance of a border, in its middle, from the true one", 0.1, "mm", [=](const Subject& subject) {
-    return largest(subject, [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).middle_mm; });
-  });
+  add("offset", of + "largest distance of a border, in its middle, from the true one", 0.1, "mm",
+      [=](const Subject& subject) {
+        return largest(subject,
+                       [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).middle_mm; });
+      });
   add("width", of + "largest error of the width, in deviations that the node gives", 3, "sigma", width_error);
   add("length", of + "largest part of the shaft that is missed", 25, "%", length_missed);
   add("canal_named", of + "without the canal among the rejected pairs", 13, "%", canal_unseen_percent);
-  add("canal_alone", "refuses the canal's borders where there are no others", 0, "", [](const Subject& subject) { return refuses(subject, {false, true, false, 120}); });
-  add("tissue_alone", "refuses the limb's borders where there are no others", 0, "", [](const Subject& subject) { return refuses(subject, {false, false, true, 120}); });
+  add("canal_alone", "refuses the canal's borders where there are no others", 0, "", [](const Subject& subject) {
+    return refuses(subject, {false, true, false, 120});
+  });
+  add("tissue_alone", "refuses the limb's borders where there are no others", 0, "", [](const Subject& subject) {
+    return refuses(subject, {false, false, true, 120});
+  });
   return suite;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Costs, on two simulated views of a body whose pose is known: three ellipsoids in soft tissue, blurred and with noise, and the edges of
-// these images. What a node asks for beside them (volume, field, surface, projector) is the same body.
+// Costs, on two simulated views of a body whose pose is known: three ellipsoids in soft tissue, blurred and with noise,
+// and the edges of these images. What a node asks for beside them (volume, field, surface, projector) is the same body.
 #include <oneapi/tbb/global_control.h>
 #include <oneapi/tbb/task_arena.h>
 
@@ -49,7 +49,8 @@ struct Scene {
 };
 
 View view_of(int index, const Scene& scene) {
-  XRay x_ray{c_arm(index ? 80 : 0, kSize_px, kSize_px, kPixel_mm), scene.gain, scene.offset, scene.noise, std::uint32_t(index)};
+  XRay x_ray{c_arm(index ? 80 : 0, kSize_px, kSize_px, kPixel_mm), scene.gain, scene.offset, scene.noise,
+             std::uint32_t(index)};
   Body bodies = bone();
   if (scene.with_other)
     for (const Ellipsoid& one : other_bone()) bodies.push_back(one);
@@ -106,10 +107,17 @@ void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vect
     const Cost& cost = outputs[i].as<Cost>();
     const std::vector<RigidTransform> poses = strange_poses();
     const std::vector<double> together = cost.values(poses);
-    expect(together.size() == poses.size(), "of " + std::to_string(poses.size()) + " poses it gives " + std::to_string(together.size()) + " values");
+    expect(together.size() == poses.size(),
+           "of " + std::to_string(poses.size()) + " poses it gives " + std::to_string(together.size()) + " values");
     for (std::size_t k = 0; k < poses.size(); ++k) {
       const double value = cost.value(poses[k]);
-      expect(std::isfinite(value), std::string("its value is ") + (std::isnan(value) ? "not a number" : "infinite") + " where the bone " + (k == 0 ? "is" : k == 1 ? "is out of view" : k == 2 ? "is behind the source" : k == 3 ? "is far away" : "is about the source"));
+      expect(std::isfinite(value), std::string("its value is ") + (std::isnan(value) ? "not a number" : "infinite") +
+                                       " where the bone " +
+                                       (k == 0   ? "is"
+                                        : k == 1 ? "is out of view"
+                                        : k == 2 ? "is behind the source"
+                                        : k == 3 ? "is far away"
+                                                 : "is about the source"));
       expect(value == together[k], "values() gives other values than value()");
     }
     expect(std::isfinite(cost.at_level({4, 10, 4})->value(truth())), "its value at another level is not finite");
@@ -127,7 +135,8 @@ double better_than_truth_percent(const Subject& subject) {
   int better = 0;
   for (int i = 0; i < kPoses; ++i) {
     const Eigen::Vector3d turn(uniform(), uniform(), uniform()), shift(uniform(), uniform(), uniform());
-    better += cost->value(off_truth(turn.normalized() * (2 + 3 * std::abs(uniform())), shift.normalized() * (2 + 3 * std::abs(uniform())))) <= best;
+    better += cost->value(off_truth(turn.normalized() * (2 + 3 * std::abs(uniform())),
+                                    shift.normalized() * (2 + 3 * std::abs(uniform())))) <= best;
   }
   return 100.0 * better / kPoses;
 }
@@ -178,12 +187,15 @@ double range_of(const Cost& cost) {
 
 double gain_percent(const Subject& subject) {
   bool is_declared = false;
-  for (const PortInfo& port : subject.info().outputs) is_declared = is_declared || port.help.find("unmoved by gain and offset of the line integrals") != std::string::npos;
+  for (const PortInfo& port : subject.info().outputs)
+    is_declared =
+        is_declared || port.help.find("unmoved by gain and offset of the line integrals") != std::string::npos;
   if (!is_declared) throw NotApplicable("it does not say that it is unmoved by them");
   const Made plain = made(subject, {false, 1, 0, 0}), changed = made(subject, {false, 1.6, 0.4, 0});
   double most = 0;
   for (int axis = 0; axis < 6; ++axis)
-    for (const double by : {0.0, 2.0, 5.0}) most = std::max(most, std::abs(plain->value(off_truth(axis, by)) - changed->value(off_truth(axis, by))));
+    for (const double by : {0.0, 2.0, 5.0})
+      most = std::max(most, std::abs(plain->value(off_truth(axis, by)) - changed->value(off_truth(axis, by))));
   return 100 * most / range_of(*plain);
 }
 
@@ -202,7 +214,8 @@ double mask_percent(const Subject& subject) {
   };
   const Made one(subject, masked(false)), other(subject, masked(true));
   double most = 0;
-  for (const double by : {0.0, 2.0, 5.0}) most = std::max(most, std::abs(one->value(off_truth(3, by)) - other->value(off_truth(3, by))));
+  for (const double by : {0.0, 2.0, 5.0})
+    most = std::max(most, std::abs(one->value(off_truth(3, by)) - other->value(off_truth(3, by))));
   return 100 * most / range_of(*one);
 }
 
@@ -245,8 +258,11 @@ double slope_percent(const Subject& subject) {
   const FragmentFrame frame{Eigen::Vector3d::Zero(), rotation_from_vector({0.3, 0.2, -0.1})};
   const auto about = cost->expansion(pose, frame);
   if (!about) throw NotApplicable("it tells no derivatives");
-  expect(std::abs(about->value - cost->value(pose)) <= 1e-9 * (1 + std::abs(about->value)), "the value of its expansion is not that of the pose");
-  expect(about->curvature.allFinite() && (about->curvature - about->curvature.transpose()).cwiseAbs().maxCoeff() < 1e-9 * about->curvature.cwiseAbs().maxCoeff(), "its curvature is not symmetric");
+  expect(std::abs(about->value - cost->value(pose)) <= 1e-9 * (1 + std::abs(about->value)),
+         "the value of its expansion is not that of the pose");
+  expect(about->curvature.allFinite() && (about->curvature - about->curvature.transpose()).cwiseAbs().maxCoeff() <
+                                             1e-9 * about->curvature.cwiseAbs().maxCoeff(),
+         "its curvature is not symmetric");
   const Vector6d eigenvalues = about->curvature.selfadjointView<Eigen::Lower>().eigenvalues();
   expect(eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff(), "its curvature has a negative eigenvalue");
   Vector6d slope, scale;
@@ -259,7 +275,8 @@ double slope_percent(const Subject& subject) {
   return 100 * (slope - about->gradient).cwiseProduct(scale).norm() / slope.cwiseProduct(scale).norm();
 }
 
-/// Alone in a list of fragments nothing may change; beside another one in the images, the least value stays near the truth.
+/// Alone in a list of fragments nothing may change; beside another one in the images, the least value stays near the
+/// truth.
 double off_beside_another(const Subject& subject) {
   bool knows = false;
   for (const PortInfo& port : subject.info().inputs) knows = knows || port.name == "other_projectors";
@@ -282,7 +299,8 @@ double off_beside_another(const Subject& subject) {
   add(inputs, false);
   const Made listed(subject, inputs);
   for (int axis = 0; axis < 6; ++axis)
-    expect(alone->value(off_truth(axis, 2)) == listed->value(off_truth(axis, 2)), "it leaves its own fragment out when that is in the list of all");
+    expect(alone->value(off_truth(axis, 2)) == listed->value(off_truth(axis, 2)),
+           "it leaves its own fragment out when that is in the list of all");
   Inputs beside = inputs_of({true, 1, 0, 1});
   add(beside, true);
   return off_the_truth(Made(subject, beside));
@@ -301,8 +319,12 @@ std::vector<Trial> trials() {
           {"black_image", [fill] { return fill(0); }},
           {"no_edges", [] { return spoilt([](View&, EdgeMap& map) { map.pixels.clear(); }); }},
           {"one_edge", [] { return spoilt([](View&, EdgeMap& map) { map.pixels.resize(1); }); }},
-          {"all_masked", [] { return spoilt([](View& view, EdgeMap&) { view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(0)); }); }},
-          {"not_a_number", [] {
+          {"all_masked",
+           [] {
+             return spoilt([](View& view, EdgeMap&) { view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(0)); });
+           }},
+          {"not_a_number",
+           [] {
              return spoilt([](View& view, EdgeMap&) {
                cv::Mat pixels;
                view.image.pixels.convertTo(pixels, CV_32F);
@@ -311,7 +333,8 @@ std::vector<Trial> trials() {
              });
            }},
           {"other_size", [] { return spoilt([](View& view, EdgeMap&) { view.camera.width_px = 50; }); }},
-          {"broken_camera", [] { return spoilt([](View& view, EdgeMap&) { view.camera.intrinsics(0, 0) = std::nan(""); }); }},
+          {"broken_camera",
+           [] { return spoilt([](View& view, EdgeMap&) { view.camera.intrinsics(0, 0) = std::nan(""); }); }},
           {"no_views", [] {
              Inputs inputs = inputs_of({});
              for (const char* port : {"views", "edges"}) {
@@ -330,19 +353,27 @@ Suite similarity_suite() {
   suite.sample = [] { return inputs_of({}); };
   suite.validate = validate;
   suite.trials = trials();
-  const auto add = [&](const char* name, const std::string& what, double limit, const char* unit, std::function<double(const Subject&)> measure) {
+  const auto add = [&](const char* name, const std::string& what, double limit, const char* unit,
+                       std::function<double(const Subject&)> measure) {
     suite.accuracy.push_back({name, what, limit, unit, std::move(measure)});
   };
-  add("truth", "poses 2 to 5 mm and degrees off that cost no more than the true one", 0, "%", better_than_truth_percent);
-  add("six_axes", "along each axis, away from the truth to 6 mm or degrees: steps at which the cost does not rise", 15, "%", steps_down_percent);
-  add("minimum", "distance of the least value from the truth along each axis, mean", 0.5, "mm or degrees", [](const Subject& subject) { return off_the_truth(made(subject)); });
+  add("truth", "poses 2 to 5 mm and degrees off that cost no more than the true one", 0, "%",
+      better_than_truth_percent);
+  add("six_axes", "along each axis, away from the truth to 6 mm or degrees: steps at which the cost does not rise", 15,
+      "%", steps_down_percent);
+  add("minimum", "distance of the least value from the truth along each axis, mean", 0.5, "mm or degrees",
+      [](const Subject& subject) { return off_the_truth(made(subject)); });
   add("gain", "change of the cost with gain and offset of the line integrals, of its range", 5, "%", gain_percent);
   add("mask", "change of the cost with what is masked out, of its range", 2, "%", mask_percent);
   add("any_threads", "values that differ with 1, 2 and 7 threads", 0, "values", differing_values);
-  add("coarse_level", "at a coarse level: sides of the six axes on which 5 mm or degrees off cost no more than the truth", 10, "%", coarse_level_off);
-  add("nothing_seen", "poses out of view or behind the source that cost less than 1 mm off the truth", 0, "poses", nothing_seen);
+  add("coarse_level",
+      "at a coarse level: sides of the six axes on which 5 mm or degrees off cost no more than the truth", 10, "%",
+      coarse_level_off);
+  add("nothing_seen", "poses out of view or behind the source that cost less than 1 mm off the truth", 0, "poses",
+      nothing_seen);
   add("slope", "its derivatives against differences", 10, "%", slope_percent);
-  add("beside_another", "distance of the least value from the truth where another fragment is in the images and known", 0.5, "mm or degrees", off_beside_another);
+  add("beside_another", "distance of the least value from the truth where another fragment is in the images and known",
+      0.5, "mm or degrees", off_beside_another);
   return suite;
 }
 

@@ -15,8 +15,10 @@ std::string keys_of(std::vector<Value>& values) {
   std::string text;
   const std::function<void(Value&)> add = [&](Value& value) {
     for (Value& one : value.items) add(one);
-    if (value.data && !value.type.is_function) text += value.type.content->hash(value.data.get()).hex() + " ";
-    else text += value.is_list() ? "list " : "none ";
+    if (value.data && !value.type.is_function)
+      text += value.type.content->hash(value.data.get()).hex() + " ";
+    else
+      text += value.is_list() ? "list " : "none ";
   };
   for (Value& value : values) add(value);
   return text;
@@ -32,8 +34,10 @@ std::vector<Value> good_call(const Suite& suite, const Subject& subject, const I
 double check_trial(const Suite& suite, const Trial& trial, const Subject& subject) {
   const Inputs inputs = trial.inputs();
   const Result result = subject.call(inputs);
-  if (result.refusal) expect_reason(*result.refusal);
-  else suite.validate(inputs, subject.info().outputs, result.outputs);
+  if (result.refusal)
+    expect_reason(*result.refusal);
+  else
+    suite.validate(inputs, subject.info().outputs, result.outputs);
   return 0;
 }
 
@@ -106,8 +110,8 @@ Value Subject::output(const Inputs& inputs, const std::string& port) const {
 }
 
 const Suite* suite_of(const std::string& kind) {
-  static const std::vector<Suite> kSuites{camera_suite(), edges_suite(), mesh_suite(), optimizer_suite(),
-                                         project_suite(), segment_suite(), shaft_suite(), similarity_suite()};
+  static const std::vector<Suite> kSuites{camera_suite(),  edges_suite(),   mesh_suite(),  optimizer_suite(),
+                                          project_suite(), segment_suite(), shaft_suite(), similarity_suite()};
   for (const Suite& suite : kSuites)
     if (suite.kind == kind) return &suite;
   return nullptr;
@@ -115,14 +119,15 @@ const Suite* suite_of(const std::string& kind) {
 
 std::vector<Check> checks_of(const Suite& suite) {
   std::vector<Check> checks;
-  checks.push_back({"contract", "takes and gives what its kind says, with valid values", 0, "", [&suite](const Subject& subject) {
-                      try {
-                        good_call(suite, subject, suite.sample());
-                      } catch (const NotApplicable& missing) {
-                        throw Failure(std::string(missing.what()) + ", which its kind does not have");
-                      }
-                      return 0.0;
-                    }});
+  checks.push_back(
+      {"contract", "takes and gives what its kind says, with valid values", 0, "", [&suite](const Subject& subject) {
+         try {
+           good_call(suite, subject, suite.sample());
+         } catch (const NotApplicable& missing) {
+           throw Failure(std::string(missing.what()) + ", which its kind does not have");
+         }
+         return 0.0;
+       }});
   checks.push_back({"determinism", "the same bytes when called again", 0, "", [&suite](const Subject& subject) {
                       const Inputs inputs = suite.sample();
                       auto one = good_call(suite, subject, inputs), other = good_call(suite, subject, inputs);
@@ -134,12 +139,14 @@ std::vector<Check> checks_of(const Suite& suite) {
                       auto one = good_call(suite, subject, inputs, 1);
                       for (const int threads : {2, 7}) {
                         auto other = good_call(suite, subject, inputs, threads);
-                        expect(keys_of(one) == keys_of(other), std::to_string(threads) + " threads gave other outputs than 1");
+                        expect(keys_of(one) == keys_of(other),
+                               std::to_string(threads) + " threads gave other outputs than 1");
                       }
                       return 0.0;
                     }});
   for (const Trial& trial : suite.trials)
-    checks.push_back({trial.name, "refused in words, or a valid output", 0, "", [&suite, &trial](const Subject& subject) { return check_trial(suite, trial, subject); }});
+    checks.push_back({trial.name, "refused in words, or a valid output", 0, "",
+                      [&suite, &trial](const Subject& subject) { return check_trial(suite, trial, subject); }});
   checks.insert(checks.end(), suite.accuracy.begin(), suite.accuracy.end());
   return checks;
 }

@@ -29,10 +29,11 @@ struct Result {
 /// The node that is looked at, with its options as they are by default, but for those that its suite gives a value.
 class Subject {
  public:
-  explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {}) : node_(node), options_(std::move(options)) {}
+  explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {})
+      : node_(node), options_(std::move(options)) {}
   const NodeInfo& info() const { return node_.info; }
-  /// Calls the node. An Error that it throws is a refusal; any other exception passes through. Throws NotApplicable for an
-  /// input or an option that the node needs and this check has not.
+  /// Calls the node. An Error that it throws is a refusal; any other exception passes through. Throws NotApplicable for
+  /// an input or an option that the node needs and this check has not.
   Result call(const Inputs& inputs, int threads = 0) const;
   /// The output of that name of a call that must not refuse. Throws Failure.
   Value output(const Inputs& inputs, const std::string& port) const;
@@ -50,7 +51,8 @@ class Failure : public Error {
  public:
   using Error::Error;
 };
-/// Thrown where a check has not the inputs that the node needs: a mesher's random field, for a node that changes a mesh.
+/// Thrown where a check has not the inputs that the node needs: a mesher's random field, for a node that changes a
+/// mesh.
 class NotApplicable : public Error {
  public:
   using Error::Error;
@@ -80,11 +82,13 @@ struct Trial {
 
 struct Suite {
   std::string kind;
-  std::function<Inputs()> sample;                                    ///< good inputs of moderate size
-  std::function<void(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>&)> validate;  ///< throws Failure for outputs that break the contract
+  std::function<Inputs()> sample;  ///< good inputs of moderate size
+  std::function<void(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>&)>
+      validate;  ///< throws Failure for outputs that break the contract
   std::vector<Trial> trials;
   std::vector<Check> accuracy;
-  std::function<std::map<std::string, OptionValue>()> options = nullptr;  ///< values for options by their names, where a node has them
+  std::function<std::map<std::string, OptionValue>()> options =
+      nullptr;  ///< values for options by their names, where a node has them
 };
 
 /// The suite of a kind, or nullptr.

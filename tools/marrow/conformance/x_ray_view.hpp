@@ -14,9 +14,10 @@ struct XRay {
   std::uint32_t seed = 0;
 };
 
-/// The body in soft tissue as a 16-bit image, or of floating point where there is no noise: exp of minus the line integrals, blurred
-/// by the device.
-View x_ray_view(const XRay& x_ray, const std::string& name, const Projector& body, const RigidTransform& world_from_model);
+/// The body in soft tissue as a 16-bit image, or of floating point where there is no noise: exp of minus the line
+/// integrals, blurred by the device.
+View x_ray_view(const XRay& x_ray, const std::string& name, const Projector& body,
+                const RigidTransform& world_from_model);
 
 /// Ridges of the gradient of the logarithm, smoothed as edge detectors do.
 EdgeMap edges_of(const View& view);

@@ -41,8 +41,10 @@ void compare_part(const std::string& name, const T& a, const T& b, Amount& amoun
 template <class T>
 void compare_lists(const std::string& what, const List<T>& a, const List<T>& b, Amount& amount) {
   for (const std::string& name : a.names())
-    if (const T* other = b.find(name)) compare_part(what + " " + name, *a.find(name), *other, amount);
-    else amount.lines.push_back(what + " " + name + ": it is not there, was there");
+    if (const T* other = b.find(name))
+      compare_part(what + " " + name, *a.find(name), *other, amount);
+    else
+      amount.lines.push_back(what + " " + name + ": it is not there, was there");
   for (const std::string& name : b.names())
     if (!a.find(name)) amount.lines.push_back(what + " " + name + ": it was not there");
 }
@@ -52,19 +54,27 @@ template <class T>
 void compare_numbers(const T& a, const T& b, Amount& amount) {
   NumberDifference numbers;
   numbers.add(a, b);
-  amount.facts = {{"numbers", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}, {"texts_differ", numbers.texts}, {"same_shape", numbers.same_shape}};
-  if (numbers.differ) amount.lines.push_back(text("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
+  amount.facts = {{"numbers", numbers.count},
+                  {"differ", numbers.differ},
+                  {"largest", numbers.largest},
+                  {"texts_differ", numbers.texts},
+                  {"same_shape", numbers.same_shape}};
+  if (numbers.differ)
+    amount.lines.push_back(
+        text("%zu of %zu numbers differ, by at most %.4g", numbers.differ, numbers.count, numbers.largest));
   if (numbers.texts) amount.lines.push_back(text("%zu texts differ", numbers.texts));
   if (!numbers.same_shape) amount.lines.push_back("lists in it are of other lengths");
 }
 
 void compare_placement(const RigidTransform& a, const RigidTransform& b, const FragmentFrame* frame, Amount& amount) {
   if (a.target != b.target || a.source != b.source) {
-    amount.lines.push_back("it leads from '" + b.source + "' to '" + b.target + "', led from '" + a.source + "' to '" + a.target + "'");
+    amount.lines.push_back("it leads from '" + b.source + "' to '" + b.target + "', led from '" + a.source + "' to '" +
+                           a.target + "'");
     return;
   }
   const Eigen::Vector3d point = frame ? frame->origin_mm : Eigen::Vector3d::Zero();
-  const double angle_deg = degrees(geodesic_angle_rad(a.rotation, b.rotation)), distance_mm = (b * point - a * point).norm();
+  const double angle_deg = degrees(geodesic_angle_rad(a.rotation, b.rotation)),
+               distance_mm = (b * point - a * point).norm();
   amount.facts = {{"rotation_deg", angle_deg}, {"displacement_mm", distance_mm}};
   const std::string where = frame ? "the fragment's centroid" : "the origin of '" + a.source + "'";
   std::string line = text("%.4g deg and %.4g mm apart at %s", angle_deg, distance_mm, where.c_str());
@@ -81,23 +91,28 @@ void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
   const bool has_frame = !a.frame.origin_mm.isZero();
   compare_placement(a.world_from_model, b.world_from_model, has_frame ? &a.frame : nullptr, amount);
   if (a.cost != b.cost || a.evaluations != b.evaluations)
-    amount.lines.push_back(text("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
+    amount.lines.push_back(
+        text("cost %.6g, was %.6g; %d evaluations, were %d", b.cost, a.cost, b.evaluations, a.evaluations));
   else if (hash_of(a.world_from_model) == hash_of(b.world_from_model) && a.warnings == b.warnings)
     amount.lines.push_back("its predicted deviations or the way of the search differ");
   amount.facts["cost"] = {a.cost, b.cost};
   amount.facts["evaluations"] = {a.evaluations, b.evaluations};
   if (a.covariance.has_value() != b.covariance.has_value())
-    amount.lines.push_back(b.covariance ? "its deviations are predicted, were not" : "its deviations are not predicted, were");
+    amount.lines.push_back(b.covariance ? "its deviations are predicted, were not"
+                                        : "its deviations are not predicted, were");
   for (const std::string& warning : b.warnings)
-    if (std::find(a.warnings.begin(), a.warnings.end(), warning) == a.warnings.end()) amount.lines.push_back("it warns now: " + warning);
+    if (std::find(a.warnings.begin(), a.warnings.end(), warning) == a.warnings.end())
+      amount.lines.push_back("it warns now: " + warning);
   for (const std::string& warning : a.warnings)
-    if (std::find(b.warnings.begin(), b.warnings.end(), warning) == b.warnings.end()) amount.lines.push_back("it warned before: " + warning);
+    if (std::find(b.warnings.begin(), b.warnings.end(), warning) == b.warnings.end())
+      amount.lines.push_back("it warned before: " + warning);
 }
 
 void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
   std::size_t same = 0;
   const auto find = [](const Metrics& metrics, const std::string& name) {
-    const auto found = std::find_if(metrics.items.begin(), metrics.items.end(), [&](const Metric& metric) { return metric.name == name; });
+    const auto found = std::find_if(metrics.items.begin(), metrics.items.end(),
+                                    [&](const Metric& metric) { return metric.name == name; });
     return found == metrics.items.end() ? nullptr : &*found;
   };
   for (const Metric& now : b.items) {
@@ -109,14 +124,17 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
       ++same;
       continue;
     } else {
-      amount.lines.push_back(text("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(), before->value, now.value - before->value));
+      amount.lines.push_back(text("%-24s %.5g%s, was %.5g (%+.3g)", now.name.c_str(), now.value, unit.c_str(),
+                                  before->value, now.value - before->value));
     }
-    amount.facts[now.name] = {{"before", before ? nlohmann::json(before->value) : nlohmann::json()}, {"now", now.value}, {"unit", now.unit}};
+    amount.facts[now.name] = {
+        {"before", before ? nlohmann::json(before->value) : nlohmann::json()}, {"now", now.value}, {"unit", now.unit}};
     if (before) amount.facts[now.name]["difference"] = now.value - before->value;
   }
   for (const Metric& before : a.items) {
     if (find(b, before.name)) continue;
-    amount.lines.push_back(text("%-24s is not there, was %.5g%s", before.name.c_str(), before.value, (before.unit.empty() ? "" : " " + before.unit).c_str()));
+    amount.lines.push_back(text("%-24s is not there, was %.5g%s", before.name.c_str(), before.value,
+                                (before.unit.empty() ? "" : " " + before.unit).c_str()));
     amount.facts[before.name] = {{"before", before.value}, {"now", nullptr}, {"unit", before.unit}};
   }
   if (same) amount.lines.push_back(text("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
@@ -128,8 +146,8 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   if (before != now || a.triangles.size() != b.triangles.size()) {
     const double area_before = surface_area_mm2(a), area_now = surface_area_mm2(b);
     amount.facts["area_mm2"] = {area_before, area_now};
-    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now, before, b.triangles.size(),
-                                a.triangles.size(), area_now, area_before));
+    amount.lines.push_back(text("%zu vertices, were %zu; %zu triangles, were %zu; surface %.6g mm2, was %.6g", now,
+                                before, b.triangles.size(), a.triangles.size(), area_now, area_before));
   }
   if (before != now) return;
   double largest_mm = 0;
@@ -142,20 +160,23 @@ void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
   amount.facts["moved"] = moved;
   amount.facts["largest_displacement_mm"] = largest_mm;
   amount.lines.push_back(text("%zu of %zu vertices lie elsewhere, by at most %.4g mm", moved, now, largest_mm));
-  if (a.triangles.size() == b.triangles.size() && a.triangles != b.triangles) amount.lines.push_back("its triangles join other vertices");
+  if (a.triangles.size() == b.triangles.size() && a.triangles != b.triangles)
+    amount.lines.push_back("its triangles join other vertices");
 }
 
 void add_samples(const NumberDifference& numbers, const char* what, const char* unit, Amount& amount) {
   amount.facts.update({{"samples", numbers.count}, {"differ", numbers.differ}, {"largest", numbers.largest}});
-  amount.lines.push_back(text("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count, what, percent(numbers.differ, numbers.count),
-                              numbers.largest, unit));
+  amount.lines.push_back(text("%zu of %zu %s differ (%.3g %%), by at most %.4g %s", numbers.differ, numbers.count, what,
+                              percent(numbers.differ, numbers.count), numbers.largest, unit));
 }
 
 /// Samples on grids; where those differ in size, samples cannot be matched.
-void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& values_a, const std::vector<float>& values_b, const char* unit, Amount& amount) {
+void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& values_a, const std::vector<float>& values_b,
+                   const char* unit, Amount& amount) {
   amount.facts["size"] = {a.size, b.size};
   if (a.size != b.size || values_a.size() != values_b.size()) {
-    amount.lines.push_back(text("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2], a.size[0], a.size[1], a.size[2]));
+    amount.lines.push_back(text("%d x %d x %d samples, were %d x %d x %d", b.size[0], b.size[1], b.size[2], a.size[0],
+                                a.size[1], a.size[2]));
     return;
   }
   if (hash_of(a) != hash_of(b)) amount.lines.push_back("its grid lies elsewhere or has another spacing");
@@ -180,7 +201,8 @@ void compare_fields(const SignedField& a, const SignedField& b, Amount& amount) 
 void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
   amount.facts["size"] = {{a.cols, a.rows}, {b.cols, b.rows}};
   if (a.size() != b.size() || a.type() != b.type()) {
-    amount.lines.push_back(text("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows, 8 * int(b.elemSize()), a.cols, a.rows, 8 * int(a.elemSize())));
+    amount.lines.push_back(text("%d x %d pixels of %d bits, were %d x %d of %d", b.cols, b.rows, 8 * int(b.elemSize()),
+                                a.cols, a.rows, 8 * int(a.elemSize())));
     return;
   }
   NumberDifference numbers;
@@ -188,7 +210,8 @@ void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
   numbers.count = a.total();
   numbers.differ = 0;  // pixels, not channels
   for (int row = 0; row < a.rows; ++row)
-    for (int column = 0; column < a.cols; ++column) numbers.differ += std::memcmp(a.ptr(row, column), b.ptr(row, column), a.elemSize()) != 0;
+    for (int column = 0; column < a.cols; ++column)
+      numbers.differ += std::memcmp(a.ptr(row, column), b.ptr(row, column), a.elemSize()) != 0;
   add_samples(numbers, "pixels", "grey values", amount);
 }
 
@@ -207,19 +230,29 @@ void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
     before.erase(found);
   }
   const std::size_t gone = before.size(), added = b.pixels.size() - common;
-  amount.facts = {{"pixels", {a.pixels.size(), b.pixels.size()}}, {"gone", gone}, {"new", added}, {"changed", changed}, {"largest_px", largest_px}};
-  amount.lines.push_back(text("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
-  if (changed) amount.lines.push_back(text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
+  amount.facts = {{"pixels", {a.pixels.size(), b.pixels.size()}},
+                  {"gone", gone},
+                  {"new", added},
+                  {"changed", changed},
+                  {"largest_px", largest_px}};
+  amount.lines.push_back(
+      text("%zu edge pixels, were %zu: %zu gone, %zu new", b.pixels.size(), a.pixels.size(), gone, added));
+  if (changed)
+    amount.lines.push_back(
+        text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
 }
 
 /// How far the line's ends are from the other line, and the angle between them.
 void compare_lines(const std::string& name, const LineSegment& a, const LineSegment& b, Amount& amount) {
   const Eigen::Vector2d along = (a.to_px - a.from_px).normalized(), now_along = (b.to_px - b.from_px).normalized();
   const auto cross = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) { return p.x() * q.y() - p.y() * q.x(); };
-  const double distance_px = std::max(std::abs(cross(along, b.from_px - a.from_px)), std::abs(cross(along, b.to_px - a.from_px)));
+  const double distance_px =
+      std::max(std::abs(cross(along, b.from_px - a.from_px)), std::abs(cross(along, b.to_px - a.from_px)));
   const double angle_deg = degrees(std::atan2(std::abs(cross(along, now_along)), along.dot(now_along)));
   amount.facts[name] = {{"distance_px", distance_px}, {"angle_deg", angle_deg}};
-  if (hash_of(a) != hash_of(b)) amount.lines.push_back(text("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
+  if (hash_of(a) != hash_of(b))
+    amount.lines.push_back(
+        text("%s border: %.4g deg and at most %.4g px from where it was", name.c_str(), angle_deg, distance_px));
 }
 
 void compare_shafts(const ShaftLines& a, const ShaftLines& b, Amount& amount) {
@@ -227,7 +260,8 @@ void compare_shafts(const ShaftLines& a, const ShaftLines& b, Amount& amount) {
   compare_lines("right", a.right, b.right, amount);
   amount.facts["width_mm"] = {a.width_mm, b.width_mm};
   if (a.width_mm != b.width_mm) amount.lines.push_back(text("width %.6g mm, was %.6g", b.width_mm, a.width_mm));
-  if (a.log_likelihood != b.log_likelihood) amount.lines.push_back(text("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
+  if (a.log_likelihood != b.log_likelihood)
+    amount.lines.push_back(text("log likelihood %.6g, was %.6g", b.log_likelihood, a.log_likelihood));
   if (amount.lines.empty()) amount.lines.push_back("the same borders; the rejected candidates differ");
 }
 
@@ -275,8 +309,10 @@ void compare_as_any_of(const Value& before, const Value& now, Amount& amount) {
 Amount amount_of_counts(std::uintmax_t before, std::uintmax_t now, std::uintmax_t differ, const std::string& what) {
   Amount amount;
   amount.facts = {{"bytes", {before, now}}, {"bytes_differ", differ}};
-  if (before == now) amount.lines.push_back(text("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
-  else amount.lines.push_back(text("%s of %ju bytes, were %ju", what.c_str(), now, before));
+  if (before == now)
+    amount.lines.push_back(text("%ju of %ju bytes of %s differ", differ, now, what.c_str()));
+  else
+    amount.lines.push_back(text("%s of %ju bytes, were %ju", what.c_str(), now, before));
   return amount;
 }
 
@@ -285,7 +321,8 @@ Amount amount_of_counts(std::uintmax_t before, std::uintmax_t now, std::uintmax_
 Amount amount_of(const Value& before, const Value& now) {
   Amount amount;
   if (before.type == now.type)
-    compare_as_any_of<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Pose, Truth, Metrics, Scene, Landscape, Case>(before, now, amount);
+    compare_as_any_of<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Pose, Truth,
+                      Metrics, Scene, Landscape, Case>(before, now, amount);
   return amount;
 }
 
@@ -305,7 +342,8 @@ Amount amount_of_files(const std::filesystem::path& before, const std::filesyste
       files[k].read(blocks[k].data(), std::streamsize(blocks[k].size()));
       sizes[k] += std::uintmax_t(counts[k] = files[k].gcount());
     }
-    for (std::streamsize i = 0; i < std::min(counts[0], counts[1]); ++i) differ += blocks[0][std::size_t(i)] != blocks[1][std::size_t(i)];
+    for (std::streamsize i = 0; i < std::min(counts[0], counts[1]); ++i)
+      differ += blocks[0][std::size_t(i)] != blocks[1][std::size_t(i)];
     is_more = counts[0] > 0 || counts[1] > 0;
   }
   return amount_of_counts(sizes[0], sizes[1], differ, "the file");

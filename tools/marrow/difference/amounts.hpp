@@ -11,11 +11,12 @@
 namespace marrow::cli {
 
 struct Amount {
-  std::vector<std::string> lines;                  ///< for people
-  nlohmann::json facts = nlohmann::json::object(); ///< for scripts
+  std::vector<std::string> lines;                   ///< for people
+  nlohmann::json facts = nlohmann::json::object();  ///< for scripts
 };
 
-/// Of two items of the types that all plugins share. Empty lines where the type is another, or the two are of different types.
+/// Of two items of the types that all plugins share. Empty lines where the type is another, or the two are of different
+/// types.
 Amount amount_of(const Value& before, const Value& now);
 
 /// Of values of which nothing is known but their bytes: `what` names those.

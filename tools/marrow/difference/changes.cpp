@@ -58,9 +58,11 @@ class Comparer {
  public:
   Comparer(const RunRecord& before, const RunRecord& now) : before_(before), now_(now) {
     for (const RecordedNode& node : before.nodes)
-      if (const RecordedNode* other = now.find(node.id); other && came_out_otherwise(node, *other)) differing_.insert(node.id);
+      if (const RecordedNode* other = now.find(node.id); other && came_out_otherwise(node, *other))
+        differing_.insert(node.id);
     for (const RecordedNode& node : now.nodes)  // in an order in which sources come before users
-      if (const RecordedNode* old = before.find(node.id); old && takes_differing(*old, node)) following_.insert(node.id);
+      if (const RecordedNode* old = before.find(node.id); old && takes_differing(*old, node))
+        following_.insert(node.id);
   }
 
   RunDifference compare() {
@@ -95,8 +97,9 @@ class Comparer {
     const auto a = before.data(), b = now.data();
     const bool went_well = before.went_well();
     if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // whatever their names
-    return !std::equal(a.begin(), a.end(), b.begin(), b.end(),
-                       [&](const RecordedOutput* x, const RecordedOutput* y) { return x->name == y->name && !is_other(*x, *y, went_well); });
+    return !std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const RecordedOutput* x, const RecordedOutput* y) {
+      return x->name == y->name && !is_other(*x, *y, went_well);
+    });
   }
 
   /// Of nodes that failed, or were never run, what they made nevertheless counts.
@@ -129,7 +132,7 @@ class Comparer {
       const RecordedWire* old = find_in(before.wires, port);
       if (!old || old->text != wire.text || !input_differs(before, now, port)) continue;
       for (const std::string& id : wire.from)
-        if (const RecordedNode *a = before_.find(id), *b = now_.find(id); a && b) visit(port, *a, *b);
+        if (const RecordedNode* a = before_.find(id), *b = now_.find(id); a && b) visit(port, *a, *b);
     }
   }
 
@@ -151,27 +154,33 @@ class Comparer {
   }
 
   /// `seen` are the functions that were looked at.
-  void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through, std::set<std::string>& seen, std::vector<Change>& why) const {
+  void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through,
+                   std::set<std::string>& seen, std::vector<Change>& why) const {
     const auto add = [&](Change change) {
       change.text = through + change.text;
       why.push_back(std::move(change));
     };
     for (Change& change : own_changes(before, now, true)) add(std::move(change));
     for (Change& change : other_wires(before, now, true)) add(std::move(change));
-    for_changed_inputs(before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
-      if (from_now.makes_data() || seen.size() >= kMostFunctions || !seen.insert(from_now.id).second) return;
-      add_reasons(from_before, from_now, "the function of node '" + from_now.id + "', which it calls: ", seen, why);
-    });
+    for_changed_inputs(
+        before, now, [&](const std::string&, const RecordedNode& from_before, const RecordedNode& from_now) {
+          if (from_now.makes_data() || seen.size() >= kMostFunctions || !seen.insert(from_now.id).second) return;
+          add_reasons(from_before, from_now, "the function of node '" + from_now.id + "', which it calls: ", seen, why);
+        });
   }
 
   std::vector<Change> own_changes(const RecordedNode& before, const RecordedNode& now, bool with_builds) const {
-    if (before.uses != now.uses) return {{"uses", now.id, "", before.uses, now.uses, "it uses " + now.uses + ", used " + before.uses}};
+    if (before.uses != now.uses)
+      return {{"uses", now.id, "", before.uses, now.uses, "it uses " + now.uses + ", used " + before.uses}};
     std::vector<Change> changes;
-    if (with_builds && before.build_id != now.build_id && !before.build_id.empty() && !now.build_id.empty()) changes.push_back(other_build(before, now));
+    if (with_builds && before.build_id != now.build_id && !before.build_id.empty() && !now.build_id.empty())
+      changes.push_back(other_build(before, now));
     for (const std::string& name : names_in(before.options, now.options)) {
       const std::string text = option_change(before, now, name);
       const std::string *a = find_in(before.options, name), *b = find_in(now.options, name);
-      if (!text.empty()) changes.push_back({now.files.contains(name) ? "content" : "option", now.id, name, a ? *a : "", b ? *b : "", text});
+      if (!text.empty())
+        changes.push_back(
+            {now.files.contains(name) ? "content" : "option", now.id, name, a ? *a : "", b ? *b : "", text});
     }
     if (with_builds && now.random && before_.seed != now_.seed)
       changes.push_back(seed_change(now.id, "it draws random numbers, and the seed is "));
@@ -186,20 +195,26 @@ class Comparer {
   Change other_build(const RecordedNode& before, const RecordedNode& now) const {
     Change change{"plugin", now.id, now.library, before.build_id, now.build_id, ""};
     const std::string ids = build_ids(before.build_id, now.build_id);
-    if (before.library != now.library) change.text = "it comes from " + now.library + ", came from " + before.library + ids;
-    else change.text = "its plugin " + now.library + " is another build" + ids;
-    if (before_.framework != now_.framework) change.text += "; marrow's own library is another build too, which gives every plugin another build id";
+    if (before.library != now.library)
+      change.text = "it comes from " + now.library + ", came from " + before.library + ids;
+    else
+      change.text = "its plugin " + now.library + " is another build" + ids;
+    if (before_.framework != now_.framework)
+      change.text += "; marrow's own library is another build too, which gives every plugin another build id";
     return change;
   }
 
   /// Why an option may make a difference; empty where it does not. Paths count by the content of what they name.
   static std::string option_change(const RecordedNode& before, const RecordedNode& now, const std::string& name) {
-    const std::string *old_text = find_in(before.options, name), *text = find_in(now.options, name), option = "option '" + name + "'";
+    const std::string *old_text = find_in(before.options, name), *text = find_in(now.options, name),
+                      option = "option '" + name + "'";
     const auto *old_content = find_in(before.files, name), *content = find_in(now.files, name);
     if (old_text && text && old_content && content) {
       if (*old_content == *content) return "";
-      if (!*content) return *text + " (" + option + ") is not there" + (*old_text == *text ? " any more" : ", was " + *old_text);
-      if (!*old_content) return *old_text + " (" + option + ") was not there" + (*old_text == *text ? " yet" : ", is " + *text);
+      if (!*content)
+        return *text + " (" + option + ") is not there" + (*old_text == *text ? " any more" : ", was " + *old_text);
+      if (!*old_content)
+        return *old_text + " (" + option + ") was not there" + (*old_text == *text ? " yet" : ", is " + *text);
       if (*old_text == *text) return "the content of " + file_or_folder(*text) + " (" + option + ") differs";
       return option + " is " + *text + ", was " + *old_text + ", and the contents differ";
     }
@@ -226,15 +241,21 @@ class Comparer {
 
   std::string did_not_run(const RecordedWire& wire, const RunRecord& in) const {
     for (const std::string& id : wire.from)
-      if (!in.find(id)) return std::string(" (") + (&in == &before_ ? "there was" : "there is") + " no node '" + id + "')";
+      if (!in.find(id))
+        return std::string(" (") + (&in == &before_ ? "there was" : "there is") + " no node '" + id + "')";
     return "";
   }
 
   Change unknown(const std::string& node) const {
     Change change{"unknown", node, "", "", "", ""};
-    change.text = "nothing that it was made from differs (plugin, options, contents of files, inputs, seed): it does not give the same result each time";
-    if (before_.cpu_level != now_.cpu_level) change.text += "; the processor is of another level (" + now_.cpu_level + ", was " + before_.cpu_level + ")";
-    if (before_.threads != now_.threads) change.text += "; it ran on " + std::to_string(now_.threads) + " threads, ran on " + std::to_string(before_.threads);
+    change.text =
+        "nothing that it was made from differs (plugin, options, contents of files, inputs, seed): it does not give "
+        "the same result each time";
+    if (before_.cpu_level != now_.cpu_level)
+      change.text += "; the processor is of another level (" + now_.cpu_level + ", was " + before_.cpu_level + ")";
+    if (before_.threads != now_.threads)
+      change.text +=
+          "; it ran on " + std::to_string(now_.threads) + " threads, ran on " + std::to_string(before_.threads);
     return change;
   }
 
@@ -246,19 +267,23 @@ class Comparer {
       for (Change& change : other_wires(node, *other, false)) result.others.push_back(std::move(change));
     }
     const auto is_seed = [](const Change& change) { return change.what == "seed"; };
-    const bool is_told = std::any_of(result.roots.begin(), result.roots.end(), [&](const Root& root) { return std::any_of(root.why.begin(), root.why.end(), is_seed); });
-    if (before_.seed != now_.seed && !is_told)
-      result.others.push_back(seed_change("", "the seed is "));
+    const bool is_told = std::any_of(result.roots.begin(), result.roots.end(), [&](const Root& root) {
+      return std::any_of(root.why.begin(), root.why.end(), is_seed);
+    });
+    if (before_.seed != now_.seed && !is_told) result.others.push_back(seed_change("", "the seed is "));
   }
 
   void add_rebuilt(RunDifference& result) const {
     for (const auto& [file, build_id] : now_.plugins) {
       const std::string* old = find_in(before_.plugins, file);
-      if (old && *old != build_id) result.rebuilt.push_back({"plugin", "", file, *old, build_id, file + build_ids(*old, build_id)});
+      if (old && *old != build_id)
+        result.rebuilt.push_back({"plugin", "", file, *old, build_id, file + build_ids(*old, build_id)});
     }
   }
 
-  static std::string build_ids(const std::string& before, const std::string& now) { return " (build id " + now.substr(0, 8) + ", was " + before.substr(0, 8) + ")"; }
+  static std::string build_ids(const std::string& before, const std::string& now) {
+    return " (build id " + now.substr(0, 8) + ", was " + before.substr(0, 8) + ")";
+  }
 
   const RunRecord& before_;
   const RunRecord& now_;

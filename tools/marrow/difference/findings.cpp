@@ -28,24 +28,29 @@ class Places {
   ValueOfRun of(const std::string& key) const {
     const auto file = files_.find(key);
     const auto maker = makers_.find(key);
-    return {key, file == files_.end() ? fs::path() : file->second.first->file_of(folder_, file->second.second), maker == makers_.end() ? "" : maker->second};
+    return {key, file == files_.end() ? fs::path() : file->second.first->file_of(folder_, file->second.second),
+            maker == makers_.end() ? "" : maker->second};
   }
 
  private:
   fs::path folder_;
-  std::map<std::string, std::pair<const RecordedResult*, std::string>> files_;  ///< an output and the place of an item in it
+  std::map<std::string, std::pair<const RecordedResult*, std::string>>
+      files_;  ///< an output and the place of an item in it
   std::map<std::string, std::string> makers_;
 };
 
 class Finder {
  public:
-  Finder(const Findings& findings, KnownValues& values) : before_(findings.before), now_(findings.now), values_(values) {}
+  Finder(const Findings& findings, KnownValues& values)
+      : before_(findings.before), now_(findings.now), values_(values) {}
 
   /// Items that are absent in both runs do not count, nor do outputs that a run does not have at all.
-  OutputDifference compare(const std::string& name, const std::vector<RecordedItem>& before, const std::vector<RecordedItem>& now) {
+  OutputDifference compare(const std::string& name, const std::vector<RecordedItem>& before,
+                           const std::vector<RecordedItem>& now) {
     OutputDifference difference{name, {}, {}, 0};
     const auto find = [](const std::vector<RecordedItem>& items, const std::string& place) {
-      const auto found = std::find_if(items.begin(), items.end(), [&](const RecordedItem& item) { return item.place == place; });
+      const auto found =
+          std::find_if(items.begin(), items.end(), [&](const RecordedItem& item) { return item.place == place; });
       return found == items.end() || found->is_absent() ? "" : found->key;
     };
     for (const RecordedItem& item : before)
@@ -62,9 +67,12 @@ class Finder {
       return;
     }
     ItemDifference item{place, before, now, {}};
-    if (now.empty()) item.amount.lines = {kIsNotThere};
-    else if (before.empty()) item.amount.lines = {kWasNotThere};
-    else item.amount = values_.amount(before_.of(before), now_.of(now));
+    if (now.empty())
+      item.amount.lines = {kIsNotThere};
+    else if (before.empty())
+      item.amount.lines = {kWasNotThere};
+    else
+      item.amount = values_.amount(before_.of(before), now_.of(now));
     difference.items.push_back(std::move(item));
   }
 
@@ -81,16 +89,23 @@ std::vector<OutputDifference> outputs_of(const Root& root, Finder& finder) {
   const auto before = root.before->data(), now = root.now->data();
   const bool only_ones = before.size() == 1 && now.size() == 1;  // another node may name its only output otherwise
   for (const RecordedOutput* output : now) {
-    const auto old = std::find_if(before.begin(), before.end(), [&](const RecordedOutput* one) { return only_ones || one->name == output->name; });
-    OutputDifference difference = finder.compare(output->name, old == before.end() ? std::vector<RecordedItem>() : (*old)->items, output->items);
-    if (difference.is_none() && difference.same && old != before.end() && (*old)->key != output->key) difference.notes.push_back("the same items in another order");
+    const auto old = std::find_if(before.begin(), before.end(),
+                                  [&](const RecordedOutput* one) { return only_ones || one->name == output->name; });
+    OutputDifference difference =
+        finder.compare(output->name, old == before.end() ? std::vector<RecordedItem>() : (*old)->items, output->items);
+    if (difference.is_none() && difference.same && old != before.end() && (*old)->key != output->key)
+      difference.notes.push_back("the same items in another order");
     if (!difference.is_none()) differences.push_back(std::move(difference));
   }
   return differences;
 }
 
 json json_of(const Change& change) {
-  json result = {{"what", change.what}, {"node", change.node}, {"before", change.before}, {"now", change.now}, {"text", change.text}};
+  json result = {{"what", change.what},
+                 {"node", change.node},
+                 {"before", change.before},
+                 {"now", change.now},
+                 {"text", change.text}};
   if (!change.name.empty()) result["name"] = change.name;
   return result;
 }
@@ -100,8 +115,16 @@ json json_of(const std::vector<OutputDifference>& outputs) {
   for (const OutputDifference& output : outputs) {
     json items = json::array();
     for (const ItemDifference& item : output.items)
-      items.push_back({{"place", item.place}, {"before", item.key_before}, {"now", item.key_now}, {"amount", item.amount.facts}, {"text", item.amount.lines}});
-    list.push_back({{"name", output.name}, {"identical", output.is_none()}, {"items", items}, {"notes", output.notes}, {"same_items", output.same}});
+      items.push_back({{"place", item.place},
+                       {"before", item.key_before},
+                       {"now", item.key_now},
+                       {"amount", item.amount.facts},
+                       {"text", item.amount.lines}});
+    list.push_back({{"name", output.name},
+                    {"identical", output.is_none()},
+                    {"items", items},
+                    {"notes", output.notes},
+                    {"same_items", output.same}});
   }
   return list;
 }
@@ -110,15 +133,21 @@ json json_of(const Root& root) {
   json why = json::array();
   for (const Change& change : root.why) why.push_back(json_of(change));
   const auto fate = [](const RecordedNode& node) { return json{{"status", node.status}, {"reason", node.reason}}; };
-  return {{"node", root.now->id}, {"uses", root.now->uses}, {"why", why}, {"before", fate(*root.before)}, {"now", fate(*root.now)}};
+  return {{"node", root.now->id},
+          {"uses", root.now->uses},
+          {"why", why},
+          {"before", fate(*root.before)},
+          {"now", fate(*root.now)}};
 }
 
 }  // namespace
 
-Findings::Findings(RunRecord before_run, RunRecord now_run) : before(std::move(before_run)), now(std::move(now_run)), difference(difference_of(before, now)) {}
+Findings::Findings(RunRecord before_run, RunRecord now_run)
+    : before(std::move(before_run)), now(std::move(now_run)), difference(difference_of(before, now)) {}
 
 bool Findings::identical() const {
-  return damaged.empty() && difference.is_none() && std::all_of(results.begin(), results.end(), [](const OutputDifference& output) { return output.is_none(); });
+  return damaged.empty() && difference.is_none() &&
+         std::all_of(results.begin(), results.end(), [](const OutputDifference& output) { return output.is_none(); });
 }
 
 Findings find_differences(RunRecord before, RunRecord now, KnownValues& values) {
@@ -134,7 +163,8 @@ Findings find_differences(RunRecord before, RunRecord now, KnownValues& values) 
     if (is_fault(result.fault)) findings.results.back().notes.push_back("in the first run: " + result.fault);
   }
   for (const RecordedResult& result : findings.now.results)
-    if (!named(findings.before.results, result.name)) findings.results.push_back(finder.compare(result.name, none, result.items));
+    if (!named(findings.before.results, result.name))
+      findings.results.push_back(finder.compare(result.name, none, result.items));
   findings.damaged = damaged_files(findings.before);
   if (findings.before.folder != findings.now.folder)
     for (std::string& file : damaged_files(findings.now)) findings.damaged.push_back(std::move(file));
@@ -145,12 +175,17 @@ json json_of(const Findings& findings) {
   const RunDifference& difference = findings.difference;
   json others = json::array(), roots = json::array(), rebuilt = json::array();
   for (const Change& change : difference.others) others.push_back(json_of(change));
-  for (const Change& change : difference.rebuilt) rebuilt.push_back({{"file", change.name}, {"before", change.before}, {"now", change.now}});
+  for (const Change& change : difference.rebuilt)
+    rebuilt.push_back({{"file", change.name}, {"before", change.before}, {"now", change.now}});
   for (const Root& root : difference.roots) roots.push_back(json_of(root));
   json result = {{"before", findings.before.folder.string()},
                  {"now", findings.now.folder.string()},
                  {"identical", findings.identical()},
-                 {"nodes", {{"same", difference.same}, {"in_consequence", difference.in_consequence}, {"only_before", difference.only_before}, {"only_now", difference.only_now}}},
+                 {"nodes",
+                  {{"same", difference.same},
+                   {"in_consequence", difference.in_consequence},
+                   {"only_before", difference.only_before},
+                   {"only_now", difference.only_now}}},
                  {"first", nullptr},
                  {"differ_by_themselves", roots},
                  {"other_changes", others},

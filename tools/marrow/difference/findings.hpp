@@ -11,7 +11,7 @@ namespace marrow::cli {
 inline constexpr const char *kIsNotThere = "it is not there", *kWasNotThere = "it was not there";
 
 struct ItemDifference {
-  std::string place;   ///< along the axes; empty outside lists
+  std::string place;  ///< along the axes; empty outside lists
   std::string key_before, key_now;
   Amount amount;
 };
@@ -20,8 +20,8 @@ struct ItemDifference {
 struct OutputDifference {
   std::string name;
   std::vector<ItemDifference> items;
-  std::vector<std::string> notes;   ///< it is only in one run, could not be written in one
-  std::size_t same = 0;             ///< items
+  std::vector<std::string> notes;  ///< it is only in one run, could not be written in one
+  std::size_t same = 0;            ///< items
 
   bool is_none() const { return items.empty() && notes.empty(); }
 };

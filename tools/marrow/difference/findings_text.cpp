@@ -17,8 +17,11 @@ std::string joined(const std::vector<std::string>& names) {
 }
 
 void print_fate(const char* which, const RecordedNode& node) {
-  if (node.went_well()) std::printf("  %s it was done\n", which);
-  else std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(), node.reason.empty() ? "" : ": ", printable_lines(node.reason).c_str());
+  if (node.went_well())
+    std::printf("  %s it was done\n", which);
+  else
+    std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(),
+                node.reason.empty() ? "" : ": ", printable_lines(node.reason).c_str());
 }
 
 void print_amount(const std::string& label, std::size_t width, const std::vector<std::string>& lines) {
@@ -30,7 +33,9 @@ void print_amount(const std::string& label, std::size_t width, const std::vector
   for (const std::string& line : lines) std::printf("      %s\n", printable(line).c_str());
 }
 
-std::string label_of(const OutputDifference& output, const ItemDifference& item) { return printable(item.place.empty() ? output.name : output.name + " " + item.place); }
+std::string label_of(const OutputDifference& output, const ItemDifference& item) {
+  return printable(item.place.empty() ? output.name : output.name + " " + item.place);
+}
 
 /// What became of a node, where that is another thing than in the other run.
 std::string fate_of(const Findings& findings, const std::string& id) {
@@ -45,8 +50,10 @@ void print_consequences(const Findings& findings) {
   for (const std::string& id : findings.difference.in_consequence) {
     const std::string fate = fate_of(findings, id);
     const auto group = std::find_if(groups.begin(), groups.end(), [&](const auto& one) { return one.first == fate; });
-    if (group == groups.end()) groups.push_back({fate, {id}});
-    else group->second.push_back(id);
+    if (group == groups.end())
+      groups.push_back({fate, {id}});
+    else
+      group->second.push_back(id);
   }
   for (const auto& [fate, names] : groups)
     if (!names.empty()) std::printf("In consequence %s: %s\n", fate.c_str(), joined(names).c_str());
@@ -55,12 +62,15 @@ void print_consequences(const Findings& findings) {
 /// Whether all that one run has of it is missing in the other, whose nodes say why.
 bool is_only_missing(const OutputDifference& output, const char* text) {
   return !output.same && !output.items.empty() &&
-         std::all_of(output.items.begin(), output.items.end(), [&](const ItemDifference& item) { return item.amount.lines == std::vector<std::string>{text}; });
+         std::all_of(output.items.begin(), output.items.end(),
+                     [&](const ItemDifference& item) { return item.amount.lines == std::vector<std::string>{text}; });
 }
 
 /// Of a node that failed: without the outputs that one run does not have at all.
 std::vector<OutputDifference> partly_there(std::vector<OutputDifference> outputs) {
-  std::erase_if(outputs, [](const OutputDifference& output) { return is_only_missing(output, kIsNotThere) || is_only_missing(output, kWasNotThere); });
+  std::erase_if(outputs, [](const OutputDifference& output) {
+    return is_only_missing(output, kIsNotThere) || is_only_missing(output, kWasNotThere);
+  });
   return outputs;
 }
 
@@ -72,7 +82,8 @@ void print_outputs(const std::vector<OutputDifference>& outputs, std::set<std::p
   for (const OutputDifference& output : outputs) {
     for (const std::string& note : output.notes) print_amount(output.name, width, {note});
     for (const ItemDifference& item : output.items) {
-      const bool is_new = item.amount.lines.empty() || item.key_before.empty() || item.key_now.empty() || shown.insert({item.key_before, item.key_now}).second;
+      const bool is_new = item.amount.lines.empty() || item.key_before.empty() || item.key_now.empty() ||
+                          shown.insert({item.key_before, item.key_now}).second;
       print_amount(label_of(output, item), width, is_new ? item.amount.lines : std::vector<std::string>{"as above"});
     }
   }
@@ -81,42 +92,53 @@ void print_outputs(const std::vector<OutputDifference>& outputs, std::set<std::p
 void print_roots(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
   bool is_first = true;
   for (const Root& root : findings.difference.roots) {
-    std::printf(is_first ? "First difference: node '%s' (%s)\n" : "Node '%s' (%s) differs by itself, too\n", printable(root.now->id).c_str(), printable(root.now->uses).c_str());
+    std::printf(is_first ? "First difference: node '%s' (%s)\n" : "Node '%s' (%s) differs by itself, too\n",
+                printable(root.now->id).c_str(), printable(root.now->uses).c_str());
     if (!root.before->went_well() || !root.now->went_well()) {
       print_fate("in the first run", *root.before);
       print_fate("in the second run", *root.now);
     }
     for (const Change& change : root.why) std::printf("  why: %s\n", printable_lines(change.text).c_str());
-    if (is_first) print_outputs(root.before->went_well() && root.now->went_well() ? findings.first : partly_there(findings.first), shown);
+    if (is_first)
+      print_outputs(root.before->went_well() && root.now->went_well() ? findings.first : partly_there(findings.first),
+                    shown);
     is_first = false;
   }
 }
 
 void print_other_changes(const Findings& findings) {
   const RunDifference& difference = findings.difference;
-  if (!difference.only_before.empty()) std::printf("Only in the first run: %s\n", joined(difference.only_before).c_str());
+  if (!difference.only_before.empty())
+    std::printf("Only in the first run: %s\n", joined(difference.only_before).c_str());
   if (!difference.only_now.empty()) std::printf("Only in the second run: %s\n", joined(difference.only_now).c_str());
   for (const Change& change : difference.others) {
     const RecordedNode* node = findings.now.find(change.node);
-    const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) != difference.in_consequence.end();
-    std::printf("Also changed: %s%s%s\n", node ? printable("node '" + change.node + "': ").c_str() : "", printable_lines(change.text).c_str(),
+    const bool differs = std::find(difference.in_consequence.begin(), difference.in_consequence.end(), change.node) !=
+                         difference.in_consequence.end();
+    std::printf("Also changed: %s%s%s\n", node ? printable("node '" + change.node + "': ").c_str() : "",
+                printable_lines(change.text).c_str(),
                 node && node->makes_data() && !differs ? " (with the same result)" : "");
   }
   if (difference.rebuilt.empty()) return;
   const bool is_all = findings.before.framework != findings.now.framework;
   std::vector<std::string> texts;
   for (const Change& change : difference.rebuilt) texts.push_back(is_all ? change.name : change.text);
-  std::printf("Of another build: %s%s\n", is_all ? "marrow's own library, and with it the build ids of " : "", joined(texts).c_str());
+  std::printf("Of another build: %s%s\n", is_all ? "marrow's own library, and with it the build ids of " : "",
+              joined(texts).c_str());
 }
 
 void print_results(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
   std::vector<OutputDifference> differing;
   std::vector<std::string> same, neither, only_before, only_now;
   for (const OutputDifference& output : findings.results)
-    if (output.is_none()) (output.same ? same : neither).push_back(output.name);
-    else if (is_only_missing(output, kIsNotThere)) only_before.push_back(output.name);
-    else if (is_only_missing(output, kWasNotThere)) only_now.push_back(output.name);
-    else differing.push_back(output);
+    if (output.is_none())
+      (output.same ? same : neither).push_back(output.name);
+    else if (is_only_missing(output, kIsNotThere))
+      only_before.push_back(output.name);
+    else if (is_only_missing(output, kWasNotThere))
+      only_now.push_back(output.name);
+    else
+      differing.push_back(output);
   std::printf("\n");
   if (!differing.empty()) std::printf("Outputs that differ\n");
   print_outputs(differing, shown);
@@ -138,11 +160,14 @@ bool has_unknown_amount(const std::vector<OutputDifference>& outputs) {
 void print(const Findings& findings) {
   const RunDifference& difference = findings.difference;
   const std::string nodes = std::to_string(difference.same) + " node" + (difference.same == 1 ? "" : "s");
-  std::printf("first run (was): %s\nsecond run (is): %s\n\n", printable(findings.before.folder.string()).c_str(), printable(findings.now.folder.string()).c_str());
+  std::printf("first run (was): %s\nsecond run (is): %s\n\n", printable(findings.before.folder.string()).c_str(),
+              printable(findings.now.folder.string()).c_str());
   if (findings.identical()) {
     std::printf("identical: %s came out the same\n", difference.same == 1 ? "the only node" : ("all " + nodes).c_str());
     for (const RecordedNode& node : findings.now.nodes)
-      if (!node.went_well() && node.status != "skipped") std::printf("node '%s' %s in both: %s\n", printable(node.id).c_str(), node.status.c_str(), printable_lines(node.reason).c_str());
+      if (!node.went_well() && node.status != "skipped")
+        std::printf("node '%s' %s in both: %s\n", printable(node.id).c_str(), node.status.c_str(),
+                    printable_lines(node.reason).c_str());
     print_other_changes(findings);
     return;
   }
@@ -156,8 +181,11 @@ void print(const Findings& findings) {
   print_other_changes(findings);
   print_results(findings, shown);
   if (has_unknown_amount(findings.first) || has_unknown_amount(findings.results))
-    std::printf("\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  marrow run %s --seed %llu\n",
-                printable((findings.before.folder / "pipeline.yaml").string()).c_str(), static_cast<unsigned long long>(findings.before.seed));
+    std::printf(
+        "\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  marrow "
+        "run %s --seed %llu\n",
+        printable((findings.before.folder / "pipeline.yaml").string()).c_str(),
+        static_cast<unsigned long long>(findings.before.seed));
 }
 
 }  // namespace marrow::cli

@@ -20,7 +20,9 @@ using nlohmann::json;
 Metrics metrics_of(const json& file) {
   Metrics metrics;
   for (const json& metric : file.at("metrics"))
-    metrics.items.push_back({metric.at("name"), metric.at("value").is_null() ? std::nan("") : metric.at("value").get<double>(), metric.at("unit")});
+    metrics.items.push_back({metric.at("name"),
+                             metric.at("value").is_null() ? std::nan("") : metric.at("value").get<double>(),
+                             metric.at("unit")});
   return metrics;
 }
 
@@ -55,7 +57,8 @@ std::optional<Value> value_of_file(const fs::path& file) {
   const std::string extension = file.extension().string();
   try {
     if (extension == ".json")
-      return Value::of(std::make_shared<const Metrics>(metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
+      return Value::of(std::make_shared<const Metrics>(
+          metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
     if (extension == ".yaml") {
       const std::string text = read_text_file(file, kMostSourceBytes);
       survey_yaml(text);
@@ -126,11 +129,14 @@ std::optional<std::string> KnownValues::packed(const Value& value, const std::st
   return std::nullopt;
 }
 
-std::optional<Amount> KnownValues::amount_of_values(const Value& before, const Value& now, const ValueOfRun& made_before, const ValueOfRun& made_now) {
+std::optional<Amount> KnownValues::amount_of_values(const Value& before, const Value& now,
+                                                    const ValueOfRun& made_before, const ValueOfRun& made_now) {
   try {
     const Amount amount = amount_of(before, now);
     if (!amount.lines.empty()) return amount;
-    if (before.type.id != now.type.id) return Amount{{"it is a " + now.type.id + ", was a " + before.type.id}, {{"types", {before.type.id, now.type.id}}}};
+    if (before.type.id != now.type.id)
+      return Amount{{"it is a " + now.type.id + ", was a " + before.type.id},
+                    {{"types", {before.type.id, now.type.id}}}};
     const auto bytes_before = packed(before, made_before.uses), bytes_now = packed(now, made_now.uses);
     if (bytes_before && bytes_now) return amount_of_bytes(*bytes_before, *bytes_now, "the " + now.type.id);
   } catch (const Error&) {  // damaged, just removed, or of another layout
@@ -141,14 +147,18 @@ std::optional<Amount> KnownValues::amount_of_values(const Value& before, const V
 Amount KnownValues::amount(const ValueOfRun& before, const ValueOfRun& now) {
   const auto value_before = find(before.key), value_now = find(now.key);
   if (value_before && value_now)
-    if (auto amount = amount_of_values(*value_before, *value_now, before, now)) return with_source(std::move(*amount), "values");
-  const auto read_before = value_before ? value_before : value_of_file(before.file), read_now = value_now ? value_now : value_of_file(now.file);
+    if (auto amount = amount_of_values(*value_before, *value_now, before, now))
+      return with_source(std::move(*amount), "values");
+  const auto read_before = value_before ? value_before : value_of_file(before.file),
+             read_now = value_now ? value_now : value_of_file(now.file);
   if (read_before && read_now)
-    if (auto amount = amount_of_values(*read_before, *read_now, before, now)) return with_source(std::move(*amount), "files");
-  if (is_file(before.file) && is_file(now.file))
-    return with_source(amount_of_files(before.file, now.file), "files");
+    if (auto amount = amount_of_values(*read_before, *read_now, before, now))
+      return with_source(std::move(*amount), "files");
+  if (is_file(before.file) && is_file(now.file)) return with_source(amount_of_files(before.file, now.file), "files");
   Amount unknown;
-  const char* whose = !value_before && !value_now ? "of both runs" : value_before ? "of the second run" : "of the first run";
+  const char* whose = !value_before && !value_now ? "of both runs"
+                      : value_before              ? "of the second run"
+                                                  : "of the first run";
   unknown.lines = {std::string("by how much is not known: the store no longer has the value ") + whose};
   return with_source(std::move(unknown), "none");
 }

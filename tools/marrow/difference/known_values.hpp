@@ -30,7 +30,8 @@ class KnownValues {
  private:
   std::optional<Value> find(const std::string& key);
   std::optional<std::string> packed(const Value& value, const std::string& uses);
-  std::optional<Amount> amount_of_values(const Value& before, const Value& now, const ValueOfRun& made_before, const ValueOfRun& made_now);
+  std::optional<Amount> amount_of_values(const Value& before, const Value& now, const ValueOfRun& made_before,
+                                         const ValueOfRun& made_now);
 
   std::map<std::string, Value> held_;
   Store store_;

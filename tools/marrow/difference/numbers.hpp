@@ -9,11 +9,11 @@
 namespace marrow::cli {
 
 struct NumberDifference {
-  std::size_t count = 0;     ///< numbers, as long as both have the same shape
+  std::size_t count = 0;  ///< numbers, as long as both have the same shape
   std::size_t differ = 0;
-  double largest = 0;        ///< of the differences; infinite where a number became finite or not
-  std::size_t texts = 0;     ///< that differ
-  bool same_shape = true;    ///< lists, images, optional values are of equal size
+  double largest = 0;      ///< of the differences; infinite where a number became finite or not
+  std::size_t texts = 0;   ///< that differ
+  bool same_shape = true;  ///< lists, images, optional values are of equal size
 
   template <class T>
   void add(const T& a, const T& b) {
@@ -44,7 +44,8 @@ struct NumberDifference {
     a.reshape(1).convertTo(wide_a, CV_64F);
     b.reshape(1).convertTo(wide_b, CV_64F);
     for (int row = 0; row < wide_a.rows; ++row)
-      for (int column = 0; column < wide_a.cols; ++column) add_number(wide_a.at<double>(row, column), wide_b.at<double>(row, column));
+      for (int column = 0; column < wide_a.cols; ++column)
+        add_number(wide_a.at<double>(row, column), wide_b.at<double>(row, column));
   }
   template <class S, int R, int C>
   void add_container(const Eigen::Matrix<S, R, C>& a, const Eigen::Matrix<S, R, C>& b) {
@@ -60,8 +61,10 @@ struct NumberDifference {
   void add_container(const std::map<K, V>& a, const std::map<K, V>& b) {
     same_shape = same_shape && a.size() == b.size();
     for (const auto& [key, value] : a)
-      if (const auto other = b.find(key); other != b.end()) add(value, other->second);
-      else same_shape = false;
+      if (const auto other = b.find(key); other != b.end())
+        add(value, other->second);
+      else
+        same_shape = false;
   }
   template <class T>
   void add_container(const List<T>& a, const List<T>& b) {

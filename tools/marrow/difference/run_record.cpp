@@ -30,7 +30,9 @@ std::string text_of(const YAML::Node& value) {
 
 RecordedWire wire_of(const YAML::Node& value) {
   RecordedWire wire{text_of(value), {}};
-  const auto add = [&](const YAML::Node& source) { wire.from.push_back(source.Scalar().substr(0, source.Scalar().find('.'))); };
+  const auto add = [&](const YAML::Node& source) {
+    wire.from.push_back(source.Scalar().substr(0, source.Scalar().find('.')));
+  };
   if (value.IsSequence())
     for (const YAML::Node& source : value) add(source);
   else
@@ -41,7 +43,8 @@ RecordedWire wire_of(const YAML::Node& value) {
 /// A key, or a content: 32 hexadecimal digits.
 std::string digest_of(const json& value) {
   const std::string text = value;
-  if (text.size() != 32 || text.find_first_not_of("0123456789abcdef") != std::string::npos) throw Error("a key in it has not 32 hexadecimal digits");
+  if (text.size() != 32 || text.find_first_not_of("0123456789abcdef") != std::string::npos)
+    throw Error("a key in it has not 32 hexadecimal digits");
   return text;
 }
 
@@ -78,7 +81,8 @@ json map_in(const json& object, const char* name) {
 double limit_in(const json& record, const char* name) {
   if (!record.contains(name)) return 0;
   const double limit = record[name].is_number() ? record[name].get<double>() : 0;
-  if (!(limit >= kLeastAmount && limit <= kMostAmount)) throw Error("its '" + std::string(name) + "' is no number from 0.001 to 1000000000");
+  if (!(limit >= kLeastAmount && limit <= kMostAmount))
+    throw Error("its '" + std::string(name) + "' is no number from 0.001 to 1000000000");
   return limit;
 }
 
@@ -113,7 +117,8 @@ void add_record(const json& recorded, RecordedNode& node) {
 YAML::Node pipeline_of(const fs::path& file) {
   Diagnostics faults;
   YAML::Node pipeline;
-  if (const auto text = read_source(file, "the pipeline", faults)) pipeline = StrictYaml(file.string(), faults).parse(*text);
+  if (const auto text = read_source(file, "the pipeline", faults))
+    pipeline = StrictYaml(file.string(), faults).parse(*text);
   if (!faults.empty()) refuse_pipeline(file, faults.sorted()[0].message);
   if (!pipeline.IsMap() || !pipeline["nodes"].IsDefined() || !pipeline["nodes"].IsMap())
     refuse_pipeline(file, "it holds no pipeline");
@@ -148,7 +153,9 @@ void check_age(const fs::path& folder, const json& record) {
   const json nodes = record.contains("nodes") ? record["nodes"] : json();
   const auto is_new = [](const json& node) { return !node.is_object() || node.contains("items"); };
   if (!nodes.is_array() || std::all_of(nodes.begin(), nodes.end(), is_new)) return;
-  throw Error((folder / "run.json").string() + " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with --seed " +
+  throw Error((folder / "run.json").string() +
+              " was written by an older marrow, which kept too little to compare it; run its pipeline.yaml again, with "
+              "--seed " +
               (record.contains("seed") && record["seed"].is_number() ? record["seed"].dump() : "1"));
 }
 
@@ -171,12 +178,19 @@ RunRecord from_json(const fs::path& folder, const YAML::Node& pipeline, const js
   run.threads = int(integer_of(record.value("threads", json(0)), 0, 1024, "its 'threads'"));
   const json inputs = map_in(record, "inputs");
   for (const auto& [name, value] : inputs.items()) run.arguments.inputs.push_back({name, value});
-  for (const std::string text : list_in(record, "overrides")) run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
-  for (const json& plugin : list_in(record, "plugins")) run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
+  for (const std::string text : list_in(record, "overrides"))
+    run.arguments.overrides.push_back({text.substr(0, text.find('=')), text.substr(text.find('=') + 1)});
+  for (const json& plugin : list_in(record, "plugins"))
+    run.plugins[plugin.at("file")] = digest_of(plugin.at("build_id"));
   run.file_limits = {limit_in(record, "file_memory_mb"), limit_in(record, "file_seconds")};
   for (const json& output : list_in(record, "outputs")) {
-    run.results.push_back({output.at("name"), output.value("fault", ""), items_of(list_in(output, "items")), output.value("files", std::vector<std::string>()), {}});
-    for (const json& content : list_in(output, "digests")) run.results.back().contents.push_back(content.is_null() ? "" : digest_of(content));
+    run.results.push_back({output.at("name"),
+                           output.value("fault", ""),
+                           items_of(list_in(output, "items")),
+                           output.value("files", std::vector<std::string>()),
+                           {}});
+    for (const json& content : list_in(output, "digests"))
+      run.results.back().contents.push_back(content.is_null() ? "" : digest_of(content));
   }
   read_nodes(pipeline, record, run);
   return run;
@@ -193,7 +207,8 @@ std::vector<const RecordedOutput*> RecordedNode::data() const {
 
 fs::path RecordedResult::file_of(const fs::path& folder, const std::string& place) const {
   std::size_t at = 0;
-  const std::size_t present = std::size_t(std::count_if(items.begin(), items.end(), [](const RecordedItem& item) { return !item.is_absent(); }));
+  const std::size_t present = std::size_t(
+      std::count_if(items.begin(), items.end(), [](const RecordedItem& item) { return !item.is_absent(); }));
   if (present != files.size()) return {};  // one of them could not be written
   for (const RecordedItem& item : items) {
     if (item.is_absent()) continue;
@@ -219,23 +234,31 @@ std::vector<std::string> damaged_files(const RunRecord& run) {
       if (result.contents[i].empty()) continue;
       const std::string name = (run.folder / result.files[i]).string();
       std::error_code error;
-      if (leads_outside(run.folder, result.files[i])) damaged.push_back(name + " leads out of the folder");
-      else if (!fs::exists(run.folder / result.files[i], error)) damaged.push_back(name + " is missing");
-      else if (!holds(run.folder / result.files[i], result.contents[i])) damaged.push_back(name + " was changed since the run wrote it");
+      if (leads_outside(run.folder, result.files[i]))
+        damaged.push_back(name + " leads out of the folder");
+      else if (!fs::exists(run.folder / result.files[i], error))
+        damaged.push_back(name + " is missing");
+      else if (!holds(run.folder / result.files[i], result.contents[i]))
+        damaged.push_back(name + " was changed since the run wrote it");
     }
   return damaged;
 }
 
 RunRecord read_run(const fs::path& folder) {
   std::error_code error;
-  const std::string advice = "; give a folder that 'marrow run' wrote, or one of the cells of a comparison (FOLDER/cells/VARIANT/CASE/START)";
+  const std::string advice =
+      "; give a folder that 'marrow run' wrote, or one of the cells of a comparison (FOLDER/cells/VARIANT/CASE/START)";
   if (!fs::is_directory(folder, error)) throw Error(folder.string() + " is not a folder" + advice);
   const bool has_pipeline = fs::exists(folder / "pipeline.yaml", error);
   if (!fs::exists(folder / "run.json", error)) {
-    if (has_pipeline) throw Error("the run in " + folder.string() + " did not come to its end: it has a pipeline.yaml, but no run.json; run it again");
+    if (has_pipeline)
+      throw Error("the run in " + folder.string() +
+                  " did not come to its end: it has a pipeline.yaml, but no run.json; run it again");
     throw Error(folder.string() + " is not the folder of a run: it has no run.json" + advice);
   }
-  if (!has_pipeline) throw Error(folder.string() + " is not the whole folder of a run: it has a run.json, but no pipeline.yaml" + advice);
+  if (!has_pipeline)
+    throw Error(folder.string() + " is not the whole folder of a run: it has a run.json, but no pipeline.yaml" +
+                advice);
   refuse_outside(folder, "pipeline.yaml");
   const json record = read_record(folder);
   const YAML::Node pipeline = pipeline_of(folder / "pipeline.yaml");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the folder of a run says of it. Read without any plugin, so that runs of plugins that are gone can be looked at too.
+// What the folder of a run says of it. Read without any plugin, so that runs of plugins that are gone can be looked at
+// too.
 #include <filesystem>
 #include <map>
 #include <optional>
@@ -12,7 +13,8 @@
 
 namespace marrow::cli {
 
-/// A single value: its place along the axes ("distal/final"; empty outside lists) and its key, which is zero for an absent one.
+/// A single value: its place along the axes ("distal/final"; empty outside lists) and its key, which is zero for an
+/// absent one.
 struct RecordedItem {
   std::string place, key;
   bool is_absent() const { return key.find_first_not_of('0') == std::string::npos; }
@@ -25,17 +27,18 @@ struct RecordedOutput {
 };
 
 struct RecordedWire {
-  std::string text;                   ///< "case.views", "[a, b]"
-  std::vector<std::string> from;      ///< nodes
+  std::string text;               ///< "case.views", "[a, b]"
+  std::vector<std::string> from;  ///< nodes
 };
 
 struct RecordedNode {
   std::string id, uses, status, reason, library, build_id;
   bool random = false;
   std::map<std::string, std::string> options;
-  std::map<std::string, RecordedWire> wires;                    ///< by port
-  std::map<std::string, std::string> input_keys;                ///< by port
-  std::map<std::string, std::optional<std::string>> files;      ///< content of what an option of type path names; nothing where it was not there
+  std::map<std::string, RecordedWire> wires;      ///< by port
+  std::map<std::string, std::string> input_keys;  ///< by port
+  std::map<std::string, std::optional<std::string>>
+      files;  ///< content of what an option of type path names; nothing where it was not there
   std::vector<RecordedOutput> outputs;
 
   bool went_well() const { return status == "done" || status == "not needed"; }
@@ -47,7 +50,7 @@ struct RecordedNode {
 struct RecordedResult {
   std::string name, fault;
   std::vector<RecordedItem> items;
-  std::vector<std::string> files;  ///< below the folder, in the order of the items that are not absent
+  std::vector<std::string> files;     ///< below the folder, in the order of the items that are not absent
   std::vector<std::string> contents;  ///< of the files when they were written; empty where that is not known
 
   /// The file that holds an item; empty where it cannot be told.

@@ -29,12 +29,16 @@ std::string starts_sentence(const Experiment& experiment) {
   const compare::StartProtocol& protocol = *experiment.protocol;
   char text[400];
   std::snprintf(text, sizeof text,
-                "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a direction uniform on the sphere through the "
+                "%zu starts a case, drawn with seed %llu: rotated by an angle uniform in 0 to %g degrees about a "
+                "direction uniform on the sphere through the "
                 "fragment's centroid, and shifted by 0 to %g mm, uniform, in a direction uniform on the sphere.",
-                protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg, protocol.translation_mm);
+                protocol.count, static_cast<unsigned long long>(protocol.seed), protocol.rotation_deg,
+                protocol.translation_mm);
   if (!(protocol.distance_mm > 0)) return text;
   char scaled[160];
-  std::snprintf(scaled, sizeof scaled, " Each displacement is scaled until the surface has moved by a mean distance uniform in 0 to %g mm.", protocol.distance_mm);
+  std::snprintf(scaled, sizeof scaled,
+                " Each displacement is scaled until the surface has moved by a mean distance uniform in 0 to %g mm.",
+                protocol.distance_mm);
   return std::string(text) + scaled;
 }
 
@@ -46,21 +50,34 @@ std::string success_sentence(const Experiment& experiment, const std::vector<std
       std::snprintf(limit, sizeof limit, metric.higher_is_better() ? " above %g" : " below %g", *metric.limit);
       limits += (limits.empty() ? "" : " and ") + metric.label + limit + (units[m].empty() ? "" : " " + units[m]);
     }
-  return limits.empty() ? "A run that ends without a fault is a success." : "A run is a success with " + limits + "; a failed run is none.";
+  return limits.empty() ? "A run that ends without a fault is a success."
+                        : "A run is a success with " + limits + "; a failed run is none.";
 }
 
 std::string time_sentence(const Experiment& experiment) {
   if (!experiment.timed_cells) return "Times were not measured.";
-  return "Times: up to " + std::to_string(experiment.timed_cells) + " runs of each variant, the same cases for all, one at a time on " +
-         std::to_string(std::thread::hardware_concurrency()) + " threads with nothing else running; what all variants share is read back and does not count.";
+  return "Times: up to " + std::to_string(experiment.timed_cells) +
+         " runs of each variant, the same cases for all, one at a time on " +
+         std::to_string(std::thread::hardware_concurrency()) +
+         " threads with nothing else running; what all variants share is read back and does not count.";
 }
 
 json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, const CellRow& row) {
-  json cell = {{"id", row.id}, {"variant", index.variant}, {"case", index.case_index}, {"start", index.start}, {"status", row.failed.empty() ? "done" : "failed"},
-               {"tries", row.tries}, {"success", row.is_success(experiment)}, {"initial_mtre_mm", of(row.initial_error)}, {"seconds", of(row.seconds)},
-               {"values", json::array()}, {"folder", "cells/" + row.id}};
-  if (row.failed.empty()) cell["evaluations"] = row.evaluations;
-  else cell["reason"] = row.failed;
+  json cell = {{"id", row.id},
+               {"variant", index.variant},
+               {"case", index.case_index},
+               {"start", index.start},
+               {"status", row.failed.empty() ? "done" : "failed"},
+               {"tries", row.tries},
+               {"success", row.is_success(experiment)},
+               {"initial_mtre_mm", of(row.initial_error)},
+               {"seconds", of(row.seconds)},
+               {"values", json::array()},
+               {"folder", "cells/" + row.id}};
+  if (row.failed.empty())
+    cell["evaluations"] = row.evaluations;
+  else
+    cell["reason"] = row.failed;
   for (const auto& value : row.values) cell["values"].push_back(row.failed.empty() ? of(value) : json());
   int cached = 0;
   for (const auto& [name, calls] : row.nodes) cached += calls.made == 0 && calls.cached > 0;
@@ -72,14 +89,20 @@ json metrics_of(const Experiment& experiment, const std::vector<std::string>& un
   json metrics = json::array();
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m) {
     const compare::MetricChoice& metric = experiment.metrics[m];
-    metrics.push_back({{"name", metric.path}, {"label", metric.label}, {"unit", units[m]}, {metric.higher_is_better() ? "success_above" : "success_below", of(metric.limit)}, {"higher_is_better", metric.higher_is_better()}});
+    metrics.push_back({{"name", metric.path},
+                       {"label", metric.label},
+                       {"unit", units[m]},
+                       {metric.higher_is_better() ? "success_above" : "success_below", of(metric.limit)},
+                       {"higher_is_better", metric.higher_is_better()}});
   }
   return metrics;
 }
 
 json pipeline_graph(const Experiment& experiment, const compare::CellRunner& runner) {
   const fs::path place = runner.case_place(0);
-  const auto of_variant = [&](std::size_t v) { return runner.pipeline_of({v, 0, 0}, place, compare::CellRunner::Depth::pictures); };
+  const auto of_variant = [&](std::size_t v) {
+    return runner.pipeline_of({v, 0, 0}, place, compare::CellRunner::Depth::pictures);
+  };
   std::vector<std::pair<std::string, Pipeline>> others;
   for (std::size_t v = 0; v < experiment.variants.size(); ++v)
     if (v != experiment.baseline) others.emplace_back(experiment.variants[v].name, of_variant(v));
@@ -94,17 +117,26 @@ std::string command_of(const Experiment& experiment, const CompareRequest& reque
 
 }  // namespace
 
-void write_report(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer, const compare::CellRunner& runner,
-                  const std::vector<compare::CellIndex>& shown, const CompareRequest& request, const fs::path& folder) {
+void write_report(const Experiment& experiment, const std::vector<CellRow>& rows, const Answer& answer,
+                  const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
+                  const CompareRequest& request, const fs::path& folder) {
   json data = {{"format", 1}, {"kind", "comparison"}, {"metrics", metrics_of(experiment, answer.units)}};
-  data["experiment"] = {{"name", experiment.name}, {"help", experiment.help}, {"file", experiment.file.string()}, {"text", experiment.text},
-                        {"pipeline_text", text_of_file(experiment.pipeline)}, {"seed", 1}, {"command", command_of(experiment, request)},
-                        {"folder", folder.string()}, {"starts_protocol", starts_sentence(experiment)}, {"success_rule", success_sentence(experiment, answer.units)},
+  data["experiment"] = {{"name", experiment.name},
+                        {"help", experiment.help},
+                        {"file", experiment.file.string()},
+                        {"text", experiment.text},
+                        {"pipeline_text", text_of_file(experiment.pipeline)},
+                        {"seed", 1},
+                        {"command", command_of(experiment, request)},
+                        {"folder", folder.string()},
+                        {"starts_protocol", starts_sentence(experiment)},
+                        {"success_rule", success_sentence(experiment, answer.units)},
                         {"time_rule", time_sentence(experiment)}};
   for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
     json options = json::object();
     for (const Override& one : experiment.variants[v].overrides) options[one.key] = one.value;
-    data["variants"].push_back({{"name", experiment.variants[v].name}, {"is_baseline", v == experiment.baseline}, {"options", options}});
+    data["variants"].push_back(
+        {{"name", experiment.variants[v].name}, {"is_baseline", v == experiment.baseline}, {"options", options}});
   }
   for (const auto& one : experiment.cases) data["cases"].push_back(one.name);
   for (const auto& start : experiment.starts) data["starts"].push_back(start.name);
@@ -115,9 +147,11 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   ReportMaterial material;
   const std::size_t starts = experiment.starts.size(), variants = experiment.variants.size();
   for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of cells: cases, then starts, then variants
-    data["cells"].push_back(cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
+    data["cells"].push_back(
+        cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
   for (const compare::CellIndex& cell : shown)
-    material.add_prepared(runner.pictures_of(cell), data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
+    material.add_prepared(runner.pictures_of(cell),
+                          data["cells"][(cell.case_index * starts + cell.start) * variants + cell.variant]);
   data["pictures"] = std::move(material.pictures);
   data["geometries"] = std::move(material.geometries);
   data["scenes"] = std::move(material.scenes);
@@ -135,7 +169,8 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   data["experiment"]["finished"] = record.value("finished", "");
   data["experiment"]["plugins"] = json::array();
   for (const json& plugin : record.value("plugins", json::array()))
-    data["experiment"]["plugins"].push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+    data["experiment"]["plugins"].push_back(
+        {{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
   write_page(data, folder / "report.html");
 }
 

@@ -64,10 +64,13 @@ json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string,
           const std::string text = difference(node, same);
           if (!text.empty()) differs[name] = text;
         }
-    nodes.push_back({{"id", node.id}, {"uses", node.info.name}, {"options", given_options(node)}, {"differs", differs}});
+    nodes.push_back(
+        {{"id", node.id}, {"uses", node.info.name}, {"options", given_options(node)}, {"differs", differs}});
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources)
-        edges.push_back({{"from", pipeline.nodes[std::size_t(source.node)].id}, {"to", node.id}, {"port", node.info.inputs[std::size_t(wire.port)].name}});
+        edges.push_back({{"from", pipeline.nodes[std::size_t(source.node)].id},
+                         {"to", node.id},
+                         {"port", node.info.inputs[std::size_t(wire.port)].name}});
   }
   return {{"nodes", nodes}, {"edges", edges}};
 }

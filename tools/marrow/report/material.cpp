@@ -67,7 +67,8 @@ void ReportMaterial::add_json(const json& file, json& cell) {
   }
   for (json& view : scene["views"]) {
     const std::string image = view["image"];
-    if (!image.starts_with("data:image/")) throw Error("an image of the scene is not in the file itself");  // an address would be fetched
+    if (!image.starts_with("data:image/"))
+      throw Error("an image of the scene is not in the file itself");  // an address would be fetched
     view["image"] = id_of(image);
     pictures[id_of(image)] = image;
   }
@@ -81,7 +82,8 @@ void ReportMaterial::add_file(const fs::path& path, const std::string& name, jso
   if (extension == ".png") {
     const std::string url = picture_url(path, kPictureSize), id = id_of(url);
     pictures[id] = url;
-    cell["pictures"].push_back({{"name", fs::path(name).lexically_relative("outputs").replace_extension().string()}, {"picture", id}});
+    cell["pictures"].push_back(
+        {{"name", fs::path(name).lexically_relative("outputs").replace_extension().string()}, {"picture", id}});
   } else if (extension == ".json") {
     add_json(parse_json(read_text_file(path, kMostRecordBytes), name), cell);
   } else if (extension == ".yaml" && !cell.contains("convergence")) {
@@ -119,7 +121,11 @@ void ReportMaterial::prepare(const fs::path& run_folder) {
   ReportMaterial material;
   json cell = json::object();
   material.add_run(run_folder, cell);
-  const json all = {{"cell", cell}, {"pictures", material.pictures}, {"geometries", material.geometries}, {"scenes", material.scenes}, {"left_out", material.left_out}};
+  const json all = {{"cell", cell},
+                    {"pictures", material.pictures},
+                    {"geometries", material.geometries},
+                    {"scenes", material.scenes},
+                    {"left_out", material.left_out}};
   write_text_file(run_folder / "report.json", all.dump(-1, ' ', false, json::error_handler_t::replace));
 }
 
@@ -146,7 +152,8 @@ json machine_of(const json& run_record) {
   std::ifstream info("/proc/cpuinfo");
   for (std::string line; cpu.empty() && std::getline(info, line);)
     if (line.starts_with("model name")) cpu = line.substr(line.find(':') + 2);
-  return {{"cpu", cpu}, {"cores", std::thread::hardware_concurrency()}, {"cpu_level", run_record.value("cpu_level", "")}};
+  return {
+      {"cpu", cpu}, {"cores", std::thread::hardware_concurrency()}, {"cpu_level", run_record.value("cpu_level", "")}};
 }
 
 }  // namespace marrow::cli

@@ -7,7 +7,8 @@ asm(".section .rodata\n"
     ".global marrow_report_page\n"
     ".global marrow_report_page_end\n"
     "marrow_report_page:\n"
-    ".incbin \"" MARROW_REPORT_PAGE "\"\n"
+    ".incbin \"" MARROW_REPORT_PAGE
+    "\"\n"
     "marrow_report_page_end:\n"
     ".byte 0\n"
     ".previous\n");
@@ -24,8 +25,10 @@ void write_page(const nlohmann::json& data, const std::filesystem::path& file, K
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;
-  write_text_file(file, std::string(page.substr(0, at)) + "<script type=\"application/json\" id=\"data\">" + safe + "</script>" +
-                            std::string(page.substr(at + kMarker.size())), kinds);
+  write_text_file(file,
+                  std::string(page.substr(0, at)) + "<script type=\"application/json\" id=\"data\">" + safe +
+                      "</script>" + std::string(page.substr(at + kMarker.size())),
+                  kinds);
 }
 
 }  // namespace marrow::cli

@@ -26,7 +26,9 @@ std::string picture_url(const std::filesystem::path& png_file, int size_px) {
   picture.custom_ptr = &writer;
   const double scale = double(size_px) / std::max(picture.width, picture.height);
   bool good = WebPPictureImportRGB(&picture, pixels.bytes.data(), 3 * picture.width);
-  if (good && scale < 1) good = WebPPictureRescale(&picture, std::max(1, int(scale * picture.width)), std::max(1, int(scale * picture.height)));
+  if (good && scale < 1)
+    good =
+        WebPPictureRescale(&picture, std::max(1, int(scale * picture.width)), std::max(1, int(scale * picture.height)));
   good = good && WebPEncode(&config, &picture);
   std::string url;
   if (good) url = "data:image/webp;base64," + base64({reinterpret_cast<const char*>(writer.mem), writer.size});

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One HTML file that shows a run or a comparison, and needs nothing else. tools/report holds the page, its data.js says what
-// the data are.
+// One HTML file that shows a run or a comparison, and needs nothing else. tools/report holds the page, its data.js says
+// what the data are.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -22,7 +22,8 @@ struct ReportMaterial {
   void note_if_outside(const std::filesystem::path& run_folder, const std::string& name);
   void print_left_out() const;
 
-  /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left out.
+  /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left
+  /// out.
   void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
   /// Encoding pictures is what a report takes longest for: keeps what add_run() finds in the folder itself.
   static void prepare(const std::filesystem::path& run_folder);
@@ -52,9 +53,9 @@ std::string shell_word(const std::string& text);
 std::string shell_path(const std::filesystem::path& path);
 
 /// FOLDER/report.html of a comparison; `shown` are the cells whose pictures were made.
-void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows, const Answer& answer,
-                  const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown, const CompareRequest& request,
-                  const std::filesystem::path& folder);
+void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
+                  const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
+                  const CompareRequest& request, const std::filesystem::path& folder);
 
 /// Writes the page of a single run; empty `file` = RUN/report.html.
 int show(const std::filesystem::path& run_folder, std::filesystem::path file);

@@ -24,7 +24,9 @@ std::optional<json> metrics_in(const fs::path& folder, const std::string& name) 
     const json file = parse_json(read_text_file(*path, kMostRecordBytes), name);
     json metrics = json::array();
     for (const json& metric : file.at("metrics"))
-      metrics.push_back({{"name", metric.at("name").get<std::string>()}, {"unit", metric.value("unit", "")}, {"value", metric.contains("value") ? metric["value"] : json()}});
+      metrics.push_back({{"name", metric.at("name").get<std::string>()},
+                         {"unit", metric.value("unit", "")},
+                         {"value", metric.contains("value") ? metric["value"] : json()}});
     return metrics;
   } catch (const std::exception&) {  // of another kind, or damaged
     return std::nullopt;
@@ -40,7 +42,8 @@ json figures_of(const fs::path& folder, const json& record) {
       const auto metrics = metrics_in(folder, path.string());
       if (!metrics) continue;
       const std::string name = path.parent_path().lexically_relative("outputs").string();
-      if (tables.empty() || tables.back()["name"] != name) tables.push_back({{"name", name}, {"columns", json::array()}, {"rows", json::array()}});
+      if (tables.empty() || tables.back()["name"] != name)
+        tables.push_back({{"name", name}, {"columns", json::array()}, {"rows", json::array()}});
       json& table = tables.back();
       table["columns"].push_back(path.stem().string());
       for (const json& metric : *metrics) {
@@ -67,7 +70,8 @@ json graph_of_run(const fs::path& file) {
 
 std::string reason_of(const json& record) {
   for (const json& node : record.value("nodes", json::array()))
-    if (node.value("status", "") == "failed") return "node '" + node.value("id", "") + "' (" + node.value("uses", "") + ") failed: " + node.value("reason", "");
+    if (node.value("status", "") == "failed")
+      return "node '" + node.value("id", "") + "' (" + node.value("uses", "") + ") failed: " + node.value("reason", "");
   return "it was stopped before it was done";
 }
 
@@ -81,10 +85,23 @@ std::string pipeline_text_of(const fs::path& file) {
 
 json page_of(const fs::path& folder, const json& record, ReportMaterial& material) {
   const std::string name = fs::absolute(folder / ".").parent_path().filename().string();
-  json cell = {{"id", name}, {"variant", 0}, {"case", 0}, {"start", 0}, {"tries", 1}, {"values", json::array()}, {"seconds", record.value("seconds", 0.0)},
-               {"status", record.value("status", "") == "done" ? "done" : "failed"}, {"success", nullptr}, {"folder", plain_path(fs::absolute(folder)).string()}};
+  json cell = {{"id", name},
+               {"variant", 0},
+               {"case", 0},
+               {"start", 0},
+               {"tries", 1},
+               {"values", json::array()},
+               {"seconds", record.value("seconds", 0.0)},
+               {"status", record.value("status", "") == "done" ? "done" : "failed"},
+               {"success", nullptr},
+               {"folder", plain_path(fs::absolute(folder)).string()}};
   if (cell["status"] == "failed") cell["reason"] = reason_of(record);
-  json data = {{"marrow", record.value("marrow", "")}, {"format", 1}, {"kind", "run"}, {"metrics", json::array()}, {"cases", {name}}, {"starts", {"0"}},
+  json data = {{"marrow", record.value("marrow", "")},
+               {"format", 1},
+               {"kind", "run"},
+               {"metrics", json::array()},
+               {"cases", {name}},
+               {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
   data["figures"] = figures_of(folder, record);
   material.add_run(folder, cell);
@@ -97,10 +114,16 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   const json graph = pipeline ? graph_of_run(*pipeline) : json();
   if (graph.is_object()) data["graph"] = graph;
   json plugins = json::array();
-  for (const json& plugin : record.value("plugins", json::array())) plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
-  data["experiment"] = {{"name", record.value("pipeline", name)}, {"pipeline_text", pipeline ? pipeline_text_of(*pipeline) : ""}, {"seed", record.contains("seed") ? record["seed"] : json(1)},
-                        {"finished", record.value("finished", "")}, {"command", "marrow rerun " + shell_path(folder)}, {"folder", cell["folder"]},
-                        {"machine", machine_of(record)}, {"plugins", plugins}};
+  for (const json& plugin : record.value("plugins", json::array()))
+    plugins.push_back({{"file", plugin.value("file", "")}, {"build_id", plugin.value("build_id", "")}});
+  data["experiment"] = {{"name", record.value("pipeline", name)},
+                        {"pipeline_text", pipeline ? pipeline_text_of(*pipeline) : ""},
+                        {"seed", record.contains("seed") ? record["seed"] : json(1)},
+                        {"finished", record.value("finished", "")},
+                        {"command", "marrow rerun " + shell_path(folder)},
+                        {"folder", cell["folder"]},
+                        {"machine", machine_of(record)},
+                        {"plugins", plugins}};
   return data;
 }
 
@@ -109,9 +132,11 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
 int show(const fs::path& folder, fs::path file) {
   std::error_code error;
   if (!fs::exists(folder / "run.json", error))
-    throw Error(folder.string() + " is not the folder of a run: it has no run.json; give the folder that marrow run wrote");
+    throw Error(folder.string() +
+                " is not the folder of a run: it has no run.json; give the folder that marrow run wrote");
   const json record = read_record(folder);
-  if (!record.contains("nodes") || !record.contains("status")) refuse_record(folder, "what it should say is missing in it, or of another type");
+  if (!record.contains("nodes") || !record.contains("status"))
+    refuse_record(folder, "what it should say is missing in it, or of another type");
   const Kinds kinds = file.empty() ? Kinds::files : Kinds::files_and_pipes;
   if (file.empty()) file = folder / "report.html";
   ReportMaterial material;

@@ -18,13 +18,13 @@ struct Variant {
   std::vector<Override> overrides;
 };
 
-/// Data to try all variants on: a folder that is there, a simulation that makes one, or neither: the pipeline makes its data itself, by
-/// the seed of its run.
+/// Data to try all variants on: a folder that is there, a simulation that makes one, or neither: the pipeline makes its
+/// data itself, by the seed of its run.
 struct ExperimentCase {
   std::string name;
   std::filesystem::path folder;  ///< empty where there is none yet
   bool is_simulated = false;
-  std::uint64_t seed = 1;        ///< of the simulation; where there is none, of the runs
+  std::uint64_t seed = 1;  ///< of the simulation; where there is none, of the runs
 };
 
 /// An input of the simulation that is drawn uniformly.
@@ -51,9 +51,9 @@ struct Start {
   double distance_mm = 0;  ///< to which the displacement is scaled; 0 = as it is
 };
 
-/// How starts are drawn: the direction of the rotation vector and of the translation uniform on the sphere, the angle and
-/// the length uniform in [0, limit]. With a distance, the displacement is then scaled until the surface has moved by a mean distance
-/// that is uniform in [0, limit]: the starts of a capture range fall evenly into its bins.
+/// How starts are drawn: the direction of the rotation vector and of the translation uniform on the sphere, the angle
+/// and the length uniform in [0, limit]. With a distance, the displacement is then scaled until the surface has moved
+/// by a mean distance that is uniform in [0, limit]: the starts of a capture range fall evenly into its bins.
 struct StartProtocol {
   std::string node;  ///< whose options rotation_deg, translation_mm and distance_mm are set
   std::size_t count = 0;
@@ -65,7 +65,7 @@ struct StartProtocol {
 /// A figure of merit: output.item....figure, as in errors.distal.final.mtre_mm.
 struct MetricChoice {
   std::string path;
-  std::string label;  ///< for people; the path where the experiment gives none
+  std::string label;                                  ///< for people; the path where the experiment gives none
   enum class Better { lower, higher, nearest_zero };  ///< of nearest_zero, the magnitude is compared
   Better better = Better::lower;
   std::optional<double> limit;  ///< of success: below it, or above it where higher is better
@@ -83,9 +83,9 @@ struct Experiment {
   std::filesystem::path file;
   std::string text;  ///< of the file
   std::filesystem::path pipeline;
-  std::vector<InputValue> inputs;         ///< of the pipeline, the same in every cell
-  std::vector<Override> common;           ///< changes of the pipeline for all variants, before their own
-  std::string case_input;                 ///< the pipeline's input that a case's folder is given to, where it has one
+  std::vector<InputValue> inputs;  ///< of the pipeline, the same in every cell
+  std::vector<Override> common;    ///< changes of the pipeline for all variants, before their own
+  std::string case_input;          ///< the pipeline's input that a case's folder is given to, where it has one
   Place cases_place;
   CaseSimulation simulation;
   std::vector<ExperimentCase> cases;
@@ -113,7 +113,8 @@ std::string cell_id(const Experiment& experiment, const CellIndex& cell);
 std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string& id);
 
 /// The pipeline of a cell; `case_folder` is where its case lies.
-PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell, const std::filesystem::path& case_folder);
+PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& cell,
+                               const std::filesystem::path& case_folder);
 
 /// The simulation's pipeline, where it makes this case.
 PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index);

@@ -43,7 +43,8 @@ struct StartOutcome {
   bool success = false;
 };
 
-/// Success over the start's error, in bins of equal width from 0 to the farthest start; of 100 bins the last holds all beyond.
+/// Success over the start's error, in bins of equal width from 0 to the farthest start; of 100 bins the last holds all
+/// beyond.
 struct CaptureRange {
   struct Bin {
     double from = 0, to = 0;  ///< from <= error < to
@@ -51,15 +52,16 @@ struct CaptureRange {
     Interval success;  ///< wilson_interval; 0 to 1 of no runs
   };
   std::vector<Bin> bins;
-  /// Up to here each bin that holds runs has at least the rate that is asked for: the upper end of the last bin before the
-  /// first that has not; where there is none such, the farthest start. 0 where the first bin that holds runs fails.
+  /// Up to here each bin that holds runs has at least the rate that is asked for: the upper end of the last bin before
+  /// the first that has not; where there is none such, the farthest start. 0 where the first bin that holds runs fails.
   double range = 0;
   bool is_open = false;  ///< no bin fails: with starts from farther away it may come out larger
 };
 
-/// The capture range of van de Kraats et al. (IEEE Trans Med Imaging 2005, 24:1177). The rate counts, not its interval: a bin
-/// of 10 successes in 10 runs reaches 95 %, though its interval begins at 72 %. Bins of no runs say nothing and are passed
-/// over. Throws Error for an error that is negative or not finite, a width that is not positive, or a rate not within 0 to 1.
+/// The capture range of van de Kraats et al. (IEEE Trans Med Imaging 2005, 24:1177). The rate counts, not its interval:
+/// a bin of 10 successes in 10 runs reaches 95 %, though its interval begins at 72 %. Bins of no runs say nothing and
+/// are passed over. Throws Error for an error that is negative or not finite, a width that is not positive, or a rate
+/// not within 0 to 1.
 CaptureRange capture_range(const std::vector<StartOutcome>& outcomes, double bin_width = 2, double least_rate = 0.95);
 
 /// A metric of two variants that ran on the same case from the same start (or seed). A case may have several pairs.

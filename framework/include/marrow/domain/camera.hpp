@@ -10,9 +10,10 @@
 
 namespace marrow {
 
-/// Pinhole model of an X-ray view (the chapter's Eq 1-3 as corrected in docs/method.md), OpenCV's convention: the source is
-/// the camera's origin, +z runs to the detector, u to the right and v down. pixel = intrinsics * (camera_from_world * X),
-/// divided by the third coordinate; intrinsics = [f/pix_u s u0; 0 f/pix_v v0; 0 0 1] with f = source-to-detector distance.
+/// Pinhole model of an X-ray view (the chapter's Eq 1-3 as corrected in docs/method.md), OpenCV's convention: the
+/// source is the camera's origin, +z runs to the detector, u to the right and v down. pixel = intrinsics *
+/// (camera_from_world * X), divided by the third coordinate; intrinsics = [f/pix_u s u0; 0 f/pix_v v0; 0 0 1] with f =
+/// source-to-detector distance.
 struct Camera {
   int width_px = 0;
   int height_px = 0;
@@ -47,7 +48,8 @@ double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
 /// Throws Error for a non-positive size or focal length, or a rotation that is not one.
 void check_camera(const Camera& camera, const std::string& what);
 
-/// One X-ray view: an image and how it was taken. mask: CV_8U, non-zero where the image may be used; empty = everywhere.
+/// One X-ray view: an image and how it was taken. mask: CV_8U, non-zero where the image may be used; empty =
+/// everywhere.
 struct View {
   std::string name;
   Image image;
@@ -56,7 +58,8 @@ struct View {
   static constexpr auto fields() { return std::make_tuple(&View::name, &View::image, &View::camera, &View::mask); }
 };
 
-/// Throws Error when image, camera and mask sizes disagree, or the image is empty. The message names the view and both sizes.
+/// Throws Error when image, camera and mask sizes disagree, or the image is empty. The message names the view and both
+/// sizes.
 void check_view(const View& view);
 
 }  // namespace marrow

@@ -5,8 +5,8 @@
 
 namespace marrow {
 
-/// What a node throws when its input, a file or an option cannot be used. The text is for people: what is wrong, what was
-/// got and expected, and what to do. The runtime adds the node's name and its inputs.
+/// What a node throws when its input, a file or an option cannot be used. The text is for people: what is wrong, what
+/// was got and expected, and what to do. The runtime adds the node's name and its inputs.
 class Error : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

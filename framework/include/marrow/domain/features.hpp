@@ -7,8 +7,8 @@
 
 namespace marrow {
 
-/// One edge pixel: sub-pixel position, unit direction of the gradient (towards brighter), and its magnitude in grey values
-/// per pixel.
+/// One edge pixel: sub-pixel position, unit direction of the gradient (towards brighter), and its magnitude in grey
+/// values per pixel.
 struct EdgePixel {
   float u_px = 0, v_px = 0;
   float direction_u = 0, direction_v = 0;
@@ -34,13 +34,13 @@ struct LineSegment {
   static constexpr auto fields() { return std::make_tuple(&LineSegment::from_px, &LineSegment::to_px); }
 };
 
-/// The two outer borders of the shaft in one view, running the same way, `left` being on the left when looking from `from`
-/// to `to` with v down.
+/// The two outer borders of the shaft in one view, running the same way, `left` being on the left when looking from
+/// `from` to `to` with v down.
 struct ShaftLines {
   LineSegment left;
   LineSegment right;
-  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), its standard deviation (of the
-  /// fit, and because the shaft may lie nearer or farther), and the pair's score.
+  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), its standard deviation (of
+  /// the fit, and because the shaft may lie nearer or farther), and the pair's score.
   double width_mm = 0;
   double width_deviation_mm = 0;
   double log_likelihood = 0;
@@ -48,14 +48,12 @@ struct ShaftLines {
   struct Rejected {
     LineSegment left, right;
     std::string reason;
-    static constexpr auto fields() {
-      return std::make_tuple(&Rejected::left, &Rejected::right, &Rejected::reason);
-    }
+    static constexpr auto fields() { return std::make_tuple(&Rejected::left, &Rejected::right, &Rejected::reason); }
   };
   std::vector<Rejected> rejected;
   static constexpr auto fields() {
-    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::width_deviation_mm,
-                           &ShaftLines::log_likelihood, &ShaftLines::rejected);
+    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm,
+                           &ShaftLines::width_deviation_mm, &ShaftLines::log_likelihood, &ShaftLines::rejected);
   }
 };
 

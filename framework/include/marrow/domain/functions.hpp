@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Functions that travel along the edges of a pipeline as values: a projector, a cost, an optimizer. All methods are const and
-// safe to call from several threads at once. A function may refer to the inputs of the node that made it: the runtime keeps
-// those alive as long as the function.
+// Functions that travel along the edges of a pipeline as values: a projector, a cost, an optimizer. All methods are
+// const and safe to call from several threads at once. A function may refer to the inputs of the node that made it: the
+// runtime keeps those alive as long as the function.
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
@@ -32,17 +32,17 @@ struct PixelGrid {
   Eigen::Vector2d pixel(int column, int row) const { return {u_px + step_px * column, v_px + step_px * row}; }
 };
 
-/// Draws a model as a view would see it: its outline, where it is a surface; radiographs (DRR), where it is a volume. What a
-/// projector cannot draw, it refuses with an Error.
+/// Draws a model as a view would see it: its outline, where it is a surface; radiographs (DRR), where it is a volume.
+/// What a projector cannot draw, it refuses with an Error.
 class Projector {
  public:
   virtual ~Projector();
-  /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a fixed
-  /// order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
+  /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a
+  /// fixed order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
   virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
                                             double spacing_px) const;
-  /// Line integrals of the attenuation along the rays through these pixels, row by row, relative to water: millimetres of
-  /// water that attenuate as much. 0 where a ray misses the model. Only what is asked for is computed.
+  /// Line integrals of the attenuation along the rays through these pixels, row by row, relative to water: millimetres
+  /// of water that attenuate as much. 0 where a ray misses the model. Only what is asked for is computed.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                         const PixelGrid& grid) const;
   /// The same for single pixels (u, v), in their order.
@@ -52,9 +52,9 @@ class Projector {
   virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const;
 };
 
-/// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond which
-/// a point counts as unmatched; of grey values, every how many pixels they are compared, 0 = as the
-/// cost was made.
+/// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond
+/// which a point counts as unmatched; of grey values, every how many pixels they are compared, 0 = as the cost was
+/// made.
 struct CostLevel {
   double contour_spacing_px = 1;
   double reach_px = 8;
@@ -79,19 +79,19 @@ class Cost {
   virtual std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const;
   /// The same cost at another resolution.
   virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
-  /// The cost about a pose, for small motions of the fragment about this frame as Pose defines them; for optimizers that use
-  /// derivatives. As dear as one value(). Absent where the cost does not know its derivatives, as by default.
+  /// The cost about a pose, for small motions of the fragment about this frame as Pose defines them; for optimizers
+  /// that use derivatives. As dear as one value(). Absent where the cost does not know its derivatives, as by default.
   virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
-  /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then predicts
-  /// the covariance of the minimum. Absent where the cost has no noise model.
+  /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then
+  /// predicts the covariance of the minimum. Absent where the cost has no noise model.
   virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
 };
 
 /// A function R^n -> R to be minimised, knowing nothing of poses.
 struct MinimisationProblem {
   std::function<double(const Eigen::VectorXd&)> function;
-  /// value + gradient . d + d . curvature d / 2 about a point, where the function knows its derivatives; the curvature has no
-  /// negative eigenvalue. May be empty. One call counts as one evaluation.
+  /// value + gradient . d + d . curvature d / 2 about a point, where the function knows its derivatives; the curvature
+  /// has no negative eigenvalue. May be empty. One call counts as one evaluation.
   struct Expansion {
     double value = 0;
     Eigen::VectorXd gradient;
@@ -99,10 +99,10 @@ struct MinimisationProblem {
   };
   std::function<Expansion(const Eigen::VectorXd&)> expansion;
   Eigen::VectorXd start;
-  Eigen::VectorXd initial_step;               ///< positive, per coordinate
-  Eigen::VectorXd lower, upper;               ///< empty = unbounded
+  Eigen::VectorXd initial_step;  ///< positive, per coordinate
+  Eigen::VectorXd lower, upper;  ///< empty = unbounded
   int max_evaluations = 1000;
-  double step_tolerance = 1e-4;               ///< stop when steps fall below this fraction of initial_step
+  double step_tolerance = 1e-4;  ///< stop when steps fall below this fraction of initial_step
   std::function<void(int evaluation, const Eigen::VectorXd&, double value)> observer;  ///< may be empty
 };
 struct MinimisationResult {
@@ -115,7 +115,8 @@ struct MinimisationResult {
 class Optimizer {
  public:
   virtual ~Optimizer();
-  /// The best point found. A function value that is not finite counts as the worst; exceptions of the function pass through.
+  /// The best point found. A function value that is not finite counts as the worst; exceptions of the function pass
+  /// through.
   virtual MinimisationResult minimise(const MinimisationProblem& problem) const = 0;
 };
 

@@ -7,8 +7,8 @@
 
 namespace marrow {
 
-/// Points of one fragment that can be told apart: anatomical landmarks or implanted markers, by their names. What is seen or
-/// tracked is matched with the model's points by name.
+/// Points of one fragment that can be told apart: anatomical landmarks or implanted markers, by their names. What is
+/// seen or tracked is matched with the model's points by name.
 struct Landmarks {
   /// A point in the frame of the CT.
   struct Point {

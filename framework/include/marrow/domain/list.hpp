@@ -8,8 +8,9 @@
 
 namespace marrow {
 
-/// Named items along one axis ("view", "fragment", ...). The axis itself is declared with the port; a list only knows the
-/// names along it. Items are shared and immutable, so a list is cheap to copy and safe to read from several threads.
+/// Named items along one axis ("view", "fragment", ...). The axis itself is declared with the port; a list only knows
+/// the names along it. Items are shared and immutable, so a list is cheap to copy and safe to read from several
+/// threads.
 template <class T>
 class List {
  public:
@@ -39,7 +40,10 @@ class List {
    public:
     explicit const_iterator(const std::shared_ptr<const T>* at) : at_(at) {}
     const T& operator*() const { return **at_; }
-    const_iterator& operator++() { ++at_; return *this; }
+    const_iterator& operator++() {
+      ++at_;
+      return *this;
+    }
     bool operator!=(const const_iterator& other) const { return at_ != other.at_; }
 
    private:

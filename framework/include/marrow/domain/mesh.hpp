@@ -31,11 +31,11 @@ double surface_area_mm2(const Mesh& mesh);
 /// `count` points spread evenly over the surface by area, in a fixed (not random) pattern: the points of an mTRE.
 std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count);
 
-/// The anatomical axes of a long-bone fragment, in the frame of its mesh, as every table of marrow uses them. Origin: the
-/// area-weighted centroid of the surface. Column 2 of `axes`: the long axis, which is the principal axis of the surface,
-/// turned to agree with the frame's +z. Column 0: the frontal axis, the frame's +x made orthogonal to it (rotation about
-/// it is seen in the lateral view). Column 1: the lateral axis, completing a right-handed frame. The chapter calls rotations
-/// about columns 0, 1, 2 Rx, Ry, Rz.
+/// The anatomical axes of a long-bone fragment, in the frame of its mesh, as every table of marrow uses them. Origin:
+/// the area-weighted centroid of the surface. Column 2 of `axes`: the long axis, which is the principal axis of the
+/// surface, turned to agree with the frame's +z. Column 0: the frontal axis, the frame's +x made orthogonal to it
+/// (rotation about it is seen in the lateral view). Column 1: the lateral axis, completing a right-handed frame. The
+/// chapter calls rotations about columns 0, 1, 2 Rx, Ry, Rz.
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();

@@ -11,9 +11,9 @@
 
 namespace marrow {
 
-/// Where a fragment is: maps the model (CT frame) to the world. `frame` says about which point and axes the covariance is
-/// meant: a small motion is x_model' = o + R(axes * r) (x_model - o) + axes * t, applied before world_from_model, with
-/// r the rotation [rad] and t the translation [mm] about and along the frame's axes.
+/// Where a fragment is: maps the model (CT frame) to the world. `frame` says about which point and axes the covariance
+/// is meant: a small motion is x_model' = o + R(axes * r) (x_model - o) + axes * t, applied before world_from_model,
+/// with r the rotation [rad] and t the translation [mm] about and along the frame's axes.
 struct Pose {
   RigidTransform world_from_model{"world", "ct"};
   FragmentFrame frame;
@@ -43,8 +43,8 @@ RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame
 /// The motion that leads from one pose to another, inverse of moved(): to = moved(from, frame, motion).
 Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, const FragmentFrame& frame);
 
-/// The exact pose of a fragment, known for simulated data. A type of its own, so that a pipeline cannot hand it to anything
-/// but `evaluate` and `render`.
+/// The exact pose of a fragment, known for simulated data. A type of its own, so that a pipeline cannot hand it to
+/// anything but `evaluate` and `render`.
 struct Truth {
   RigidTransform world_from_model{"world", "ct"};
   static constexpr auto fields() { return std::make_tuple(&Truth::world_from_model); }

@@ -22,7 +22,9 @@ struct Scene {
   struct Placement {
     std::string model, name;
     RigidTransform world_from_model{"world", "ct"};
-    static constexpr auto fields() { return std::make_tuple(&Placement::model, &Placement::name, &Placement::world_from_model); }
+    static constexpr auto fields() {
+      return std::make_tuple(&Placement::model, &Placement::name, &Placement::world_from_model);
+    }
   };
   /// A view's camera and its image as shown: 8 bit, grey, and as large as the camera says.
   struct Backdrop {
@@ -40,8 +42,8 @@ struct Scene {
 /// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b).
 struct Landscape {
   struct Profile {
-    std::string axis;   ///< "rotation about the frontal axis"
-    std::string unit;   ///< of the offsets: "deg" or "mm"
+    std::string axis;  ///< "rotation about the frontal axis"
+    std::string unit;  ///< of the offsets: "deg" or "mm"
     std::vector<double> offsets, costs;
     std::optional<double> truth;  ///< where the exact pose lies
     static constexpr auto fields() {

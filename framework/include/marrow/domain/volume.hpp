@@ -9,8 +9,9 @@
 
 namespace marrow {
 
-/// Where the samples of a volume lie: ct point = origin_mm + direction * (index .* spacing_mm), index (0, 0, 0) being the
-/// centre of the first voxel (ITK's convention). Columns of direction are the axes of the grid, orthonormal, in the frame.
+/// Where the samples of a volume lie: ct point = origin_mm + direction * (index .* spacing_mm), index (0, 0, 0) being
+/// the centre of the first voxel (ITK's convention). Columns of direction are the axes of the grid, orthonormal, in the
+/// frame.
 struct Grid {
   std::array<int, 3> size{0, 0, 0};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
@@ -44,8 +45,8 @@ struct Volume {
   static constexpr auto fields() { return std::make_tuple(&Volume::grid, &Volume::values); }
 };
 
-/// A level set: signed distance in mm to the surface of one fragment, negative inside, sampled on the CT's grid. Away from
-/// the surface the value may be clamped (a narrow band), never of the wrong sign.
+/// A level set: signed distance in mm to the surface of one fragment, negative inside, sampled on the CT's grid. Away
+/// from the surface the value may be clamped (a narrow band), never of the wrong sign.
 struct SignedField {
   Grid grid;
   std::vector<float> values_mm;
@@ -56,8 +57,8 @@ struct SignedField {
 /// Trilinear value at a fractional index, clamped to the border of the grid.
 float sample_trilinear(const Grid& grid, const std::vector<float>& values, const Eigen::Vector3d& index);
 
-/// Throws Error unless sizes are positive, spacings positive and finite, directions orthonormal, values complete and finite.
-/// `what` names the volume in the message.
+/// Throws Error unless sizes are positive, spacings positive and finite, directions orthonormal, values complete and
+/// finite. `what` names the volume in the message.
 void check_volume(const Volume& volume, const std::string& what);
 
 /// Points inside one fragment, from which a segmenter grows it, in the frame of the CT.

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a plugin library says of itself before anything in it is called. A plugin built with other compiler flags than the
-// program can corrupt memory without a word (Eigen's alignment changes with -mavx, for one), so the two stamps must agree.
+// What a plugin library says of itself before anything in it is called. A plugin built with other compiler flags than
+// the program can corrupt memory without a word (Eigen's alignment changes with -mavx, for one), so the two stamps must
+// agree.
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/version.hpp>
@@ -23,12 +24,12 @@ struct AbiStamp {
   char compiler[32];
   std::int64_t cxx_standard;
   std::int32_t cxx11_abi;
-  std::int32_t glibcxx_debug;   ///< -D_GLIBCXX_DEBUG changes the layout of every container
-  std::int32_t sanitizers;      ///< bit 0 address, bit 1 thread
+  std::int32_t glibcxx_debug;  ///< -D_GLIBCXX_DEBUG changes the layout of every container
+  std::int32_t sanitizers;     ///< bit 0 address, bit 1 thread
   std::int32_t eigen_max_align;
   std::int32_t eigen_version;
   std::int32_t opencv_version;
-  std::uint32_t sizes[12];      ///< of the main domain types
+  std::uint32_t sizes[12];  ///< of the main domain types
 };
 
 /// The one thing that a plugin exports, by the C function marrow_plugin_entry().
@@ -65,16 +66,17 @@ struct PluginEntry {
 
 /// The stamp of the code that is being compiled.
 constexpr AbiStamp abi_stamp() {
-  return {MARROW_COMPILER,
-          __cplusplus,
-          _GLIBCXX_USE_CXX11_ABI,
-          MARROW_GLIBCXX_DEBUG,
-          MARROW_SANITIZE_ADDRESS | MARROW_SANITIZE_THREAD,
-          EIGEN_MAX_ALIGN_BYTES,
-          EIGEN_WORLD_VERSION * 10000 + EIGEN_MAJOR_VERSION * 100 + EIGEN_MINOR_VERSION,
-          CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100,
-          {sizeof(Image), sizeof(Volume), sizeof(SignedField), sizeof(Mesh), sizeof(Camera), sizeof(View), sizeof(EdgeMap),
-           sizeof(ShaftLines), sizeof(Pose), sizeof(Case), sizeof(MinimisationProblem), sizeof(RigidTransform)}};
+  return {
+      MARROW_COMPILER,
+      __cplusplus,
+      _GLIBCXX_USE_CXX11_ABI,
+      MARROW_GLIBCXX_DEBUG,
+      MARROW_SANITIZE_ADDRESS | MARROW_SANITIZE_THREAD,
+      EIGEN_MAX_ALIGN_BYTES,
+      EIGEN_WORLD_VERSION * 10000 + EIGEN_MAJOR_VERSION * 100 + EIGEN_MINOR_VERSION,
+      CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100,
+      {sizeof(Image), sizeof(Volume), sizeof(SignedField), sizeof(Mesh), sizeof(Camera), sizeof(View), sizeof(EdgeMap),
+       sizeof(ShaftLines), sizeof(Pose), sizeof(Case), sizeof(MinimisationProblem), sizeof(RigidTransform)}};
 }
 
 }  // namespace marrow

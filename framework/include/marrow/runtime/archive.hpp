@@ -39,7 +39,9 @@ concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
 template <class T>
-concept HasFields = requires { T::fields(); };
+concept HasFields = requires {
+  T::fields();
+};
 
 /// Of memory that is about to be filled: to touch 800 MB for the first time takes half as long in large pages.
 void use_large_pages(void* data, std::size_t size);

@@ -11,8 +11,8 @@
 
 namespace marrow {
 
-/// All nodes that can be used, known from manifests; a library is loaded when a node of it is first called. Safe to use from
-/// several threads once made.
+/// All nodes that can be used, known from manifests; a library is loaded when a node of it is first called. Safe to use
+/// from several threads once made.
 class Catalogue {
  public:
   /// Looks into the folders in their order; the first library that offers a name has it.

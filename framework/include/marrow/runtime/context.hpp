@@ -10,8 +10,8 @@
 
 namespace marrow {
 
-/// What the runtime gives a node beside its inputs: take it as an argument `Context&`. Safe to use from several threads of the
-/// node. A default-made one (in tests) is never cancelled and keeps silent.
+/// What the runtime gives a node beside its inputs: take it as an argument `Context&`. Safe to use from several threads
+/// of the node. A default-made one (in tests) is never cancelled and keeps silent.
 class Context {
  public:
   struct Hooks {
@@ -24,8 +24,8 @@ class Context {
   explicit Context(std::uint64_t seed) { hooks_.seed = seed; }
   explicit Context(Hooks hooks) : hooks_(std::move(hooks)) {}
 
-  /// The only source of randomness: made from the run's seed and from all that the node was given, so two nodes with the
-  /// same recipe draw the same numbers. A node that uses it is declared with .random().
+  /// The only source of randomness: made from the run's seed and from all that the node was given, so two nodes with
+  /// the same recipe draw the same numbers. A node that uses it is declared with .random().
   std::uint64_t seed() const { return hooks_.seed; }
   /// Throws Cancelled after Ctrl-C. Call it inside long loops.
   void check_cancelled() const {

@@ -32,8 +32,8 @@ class Diagnostics {
   std::size_t size() const { return items_.size() + not_kept_; }
   /// Those that were kept, by file, line and column.
   std::vector<Diagnostic> sorted() const;
-  /// file:line:column: message, the source line with a caret, and the hint, for each of the first 50; control characters
-  /// are written out.
+  /// file:line:column: message, the source line with a caret, and the hint, for each of the first 50; control
+  /// characters are written out.
   std::string text() const;
   /// Remembers a file's text, so that its lines can be shown.
   void remember(const std::string& file, const std::string& text) { sources_[file] = text; }
@@ -44,8 +44,8 @@ class Diagnostics {
   std::map<std::string, std::string> sources_;
 };
 
-/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string. Names of more
-/// than 100 bytes are near to none.
+/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string. Names of
+/// more than 100 bytes are near to none.
 std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known);
 
 /// "did you mean 'x'?" or, when nothing is near, "known: a, b, c".

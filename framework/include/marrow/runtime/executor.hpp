@@ -15,8 +15,9 @@
 
 namespace marrow {
 
-/// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names the place along the mapped axes ("lateral", "distal/final").
-/// `waiting`: another run is making the same result, with a text once that takes seconds; `waited`: that is over, and the call goes on.
+/// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names
+/// the place along the mapped axes ("lateral", "distal/final"). `waiting`: another run is making the same result, with
+/// a text once that takes seconds; `waited`: that is over, and the call goes on.
 struct RunEvent {
   enum class Kind { started, progress, finished, failed, skipped, message, warning, cached, waiting, waited };
   Kind kind = Kind::message;
@@ -36,12 +37,13 @@ struct RunSettings {
   int threads = 0;  ///< 0 = as many as the machine has
   const std::atomic<bool>* cancelled = nullptr;
   std::function<void(const RunEvent&)> observer;  ///< called by one thread at a time
-  /// Outputs of nodes that are already known, by the node's name: they and what only they need are not run. A program that
-  /// holds the model and the images in memory registers new ones this way.
+  /// Outputs of nodes that are already known, by the node's name: they and what only they need are not run. A program
+  /// that holds the model and the images in memory registers new ones this way.
   std::map<std::string, std::vector<Value>> given;
   /// Where results are looked up before a node is called, and kept for later runs. None: nothing is kept.
   const Store* store = nullptr;
-  std::set<std::string> made_anew = {};  ///< nodes that are called although the store may have their results; for measuring time
+  std::set<std::string> made_anew =
+      {};                ///< nodes that are called although the store may have their results; for measuring time
   bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
   FileLimits file_limits = {};
 };
@@ -58,7 +60,8 @@ struct NodeRecord {
   double cached_seconds = 0;   ///< that those calls took when they were made
   double peak_memory_mb = 0;   ///< most memory of the whole process while it ran
   std::vector<Value> outputs;  ///< in the order of the node's outputs
-  std::map<std::string, Digest> files;  ///< content of what its options named when it was read; zero: not there or not to be read
+  std::map<std::string, Digest>
+      files;  ///< content of what its options named when it was read; zero: not there or not to be read
 };
 const char* status_name(NodeRecord::Status status);
 
@@ -69,8 +72,9 @@ struct RunResult {
   bool cancelled() const;
 };
 
-/// Evaluates what the pipeline's outputs need, independent nodes in parallel on one pool. A node that fails leaves the others
-/// going; what depends on it is not run. The same pipeline and seed give the same bytes at any number of threads.
+/// Evaluates what the pipeline's outputs need, independent nodes in parallel on one pool. A node that fails leaves the
+/// others going; what depends on it is not run. The same pipeline and seed give the same bytes at any number of
+/// threads.
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
 
 /// What a run would do with one node.
@@ -84,7 +88,8 @@ struct PlannedNode {
 };
 
 /// What run_pipeline() would do, in the order of Pipeline::nodes. Calls no node. `settings.store` must be given.
-std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
+std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue,
+                                       const RunSettings& settings);
 
 /// The value that a reference means in a result; absent where it could not be made. Throws Error for a name that a list
 /// does not have.

@@ -13,16 +13,16 @@ struct KindPort {
   std::string axis;  ///< of a list port
 };
 
-/// A kind is the part of a node's name before the dot, and a contract that makes its nodes replaceable by each other in one
-/// line: the inputs that any of them may use, and the outputs that each of them has.
+/// A kind is the part of a node's name before the dot, and a contract that makes its nodes replaceable by each other in
+/// one line: the inputs that any of them may use, and the outputs that each of them has.
 struct Kind {
   std::string name;
   std::string help;
   std::vector<KindPort> inputs, outputs;
   bool open = false;        ///< its nodes choose their ports freely
   bool sees_truth = false;  ///< only such a kind may be given the truth
-  /// Nodes that name files by options are called in a process of their own, whose limits follow the size of the files: those that
-  /// only parse take little beside what they read, those that compute take their time.
+  /// Nodes that name files by options are called in a process of their own, whose limits follow the size of the files:
+  /// those that only parse take little beside what they read, those that compute take their time.
   enum class Apart { no, parses, computes } apart = Apart::no;
 };
 

@@ -30,19 +30,19 @@ struct LibraryInfo {
   std::vector<WriterInfo> writers;
 };
 
-/// Loads a plugin library into this process and registers its nodes. It is never unloaded. Throws Error with one sentence, also
-/// when the library is not the described one: each node and writer that it registers, and each library that it links, must be as
-/// described, so that nothing is called with the options of another.
+/// Loads a plugin library into this process and registers its nodes. It is never unloaded. Throws Error with one
+/// sentence, also when the library is not the described one: each node and writer that it registers, and each library
+/// that it links, must be as described, so that nothing is called with the options of another.
 std::unique_ptr<Plugin> load_library(const LibraryInfo& described);
 
-/// Describes a library by loading it in a child process with a time limit, so that one that crashes or hangs does no harm. One
-/// that others than the user, root and the owner of marrow could have put there is refused without being loaded, unless
-/// MARROW_TRUST_ALL_PLUGINS is 1.
+/// Describes a library by loading it in a child process with a time limit, so that one that crashes or hangs does no
+/// harm. One that others than the user, root and the owner of marrow could have put there is refused without being
+/// loaded, unless MARROW_TRUST_ALL_PLUGINS is 1.
 LibraryInfo describe_library(const std::filesystem::path& file);
 
-/// The description of a library: from the manifest beside it when that is whole, trusted and belongs to this very file, else from
-/// the user's cache of descriptions, else by describe_library(). `framework` is the digest of the framework's own library. Throws
-/// Error, which begins with a verb, for what is no file or not trusted.
+/// The description of a library: from the manifest beside it when that is whole, trusted and belongs to this very file,
+/// else from the user's cache of descriptions, else by describe_library(). `framework` is the digest of the framework's
+/// own library. Throws Error, which begins with a verb, for what is no file or not trusted.
 LibraryInfo library_info(const std::filesystem::path& file, const Digest& framework);
 
 /// Writes the manifest beside a library. Throws Error when the library is refused or the file cannot be written.

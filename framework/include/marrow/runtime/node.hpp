@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is known of a node, as plain data: all that listing, checking, inspecting, the JSON Schema and the cache key need.
+// What is known of a node, as plain data: all that listing, checking, inspecting, the JSON Schema and the cache key
+// need.
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -26,8 +27,9 @@ enum class OptionType { boolean, integer, number, text, path, numbers, texts, pa
 using OptionVariant =
     std::variant<bool, std::int64_t, double, std::string, std::vector<double>, std::vector<std::string>>;
 
-/// The value of an option: a variant whose copies survive a lack of memory. In libstdc++ 12, where a text or list that is
-/// copied into a new variant gets no memory, the variant destroys what was never made. An assignment copies the text first.
+/// The value of an option: a variant whose copies survive a lack of memory. In libstdc++ 12, where a text or list that
+/// is copied into a new variant gets no memory, the variant destroys what was never made. An assignment copies the text
+/// first.
 struct OptionValue : OptionVariant {
   using OptionVariant::OptionVariant;
   using OptionVariant::operator=;

@@ -16,8 +16,8 @@ namespace marrow {
 struct Reference {
   std::string text;
   Place place;
-  int node = -1;    ///< index into Pipeline::nodes
-  int output = -1;  ///< index into the node's outputs
+  int node = -1;                   ///< index into Pipeline::nodes
+  int output = -1;                 ///< index into the node's outputs
   std::vector<std::string> items;  ///< picks along the axes, outermost first
 };
 
@@ -49,7 +49,7 @@ struct Pipeline {
   std::filesystem::path file;
   std::vector<PipelineNode> nodes;  ///< in an order in which sources come before users
   std::vector<PipelineOutput> outputs;
-  std::vector<std::string> notes;   ///< things worth knowing that are no faults
+  std::vector<std::string> notes;  ///< things worth knowing that are no faults
 
   /// The axes of an output of a node, outermost first.
   std::vector<std::string> axes_of(const Reference& source) const;
@@ -60,7 +60,8 @@ struct Pipeline {
 /// A value of one of the pipeline's inputs.
 struct InputValue {
   std::string name, value;
-  Place place = {};  ///< in the file that it was written in, whose folder relative paths start from; none: the command line
+  Place place =
+      {};  ///< in the file that it was written in, whose folder relative paths start from; none: the command line
 };
 
 /// node.option=value, node.uses=kind.name or node.in.port=reference.
@@ -76,8 +77,8 @@ struct PipelineArguments {
 
 /// Reads and checks a pipeline. All faults go to `diagnostics`; the result may be used only when there are none.
 /// `inputs_required` is false for `check`, where values of inputs without a default may be left out.
-Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
-                       Diagnostics& diagnostics, bool inputs_required = true);
+Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
+                       const Catalogue& catalogue, Diagnostics& diagnostics, bool inputs_required = true);
 
 /// The pipeline as YAML with everything explicit; reading it gives the same pipeline.
 std::string resolved_yaml(const Pipeline& pipeline);

@@ -8,9 +8,9 @@
 
 namespace marrow {
 
-/// The folder that a run leaves behind: pipeline.yaml (resolved), run.json (what ran, with what, how long), log.txt, and
-/// outputs/ in formats that other programs open. Nothing that was there before is overwritten: the folder must be new or empty.
-/// Of several processes that want the same folder, one gets it.
+/// The folder that a run leaves behind: pipeline.yaml (resolved), run.json (what ran, with what, how long), log.txt,
+/// and outputs/ in formats that other programs open. Nothing that was there before is overwritten: the folder must be
+/// new or empty. Of several processes that want the same folder, one gets it.
 class RunFolder {
  public:
   /// Throws Error when the folder holds anything, was taken by another run just now, or cannot be written to.
@@ -28,8 +28,9 @@ class RunFolder {
   void append_log(const std::string& line);
   /// Why lines are missing in the log; empty where none are.
   const std::string& log_fault() const { return log_fault_; }
-  void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings, const Catalogue& catalogue,
-                    const PipelineArguments& arguments, const std::vector<Written>& written);
+  void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,
+                    const Catalogue& catalogue, const PipelineArguments& arguments,
+                    const std::vector<Written>& written);
 
   const std::filesystem::path& path() const { return folder_; }
 

@@ -16,18 +16,18 @@ namespace marrow {
 
 /// What a result was made from: all that its key depends on, in words, so that two keys can be compared.
 struct Provenance {
-  std::string node;                       ///< kind.name
-  Digest build_id;                        ///< of its library
+  std::string node;  ///< kind.name
+  Digest build_id;   ///< of its library
   std::map<std::string, std::string> options;
-  std::map<std::string, Digest> inputs;   ///< port -> key
+  std::map<std::string, Digest> inputs;  ///< port -> key
   bool random = false;
-  std::uint64_t seed = 0;                 ///< counts only where random
-  double seconds = 0;                     ///< that the call took
-  std::vector<std::string> warnings;      ///< that the node gave; repeated when the result is read back
+  std::uint64_t seed = 0;             ///< counts only where random
+  double seconds = 0;                 ///< that the call took
+  std::vector<std::string> warnings;  ///< that the node gave; repeated when the result is read back
 
   static constexpr auto fields() {
-    return std::make_tuple(&Provenance::node, &Provenance::build_id, &Provenance::options, &Provenance::inputs, &Provenance::random,
-                           &Provenance::seed, &Provenance::seconds, &Provenance::warnings);
+    return std::make_tuple(&Provenance::node, &Provenance::build_id, &Provenance::options, &Provenance::inputs,
+                           &Provenance::random, &Provenance::seed, &Provenance::seconds, &Provenance::warnings);
   }
 };
 
@@ -83,7 +83,8 @@ class Store {
   };
   /// Waits for it; look the result up again then. Comes back empty-handed where the folder cannot be written or when
   /// `cancelled` says so. Held by the thread's process: a process that is killed gives it back. `on_wait(true)`
-  /// is called when waiting begins and again after five seconds of it, `on_wait(false)` when it has ended, however it did.
+  /// is called when waiting begins and again after five seconds of it, `on_wait(false)` when it has ended, however it
+  /// did.
   Claim claim(const Digest& key, const std::atomic<bool>* cancelled,
               const std::function<void(bool waits)>& on_wait = {}) const;
   /// Removes an entry that turned out to be damaged.
@@ -116,7 +117,8 @@ class Store {
     std::string fault;  ///< of the first that could not be removed
   };
   /// Removes the least recently used entries, and simulated cases that no comparison is using, until the rest is at
-  /// most `keep_bytes`, and what killed processes left behind. Touches only what bears a name that the store itself gives, and follows no link.
+  /// most `keep_bytes`, and what killed processes left behind. Touches only what bears a name that the store itself
+  /// gives, and follows no link.
   Freed collect(std::uint64_t keep_bytes) const;
   /// The same with MARROW_CACHE_GB (20 where it is not set), once a day at most: after a run, so that the store does
   /// not fill the disk. Returns what is wrong with MARROW_CACHE_GB, in which case nothing is removed, or what could not

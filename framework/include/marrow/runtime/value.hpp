@@ -13,24 +13,26 @@ template <class T>
 struct ValueType {};
 
 template <class T>
-concept Registered = requires { ValueType<T>::kId; };
+concept Registered = requires {
+  ValueType<T>::kId;
+};
 
 /// Registers a type as a value. Use at global scope. `id` is the name that pipelines and messages show; raise `version`
-/// whenever the meaning or layout changes. A function (projector, cost, optimizer) has no content, is keyed by its recipe and
-/// never stored.
-#define MARROW_VALUE_TYPE(Type, id, version)          \
-  template <>                                         \
-  struct marrow::ValueType<Type> {                    \
-    static constexpr const char* kId = id;            \
-    static constexpr int kVersion = version;          \
-    static constexpr bool kIsFunction = false;        \
+/// whenever the meaning or layout changes. A function (projector, cost, optimizer) has no content, is keyed by its
+/// recipe and never stored.
+#define MARROW_VALUE_TYPE(Type, id, version)   \
+  template <>                                  \
+  struct marrow::ValueType<Type> {             \
+    static constexpr const char* kId = id;     \
+    static constexpr int kVersion = version;   \
+    static constexpr bool kIsFunction = false; \
   };
-#define MARROW_FUNCTION_TYPE(Type, id, version)       \
-  template <>                                         \
-  struct marrow::ValueType<Type> {                    \
-    static constexpr const char* kId = id;            \
-    static constexpr int kVersion = version;          \
-    static constexpr bool kIsFunction = true;         \
+#define MARROW_FUNCTION_TYPE(Type, id, version) \
+  template <>                                   \
+  struct marrow::ValueType<Type> {              \
+    static constexpr const char* kId = id;      \
+    static constexpr int kVersion = version;    \
+    static constexpr bool kIsFunction = true;   \
   };
 
 /// How the content of a data type is hashed, written and read. The code lies in the library that knows the type.
@@ -40,8 +42,8 @@ struct Content {
   std::shared_ptr<const void> (*unpack)(Unpacker&);
 };
 
-/// The content of a type. Defined once for each of marrow's own types, in its library (types.hpp), so that not every plugin
-/// compiles them all again.
+/// The content of a type. Defined once for each of marrow's own types, in its library (types.hpp), so that not every
+/// plugin compiles them all again.
 template <class T>
 __attribute__((visibility("default"))) const Content* content_of() {
   static constexpr Content kContent{
@@ -51,8 +53,8 @@ __attribute__((visibility("default"))) const Content* content_of() {
   return &kContent;
 }
 
-/// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different layout
-/// would pass for each other.)
+/// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different
+/// layout would pass for each other.)
 struct TypeInfo {
   std::string id;
   int version = 0;
@@ -80,8 +82,8 @@ class Source {
   virtual std::shared_ptr<const void> data(const TypeInfo& type) = 0;
 };
 
-/// A value on an edge: absent, one item, or items along an axis (each of which may again have an axis). Immutable and cheap
-/// to copy.
+/// A value on an edge: absent, one item, or items along an axis (each of which may again have an axis). Immutable and
+/// cheap to copy.
 struct Value {
   TypeInfo type;
   std::shared_ptr<const void> data;  ///< of one item
@@ -124,7 +126,8 @@ struct Value {
   List<T> as_list() const {
     List<T> list;
     for (std::size_t i = 0; i < items.size(); ++i)
-      list.add_shared(names[i], std::static_pointer_cast<const T>(items[i].data ? items[i].data : items[i].source->data(TypeInfo::of<T>())));
+      list.add_shared(names[i], std::static_pointer_cast<const T>(
+                                    items[i].data ? items[i].data : items[i].source->data(TypeInfo::of<T>())));
     return list;
   }
 };

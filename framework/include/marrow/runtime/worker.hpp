@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Work in another process: what may crash, hang or take all memory does so there, and is one job's failure here. Readers of
-// files, cells of a comparison, checks of conformance and unknown libraries all run in workers.
+// Work in another process: what may crash, hang or take all memory does so there, and is one job's failure here.
+// Readers of files, cells of a comparison, checks of conformance and unknown libraries all run in workers.
 //
 // A worker reads requests and writes reports and answers, one JSON document a line:
 //   {"job": 7, "do": "call", ...}             to the worker: what to do, and the job's number
@@ -27,7 +27,8 @@ struct WorkerSettings {
   std::vector<std::string> command;  ///< program and its arguments
   std::vector<int> shared = {};      ///< open files that the worker gets as descriptors 3, 4, ...
   bool quiet = false;                ///< what it prints on its standard error goes nowhere
-  bool has_large_pages = false;      ///< its memory comes in large pages, which is quicker where it takes hundreds of megabytes
+  bool has_large_pages =
+      false;  ///< its memory comes in large pages, which is quicker where it takes hundreds of megabytes
 };
 
 /// What one job may use.
@@ -64,7 +65,8 @@ class Worker {
   int descriptor() const { return from_; }
   /// Takes what has come, without waiting: `said` gets each report. The end of the job, once it is there.
   std::optional<WorkerEnd> take(const Said& said);
-  /// Ends the process where the job is beyond its limits; then that is the job's end. To be called every second or oftener.
+  /// Ends the process where the job is beyond its limits; then that is the job's end. To be called every second or
+  /// oftener.
   std::optional<WorkerEnd> check(const WorkerLimits& limits);
   /// Waits for the end of the job, within its limits. Throws Cancelled, and ends the process, when `cancelled` says so.
   WorkerEnd wait(const WorkerLimits& limits, const std::atomic<bool>* cancelled, const Said& said);
@@ -108,8 +110,9 @@ class WorkerReports {
 
 using WorkerTask = std::function<nlohmann::json(const nlohmann::json& request, WorkerReports& reports)>;
 
-/// The worker's side: does what it is asked, until its standard input ends. What an Error says is the job's failure. The standard
-/// output is redirected to the standard error first, so that what a library prints cannot pass for an answer.
+/// The worker's side: does what it is asked, until its standard input ends. What an Error says is the job's failure.
+/// The standard output is redirected to the standard error first, so that what a library prints cannot pass for an
+/// answer.
 int serve_worker(const std::map<std::string, WorkerTask>& tasks);
 
 /// The program marrow-worker, which lies beside the framework's library.

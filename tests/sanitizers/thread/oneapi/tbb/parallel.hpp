@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// In place of oneTBB under the thread sanitizer. The sanitizer does not see into libtbb.so, which is built without it, and takes
-// each hand-over of a task there for a race. What marrow uses of it is here on plain threads, which the sanitizer understands.
-// A task waits for no other one here either, so that what is free of races on these threads is so on oneTBB's.
+// In place of oneTBB under the thread sanitizer. The sanitizer does not see into libtbb.so, which is built without it,
+// and takes each hand-over of a task there for a race. What marrow uses of it is here on plain threads, which the
+// sanitizer understands. A task waits for no other one here either, so that what is free of races on these threads is
+// so on oneTBB's.
 #pragma once
 #include <atomic>
 #include <condition_variable>
