@@ -20,8 +20,8 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   if (!fs::is_directory(folder, failure))
     throw Error(path.string() + ": cannot be written, there is no folder " + folder.string());
   // Hidden, and with the same extension, by which some writers choose the format.
-  fs::path temporary = path;
-  temporary.replace_filename(fs::path(".part" + std::to_string(::getpid()) + "-").concat(path.filename().string()));
+  // Not by replace_filename(): where memory ends in it, GCC 12 leaves a path that cannot be destroyed.
+  const fs::path temporary = folder / (".part" + std::to_string(::getpid()) + "-" + path.filename().string());
   try {
     fill(temporary);
     // A folder is only replaced by another; rename() needs the old one to be gone.
