@@ -9,6 +9,7 @@ function(marrow_add_plugin name)
   target_link_libraries(${target} PRIVATE marrow::marrow ${plugin_LINK})
   target_compile_features(${target} PRIVATE cxx_std_20)
   target_compile_options(${target} PRIVATE -Wall -Wextra)
+  target_link_options(${target} PRIVATE -Wl,--as-needed)  # of a topic's libraries only what the node uses
   if(plugin_FOLDER)
     set(folder ${plugin_FOLDER})
   elseif(PROJECT_NAME STREQUAL "marrow")
@@ -37,17 +38,4 @@ function(marrow_add_plugin name)
     install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)
     install(FILES ${folder}/marrow_${name}.json DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow)
   endif()
-endfunction()
-
-# marrow_add_shared(NAME source.cpp [...] [LINK library ...])
-#
-# What several plugins, and their tests, share: compiled once, and linked into each.
-function(marrow_add_shared name)
-  cmake_parse_arguments(PARSE_ARGV 1 shared "" "" "LINK")
-  add_library(${name} STATIC ${shared_UNPARSED_ARGUMENTS})
-  target_link_libraries(${name} PUBLIC marrow::marrow ${shared_LINK})
-  target_compile_features(${name} PRIVATE cxx_std_20)
-  target_compile_options(${name} PRIVATE -Wall -Wextra)
-  set_target_properties(${name} PROPERTIES POSITION_INDEPENDENT_CODE ON CXX_VISIBILITY_PRESET hidden
-    VISIBILITY_INLINES_HIDDEN ON)
 endfunction()

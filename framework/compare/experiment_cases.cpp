@@ -7,9 +7,9 @@
 #include "experiment_text.hpp"
 #include "folder_search.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
 #include "runtime/plain_path.hpp"
-#include "runtime/printable.hpp"
 
 namespace marrow::compare {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "draw.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::compare {

@@ -4,9 +4,9 @@
 #include <algorithm>
 
 #include "draw.hpp"
+#include "marrow/domain/printable.hpp"
 #include "runtime/file_names.hpp"
 #include "runtime/plain_path.hpp"
-#include "runtime/printable.hpp"
 
 namespace marrow::compare {
 

@@ -2,7 +2,7 @@
 #include "marrow/domain/names.hpp"
 
 #include "marrow/domain/error.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow {
 

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <tuple>
 
-#include "printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow {
 namespace {

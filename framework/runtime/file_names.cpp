@@ -5,8 +5,8 @@
 #include <map>
 #include <set>
 
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
-#include "printable.hpp"
 
 namespace marrow {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cctype>
 
-#include "printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow {
 namespace {

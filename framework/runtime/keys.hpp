@@ -22,7 +22,7 @@ using Contents = std::map<std::string, PathContent>;  ///< by the path as an opt
 /// and as files_named_by() does.
 PathContent content_of(const std::string& path);
 
-/// The recipe of one call of a node: its name, the options that affect its result (a path by the names and content of
+/// The recipe of one call of a node: its name, all of its options (a path by the names and content of
 /// all that it names) and the keys of its inputs. Without the build id, so that a rebuilt plugin draws the same random
 /// numbers. `contents` is given what its paths named; also of those before one that throws Error.
 Digest recipe_of(const PipelineNode& node, const std::vector<Value>& inputs, Contents* contents = nullptr);

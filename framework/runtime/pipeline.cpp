@@ -10,11 +10,11 @@
 
 #include "file_names.hpp"
 #include "input_texts.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/kinds.hpp"
 #include "pipeline_order.hpp"
 #include "pipeline_text.hpp"
 #include "plain_path.hpp"
-#include "printable.hpp"
 
 namespace marrow {
 namespace {

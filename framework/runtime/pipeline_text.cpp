@@ -5,8 +5,8 @@
 #include <set>
 
 #include "file_names.hpp"
+#include "marrow/domain/printable.hpp"
 #include "plain_path.hpp"
-#include "printable.hpp"
 
 namespace marrow {
 namespace {

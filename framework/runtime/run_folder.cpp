@@ -18,7 +18,7 @@
 #include "manifest.hpp"
 #include "mapping.hpp"
 #include "marrow/domain/error.hpp"
-#include "printable.hpp"
+#include "marrow/domain/printable.hpp"
 #include "text_file.hpp"
 #include "written_content.hpp"
 

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "marrow/domain/error.hpp"
-#include "printable.hpp"
+#include "marrow/domain/printable.hpp"
 #include "text_file.hpp"
 #include "unclosed.hpp"
 #include "yaml_survey.hpp"

@@ -20,5 +20,6 @@ template const Content* content_of<Metrics>();
 template const Content* content_of<Scene>();
 template const Content* content_of<Landscape>();
 template const Content* content_of<Case>();
+template const Content* content_of<Calibration>();
 
 }  // namespace marrow

@@ -4,17 +4,17 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "correspondence.hpp"
-#include "plugins/render/canvas.hpp"
-#include "plugins/write/atomic_write.hpp"
-#include "plugins/write/yaml_text.hpp"
+#include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace {
 
 using namespace marrow;
-using camera::CalibrationModel;
-using camera::CalibrationResult;
-using camera::ViewPoints;
+using calibration::CalibrationModel;
+using calibration::CalibrationResult;
+using calibration::ViewPoints;
 
 struct BeadBoardOptions {
   std::filesystem::path board;
@@ -29,7 +29,7 @@ struct BeadBoardOptions {
 
 struct BeadBoardResult {
   List<Camera> cameras;
-  read::Calibration calibration;
+  Calibration calibration;
   Metrics report;
   List<Metrics> poses;
   List<Picture> pictures;
@@ -72,9 +72,9 @@ CalibrationResult calibrate_without_outliers(std::vector<ViewPoints>& views, int
                                              const BeadBoardOptions& options, Outliers& outliers) {
   const CalibrationModel model{options.radial_terms, options.square_pixels, true};
   outliers.pixels.resize(views.size());
-  CalibrationResult fit = camera::calibrate(views, width_px, height_px, model);
+  CalibrationResult fit = calibration::calibrate(views, width_px, height_px, model);
   for (int round = 0; round < 3 && take_outliers(views, fit, options.outlier_deviations, outliers); ++round)
-    fit = camera::calibrate(views, width_px, height_px, model);
+    fit = calibration::calibrate(views, width_px, height_px, model);
   return fit;
 }
 
@@ -85,7 +85,7 @@ double root_mean_square(const std::vector<Eigen::Vector2d>& residuals) {
 }
 
 Metrics report_of(const CalibrationResult& fit, const Outliers& outliers) {
-  const read::Calibration& c = fit.calibration;
+  const Calibration& c = fit.calibration;
   Metrics report;
   const auto add = [&](const std::string& name, double value, const std::string& unit) {
     report.items.push_back({name, value, unit});
@@ -113,7 +113,7 @@ Metrics report_of(const CalibrationResult& fit, const Outliers& outliers) {
   return report;
 }
 
-Metrics pose_report(const camera::CalibratedView& view) {
+Metrics pose_report(const calibration::CalibratedView& view) {
   Metrics report{
       {{"beads", double(view.residuals_px.size()), ""}, {"residual", root_mean_square(view.residuals_px), "px"}}};
   const char* directions[] = {"x", "y", "z"};
@@ -126,9 +126,9 @@ Metrics pose_report(const camera::CalibratedView& view) {
 }
 
 /// The image with what was taken for beads, how far each is off, and what was left out.
-Picture picture_of(const Image& image, const ViewPoints& points, const camera::CalibratedView& view,
+Picture picture_of(const Image& image, const ViewPoints& points, const calibration::CalibratedView& view,
                    const std::vector<Eigen::Vector2d>& outliers, const BeadBoardOptions& options) {
-  using namespace render;
+  using namespace draw;
   View shown{points.name, image, {}, {}};
   shown.camera.width_px = image.width();
   shown.camera.height_px = image.height();
@@ -160,20 +160,20 @@ void check_images(const List<Image>& images) {
 
 BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& options, Context& context) {
   check_images(images);
-  const camera::Board board = camera::read_board_file(options.board);
+  const calibration::Board board = calibration::read_board_file(options.board);
   const int width = images[0].width(), height = images[0].height();
   std::vector<ViewPoints> views;
   for (std::size_t i = 0; i < images.size(); ++i) {
     context.check_cancelled();
-    const auto discs = camera::find_beads(images[i], {options.largest_bead_px, options.least_contrast});
-    views.push_back(camera::match_board(board, discs, width, height, images.name(i)));
+    const auto discs = calibration::find_beads(images[i], {options.largest_bead_px, options.least_contrast});
+    views.push_back(calibration::match_board(board, discs, width, height, images.name(i)));
     context.progress(double(i + 1) / double(images.size()), "views");
   }
   Outliers outliers;
   const CalibrationResult fit = calibrate_without_outliers(views, width, height, options, outliers);
   BeadBoardResult result;
   result.calibration = fit.calibration;
-  read::check_distortion(fit.calibration.intrinsics, fit.calibration.distortion, width, height, "the calibration");
+  check_distortion(fit.calibration.intrinsics, fit.calibration.distortion, width, height, "the calibration");
   result.report = report_of(fit, outliers);
   for (std::size_t n = 0; n < views.size(); ++n) {
     result.cameras.add(views[n].name, {width, height, fit.calibration.intrinsics, fit.views[n].camera_from_world});
@@ -184,19 +184,19 @@ BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& op
 }
 
 std::string list_of(const std::array<double, 3>& values) {
-  return write::vector(Eigen::Vector3d(values[0], values[1], values[2]));
+  return files::vector(Eigen::Vector3d(values[0], values[1], values[2]));
 }
 
-void write_calibration(const read::Calibration& c, const std::string& path) {
-  write::write_text(
+void write_calibration(const Calibration& c, const std::string& path) {
+  files::write_text(
       path,
       "marrow-calibration: 1\nwidth_px: " + std::to_string(c.width_px) + "\nheight_px: " + std::to_string(c.height_px) +
-          "\nintrinsics:\n" + write::matrix(c.intrinsics, "  ") + "radial_distortion: " + list_of(c.distortion.k) +
+          "\nintrinsics:\n" + files::matrix(c.intrinsics, "  ") + "radial_distortion: " + list_of(c.distortion.k) +
           "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
           "deviation:  # one standard deviation\n  focal_px: " +
-          write::vector(c.focal_deviation_px) + "\n  principal_px: " + write::vector(c.principal_deviation_px) +
+          files::vector(c.focal_deviation_px) + "\n  principal_px: " + files::vector(c.principal_deviation_px) +
           "\n  radial_distortion: " + list_of(c.distortion_deviation) +
-          "\nresidual_px: " + write::number(c.residual_px) + "\n");
+          "\nresidual_px: " + files::number(c.residual_px) + "\n");
 }
 
 }  // namespace
@@ -228,5 +228,5 @@ MARROW_PLUGIN(plugin) {
       .option("residual_scale", &BeadBoardOptions::residual_scale, "how many times longer residuals are drawn",
               at_least(1), unit("1"))
       .option("size_px", &BeadBoardOptions::size_px, "longer side of the pictures", at_least(100), at_most(4096));
-  plugin.writer<read::Calibration>(".yaml", write_calibration, "camera matrix and distortion with their deviations");
+  plugin.writer<Calibration>(".yaml", write_calibration, "camera matrix and distortion with their deviations");
 }

@@ -5,7 +5,7 @@
 #include <marrow/plugin.hpp>
 #include <set>
 
-#include "carm_geometry.hpp"
+#include "marrow/domain/c_arm.hpp"
 
 namespace {
 
@@ -22,14 +22,14 @@ struct Options {
 };
 
 marrow::Camera camera_at(const Options& options, double alpha_deg, double beta_deg) {
-  const marrow::camera::CArm arm{options.width_px,
-                                 options.height_px,
-                                 Eigen::Vector2d::Constant(options.pixel_mm),
-                                 options.source_to_detector_mm,
-                                 options.source_to_isocentre_mm,
-                                 options.isocentre_mm};
-  return marrow::camera::carm_camera(
-      arm, marrow::camera::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
+  const marrow::CArm arm{options.width_px,
+                         options.height_px,
+                         Eigen::Vector2d::Constant(options.pixel_mm),
+                         options.source_to_detector_mm,
+                         options.source_to_isocentre_mm,
+                         options.isocentre_mm};
+  return marrow::carm_camera(arm,
+                             marrow::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
 }
 
 void check_options(const Options& options) {

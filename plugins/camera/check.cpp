@@ -7,15 +7,15 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
-#include "plausibility.hpp"
-#include "plugins/render/canvas.hpp"
-#include "points_file.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
+#include "marrow/toolbox/files/points_file.hpp"
 
 namespace {
 
 using namespace marrow;
-using camera::KnownPoint;
-using camera::SeenPoints;
+using calibration::SeenPoints;
+using files::KnownPoint;
 
 struct Options {
   std::filesystem::path points;
@@ -105,7 +105,7 @@ std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> outline_edges(const Mes
 
 Picture draw(const View& view, const SeenPoints& points, const Mesh* mesh, const std::string& verdict,
              const Options& options) {
-  using namespace render;
+  using namespace draw;
   Panel panel = make_panel(view, whole_image(view), options.size_px, Contrast::local);
   std::vector<LegendItem> legend;
   if (mesh) {
@@ -148,13 +148,13 @@ std::vector<std::string> warnings_of(const View& view, const InView& points, con
   std::vector<Eigen::Vector3d> object = points.known.world_mm;
   if (mesh) object.insert(object.end(), mesh->vertices_mm.begin(), mesh->vertices_mm.end());
   std::vector<std::string> warnings;
-  const auto mistake = camera::explanation(view.camera, points.known);
+  const auto mistake = calibration::explanation(view.camera, points.known);
   if (mistake) warnings.push_back(*mistake);
-  for (const std::string& sentence : camera::implausible_numbers(
+  for (const std::string& sentence : calibration::implausible_numbers(
            view.camera, {options.source_to_detector_mm, options.pixel_mm, options.detector_mm}, object))
     warnings.push_back(sentence);
   if (mistake || points.all.pixels.empty() || error <= options.warn_above_px) return warnings;
-  const auto refit = camera::refit_pose(view.camera, points.known);
+  const auto refit = calibration::refit_pose(view.camera, points.known);
   if (refit && refit->error_px < error / 3)
     warnings.push_back("the points are " + text(error) + " px off, but only " + text(refit->error_px) +
                        " px if the camera is turned by " + text(refit->turn_deg) + " degrees and moved by " +
@@ -183,7 +183,7 @@ void add_metrics(const View& view, const InView& points, double error, Metrics& 
   metrics.items.push_back({name + "error", error, "px"});
   metrics.items.push_back({name + "worst", worst, "px"});
   metrics.items.push_back({name + "mean_at_object", millimetres, "mm"});
-  if (const auto refit = camera::refit_pose(view.camera, points.known))
+  if (const auto refit = calibration::refit_pose(view.camera, points.known))
     metrics.items.push_back({name + "error_with_free_pose", refit->error_px, "px"});
 }
 
@@ -204,7 +204,7 @@ void check_directions(const List<View>& views, Context& context, int& warnings) 
 
 Checked check(const List<View>& views, const Mesh* mesh, const Options& options, Context& context) {
   std::vector<KnownPoint> points;
-  if (!options.points.empty()) points = camera::read_points_file(options.points);
+  if (!options.points.empty()) points = files::read_points_file(options.points);
   check_names(points, views);
   if (mesh) check_mesh(*mesh, "camera.check: mesh");
   Checked checked;
@@ -213,7 +213,7 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
   for (const View& view : views) {
     check_view(view);
     const InView seen = points_in(view, points, views);
-    const double error = camera::reprojection_error_px(view.camera, seen.all);
+    const double error = calibration::reprojection_error_px(view.camera, seen.all);
     squares += error * error * double(seen.all.pixels.size());
     count += double(seen.all.pixels.size());
     add_metrics(view, seen, error, checked.metrics);

@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
-#include "plugins/read/xray_header.hpp"
+#include "marrow/toolbox/files/xray_header.hpp"
 
 namespace {
 
@@ -26,7 +26,7 @@ marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& cont
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
     marrow::check_item_name("view", name);
     if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
-    const auto geometry = marrow::read::read_xray_geometry(
+    const auto geometry = marrow::files::read_xray_geometry(
         options.paths[i], options.frame,
         {options.source_to_detector_mm, options.source_to_isocentre_mm, options.pixel_mm});
     for (const std::string& warning : geometry.warnings) context.warn(warning);

@@ -8,13 +8,13 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "gradient.hpp"
-#include "refine.hpp"
-#include "window.hpp"
+#include "marrow/toolbox/image/gradient.hpp"
+#include "marrow/toolbox/image/refine.hpp"
+#include "marrow/toolbox/image/window.hpp"
 
 namespace {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 struct Options {
   double sigma_px = 1.5;

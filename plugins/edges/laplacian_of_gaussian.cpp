@@ -6,11 +6,11 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "threshold.hpp"
+#include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 constexpr double kReach =
     5;  // sigma at which kernels end: what is cut off sooner makes zero crossings beside a steep edge

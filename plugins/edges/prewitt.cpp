@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Prewitt's mask (in: Picture Processing and Psychopictorics, 1970): differences of 3 x 3 pixels, the mean across them.
-#include "threshold.hpp"
+#include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 marrow::EdgeMap prewitt(const marrow::View& view, const ThresholdOptions& options) {
   static const Kernel kMask{{1 / 3.0f, 1 / 3.0f, 1 / 3.0f}, {-0.5f, 0, 0.5f}};

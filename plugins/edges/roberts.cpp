@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Roberts' cross (in: Optical and Electro-Optical Information Processing, 1965). The differences along the two
 // diagonals of 2 x 2 pixels, turned by 45 degrees, are the differences of the means of its sides.
-#include "threshold.hpp"
+#include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 marrow::EdgeMap roberts(const marrow::View& view, const ThresholdOptions& options) {
   static const Kernel kMask{{0.5f, 0.5f}, {-1, 1}};

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Sobel's mask (Stanford Artificial Intelligence Project, 1968): differences of 3 x 3 pixels, the middle row counted
 // twice.
-#include "threshold.hpp"
+#include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
 
-using namespace marrow::edges;
+using namespace marrow::image;
 
 marrow::EdgeMap sobel(const marrow::View& view, const ThresholdOptions& options) {
   static const Kernel kMask{{0.25f, 0.5f, 0.25f}, {-0.5f, 0, 0.5f}};

@@ -3,11 +3,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "plugins/read/calibration.hpp"
+#include "marrow/domain/calibration.hpp"
 
 namespace {
 
-using marrow::read::Calibration;
+using marrow::Calibration;
 
 marrow::Metrics calibration_error(const Calibration& found, const Calibration& truth) {
   if (found.width_px != truth.width_px || found.height_px != truth.height_px)

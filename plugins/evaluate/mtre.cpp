@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -15,13 +15,13 @@ struct Options {
 
 Metrics mtre(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
              const Options& options) {
-  evaluate::check_poses(pose.world_from_model, truth.world_from_model);
+  geometry::check_poses(pose.world_from_model, truth.world_from_model);
   const std::vector<double> errors =
-      evaluate::target_errors_mm(pose.world_from_model, truth.world_from_model,
-                                 evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points));
+      geometry::target_errors_mm(pose.world_from_model, truth.world_from_model,
+                                 geometry::targets_mm(pose.world_from_model, model, landmarks, options.points));
   Metrics metrics;
-  metrics.items = {{"mtre_mm", evaluate::mean(errors), "mm"},
-                   {"rms_mm", evaluate::root_mean_square(errors), "mm"},
+  metrics.items = {{"mtre_mm", geometry::mean(errors), "mm"},
+                   {"rms_mm", geometry::root_mean_square(errors), "mm"},
                    {"max_mm", *std::max_element(errors.begin(), errors.end()), "mm"}};
   return metrics;
 }

@@ -2,7 +2,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -12,15 +12,15 @@ struct Options {
 
 marrow::Metrics pose_difference(const marrow::Pose& pose, const marrow::Pose& reference, const marrow::Mesh& model,
                                 const Options& options) {
-  namespace evaluate = marrow::evaluate;
+  namespace geometry = marrow::geometry;
   const marrow::RigidTransform &found = pose.world_from_model, &other = reference.world_from_model;
-  evaluate::check_poses(found, other, "reference");
-  const std::vector<Eigen::Vector3d> targets_mm = evaluate::targets_mm(found, &model, nullptr, options.points);
+  geometry::check_poses(found, other, "reference");
+  const std::vector<Eigen::Vector3d> targets_mm = geometry::targets_mm(found, &model, nullptr, options.points);
   const marrow::Vector6d motion = marrow::motion_between(other, found, marrow::fragment_frame(model));
   return {{{"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(found.rotation, other.rotation)), "deg"},
            {"axial_deg", marrow::degrees(motion[2]), "deg"},
            {"translation_mm", motion.tail<3>().norm(), "mm"},
-           {"distance_mm", evaluate::mean(evaluate::target_errors_mm(found, other, targets_mm)), "mm"}}};
+           {"distance_mm", geometry::mean(geometry::target_errors_mm(found, other, targets_mm)), "mm"}}};
 }
 
 }  // namespace

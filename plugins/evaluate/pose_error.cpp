@@ -6,7 +6,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -51,8 +51,8 @@ void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& fram
 marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth, const marrow::Mesh& model,
                            const Options& options) {
   const marrow::RigidTransform &found = pose.world_from_model, &exact = truth.world_from_model;
-  marrow::evaluate::check_poses(found, exact);
-  marrow::evaluate::check_model(found, model);
+  marrow::geometry::check_poses(found, exact);
+  marrow::geometry::check_model(found, model);
   const marrow::FragmentFrame frame = marrow::fragment_frame(model);
   const marrow::Vector6d motion = marrow::motion_between(exact, found, frame);
   const Eigen::Vector3d turn_rad = motion.head<3>(), shift_mm = motion.tail<3>();
@@ -69,7 +69,7 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
       {"along_lateral_mm", shift_mm[1], "mm"},
       {"across_mm", std::hypot(shift_mm[0], shift_mm[1]), "mm"},
       {"mtre_mm",
-       marrow::evaluate::mean(marrow::evaluate::target_errors_mm(
+       marrow::geometry::mean(marrow::geometry::target_errors_mm(
            found, exact, marrow::sample_surface(model, std::size_t(options.points)))),
        "mm"},
       {"chapter_rotation_deg", degrees(turn_rad.cwiseAbs().mean()), "deg"},

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -53,18 +53,18 @@ Distances distances_of(const View& view, const RigidTransform& pose, const Rigid
 }
 
 void report(const std::string& prefix, const Distances& distances, Metrics& metrics) {
-  metrics.items.push_back({prefix + "mpd_px", evaluate::mean(distances.px), "px"});
-  metrics.items.push_back({prefix + "mpd_mm", evaluate::mean(distances.mm), "mm"});
+  metrics.items.push_back({prefix + "mpd_px", geometry::mean(distances.px), "px"});
+  metrics.items.push_back({prefix + "mpd_mm", geometry::mean(distances.mm), "mm"});
   if (!distances.detector_mm.empty())
-    metrics.items.push_back({prefix + "mpd_detector_mm", evaluate::mean(distances.detector_mm), "mm"});
+    metrics.items.push_back({prefix + "mpd_detector_mm", geometry::mean(distances.detector_mm), "mm"});
 }
 
 Metrics projection_distance(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
                             const List<View>& views, const Options& options) {
-  evaluate::check_poses(pose.world_from_model, truth.world_from_model);
+  geometry::check_poses(pose.world_from_model, truth.world_from_model);
   if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
   const std::vector<Eigen::Vector3d> targets =
-      evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
+      geometry::targets_mm(pose.world_from_model, model, landmarks, options.points);
   Distances all;
   Metrics each, metrics;
   for (std::size_t i = 0; i < views.size(); ++i) {

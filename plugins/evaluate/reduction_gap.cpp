@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "plugins/fracture/fragments.hpp"
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
-struct Options : marrow::fracture::Options {
+struct Options : marrow::geometry::FragmentPair {
   double border_mm = 3;
 };
 
@@ -42,8 +42,8 @@ marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const mar
                      &reference = named(poses, options.reference, "poses");
   const marrow::RigidTransform &true_moved = named(truths, options.moved, "truths").world_from_model,
                                &true_reference = named(truths, options.reference, "truths").world_from_model;
-  marrow::evaluate::check_poses(moved.world_from_model, true_moved);
-  marrow::evaluate::check_poses(reference.world_from_model, true_reference);
+  marrow::geometry::check_poses(moved.world_from_model, true_moved);
+  marrow::geometry::check_poses(reference.world_from_model, true_reference);
   const marrow::RigidTransform reduction = reference.world_from_model * marrow::inverse(moved.world_from_model);
   const marrow::RigidTransform reduced = reduction * true_moved;
   const std::vector<Eigen::Vector3d> points_mm = fracture_points(
@@ -53,11 +53,11 @@ marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const mar
         "the surfaces of '" + options.moved + "' and '" + options.reference +
         "' are nowhere within border_mm of each other; they are no two sides of a fracture, or raise border_mm");
   const Eigen::Vector3d centre_mm = marrow::fragment_frame(named(models, options.moved, "models")).origin_mm;
-  const std::vector<double> before = marrow::evaluate::target_errors_mm(true_moved, true_reference, points_mm),
-                            after = marrow::evaluate::target_errors_mm(reduced, true_reference, points_mm);
+  const std::vector<double> before = marrow::geometry::target_errors_mm(true_moved, true_reference, points_mm),
+                            after = marrow::geometry::target_errors_mm(reduced, true_reference, points_mm);
   return {
-      {{"before_mm", marrow::evaluate::mean(before), "mm"},
-       {"gap_mm", marrow::evaluate::mean(after), "mm"},
+      {{"before_mm", marrow::geometry::mean(before), "mm"},
+       {"gap_mm", marrow::geometry::mean(after), "mm"},
        {"largest_gap_mm", *std::max_element(after.begin(), after.end()), "mm"},
        {"rotation_deg", marrow::degrees(marrow::geodesic_angle_rad(reduced.rotation, true_reference.rotation)), "deg"},
        {"translation_mm", (reduced * centre_mm - true_reference * centre_mm).norm(), "mm"}}};

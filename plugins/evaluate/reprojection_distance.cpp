@@ -5,7 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
 
@@ -30,15 +30,15 @@ std::vector<double> distances_mm(const View& view, const RigidTransform& pose, c
 }
 
 void add_mean(const std::string& prefix, const std::vector<double>& distances_mm, Metrics& metrics) {
-  metrics.items.push_back({prefix + "mrpd_mm", evaluate::mean(distances_mm), "mm"});
+  metrics.items.push_back({prefix + "mrpd_mm", geometry::mean(distances_mm), "mm"});
 }
 
 Metrics reprojection_distance(const Pose& pose, const Truth& truth, const Mesh* model, const Landmarks* landmarks,
                               const List<View>& views, const Options& options) {
-  evaluate::check_poses(pose.world_from_model, truth.world_from_model);
+  geometry::check_poses(pose.world_from_model, truth.world_from_model);
   if (views.empty()) throw Error("there is no view to project into; wire the views that the pose was found in");
   const std::vector<Eigen::Vector3d> targets =
-      evaluate::targets_mm(pose.world_from_model, model, landmarks, options.points);
+      geometry::targets_mm(pose.world_from_model, model, landmarks, options.points);
   Metrics metrics;
   std::vector<double> all;
   for (std::size_t i = 0; i < views.size(); ++i) {

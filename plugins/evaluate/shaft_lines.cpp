@@ -5,7 +5,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "../initial/model_borders.hpp"
+#include "marrow/toolbox/shaft/model_borders.hpp"
 
 namespace {
 
@@ -51,7 +51,7 @@ std::optional<Comparison> compare(const ShaftLines& lines, const View& view, con
     const Truth* truth = truths.find(models.name(i));
     if (!truth) continue;
     const auto borders =
-        marrow::initial::model_borders(models[i], truth->world_from_model, view.camera, lines, tolerance_px);
+        marrow::shaft::model_borders(models[i], truth->world_from_model, view.camera, lines, tolerance_px);
     if (!borders) continue;
     const Comparison one{models.name(i), difference(lines.left, borders->left), difference(lines.right, borders->right),
                          difference(middle_of(lines.left, lines.right), middle_of(borders->left, borders->right)),

@@ -4,12 +4,12 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "../initial/axis.hpp"
-#include "../shaft/widths.hpp"
+#include "marrow/toolbox/shaft/axis.hpp"
+#include "marrow/toolbox/shaft/widths.hpp"
 
 namespace {
 
-using marrow::LineSegment, marrow::List, marrow::ShaftLines, marrow::View, marrow::initial::Axis;
+using marrow::LineSegment, marrow::List, marrow::ShaftLines, marrow::View, marrow::shaft::Axis;
 
 struct Options {
   std::vector<double> width_mm, width_deviation_mm;
@@ -50,7 +50,7 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
                           "', but no such view; wire the views that the lines were found in");
     marrow::check_camera(view->camera, "view '" + view->name + "'");
     seen.push_back(view);
-    planes.push_back(marrow::initial::bisecting_plane(view->camera, lines[i].left, lines[i].right));
+    planes.push_back(marrow::shaft::bisecting_plane(view->camera, lines[i].left, lines[i].right));
   }
   if (planes.size() < 2) {
     context.warn(
@@ -58,7 +58,7 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
         "diameter, is not known");
     return std::nullopt;
   }
-  const Axis axis = marrow::initial::axis_of_planes(planes);
+  const Axis axis = marrow::shaft::axis_of_planes(planes);
   marrow::Metrics metrics;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const double width_mm = diameter_mm(axis, seen[i]->camera, lines[i]);

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "../mesh/to_vtk.hpp"
-#include "targets.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
+#include "marrow/toolbox/vtk/poly_data.hpp"
 
 namespace {
 
@@ -27,7 +27,7 @@ struct Distances {
 
 Distances distances_from(const Mesh& mesh, const Mesh& other, int points, const Context& context) {
   vtkNew<vtkImplicitPolyDataDistance> surface;
-  surface->SetInput(to_vtk(other));
+  surface->SetInput(marrow::vtk::poly_data(other));
   Distances distances;
   const auto signed_distance = [&](Eigen::Vector3d point) {
     const double distance = surface->EvaluateFunction(point.data());
@@ -56,11 +56,11 @@ Metrics surface_distance(const Mesh& mesh, const Mesh& reference, const Options&
   if (!is_closed(reference))
     context.warn("the reference is no closed surface; the sign of bias_mm then is that of the nearest triangle's side");
   Metrics metrics;
-  metrics.items = {{"mean_mm", evaluate::mean(both), "mm"},
-                   {"rms_mm", evaluate::root_mean_square(both), "mm"},
-                   {"p95_mm", evaluate::quantile(both, 0.95), "mm"},
+  metrics.items = {{"mean_mm", geometry::mean(both), "mm"},
+                   {"rms_mm", geometry::root_mean_square(both), "mm"},
+                   {"p95_mm", geometry::quantile(both, 0.95), "mm"},
                    {"max_mm", std::max(there.largest_mm, back.largest_mm), "mm"},
-                   {"bias_mm", evaluate::mean(there.of_points_mm), "mm"}};
+                   {"bias_mm", geometry::mean(there.of_points_mm), "mm"}};
   return metrics;
 }
 

@@ -2,21 +2,21 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "fragments.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 
 namespace {
 
 using marrow::degrees;
-using marrow::fracture::displacement;
-using marrow::fracture::Options;
-using marrow::fracture::pose_of;
+using marrow::geometry::displacement;
+using marrow::geometry::FragmentPair;
+using marrow::geometry::pose_of;
 
 /// +1 where the long axis of the moved fragment runs towards the other fragment, else -1.
 double towards_the_other(const marrow::Pose& moved, const marrow::Pose& reference) {
   return moved.frame.axes.col(2).dot(reference.frame.origin_mm - moved.frame.origin_mm) >= 0 ? 1 : -1;
 }
 
-marrow::Metrics misalignment(const marrow::List<marrow::Pose>& poses, const Options& options) {
+marrow::Metrics misalignment(const marrow::List<marrow::Pose>& poses, const FragmentPair& options) {
   const marrow::Vector6d motion = displacement(poses, options);
   const double along = towards_the_other(pose_of(poses, options.moved), pose_of(poses, options.reference)) * motion[5];
   return {{{"angulation_frontal_axis_deg", degrees(motion[0]), "deg"},
@@ -40,6 +40,6 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "rotations about and shifts along the moved fragment's own axes; shortening is positive where the fragments "
            "overlap")
-      .option("moved", &Options::moved, "fragment whose misalignment is told")
-      .option("reference", &Options::reference, "fragment that it is told against");
+      .option("moved", &FragmentPair::moved, "fragment whose misalignment is told")
+      .option("reference", &FragmentPair::reference, "fragment that it is told against");
 }

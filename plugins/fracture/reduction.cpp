@@ -2,20 +2,20 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "fragments.hpp"
+#include "marrow/toolbox/geometry/fragments.hpp"
 
 namespace {
 
-using marrow::fracture::displacement;
-using marrow::fracture::Options;
-using marrow::fracture::pose_of;
+using marrow::geometry::displacement;
+using marrow::geometry::FragmentPair;
+using marrow::geometry::pose_of;
 
 struct Reduction {
   marrow::Pose pose;
   marrow::Metrics motion;
 };
 
-Reduction reduction(const marrow::List<marrow::Pose>& poses, const Options& options) {
+Reduction reduction(const marrow::List<marrow::Pose>& poses, const FragmentPair& options) {
   const marrow::Vector6d motion = displacement(poses, options);
   const marrow::Pose &moved = pose_of(poses, options.moved), &reference = pose_of(poses, options.reference);
   Reduction result;
@@ -46,6 +46,6 @@ MARROW_PLUGIN(plugin) {
       .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
       .out("motion", &Reduction::motion,
            "in the world: rotation vector, and shift of the fragment's middle, about which it turns")
-      .option("moved", &Options::moved, "fragment that is moved")
-      .option("reference", &Options::reference, "fragment that stays");
+      .option("moved", &FragmentPair::moved, "fragment that is moved")
+      .option("reference", &FragmentPair::reference, "fragment that stays");
 }

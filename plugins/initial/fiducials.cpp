@@ -7,12 +7,12 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "rigid_fit.hpp"
+#include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
 
 using namespace marrow;
-using initial::short_number;
+using geometry::short_number;
 
 struct Options {
   double noise_mm = 0;
@@ -64,7 +64,7 @@ Residuals residuals_of(const Pairs& pairs, const RigidTransform& world_from_mode
 Matrix6d covariance_of(const Pairs& pairs, const FragmentFrame& frame, double deviation_mm) {
   Matrix6d information = Matrix6d::Zero();
   for (const Eigen::Vector3d& point : pairs.model_mm) {
-    const auto derivatives = initial::point_by_motion(frame, point);
+    const auto derivatives = geometry::point_by_motion(frame, point);
     information += derivatives.transpose() * derivatives;
   }
   return deviation_mm * deviation_mm * information.inverse();
@@ -75,7 +75,7 @@ Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& opt
   const Pairs pairs = pairs_of(landmarks);
   const double count = double(pairs.names.size());
   Pose pose;
-  pose.world_from_model = initial::fit_rigid(pairs.model_mm, pairs.world_mm, "the tracked points");
+  pose.world_from_model = geometry::fit_rigid(pairs.model_mm, pairs.world_mm, "the tracked points");
   pose.world_from_model.source = model.frame;
   pose.frame = fragment_frame(model);
   const Residuals residuals = residuals_of(pairs, pose.world_from_model);

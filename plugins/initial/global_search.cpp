@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "plugins/register/search.hpp"
+#include "marrow/toolbox/search/search.hpp"
 
 namespace {
 
@@ -20,8 +20,8 @@ struct Options {
 };
 
 /// The search of register.multiresolution, from everywhere within the ranges. First steps get shorter with the reach.
-marrow::registration::SearchOptions search_options(const Options& options) {
-  marrow::registration::SearchOptions search;
+marrow::search::SearchOptions search_options(const Options& options) {
+  marrow::search::SearchOptions search;
   search.scan_poses = options.poses;
   search.scan_side_deg = options.rotation_side_deg;
   search.scan_rotation_deg = options.rotation_axial_deg;
@@ -47,14 +47,14 @@ marrow::registration::SearchOptions search_options(const Options& options) {
 marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
                            const marrow::Pose* start, const Options& options, marrow::Context& context) {
   marrow::check_mesh(model, "model");
-  const marrow::registration::SearchOptions settings = search_options(options);
-  marrow::registration::check_options(settings);
+  const marrow::search::SearchOptions settings = search_options(options);
+  marrow::search::check_options(settings);
   marrow::Pose middle;
   middle.world_from_model = start ? start->world_from_model : marrow::RigidTransform{"world", model.frame};
   marrow::check_rigid(middle.world_from_model, "start");
   middle.frame = marrow::fragment_frame(model);
-  const marrow::registration::Levels levels = levels_of(cost, settings);
-  marrow::registration::Search search(optimizer, middle, settings, context);
+  const marrow::search::Levels levels = levels_of(cost, settings);
+  marrow::search::Search search(optimizer, middle, settings, context);
   search.go_to(search.find(levels).pose);
   return pose_of(search, middle, *levels.back());
 }

@@ -8,13 +8,13 @@
 #include <limits>
 #include <marrow/plugin.hpp>
 
-#include "pose_starts.hpp"
-#include "rigid_fit.hpp"
+#include "marrow/toolbox/geometry/pose_starts.hpp"
+#include "marrow/toolbox/geometry/rigid_fit.hpp"
 
 namespace {
 
 using namespace marrow;
-using initial::Sight, initial::short_number;
+using geometry::Sight, geometry::short_number;
 
 struct Options {
   double noise_px = 1;
@@ -55,7 +55,7 @@ void check_enough(const std::vector<Sight>& sights) {
     throw Error(std::to_string(names.size()) + " landmarks are seen in " + std::to_string(views.size()) +
                 (views.size() == 1 ? " view" : " views") +
                 "; a pose takes three that are seen in two views, or four in one");
-  initial::check_spread(points, "the landmarks that are seen");
+  geometry::check_spread(points, "the landmarks that are seen");
 }
 
 /// Sum of squared distances from where the landmarks are seen [px^2]; infinite where one lies behind a source.
@@ -84,7 +84,7 @@ Normal normal_at(const std::vector<Sight>& sights, const RigidTransform& pose, c
     by_image << 1, 0, -pixel.x(), 0, 1, -pixel.y();
     const Eigen::Matrix<double, 2, 6> by_motion = by_image / image.z() * camera.intrinsics *
                                                   camera.camera_from_world.rotation * pose.rotation *
-                                                  initial::point_by_motion(frame, sight.model_mm);
+                                                  geometry::point_by_motion(frame, sight.model_mm);
     normal.curvature += by_motion.transpose() * by_motion;
     normal.gradient += by_motion.transpose() * (pixel - sight.pixel);
   }
@@ -121,7 +121,7 @@ struct Candidate {
 /// The minima that the starts lead to, the least first.
 std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFrame& frame) {
   std::vector<Candidate> found;
-  for (const RigidTransform& start : initial::pose_starts(sights)) {
+  for (const RigidTransform& start : geometry::pose_starts(sights)) {
     const RigidTransform pose = refined(sights, start, frame);
     if (const double squares = squares_px(sights, pose); std::isfinite(squares)) found.push_back({pose, squares});
   }

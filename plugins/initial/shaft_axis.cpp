@@ -14,12 +14,12 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "axis.hpp"
-#include "model_borders.hpp"
+#include "marrow/toolbox/shaft/axis.hpp"
+#include "marrow/toolbox/shaft/model_borders.hpp"
 
 namespace {
 
-using namespace marrow::initial;
+using namespace marrow::shaft;
 using marrow::Camera, marrow::List, marrow::Mesh, marrow::Plane, marrow::Pose, marrow::RigidTransform,
     marrow::ShaftLines, marrow::View;
 

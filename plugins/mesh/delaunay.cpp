@@ -3,8 +3,8 @@
 #include <marrow/domain/manifold.hpp>
 #include <marrow/plugin.hpp>
 
-#include "cgal_mesher.hpp"
-#include "signs.hpp"
+#include "marrow/toolbox/surface/delaunay_refinement.hpp"
+#include "marrow/toolbox/surface/signs.hpp"
 
 namespace {
 
@@ -13,7 +13,7 @@ using marrow::Grid;
 using marrow::Mesh;
 using marrow::SignedField;
 
-struct Options : surface::Finish {
+struct Options : marrow::surface::Finish {
   double angle_deg = 30, size_mm = 2, distance_mm = 0.05;
 };
 
@@ -41,12 +41,12 @@ class Interpolated {
 
  private:
   static constexpr double kOutside = 1, kLeast = 1e-12;
-  surface::Padded padded_;
+  marrow::surface::Padded padded_;
   std::array<int, 3> size_;
 };
 
 /// Some points of the surface: one in each block of samples, so that there are some on each part of it.
-std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
+std::vector<Vector3d> spread_points(const marrow::surface::Signs& signs, int block) {
   std::array<std::size_t, 3> blocks;
   for (std::size_t axis = 0; axis < 3; ++axis) blocks[axis] = std::size_t(signs.size()[axis] / block + 1);
   std::vector<bool> taken(blocks[0] * blocks[1] * blocks[2], false);
@@ -63,7 +63,7 @@ std::vector<Vector3d> spread_points(const surface::Signs& signs, int block) {
 
 /// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than
 /// its cells.
-std::size_t most_points(const surface::Signs& signs, const Grid& grid, const Options& options) {
+std::size_t most_points(const marrow::surface::Signs& signs, const Grid& grid, const Options& options) {
   double crossings = 0;
   signs.for_edges([&](int, int, int, int) { ++crossings; });
   const double smallest_mm = std::min(options.size_mm, 4 * options.distance_mm);
@@ -72,15 +72,15 @@ std::size_t most_points(const surface::Signs& signs, const Grid& grid, const Opt
 
 Mesh delaunay(const SignedField& field, const Options& options, marrow::Context& context) {
   const Grid& grid = field.grid;
-  const surface::Signs signs(field);
+  const marrow::surface::Signs signs(field);
   const Interpolated interpolated(field);
   // CGAL works in mm about the middle of the grid, along its axes.
   const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
-  cgal_mesher::LevelSet level_set;
+  marrow::surface::LevelSet level_set;
   level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
-  const cgal_mesher::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
-                                       most_points(signs, grid, options)};
+  const marrow::surface::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
+                                           most_points(signs, grid, options)};
   std::string fault;
   // About as far apart as the triangles are large; parts that are smaller need more points to begin with.
   const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
@@ -89,13 +89,13 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
     for (const Vector3d& index : spread_points(signs, block))
       level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
     try {
-      cgal_mesher::Surface surface = cgal_mesher::mesh(level_set, criteria, [&] { context.check_cancelled(); });
+      marrow::surface::Surface surface = marrow::surface::mesh(level_set, criteria, [&] { context.check_cancelled(); });
       Mesh mesh;
       mesh.frame = grid.frame;
       for (const Vector3d& p : surface.vertices_mm)
         mesh.vertices_mm.push_back(grid.point_from_index(p.cwiseQuotient(grid.spacing_mm) + middle));
       mesh.triangles = std::move(surface.triangles);
-      mesh = surface::finish(std::move(mesh), options);
+      mesh = marrow::surface::finish(std::move(mesh), options);
       if (surface.complete && marrow::is_manifold(mesh)) return mesh;
       fault = surface.complete ? "its parts are smaller than the triangles"
                                : "it stopped at " + std::to_string(criteria.most_points) + " vertices";
@@ -122,6 +122,7 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0.01))
       .option("distance_mm", &Options::distance_mm, "largest distance of a triangle's middle from the surface",
               marrow::at_least(0.001))
-      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
-      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
+              marrow::at_most(200));
 }

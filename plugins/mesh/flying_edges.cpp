@@ -7,14 +7,14 @@
 
 #include <marrow/plugin.hpp>
 
-#include "surface.hpp"
+#include "marrow/toolbox/surface/surface.hpp"
 
 namespace {
 
 using marrow::Mesh;
 using marrow::SignedField;
 
-using Options = surface::Finish;
+using Options = marrow::surface::Finish;
 
 /// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes
 /// half a voxel outside the last samples.
@@ -22,7 +22,7 @@ void fill(vtkImageData& image, const SignedField& field) {
   const auto& size = field.grid.size;
   image.SetExtent(-1, size[0], -1, size[1], -1, size[2]);
   image.AllocateScalars(VTK_FLOAT, 1);
-  const surface::Padded padded(field);
+  const marrow::surface::Padded padded(field);
   float* out = static_cast<float*>(image.GetScalarPointer());
   for (int z = -1; z <= size[2]; ++z)
     for (int y = -1; y <= size[1]; ++y)
@@ -30,7 +30,7 @@ void fill(vtkImageData& image, const SignedField& field) {
 }
 
 Mesh flying_edges(const SignedField& field, const Options& options) {
-  surface::check_field(field);
+  marrow::surface::check_field(field);
   vtkNew<vtkImageData> image;
   fill(*image, field);
   vtkNew<vtkFlyingEdges3D> filter;
@@ -54,7 +54,7 @@ Mesh flying_edges(const SignedField& field, const Options& options) {
     for (int k = 0; k < 3; ++k) triangle[k] = std::uint32_t(corners[2 - k]);  // VTK's normals point down the field
     mesh.triangles.push_back(triangle);
   }
-  return surface::finish(std::move(mesh), options);
+  return marrow::surface::finish(std::move(mesh), options);
 }
 
 }  // namespace
@@ -64,6 +64,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Flying edges of VTK (Schroeder, Maynard and Geveci, LDAV 2015)")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
-      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
+              marrow::at_most(200));
 }

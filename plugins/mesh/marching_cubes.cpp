@@ -3,17 +3,17 @@
 
 #include <marrow/plugin.hpp>
 
-#include "cells.hpp"
-#include "signs.hpp"
+#include "marrow/toolbox/surface/cells.hpp"
+#include "marrow/toolbox/surface/signs.hpp"
 
 namespace {
 
 using marrow::Grid;
 using marrow::Mesh;
 using marrow::SignedField;
-using surface::Signs;
-using surface::Word;
-using Options = surface::Finish;
+using marrow::surface::Signs;
+using marrow::surface::Word;
+using Options = marrow::surface::Finish;
 
 /// Where the vertices and triangles of a row of cells begin. A row owns the edges that leave its first points in +x, +y
 /// and +z, and numbers their vertices by axis and then along x.
@@ -63,7 +63,7 @@ class Surface {
       for (std::uint32_t& first : row.vertex) vertices += std::exchange(first, std::uint32_t(vertices));
       triangles += std::exchange(row.triangle, triangles);
     }
-    surface::check_vertex_count(vertices);
+    marrow::surface::check_vertex_count(vertices);
     mesh_.vertices_mm.resize(vertices);
     mesh_.triangles.resize(triangles);
   }
@@ -97,7 +97,7 @@ class Surface {
     });
   }
 
-  static inline const cells::TriangleTable kTable;
+  static inline const marrow::surface::TriangleTable kTable;
   Signs signs_;
   const Grid& grid_;
   std::vector<Row> rows_;
@@ -105,7 +105,7 @@ class Surface {
 };
 
 Mesh marching_cubes(const SignedField& field, const Options& options) {
-  return surface::finish(Surface(field).take(), options);
+  return marrow::surface::finish(Surface(field).take(), options);
 }
 
 }  // namespace
@@ -115,6 +115,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Marching cubes (Lorensen and Cline, SIGGRAPH 1987), closed for every field")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
-      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
+              marrow::at_most(200));
 }

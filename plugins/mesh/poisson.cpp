@@ -2,8 +2,8 @@
 #include <marrow/domain/manifold.hpp>
 #include <marrow/plugin.hpp>
 
-#include "pcl_poisson.hpp"
-#include "signs.hpp"
+#include "marrow/toolbox/surface/poisson.hpp"
+#include "marrow/toolbox/surface/signs.hpp"
 
 namespace {
 
@@ -12,7 +12,7 @@ using marrow::Grid;
 using marrow::Mesh;
 using marrow::SignedField;
 
-struct Options : surface::Finish {
+struct Options : marrow::surface::Finish {
   int depth = 0;
   double point_weight = 4;
 };
@@ -23,16 +23,16 @@ std::array<float, 3> to_array(const Vector3d& v) { return {float(v.x()), float(v
 
 /// Where the field changes sign along the edges of its grid, with the field's direction there, in mm about the middle
 /// of the grid and along its axes.
-std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const Vector3d& middle) {
-  const surface::Signs signs(field);
-  const surface::Padded padded(field);
+std::vector<marrow::surface::OrientedPoint> sample(const SignedField& field, const Vector3d& middle) {
+  const marrow::surface::Signs signs(field);
+  const marrow::surface::Padded padded(field);
   const Vector3d& spacing = field.grid.spacing_mm;
   const auto gradient = [&](int x, int y, int z) {
     return Vector3d((padded(x + 1, y, z) - padded(x - 1, y, z)) / spacing.x(),
                     (padded(x, y + 1, z) - padded(x, y - 1, z)) / spacing.y(),
                     (padded(x, y, z + 1) - padded(x, y, z - 1)) / spacing.z());
   };
-  std::vector<pcl_poisson::OrientedPoint> points;
+  std::vector<marrow::surface::OrientedPoint> points;
   signs.for_edges([&](int axis, int x, int y, int z) {
     const Vector3d index = signs.crossing(axis, x, y, z);
     const int from[3] = {x - 1, y - 1, z - 1};
@@ -50,8 +50,8 @@ std::vector<pcl_poisson::OrientedPoint> sample(const SignedField& field, const V
 
 /// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges
 /// out. In it, the depth of the octree at which the smallest cells are about as large as the field's.
-pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>& points, double cell_mm,
-                                   const Options& options) {
+marrow::surface::Settings settings_for(const std::vector<marrow::surface::OrientedPoint>& points, double cell_mm,
+                                       const Options& options) {
   double extent_mm = 0;
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const auto [low, high] = std::minmax_element(points.begin(), points.end(),
@@ -65,13 +65,13 @@ pcl_poisson::Settings settings_for(const std::vector<pcl_poisson::OrientedPoint>
 
 Mesh poisson(const SignedField& field, const Options& options) {
   const Grid& grid = field.grid;
-  surface::check_grid(field);
+  marrow::surface::check_grid(field);
   const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
-  const std::vector<pcl_poisson::OrientedPoint> points = sample(field, middle);
-  const pcl_poisson::Settings settings = settings_for(points, grid.spacing_mm.minCoeff(), options);
-  pcl_poisson::Surface surface;
+  const std::vector<marrow::surface::OrientedPoint> points = sample(field, middle);
+  const marrow::surface::Settings settings = settings_for(points, grid.spacing_mm.minCoeff(), options);
+  marrow::surface::Surface surface;
   try {
-    surface = pcl_poisson::reconstruct(points, settings);
+    surface = marrow::surface::reconstruct(points, settings);
   } catch (const std::exception& error) {
     throw marrow::Error(std::string("field: PCL's Poisson reconstruction gave up (") + error.what() +
                         "); use mesh.marching_cubes, which takes every field");
@@ -83,7 +83,7 @@ Mesh poisson(const SignedField& field, const Options& options) {
   mesh.triangles = std::move(surface.triangles);
   const bool finite =
       std::all_of(mesh.vertices_mm.begin(), mesh.vertices_mm.end(), [](const Vector3d& p) { return p.allFinite(); });
-  if (finite) mesh = surface::finish(std::move(mesh), options);
+  if (finite) mesh = marrow::surface::finish(std::move(mesh), options);
   if (!finite || !marrow::is_manifold(mesh))
     throw marrow::Error(
         "field: the surface that fits its points is not closed, as Poisson reconstruction needs a smooth surface; "
@@ -105,6 +105,7 @@ MARROW_PLUGIN(plugin) {
       .option("point_weight", &Options::point_weight,
               "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
               marrow::at_least(0))
-      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
-      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
+              marrow::at_most(200));
 }

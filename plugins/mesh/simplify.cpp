@@ -3,7 +3,7 @@
 
 #include <marrow/plugin.hpp>
 
-#include "to_vtk.hpp"
+#include "marrow/toolbox/vtk/poly_data.hpp"
 
 namespace {
 
@@ -15,7 +15,7 @@ marrow::Mesh simplify(const marrow::Mesh& mesh, const Options& options) {
   marrow::check_mesh(mesh, "mesh to simplify");
   if (mesh.triangles.size() <= std::size_t(options.triangles)) return mesh;
   vtkNew<vtkQuadricDecimation> filter;
-  filter->SetInputData(marrow::to_vtk(mesh));
+  filter->SetInputData(marrow::vtk::poly_data(mesh));
   filter->SetTargetReduction(1.0 - double(options.triangles) / double(mesh.triangles.size()));
   filter->VolumePreservationOn();
   filter->Update();

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "surface.hpp"
+#include "marrow/toolbox/surface/surface.hpp"
 
 namespace {
 
 using marrow::Mesh;
 
-Mesh smooth(const Mesh& mesh, const surface::Taubin& options) {
+Mesh smooth(const Mesh& mesh, const marrow::surface::Taubin& options) {
   marrow::check_mesh(mesh, "mesh to smooth");
   if (!marrow::is_closed(mesh))
     throw marrow::Error(
         "mesh to smooth: it is not closed, as an edge has not just two triangles; a mesh node gives closed ones");
   Mesh result = mesh;
-  surface::smooth(result, options);
+  marrow::surface::smooth(result, options);
   return result;
 }
 
@@ -24,11 +24,11 @@ MARROW_PLUGIN(plugin) {
       .summary("Smooths without shrinking (Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995)")
       .in("mesh", "closed surface")
       .out("mesh", "the same triangles, their vertices moved")
-      .option("iterations", &surface::Taubin::iterations, "pairs of a smoothing and an inflating step",
+      .option("iterations", &marrow::surface::Taubin::iterations, "pairs of a smoothing and an inflating step",
               marrow::at_least(0), marrow::at_most(1000))
-      .option("lambda", &surface::Taubin::lambda, "how far a smoothing step goes to the mean of the neighbours",
+      .option("lambda", &marrow::surface::Taubin::lambda, "how far a smoothing step goes to the mean of the neighbours",
               marrow::at_least(0.01), marrow::at_most(1))
-      .option("pass_band", &surface::Taubin::pass_band,
+      .option("pass_band", &marrow::surface::Taubin::pass_band,
               "smaller keeps only longer waves: those longer than 2 pi / sqrt(pass_band) edges stay",
               marrow::at_least(0.001), marrow::at_most(1));
 }

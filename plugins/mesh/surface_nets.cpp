@@ -12,17 +12,17 @@
 
 #include <marrow/plugin.hpp>
 
-#include "cells.hpp"
-#include "signs.hpp"
+#include "marrow/toolbox/surface/cells.hpp"
+#include "marrow/toolbox/surface/signs.hpp"
 
 namespace {
 
 using Eigen::Vector3d;
 using marrow::Mesh;
 using marrow::SignedField;
-using surface::Signs;
+using marrow::surface::Signs;
 
-struct Options : surface::Finish {
+struct Options : marrow::surface::Finish {
   int relaxation = 0;
 };
 
@@ -32,7 +32,7 @@ struct LoopTable {
   std::array<std::array<std::uint8_t, 12>, 256> loop_of{};
   LoopTable() {
     for (unsigned pattern = 0; pattern < 256; ++pattern) {
-      loops[pattern] = cells::cell_loops(pattern);
+      loops[pattern] = marrow::surface::cell_loops(pattern);
       for (std::size_t loop = 0; loop < loops[pattern].size(); ++loop)
         for (const int edge : loops[pattern][loop]) loop_of[pattern][std::size_t(edge)] = std::uint8_t(loop);
     }
@@ -57,8 +57,8 @@ bool crossed_twice(unsigned pattern, int axis) {
 bool in_one_loop(unsigned pattern, int axis, bool high) {
   const auto corner = [&](int k) { return face_corner(axis, high, k); };
   const auto& loop_of = kTable.loop_of[pattern];
-  return loop_of[std::size_t(cells::edge_between(corner(0), corner(1)))] ==
-         loop_of[std::size_t(cells::edge_between(corner(2), corner(3)))];
+  return loop_of[std::size_t(marrow::surface::edge_between(corner(0), corner(1)))] ==
+         loop_of[std::size_t(marrow::surface::edge_between(corner(2), corner(3)))];
 }
 
 /// What the net has in a cell: first the vertices of its loops, then two for each of its low faces that needs them.
@@ -139,7 +139,7 @@ void add_polygon(const Slice* const slices[2], int axis, const std::array<int, 3
   const bool starts_inside = around[0].pattern >> start[0] & 1;
   const std::size_t begin = polygons.corners.size();
   for (int k = 0; k < 4; ++k) {
-    polygons.corners.push_back(around[k].vertex_of_edge(cells::edge_between(start[k], start[k] | 1 << axis)));
+    polygons.corners.push_back(around[k].vertex_of_edge(marrow::surface::edge_between(start[k], start[k] | 1 << axis)));
     const int owner = std::array{1, 2, 2, 3}[std::size_t(k)], face = k % 2 ? c : b;  // between this cell and the next
     if (!(around[owner].split_faces >> face & 1)) continue;
     const int inside = starts_inside ? start[owner] : start[owner] | 1 << axis;
@@ -213,7 +213,7 @@ class Net {
       first_[z] = std::uint32_t(total);
       total += counts[z];
     }
-    surface::check_vertex_count(total);
+    marrow::surface::check_vertex_count(total);
   }
 
   void add_polygons(const Slice& below, const Slice& slice, int z, Polygons& polygons) const {
@@ -221,7 +221,7 @@ class Net {
     for (int y = 0; y < signs_.size()[1]; ++y)
       for (int word = 0; word < signs_.words(); ++word)
         for (int axis = 0; axis < 3; ++axis)
-          for (surface::Word left = signs_.edges(axis, word, y, z); left; left &= left - 1)
+          for (marrow::surface::Word left = signs_.edges(axis, word, y, z); left; left &= left - 1)
             add_polygon(slices, axis, {64 * word + std::countr_zero(left), y, z}, polygons);
   }
 
@@ -232,7 +232,7 @@ class Net {
       signs_.for_cells(y, z, [&](int x, unsigned pattern) {
         const Cell& cell = slice.at(x, y);
         const auto crossing = [&](int edge) {
-          const int start = cells::kEdgeStart[std::size_t(edge)];
+          const int start = marrow::surface::kEdgeStart[std::size_t(edge)];
           return signs_.crossing(edge / 4, x + (start & 1), y + (start >> 1 & 1), z + (start >> 2));
         };
         const Vector3d low(x - 1, y - 1, z - 1);
@@ -251,8 +251,8 @@ class Net {
             if (!(pattern >> corner & 1)) continue;
             cells_[vertex] = box;
             cells_[vertex].high[axis] = low[axis];
-            places_[vertex++] = (crossing(cells::edge_between(corner, face_corner(axis, false, k ^ 1))) +
-                                 crossing(cells::edge_between(corner, face_corner(axis, false, k ^ 2)))) /
+            places_[vertex++] = (crossing(marrow::surface::edge_between(corner, face_corner(axis, false, k ^ 1))) +
+                                 crossing(marrow::surface::edge_between(corner, face_corner(axis, false, k ^ 2)))) /
                                 2;
           }
         }
@@ -282,7 +282,7 @@ Mesh surface_nets(const SignedField& field, const Options& options, marrow::Cont
     context.check_cancelled();
     net.relax();
   }
-  return surface::finish(net.mesh(field.grid), options);
+  return marrow::surface::finish(net.mesh(field.grid), options);
 }
 
 }  // namespace
@@ -295,6 +295,7 @@ MARROW_PLUGIN(plugin) {
       .option("relaxation", &Options::relaxation,
               "how often each vertex moves to the mean of its neighbours, never out of its cell; for fields with steps",
               marrow::at_least(0), marrow::at_most(200))
-      .option("largest_only", &Options::largest_only, surface::kLargestOnlyHelp)
-      .option("smoothing", &Options::smoothing, surface::kSmoothingHelp, marrow::at_least(0), marrow::at_most(200));
+      .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
+      .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
+              marrow::at_most(200));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "nlopt_run.hpp"
+#include "marrow/toolbox/search/nlopt_run.hpp"
 
 namespace {
 
@@ -11,7 +11,7 @@ class Bobyqa : public marrow::Optimizer {
     if (problem.start.size() < 2)
       throw marrow::Error("BOBYQA minimises functions of two or more numbers, got " +
                           std::to_string(problem.start.size()) + "; use another optimizer");
-    return NloptRun(nlopt::LN_BOBYQA, problem).run();
+    return marrow::search::NloptRun(nlopt::LN_BOBYQA, problem).run();
   }
 };
 

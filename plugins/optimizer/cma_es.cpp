@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "evaluations.hpp"
+#include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
 
@@ -56,7 +56,7 @@ class Strategy {
   }
 
   /// One generation; true when it has become smaller than the tolerance.
-  bool step(Evaluations& evaluate) {
+  bool step(marrow::search::Evaluations& evaluate) {
     std::vector<Eigen::VectorXd> points;
     std::vector<double> values;
     for (int i = 0; i < lambda_; ++i) {
@@ -113,7 +113,7 @@ class CmaEs : public marrow::Optimizer {
  public:
   explicit CmaEs(const Options& options) : options_(options) {}
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return Evaluations(problem).run([&](Evaluations& evaluate) -> std::string {
+    return marrow::search::Evaluations(problem).run([&](marrow::search::Evaluations& evaluate) -> std::string {
       evaluate(Eigen::VectorXd::Zero(evaluate.size()));
       Strategy strategy(evaluate.size(), options_);
       while (!strategy.step(evaluate)) {

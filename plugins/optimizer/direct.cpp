@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "nlopt_run.hpp"
+#include "marrow/toolbox/search/nlopt_run.hpp"
 
 namespace {
 
@@ -13,11 +13,11 @@ class Direct : public marrow::Optimizer {
  public:
   explicit Direct(double reach) : reach_(reach) {}
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    check_problem(problem);
+    marrow::search::check_problem(problem);
     marrow::MinimisationProblem bounded = problem;
     if (bounded.lower.size() == 0) bounded.lower = problem.start - reach_ * problem.initial_step;
     if (bounded.upper.size() == 0) bounded.upper = problem.start + reach_ * problem.initial_step;
-    return NloptRun(nlopt::GN_DIRECT_L, bounded).run();
+    return marrow::search::NloptRun(nlopt::GN_DIRECT_L, bounded).run();
   }
 
  private:

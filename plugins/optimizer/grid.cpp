@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "evaluations.hpp"
+#include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
 
@@ -11,7 +11,7 @@ struct Options {
 
 /// All points of a grid about the best so far, then a finer one about the best of these: as wide as one step of the
 /// last.
-std::string search(Evaluations& evaluate, int points) {
+std::string search(marrow::search::Evaluations& evaluate, int points) {
   const Eigen::Index n = evaluate.size();
   Eigen::VectorXd centre = Eigen::VectorXd::Zero(n);
   double least = evaluate(centre);
@@ -37,7 +37,8 @@ class GridSearch : public marrow::Optimizer {
  public:
   explicit GridSearch(int points) : points_(points) {}
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return Evaluations(problem).run([&](Evaluations& evaluate) { return search(evaluate, points_); });
+    return marrow::search::Evaluations(problem).run(
+        [&](marrow::search::Evaluations& evaluate) { return search(evaluate, points_); });
   }
 
  private:

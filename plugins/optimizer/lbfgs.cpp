@@ -3,7 +3,7 @@
 #include <marrow/plugin.hpp>
 #include <string>
 
-#include "evaluations.hpp"
+#include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
 
@@ -11,7 +11,7 @@ constexpr std::size_t kMemory = 8;
 
 /// The gradient: as the function tells it, else by central differences of h to either side, cut at the bounds (2 n
 /// evaluations). 0 along a coordinate whose bounds meet.
-Eigen::VectorXd gradient_at(Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
+Eigen::VectorXd gradient_at(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
   if (evaluate.has_derivatives())
     if (const auto about = evaluate.expansion(y)) return about->gradient;
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(y.size());
@@ -63,8 +63,8 @@ class Memory {
 
 /// Goes along the direction to where the value is enough lower (Armijo's condition), by parabolas. False where there is
 /// no such place.
-bool step_along(Evaluations& evaluate, const Eigen::VectorXd& direction, double slope, Eigen::VectorXd& here,
-                double& value) {
+bool step_along(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& direction, double slope,
+                Eigen::VectorXd& here, double& value) {
   double t = 1;
   for (int i = 0; i < 8; ++i) {
     const Eigen::VectorXd there = evaluate.within(here + t * direction);
@@ -81,13 +81,13 @@ bool step_along(Evaluations& evaluate, const Eigen::VectorXd& direction, double 
 }
 
 /// 1 for the coordinates that may follow -gradient, 0 for those that a bound stops.
-Eigen::VectorXd free_coordinates(const Evaluations& evaluate, const Eigen::VectorXd& here,
+Eigen::VectorXd free_coordinates(const marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here,
                                  const Eigen::VectorXd& gradient, double h) {
   const Eigen::VectorXd down = here - h * gradient / std::max(gradient.norm(), 1e-300);
   return (evaluate.within(down) - down).unaryExpr([](double cut) { return std::abs(cut) > 1e-12 ? 0.0 : 1.0; });
 }
 
-std::string search(Evaluations& evaluate) {
+std::string search(marrow::search::Evaluations& evaluate) {
   constexpr double kLongest = 4;
   Eigen::VectorXd here = Eigen::VectorXd::Zero(evaluate.size());
   double value = evaluate(here), h = 0.1;
@@ -116,7 +116,7 @@ std::string search(Evaluations& evaluate) {
 class Lbfgs : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return Evaluations(problem).run(search);
+    return marrow::search::Evaluations(problem).run(search);
   }
 };
 

@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 #include <string>
 
-#include "evaluations.hpp"
+#include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
 
@@ -12,7 +12,7 @@ using Expansion = marrow::MinimisationProblem::Expansion;
 
 /// Of a function that does not know its derivatives: by differences, the Hessian's negative eigenvalues turned
 /// positive.
-Expansion by_differences(Evaluations& evaluate, const Eigen::VectorXd& here, double value, double h) {
+Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here, double value, double h) {
   const Eigen::Index n = here.size();
   Expansion about{value, Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
   Eigen::VectorXd above(n);
@@ -41,7 +41,7 @@ Expansion by_differences(Evaluations& evaluate, const Eigen::VectorXd& here, dou
 /// Steps that Marquardt's damping keeps short while the expansion misleads (SIAM J Appl Math 1963).
 class Search {
  public:
-  explicit Search(Evaluations& evaluate)
+  explicit Search(marrow::search::Evaluations& evaluate)
       : evaluate_(evaluate), here_(Eigen::VectorXd::Zero(evaluate.size())), derivatives_(evaluate.has_derivatives()) {
     value_ = look(here_);
     about_ = seen_;
@@ -101,7 +101,7 @@ class Search {
     return 0;
   }
 
-  Evaluations& evaluate_;
+  marrow::search::Evaluations& evaluate_;
   Eigen::VectorXd here_;
   double value_ = 0, damping_ = 1e-2;
   bool derivatives_;
@@ -111,7 +111,8 @@ class Search {
 class LevenbergMarquardt : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return Evaluations(problem).run([](Evaluations& evaluate) { return Search(evaluate).run(); });
+    return marrow::search::Evaluations(problem).run(
+        [](marrow::search::Evaluations& evaluate) { return Search(evaluate).run(); });
   }
 };
 

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 #include <vector>
 
-#include "evaluations.hpp"
+#include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
 
@@ -10,7 +10,8 @@ namespace {
 /// a parabola through the last three, kept within them, is refined.
 class Line {
  public:
-  Line(Evaluations& evaluate, const Eigen::VectorXd& from, double value, const Eigen::VectorXd& direction)
+  Line(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& from, double value,
+       const Eigen::VectorXd& direction)
       : evaluate_(evaluate), from_(from), direction_(direction), value_(value) {}
 
   /// Goes to the least value found; returns how far that is from the start, in lengths of the direction.
@@ -45,14 +46,14 @@ class Line {
  private:
   double at(double t) { return evaluate_(from_ + t * direction_); }
 
-  Evaluations& evaluate_;
+  marrow::search::Evaluations& evaluate_;
   const Eigen::VectorXd from_, direction_;
   double value_;
 };
 
 /// Powell's method with the discarding rule of his section 3: the direction of the greatest fall gives way to that of
 /// the whole round where this does not make the set dependent.
-std::string search(Evaluations& evaluate) {
+std::string search(marrow::search::Evaluations& evaluate) {
   const Eigen::Index n = evaluate.size();
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(n, n);
   Eigen::VectorXd here = Eigen::VectorXd::Zero(n);
@@ -90,7 +91,7 @@ std::string search(Evaluations& evaluate) {
 class Powell : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return Evaluations(problem).run(search);
+    return marrow::search::Evaluations(problem).run(search);
   }
 };
 

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "nlopt_run.hpp"
+#include "marrow/toolbox/search/nlopt_run.hpp"
 
 namespace {
 
 class Sbplx : public marrow::Optimizer {
  public:
   marrow::MinimisationResult minimise(const marrow::MinimisationProblem& problem) const override {
-    return NloptRun(nlopt::LN_SBPLX, problem).run();
+    return marrow::search::NloptRun(nlopt::LN_SBPLX, problem).run();
   }
 };
 

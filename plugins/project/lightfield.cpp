@@ -7,8 +7,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "bricks.hpp"
-#include "rays.hpp"
+#include "marrow/toolbox/rays/bricks.hpp"
+#include "marrow/toolbox/rays/rays.hpp"
 
 namespace {
 

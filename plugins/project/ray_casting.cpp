@@ -2,7 +2,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "rays.hpp"
+#include "marrow/toolbox/rays/rays.hpp"
 
 namespace {
 

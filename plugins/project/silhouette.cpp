@@ -4,7 +4,7 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "volume_border.hpp"
+#include "marrow/toolbox/rays/volume_border.hpp"
 
 namespace {
 
@@ -129,7 +129,8 @@ class SilhouetteProjector : public marrow::Projector {
 std::shared_ptr<const marrow::Projector> silhouette(const marrow::Mesh& mesh, const marrow::Volume* volume,
                                                     const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
-  return std::make_shared<SilhouetteProjector>(mesh, vertices_at_volume_border(mesh, volume, options.border_voxels));
+  return std::make_shared<SilhouetteProjector>(
+      mesh, marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels));
 }
 
 }  // namespace

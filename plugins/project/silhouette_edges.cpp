@@ -3,9 +3,9 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "coarse_surface.hpp"
-#include "surface_patches.hpp"
-#include "volume_border.hpp"
+#include "marrow/toolbox/rays/volume_border.hpp"
+#include "marrow/toolbox/surface/coarse_surface.hpp"
+#include "marrow/toolbox/surface/surface_patches.hpp"
 
 // The hot loop is compiled for newer processors as well, and the fitting version taken at run time.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
@@ -301,10 +301,10 @@ std::shared_ptr<const marrow::Projector> silhouette_edges(const marrow::Mesh& me
                                                           const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
   constexpr std::size_t kWorthIt = 20000;  // triangles
-  const std::vector<char> at_border = vertices_at_volume_border(mesh, volume, options.border_voxels);
+  const std::vector<char> at_border = marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels);
   SurfacePatches coarse;
   if (mesh.triangles.size() >= kWorthIt) {
-    CoarseSurface surface = coarse_surface(mesh, at_border);
+    marrow::surface::CoarseSurface surface = marrow::surface::coarse_surface(mesh, at_border);
     if (!surface.mesh.triangles.empty()) coarse = make_surface_patches(surface.mesh, surface.at_border);
   }
   return std::make_shared<SilhouetteEdges>(make_surface_patches(mesh, at_border), std::move(coarse));

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "camera_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
 
 namespace {
 
@@ -10,7 +10,7 @@ struct Options {
 };
 
 marrow::Camera camera(const Options& options, marrow::Context& context) {
-  const marrow::read::DistortedCamera file = marrow::read::read_camera_file(options.path);
+  const marrow::DistortedCamera file = marrow::files::read_camera_file(options.path);
   if (!file.distortion.is_none())
     context.warn(
         options.path.string() +

@@ -2,17 +2,17 @@
 // A case: one patient's folder with case.yaml, which names everything else in it (docs/case.md).
 #include <marrow/plugin.hpp>
 
-#include "camera_file.hpp"
-#include "input_file.hpp"
 #include "marrow/domain/names.hpp"
-#include "volume_file.hpp"
-#include "yaml_values.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-using marrow::read::YamlFile;
-using marrow::read::YamlMap;
+using marrow::files::YamlFile;
+using marrow::files::YamlMap;
 
 constexpr std::size_t kMostViews = 1000;
 
@@ -64,7 +64,7 @@ auto read_or_fault(const YamlMap& map, const std::string& key, Read read) -> std
 void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
   const auto node = map.required("ct");
   if (!node) return;
-  marrow::read::VolumeReading reading;
+  marrow::files::VolumeReading reading;
   std::optional<fs::path> file;
   if (node->IsMap()) {
     const YamlMap ct(map.file(), *node, "ct", {"file", "voxel_size_mm", "flip", "value_offset_hu", "series_uid"});
@@ -78,23 +78,23 @@ void read_ct(const fs::path& folder, const YamlMap& map, marrow::Case& result) {
     file = file_in(folder, map, "ct");
   }
   if (!file) return;
-  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::read::read_volume_file(*file, reading); }))
+  if (auto volume = read_or_fault(map, "ct", [&] { return marrow::files::read_volume_file(*file, reading); }))
     result.ct = std::move(*volume);
 }
 
-std::optional<marrow::read::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map) {
+std::optional<marrow::DistortedCamera> read_camera(const fs::path& folder, const YamlMap& map) {
   const auto node = map.required("camera");
   if (!node) return std::nullopt;
-  if (node->IsMap()) return marrow::read::camera_from(*node, map.file());
+  if (node->IsMap()) return marrow::files::camera_from(*node, map.file());
   const auto file = file_in(folder, map, "camera");
   if (!file) return std::nullopt;
-  return read_or_fault(map, "camera", [&] { return marrow::read::read_camera_file(*file); });
+  return read_or_fault(map, "camera", [&] { return marrow::files::read_camera_file(*file); });
 }
 
 std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& map, const std::string& key) {
   const auto file = file_in(folder, map, key);
   if (!file) return std::nullopt;
-  return read_or_fault(map, key, [&] { return marrow::read::read_image_file(*file); });
+  return read_or_fault(map, key, [&] { return marrow::files::read_image_file(*file); });
 }
 
 /// The mask is drawn on the image as it is stored: where that is mirrored as it is read, so is the mask.
@@ -104,7 +104,7 @@ std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, boo
   if (mask->pixels.type() != CV_8U)
     map.fault("mask", "mask: expected an image of 8 bits, zero where the view may not be used");
   const auto is_mirrored = [&](const std::string& key) {
-    return marrow::read::is_mirrored_as_read(file_in(folder, map, key).value());
+    return marrow::files::is_mirrored_as_read(file_in(folder, map, key).value());
   };
   if (!has_image || is_mirrored("image") == is_mirrored("mask")) return mask->pixels;
   cv::Mat mirrored;
@@ -153,8 +153,8 @@ void read_views(const fs::path& folder, const YamlMap& map, marrow::Case& result
 }
 
 std::optional<marrow::RigidTransform> read_transform(const YamlMap& fragment, const std::string& key) {
-  const YamlMap map(fragment.file(), fragment.node(key), key, marrow::read::transform_keys());
-  return marrow::read::transform_from(map, marrow::Pose{}.world_from_model);
+  const YamlMap map(fragment.file(), fragment.node(key), key, marrow::files::transform_keys());
+  return marrow::files::transform_from(map, marrow::Pose{}.world_from_model);
 }
 
 void read_fragments(const YamlMap& map, marrow::Case& result) {
@@ -163,12 +163,12 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
   if (!fragments->IsMap() || fragments->size() == 0)
     return map.fault("fragments", "fragments: expected at least one fragment by name, with its seeds");
   std::vector<std::string> registered, with_start, with_truth;
-  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::read::FreeKeys{});
+  const YamlMap by_name(map.file(), *fragments, "fragments", marrow::files::FreeKeys{});
   for (const std::string& name : by_name.keys()) {
     const YamlMap fragment(map.file(), by_name.node(name), "fragment '" + name + "'",
                            {"seeds", "register", "start", "truth"});
     if (!fragment.valid()) continue;
-    marrow::Seeds seeds = marrow::read::seeds_from(fragment, name);
+    marrow::Seeds seeds = marrow::files::seeds_from(fragment, name);
     const bool wanted = seeds.wanted;
     result.seeds.add(name, std::move(seeds));
     if (wanted) registered.push_back(name);
@@ -200,10 +200,10 @@ marrow::Case read_case(const Options& options) {
     throw marrow::Error(
         options.path.string() + ": expected the folder of a case, which holds case.yaml" +
         (fs::exists(options.path, failure) ? " (name the folder, not a file in it)" : "; there is no such folder"));
-  marrow::read::check_stays_inside(options.path, options.path / "case.yaml");
+  marrow::files::check_stays_inside(options.path, options.path / "case.yaml");
   YamlFile file(options.path / "case.yaml");
   const YamlMap map(file, file.root(), "case", {"marrow-case", "ct", "views", "fragments"});
-  marrow::read::check_version(map, "marrow-case");
+  marrow::files::check_version(map, "marrow-case");
   marrow::Case result;
   read_fragments(map, result);
   read_views(options.path, map, result);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
 
@@ -10,7 +10,7 @@ struct Options {
   int frame = 0;
 };
 
-marrow::Image image(const Options& options) { return marrow::read::read_image_file(options.path, options.frame); }
+marrow::Image image(const Options& options) { return marrow::files::read_image_file(options.path, options.frame); }
 
 }  // namespace
 

@@ -2,7 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
-#include "volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
 
@@ -22,7 +22,7 @@ marrow::List<marrow::Image> images(const Options& options) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
     marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
-    images.add(name, marrow::read::read_image_file(options.paths[i], options.frame));
+    images.add(name, marrow::files::read_image_file(options.paths[i], options.frame));
   }
   return images;
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "yaml_values.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
 
 using namespace marrow;
-using read::FreeKeys, read::YamlFile, read::YamlMap;
+using files::FreeKeys, files::YamlFile, files::YamlMap;
 
 struct Options {
   std::filesystem::path path;
@@ -15,7 +15,7 @@ struct Options {
 /// Notes a fault where a point that is seen or tracked is none of the CT's.
 void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
   if (places.has(name)) return;
-  const std::string near = map.file().is_full() ? "" : read::nearest(name, places.keys());
+  const std::string near = map.file().is_full() ? "" : files::nearest(name, places.keys());
   map.fault(name, "the points have no '" + name + "'; " +
                       (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
 }
@@ -55,7 +55,7 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
 List<Landmarks> landmarks(const Options& options) {
   YamlFile file(options.path);
   const YamlMap map(file, file.root(), "landmarks", {"marrow-landmarks", "fragments"});
-  read::check_version(map, "marrow-landmarks");
+  files::check_version(map, "marrow-landmarks");
   List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});

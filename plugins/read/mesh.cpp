@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "mesh_file.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
 
 namespace {
 
@@ -12,7 +12,7 @@ struct Options {
 };
 
 marrow::Mesh mesh(const Options& options, marrow::Context& context) {
-  marrow::Mesh mesh = marrow::read::read_mesh_file(options.path, options.scale);
+  marrow::Mesh mesh = marrow::files::read_mesh_file(options.path, options.scale);
   mesh.frame = options.frame;
   const auto largest = [&] {
     Eigen::AlignedBox3d box;

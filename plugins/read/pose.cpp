@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "yaml_values.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
 
@@ -9,7 +9,7 @@ struct Options {
   std::filesystem::path path;
 };
 
-marrow::Pose pose(const Options& options) { return marrow::read::read_pose_file(options.path); }
+marrow::Pose pose(const Options& options) { return marrow::files::read_pose_file(options.path); }
 
 }  // namespace
 

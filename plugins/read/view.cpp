@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "view_file.hpp"
+#include "marrow/toolbox/files/view_file.hpp"
 
 namespace {
 
@@ -17,7 +17,7 @@ marrow::View view(const marrow::Camera* camera, const Options& options) {
   if (bool(camera) == !options.camera.empty())
     throw marrow::Error("view '" + options.name +
                         "': give its camera either as the option (a file) or as the input (a value)");
-  return marrow::read::read_view_files(
+  return marrow::files::read_view_files(
       {options.name, options.image, camera, options.camera, options.calibration, options.frame});
 }
 

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "view_file.hpp"
+#include "marrow/toolbox/files/view_file.hpp"
 
 namespace {
 
@@ -41,7 +41,7 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name, marrow::read::read_view_files(
+    views.add(name, marrow::files::read_view_files(
                         {name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
                          cameras ? std::filesystem::path() : options.cameras[i], options.calibration, options.frame}));
   }

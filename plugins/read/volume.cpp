@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 
 namespace {
 
@@ -14,7 +14,7 @@ struct Options {
 };
 
 marrow::Volume volume(const Options& options) {
-  return marrow::read::read_volume_file(
+  return marrow::files::read_volume_file(
       options.path, {options.voxel_size_mm, options.flip, options.value_offset_hu, options.series_uid});
 }
 

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "pcl_icp.hpp"
+#include "marrow/toolbox/match/closest_points.hpp"
 
 namespace {
 
@@ -48,7 +48,7 @@ std::string percent(std::size_t part, std::size_t whole) {
   return text;
 }
 
-void add_warnings(const pcl_icp::Result& found, const Options& options, Pose& pose, const Context& context) {
+void add_warnings(const marrow::match::Result& found, const Options& options, Pose& pose, const Context& context) {
   if (!found.converged)
     pose.warnings.push_back("the pairs of points still changed after " + std::to_string(options.max_iterations) +
                             " iterations; raise max_iterations");
@@ -69,7 +69,7 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
   for (Eigen::Vector3d& point : points) point = initial.world_from_model * point - middle;
   for (Eigen::Vector3d& point : goal) point -= middle;
   context.check_cancelled();
-  const pcl_icp::Result found = pcl_icp::align(points, goal, {options.max_iterations, options.reach_mm});
+  const marrow::match::Result found = marrow::match::align(points, goal, {options.max_iterations, options.reach_mm});
   if (found.paired < 3)
     throw Error(std::to_string(found.paired) + " of " + std::to_string(points.size()) +
                 " points of the model have one of the target within " +

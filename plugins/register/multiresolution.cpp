@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "search.hpp"
+#include "marrow/toolbox/search/search.hpp"
 
 namespace {
 
-using marrow::registration::SearchOptions;
+using marrow::search::SearchOptions;
 
 struct Result {
   marrow::Pose pose;
@@ -14,14 +14,14 @@ struct Result {
 
 Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimizer, const marrow::Pose& initial,
                        const SearchOptions& options, marrow::Context& context) {
-  marrow::registration::check_options(options);
+  marrow::search::check_options(options);
   marrow::check_rigid(initial.world_from_model, "the pose to start from");
-  const marrow::registration::Levels levels = marrow::registration::levels_of(cost, options);
+  const marrow::search::Levels levels = marrow::search::levels_of(cost, options);
   const marrow::Cost& last = *levels.back();
-  marrow::registration::Search search(optimizer, initial, options, context);
+  marrow::search::Search search(optimizer, initial, options, context);
   Result result;
   result.stages.add("start", pose_of(search, initial, last));
-  const marrow::registration::Found best = search.find(levels);
+  const marrow::search::Found best = search.find(levels);
   search.go_to(best.axial);
   result.stages.add("axial", pose_of(search, initial, last));
   search.go_to(best.pose);
@@ -40,5 +40,5 @@ MARROW_PLUGIN(plugin) {
       .in("initial", "pose to start from, and the fragment's axes")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
       .out("stages", &Result::stages, "poses on the way: start, axial, final", marrow::over("stage"));
-  marrow::registration::declare<SearchOptions>(node);
+  marrow::search::declare<SearchOptions>(node);
 }

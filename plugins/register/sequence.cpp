@@ -2,13 +2,13 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "search.hpp"
+#include "marrow/toolbox/search/search.hpp"
 
 namespace {
 
-using marrow::registration::Search;
+using marrow::search::Search;
 
-struct Options : marrow::registration::SearchOptions {
+struct Options : marrow::search::SearchOptions {
   std::vector<double> finer_pixel_step{4, 2};
   std::vector<double> finer_step_deg{1, 0.3};
   std::vector<double> finer_step_axial_deg{2, 0.6};
@@ -29,8 +29,8 @@ void check_finer(const Options& options) {
         std::pair(&options.finer_step_axial_deg, "finer_step_axial_deg"),
         std::pair(&options.finer_step_mm, "finer_step_mm"),
         std::pair(&options.finer_step_tolerance, "finer_step_tolerance")})
-    marrow::registration::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step",
-                                           "give all options that begin with finer_ as many, one for each level");
+    marrow::search::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step",
+                                     "give all options that begin with finer_ as many, one for each level");
 }
 
 /// A sentence where the second cost leads far from what the first one found: then one of them is wrong.
@@ -49,10 +49,10 @@ std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, 
 Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const marrow::Optimizer& optimizer,
                 const marrow::Optimizer* finer_optimizer, const marrow::Pose& initial, const Options& options,
                 marrow::Context& context) {
-  marrow::registration::check_options(options);
+  marrow::search::check_options(options);
   check_finer(options);
   marrow::check_rigid(initial.world_from_model, "the pose to start from");
-  const marrow::registration::Levels levels = marrow::registration::levels_of(cost, options);
+  const marrow::search::Levels levels = marrow::search::levels_of(cost, options);
   Search coarse(optimizer, initial, options, context);
   Result result;
   result.stages.add("start", pose_of(coarse, initial, *levels.back()));
@@ -63,11 +63,11 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   std::shared_ptr<const marrow::Cost> level;
   const double share = 1.0 / double(options.finer_pixel_step.size());
   for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
-    const marrow::registration::Steps steps{options.finer_step_deg[i], options.finer_step_axial_deg[i],
-                                            options.finer_step_mm[i], options.finer_step_tolerance[i]};
+    const marrow::search::Steps steps{options.finer_step_deg[i], options.finer_step_axial_deg[i],
+                                      options.finer_step_mm[i], options.finer_step_tolerance[i]};
     level = finer_cost.at_level(
         {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
-    search.refine(*level, marrow::registration::kAllAxes, steps, double(i) * share, share);
+    search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
   }
   result.pose = final_pose_of(search, first, *level, options, context);
   result.pose.evaluations += first.evaluations;
@@ -91,7 +91,7 @@ MARROW_PLUGIN(plugin) {
       .in("initial", "pose to start from, and the fragment's axes")
       .out("pose", &Result::pose, "pose of least finer_cost near that of least cost")
       .out("stages", &Result::stages, "poses on the way: start, first, final", marrow::over("stage"));
-  marrow::registration::declare<Options>(node);
+  marrow::search::declare<Options>(node);
   node.option("finer_pixel_step", &Options::finer_pixel_step,
               "per level of the finer cost: every how many pixels are compared")
       .option("finer_step_deg", &Options::finer_step_deg,

@@ -4,11 +4,11 @@
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "canvas.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {
 
-using namespace marrow::render;
+using namespace marrow::draw;
 
 struct Options {
   int size_px = 768;

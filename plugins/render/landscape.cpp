@@ -4,12 +4,12 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "canvas.hpp"
-#include "plot.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
+#include "marrow/toolbox/draw/plot.hpp"
 
 namespace {
 
-using namespace marrow::render;
+using namespace marrow::draw;
 using Profile = marrow::Landscape::Profile;
 
 /// Where the cost is least; nothing where no cost is finite.

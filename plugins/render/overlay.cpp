@@ -4,11 +4,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "canvas.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {
 
-using namespace marrow::render;
+using namespace marrow::draw;
 
 struct Options {
   int size_px = 800;

@@ -5,11 +5,11 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "canvas.hpp"
+#include "marrow/toolbox/draw/canvas.hpp"
 
 namespace {
 
-using namespace marrow::render;
+using namespace marrow::draw;
 
 struct Options {
   int size_px = 1000;

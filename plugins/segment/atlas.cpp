@@ -8,11 +8,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "expansion.hpp"
-#include "fragments.hpp"
-#include "interior.hpp"
-#include "mesh_field.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/expansion.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/interior.hpp"
+#include "marrow/toolbox/field/mesh_field.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -40,11 +40,11 @@ constexpr double kReach_mm = 40;  // of the CT's distances, in which closest poi
 class Target {
  public:
   Target(const Volume& volume, const std::vector<std::vector<Vector3d>>& seeds, double floor_hu) : volume_(volume) {
-    auto owner = level_set::race(volume, seeds, {.floor_hu = floor_hu});
+    auto owner = marrow::field::race(volume, seeds, {.floor_hu = floor_hu});
     for (auto& one : owner)
-      if (one != segment::kNobody) one = 0;
-    const segment::Mask mask = segment::solid(volume.grid, owner, 0, 4);
-    field_.grid = segment::grid_of(volume.grid, mask);
+      if (one != marrow::field::kNobody) one = 0;
+    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, 0, 4);
+    field_.grid = marrow::field::grid_of(volume.grid, mask);
     const float half_voxel_mm = float(volume.grid.spacing_mm.minCoeff() / 2);
     for (const std::uint8_t inside : mask.is_inside)
       field_.values_mm.push_back(inside ? -half_voxel_mm : half_voxel_mm);
@@ -53,7 +53,7 @@ class Target {
         for (int x = 0; x < mask.size[0]; ++x)
           if (mask.is_inside[field_.grid.offset(x, y, z)])
             points_mm_.push_back(field_.grid.point_from_index(Vector3d(x, y, z)));
-    segment::march_distances(field_.grid, field_.values_mm, kReach_mm);
+    marrow::field::march_distances(field_.grid, field_.values_mm, kReach_mm);
   }
   /// The closest point of the bone's surface, as far as the distances reach; `at_edge`: drawn to the steepest descent
   /// of the CT, as the race ends a little outside the bone.
@@ -229,7 +229,7 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
     throw marrow::Error("template: a closed surface expected, got one with holes; its inside is not defined");
   if (std::abs(marrow::enclosed_volume_mm3(whole)) < 1)
     throw marrow::Error("template: it encloses less than 1 mm^3; is it in mm?");
-  const Target target(volume, segment::seed_indices(volume, seeds, options.floor_hu), options.floor_hu);
+  const Target target(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu), options.floor_hu);
   std::vector<Vector3d> vertices;
   const std::size_t step = std::max<std::size_t>(1, whole.vertices_mm.size() / 4000);
   for (std::size_t i = 0; i < whole.vertices_mm.size(); i += step) vertices.push_back(whole.vertices_mm[i]);
@@ -247,7 +247,7 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
   context.info(line);
   Mesh moved = whole;
   for (Vector3d& vertex : moved.vertices_mm) vertex = best * vertex;
-  const SignedField field = segment::field_of_mesh(volume.grid, moved, options.band_mm);
+  const SignedField field = marrow::field::field_of_mesh(volume.grid, moved, options.band_mm);
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     if (!seeds[f].wanted) continue;
@@ -259,7 +259,7 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
       throw marrow::Error("fragment '" + seeds.name(f) +
                           "': the template does not reach it; give a template of this bone, or place it closer");
   }
-  return segment::list_of(seeds, std::move(fields));
+  return marrow::field::list_of(seeds, std::move(fields));
 }
 
 }  // namespace

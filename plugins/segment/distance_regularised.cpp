@@ -11,10 +11,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "expansion.hpp"
-#include "fragments.hpp"
-#include "interior.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/expansion.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/interior.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -53,7 +53,7 @@ float dirac(float value) {
 /// phi of one fragment in a box around it, in units of the finest voxel spacing.
 class Evolution {
  public:
-  Evolution(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
+  Evolution(const Volume& volume, const marrow::field::Mask& mask, const std::vector<std::uint8_t>& owner,
             std::uint8_t fragment, const Options& options)
       : options_(options), size_(mask.size), phi_(mask.is_inside.size()), is_foreign_(mask.is_inside.size()) {
     const Grid& grid = volume.grid;
@@ -66,9 +66,9 @@ class Evolution {
           const std::size_t at = std::size_t(z) * steps_[2] + std::size_t(y) * steps_[1] + std::size_t(x);
           const std::uint8_t here = owner[grid.offset(mask.first[0] + x, mask.first[1] + y, mask.first[2] + z)];
           phi_[at] = mask.is_inside[at] ? -kStart : kStart;
-          is_foreign_[at] = here != fragment && here != segment::kNobody;
+          is_foreign_[at] = here != fragment && here != marrow::field::kNobody;
         }
-    make_indicator(segment::cut_out(volume, mask), grid.spacing_mm);
+    make_indicator(marrow::field::cut_out(volume, mask), grid.spacing_mm);
   }
 
   void run(Context& context) {
@@ -193,13 +193,13 @@ class Evolution {
 List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                        Context& context) {
   marrow::check_volume(volume, "volume");
-  const auto owner =
-      level_set::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
+  const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu),
+                                         {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.progress(double(f) / double(seeds.size()), seeds.name(f));
-    const segment::Mask mask =
-        segment::solid(volume.grid, owner, std::uint8_t(f), segment::margin(volume.grid, options.band_mm) + kReach);
+    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, std::uint8_t(f),
+                                                          marrow::field::margin(volume.grid, options.band_mm) + kReach);
     if (mask.empty())
       throw marrow::Error("seeds of fragment '" + seeds.name(f) +
                           "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
@@ -211,10 +211,10 @@ List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& 
     if (std::none_of(values.begin(), values.end(), [](float value) { return value < 0; }))
       throw marrow::Error("fragment '" + seeds.name(f) +
                           "': its level set vanished; take fewer steps, or a lower area weight");
-    segment::march_distances(segment::grid_of(volume.grid, mask), values, options.band_mm);
-    fields.push_back(segment::paste(volume.grid, mask, values, float(options.band_mm)));
+    marrow::field::march_distances(marrow::field::grid_of(volume.grid, mask), values, options.band_mm);
+    fields.push_back(marrow::field::paste(volume.grid, mask, values, float(options.band_mm)));
   }
-  return segment::list_of(seeds, std::move(fields));
+  return marrow::field::list_of(seeds, std::move(fields));
 }
 
 }  // namespace

@@ -5,21 +5,21 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "expansion.hpp"
-#include "fragments.hpp"
-#include "front.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/expansion.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/front.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
-using level_set::EdgeProfile;
-using level_set::Force;
-using level_set::Front;
 using marrow::Context;
 using marrow::List;
 using marrow::Seeds;
 using marrow::SignedField;
 using marrow::Volume;
+using marrow::field::EdgeProfile;
+using marrow::field::Force;
+using marrow::field::Front;
 
 struct Options {
   double band_voxels = 5;
@@ -46,15 +46,15 @@ void keep_all_apart(std::vector<Front>& fronts) {
 }
 
 std::vector<Front> begin(const Volume& volume, const List<Seeds>& seeds, const Options& options, Context& context) {
-  const auto indices = segment::seed_indices(volume, seeds, options.floor_hu);
+  const auto indices = marrow::field::seed_indices(volume, seeds, options.floor_hu);
   context.progress(0, "racing");
   const auto owner =
-      level_set::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
+      marrow::field::race(volume, indices, {options.sigma_mm, options.cleft_mm, options.cleft_part, options.floor_hu});
   std::vector<Front> fronts;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(0.3 + 0.2 * double(f) / double(seeds.size()), "filling");
-    const segment::Mask mask = segment::solid(volume.grid, owner, std::uint8_t(f));
+    const marrow::field::Mask mask = marrow::field::solid(volume.grid, owner, std::uint8_t(f));
     if (mask.empty())
       throw marrow::Error("seeds of fragment '" + seeds.name(f) +
                           "': all of them lie where another fragment's seeds are; move them into this fragment's bone");

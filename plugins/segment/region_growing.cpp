@@ -6,8 +6,8 @@
 #include <deque>
 #include <marrow/plugin.hpp>
 
-#include "fragments.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -29,13 +29,13 @@ class Growth {
   Growth(const Volume& volume, std::size_t fragments, double least_hu)
       : volume_(volume),
         least_hu_(least_hu),
-        owner_(volume.values.size(), segment::kNobody),
+        owner_(volume.values.size(), marrow::field::kNobody),
         sums_hu_(fragments, 0),
         counts_(fragments, 0),
         waiting_(kSteps) {}
 
   void claim(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != segment::kNobody || volume_.values[at] < least_hu_) return;
+    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < least_hu_) return;
     owner_[at] = fragment;
     sums_hu_[fragment] += volume_.values[at];
     ++counts_[fragment];
@@ -73,7 +73,7 @@ class Growth {
   };
 
   void wait(std::size_t at, std::uint8_t fragment) {
-    if (owner_[at] != segment::kNobody || volume_.values[at] < least_hu_) return;
+    if (owner_[at] != marrow::field::kNobody || volume_.values[at] < least_hu_) return;
     const double unlikeness = std::abs(volume_.values[at] - sums_hu_[fragment] / double(counts_[fragment]));
     const std::size_t step = std::min(std::size_t(unlikeness), kSteps - 1);
     waiting_[step].push_back({at, fragment});
@@ -93,7 +93,7 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
                                  Context& context) {
   marrow::check_volume(volume, "volume");
   // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
-  const auto indices = segment::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
+  const auto indices = marrow::field::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
   Growth growth(volume, seeds.size(), options.least_hu);
   for (std::size_t f = 0; f < indices.size(); ++f)
     for (const Eigen::Vector3d& index : indices[f]) {
@@ -114,11 +114,11 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
                           std::to_string(int(options.least_hu)) +
                           " HU, or it belongs to another fragment; add a point in brighter bone, or lower least_hu");
     if (!seeds[f].wanted) continue;
-    const segment::Mask mask =
-        segment::solid(volume.grid, growth.owner(), std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
-    fields.push_back(segment::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
+    const marrow::field::Mask mask = marrow::field::solid(volume.grid, growth.owner(), std::uint8_t(f),
+                                                          marrow::field::margin(volume.grid, options.band_mm));
+    fields.push_back(marrow::field::field_at_threshold(volume, mask, options.least_hu, options.band_mm));
   }
-  return segment::list_of(seeds, std::move(fields));
+  return marrow::field::list_of(seeds, std::move(fields));
 }
 
 }  // namespace

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "expansion.hpp"
-#include "fragments.hpp"
-#include "interior.hpp"
-#include "itk_contour.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/expansion.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/interior.hpp"
+#include "marrow/toolbox/field/itk_contour.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -32,19 +32,19 @@ struct Options {
   double band_mm = 4;
 };
 
-SignedField field_of(const Volume& volume, const segment::Mask& mask, const std::vector<std::uint8_t>& owner,
+SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment, const std::string& name, const Options& options, Context& context) {
-  const Grid box = segment::grid_of(volume.grid, mask);
+  const Grid box = marrow::field::grid_of(volume.grid, mask);
   const float half_voxel_mm = float(box.spacing_mm.minCoeff() / 2);
   std::vector<float> start(mask.is_inside.size());
   for (std::size_t at = 0; at < start.size(); ++at) start[at] = mask.is_inside[at] ? -half_voxel_mm : half_voxel_mm;
-  segment::march_distances(box, start, options.band_mm);
+  marrow::field::march_distances(box, start, options.band_mm);
   const auto& s = box.spacing_mm;
-  const itk_contour::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation,
-                                       options.curvature, options.advection,      options.iterations,
-                                       options.least_rms};
-  itk_contour::Contour contour = itk_contour::geodesic(segment::cut_out(volume, mask), std::move(start), box.size,
-                                                       {s.x(), s.y(), s.z()}, settings);
+  const marrow::field::Settings settings{options.sigma_mm,  options.edge_hu_per_mm, options.propagation,
+                                         options.curvature, options.advection,      options.iterations,
+                                         options.least_rms};
+  marrow::field::Contour contour = marrow::field::geodesic(marrow::field::cut_out(volume, mask), std::move(start),
+                                                           box.size, {s.x(), s.y(), s.z()}, settings);
   char line[200];
   std::snprintf(line, sizeof line, "%s: %d iterations, last change %.4f", name.c_str(), contour.iterations,
                 contour.rms);
@@ -53,14 +53,14 @@ SignedField field_of(const Volume& volume, const segment::Mask& mask, const std:
     for (int y = 0; y < box.size[1]; ++y)
       for (int x = 0; x < box.size[0]; ++x) {
         const std::uint8_t here = owner[volume.grid.offset(mask.first[0] + x, mask.first[1] + y, mask.first[2] + z)];
-        if (here == fragment || here == segment::kNobody) continue;
+        if (here == fragment || here == marrow::field::kNobody) continue;
         float& value = contour.values[box.offset(x, y, z)];
         value = std::max(value, 0.1f * half_voxel_mm);
       }
   if (std::none_of(contour.values.begin(), contour.values.end(), [](float value) { return value < 0; }))
     throw marrow::Error("fragment '" + name + "': its contour vanished; take fewer iterations, or less curvature");
-  segment::march_distances(box, contour.values, options.band_mm);
-  return segment::paste(volume.grid, mask, contour.values, float(options.band_mm));
+  marrow::field::march_distances(box, contour.values, options.band_mm);
+  return marrow::field::paste(volume.grid, mask, contour.values, float(options.band_mm));
 }
 
 List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, const Options& options,
@@ -69,21 +69,21 @@ List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, c
   for (int size : volume.grid.size)
     if (size < 4)
       throw marrow::Error("volume: at least 4 voxels along each axis expected, got " + std::to_string(size));
-  const auto owner =
-      level_set::race(volume, segment::seed_indices(volume, seeds, options.floor_hu), {.floor_hu = options.floor_hu});
+  const auto owner = marrow::field::race(volume, marrow::field::seed_indices(volume, seeds, options.floor_hu),
+                                         {.floor_hu = options.floor_hu});
   std::vector<SignedField> fields;
   for (std::size_t f = 0; f < seeds.size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds.size()), seeds.name(f));
-    const segment::Mask mask =
-        segment::solid(volume.grid, owner, std::uint8_t(f), segment::margin(volume.grid, options.band_mm));
+    const marrow::field::Mask mask =
+        marrow::field::solid(volume.grid, owner, std::uint8_t(f), marrow::field::margin(volume.grid, options.band_mm));
     if (mask.empty())
       throw marrow::Error("seeds of fragment '" + seeds.name(f) +
                           "': all of them lie where another fragment's seeds are; move them into this fragment's bone");
     if (seeds[f].wanted)
       fields.push_back(field_of(volume, mask, owner, std::uint8_t(f), seeds.name(f), options, context));
   }
-  return segment::list_of(seeds, std::move(fields));
+  return marrow::field::list_of(seeds, std::move(fields));
 }
 
 }  // namespace

@@ -2,8 +2,8 @@
 #include <marrow/plugin.hpp>
 #include <queue>
 
-#include "fragments.hpp"
-#include "seed_points.hpp"
+#include "marrow/toolbox/field/fragments.hpp"
+#include "marrow/toolbox/field/seed_points.hpp"
 
 namespace {
 
@@ -20,7 +20,7 @@ struct Options {
   double band_mm = 4;
 };
 
-using segment::kNobody;
+using marrow::field::kNobody;
 constexpr std::uint8_t kUnclaimed = 254;
 
 template <class Visit>
@@ -99,9 +99,9 @@ void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
 
 SignedField field_of(const Volume& volume, const Options& options, const std::vector<std::uint8_t>& owner,
                      std::uint8_t fragment) {
-  const segment::Mask mask =
-      segment::solid(volume.grid, owner, fragment, segment::margin(volume.grid, options.band_mm));
-  return segment::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
+  const marrow::field::Mask mask =
+      marrow::field::solid(volume.grid, owner, fragment, marrow::field::margin(volume.grid, options.band_mm));
+  return marrow::field::field_at_threshold(volume, mask, options.threshold_hu, options.band_mm);
 }
 
 List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, const Options& options, Context& context) {
@@ -122,14 +122,14 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
   std::vector<SignedField> fields;
   // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
   const double least_hu = std::min(options.floor_hu, options.threshold_hu);
-  claim_from_seeds(volume.grid, segment::seed_indices(volume, *seeds, least_hu), owner);
+  claim_from_seeds(volume.grid, marrow::field::seed_indices(volume, *seeds, least_hu), owner);
   check_claims(*seeds, options, owner);
   for (std::size_t f = 0; f < seeds->size(); ++f) {
     context.check_cancelled();
     context.progress(double(f) / double(seeds->size()), seeds->name(f));
     if ((*seeds)[f].wanted) fields.push_back(field_of(volume, options, owner, std::uint8_t(f)));
   }
-  return segment::list_of(*seeds, std::move(fields));
+  return marrow::field::list_of(*seeds, std::move(fields));
 }
 
 }  // namespace

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pairs.hpp"
+#include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
 

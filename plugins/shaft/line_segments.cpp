@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "pairs.hpp"
+#include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
 

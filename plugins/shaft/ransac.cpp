@@ -7,7 +7,7 @@
 #include <optional>
 #include <random>
 
-#include "pairs.hpp"
+#include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
 

@@ -5,10 +5,10 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
-#include "edge_loss.hpp"
-#include "inputs.hpp"
-#include "nearest_edges.hpp"
-#include "nearest_outline.hpp"
+#include "marrow/toolbox/match/edge_loss.hpp"
+#include "marrow/toolbox/match/inputs.hpp"
+#include "marrow/toolbox/match/nearest_edges.hpp"
+#include "marrow/toolbox/match/nearest_outline.hpp"
 
 namespace {
 
@@ -21,11 +21,11 @@ struct Options {
   bool estimate_offset = true;
   double model_error_px = 0.4;
   bool symmetric = false;
-  double others_reach_px = marrow::similarity::kOthersReach_px;
+  double others_reach_px = marrow::match::kOthersReach_px;
   std::vector<double> weights;
 };
 
-using marrow::similarity::weight_of;
+using marrow::match::weight_of;
 
 /// The offset between outline and edges is sought this far from the one that is given.
 constexpr double kMostOffset_px = 3;
@@ -49,7 +49,7 @@ struct Matches {
 struct Scene {
   const marrow::Projector* projector;
   marrow::List<marrow::View> views;
-  std::vector<NearestEdges> edges;
+  std::vector<marrow::match::NearestEdges> edges;
   Options options;
 };
 
@@ -150,7 +150,7 @@ class ContourDistance : public marrow::Cost {
     for (const Matches& view : views)
       of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset))
                                                   : forward(view, offset));
-    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+    return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
   /// How far a point moves along its normal in the image, for each motion about the frame.
@@ -223,8 +223,8 @@ class ContourDistance : public marrow::Cost {
     const double reach_px =
         level_.reach_px + (scene_->options.estimate_offset ? kMostOffset_px : std::abs(scene_->options.edge_offset_px));
     const float least_cosine = float(std::cos(marrow::radians(scene_->options.direction_tolerance_deg)));
-    const NearestOutline nearest(outline, scene_->views[index].camera.width_px, scene_->views[index].camera.height_px,
-                                 reach_px);
+    const marrow::match::NearestOutline nearest(outline, scene_->views[index].camera.width_px,
+                                                scene_->views[index].camera.height_px, reach_px);
     std::vector<Residual> residuals;
     for (const marrow::EdgePixel& edge : scene_->edges[index].all())
       if (const int point = nearest.find(edge, reach_px, least_cosine); point >= 0)
@@ -272,7 +272,7 @@ class ContourDistance : public marrow::Cost {
 
   std::shared_ptr<const Scene> scene_;
   const marrow::CostLevel level_;
-  const EdgeLoss loss_;
+  const marrow::match::EdgeLoss loss_;
 };
 
 std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
@@ -281,11 +281,11 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& pr
                                                      const marrow::List<marrow::Pose>* others,
                                                      const marrow::List<marrow::Projector>* other_projectors,
                                                      const Options& options) {
-  marrow::similarity::check_edges(views, edges);
-  marrow::similarity::check_weights(options.weights, views.size());
-  const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
-      views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
+  marrow::match::check_edges(views, edges);
+  marrow::match::check_weights(options.weights, views.size());
+  const auto other = marrow::match::others_of(&projector, others, other_projectors);
+  const marrow::List<marrow::EdgeMap> own =
+      marrow::match::without_outlines(views, edges, other, options.others_reach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;

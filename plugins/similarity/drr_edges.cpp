@@ -9,9 +9,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "edge_loss.hpp"
-#include "inputs.hpp"
-#include "nearest_edges.hpp"
+#include "marrow/toolbox/match/edge_loss.hpp"
+#include "marrow/toolbox/match/inputs.hpp"
+#include "marrow/toolbox/match/nearest_edges.hpp"
 
 namespace {
 
@@ -74,7 +74,7 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
 struct Scene {
   const marrow::Projector* projector;
   marrow::List<marrow::View> views;
-  std::vector<NearestEdges> edges;
+  std::vector<marrow::match::NearestEdges> edges;
   Options options;
 };
 
@@ -87,7 +87,7 @@ class DrrEdges : public marrow::Cost {
     std::vector<double> of_view(scene_->views.size());
     tbb::parallel_for(std::size_t(0), of_view.size(),
                       [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+    return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
@@ -139,7 +139,7 @@ class DrrEdges : public marrow::Cost {
 
   std::shared_ptr<const Scene> scene_;
   const int step_;
-  const EdgeLoss loss_;
+  const marrow::match::EdgeLoss loss_;
 };
 
 std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector,
@@ -148,11 +148,11 @@ std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector
                                               const marrow::List<marrow::Pose>* others,
                                               const marrow::List<marrow::Projector>* other_projectors,
                                               const Options& options) {
-  marrow::similarity::check_edges(views, edges);
-  marrow::similarity::check_weights(options.weights, views.size());
-  const auto other = marrow::similarity::others_of(&projector, others, other_projectors);
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
-      views, edges, other, marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
+  marrow::match::check_edges(views, edges);
+  marrow::match::check_weights(options.weights, views.size());
+  const auto other = marrow::match::others_of(&projector, others, other_projectors);
+  const marrow::List<marrow::EdgeMap> own = marrow::match::without_outlines(
+      views, edges, other, marrow::match::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
   scene->projector = &projector;
   scene->views = views;

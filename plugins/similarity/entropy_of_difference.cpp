@@ -1,21 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "histogram.hpp"
+#include "marrow/toolbox/match/histogram.hpp"
 
 namespace {
 
-using marrow::similarity::bins_of;
-using marrow::similarity::Patch;
+using marrow::match::bins_of;
+using marrow::match::Patch;
 
-struct Options : marrow::similarity::IntensityOptions {
+struct Options : marrow::match::IntensityOptions {
   int bins = 64;
 };
 
 /// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part
 /// of the image's own range, and go as far below it, where the difference may lie.
-marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
-  marrow::similarity::Bins within = bins_of(whole.seen, whole.counts, bins);
+marrow::match::Measure measure_of(const Patch& whole, int bins) {
+  marrow::match::Bins within = bins_of(whole.seen, whole.counts, bins);
   if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
   within.low -= (bins + 0.5) / within.per_unit;  // the brightest, often the background, in the middle of its bin
   within.count = 2 * bins + 1;
@@ -23,9 +23,9 @@ marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
   double n = 0;
   for (std::size_t i = 0; i < whole.seen.size(); ++i)
     if (whole.counts[i]) image[std::size_t(within.of(whole.seen[i]))] += 1, n += 1;
-  const double before = marrow::similarity::entropy(image, n);
+  const double before = marrow::match::entropy(image, n);
   return [=](const Patch& patch) {
-    const double scale = marrow::similarity::scale_of(marrow::similarity::gradients_of(patch));
+    const double scale = marrow::match::scale_of(marrow::match::gradients_of(patch));
     if (!(scale > 0) || !(before > 0)) return 1.0;
     std::vector<double> histogram = image;
     for (std::size_t i = 0; i < patch.seen.size(); ++i) {
@@ -33,7 +33,7 @@ marrow::similarity::Measure measure_of(const Patch& whole, int bins) {
       histogram[std::size_t(within.of(patch.seen[i]))] -= 1;
       histogram[std::size_t(within.of(patch.seen[i] - scale * patch.rendered[i]))] += 1;
     }
-    return std::min(2.0, marrow::similarity::entropy(histogram, n) / before);
+    return std::min(2.0, marrow::match::entropy(histogram, n) / before);
   };
 }
 
@@ -42,9 +42,8 @@ std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projecto
                                                           const marrow::List<marrow::Pose>* others,
                                                           const marrow::List<marrow::Projector>* other_projectors,
                                                           const Options& options) {
-  return marrow::similarity::intensity_cost(
-      projector, views, others, other_projectors, options, 2,
-      [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2,
+                                       [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
 }
 
 }  // namespace
@@ -54,7 +53,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med "
       "Imaging 1998)");
-  marrow::similarity::declare<decltype(node), Options>(node);
+  marrow::match::declare<decltype(node), Options>(node);
   node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4),
               marrow::at_most(1024));
 }

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
-using marrow::similarity::IntensityOptions;
-using marrow::similarity::Patch;
+using marrow::match::IntensityOptions;
+using marrow::match::Patch;
 
 double value(const Patch& patch) {
-  const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
-  using marrow::similarity::correlation;
+  const marrow::match::Gradients g = marrow::match::gradients_of(patch);
+  using marrow::match::correlation;
   return 1 - 0.5 * (correlation(g.rendered_u, g.seen_u, g.counts) + correlation(g.rendered_v, g.seen_v, g.counts));
 }
 
@@ -19,7 +19,7 @@ std::shared_ptr<const marrow::Cost> gradient_correlation(const marrow::Projector
                                                          const marrow::List<marrow::Pose>* others,
                                                          const marrow::List<marrow::Projector>* other_projectors,
                                                          const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, value);
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2, value);
 }
 
 }  // namespace
@@ -29,5 +29,5 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "1 - mean correlation of the horizontal and of the vertical gradients (Penney et al., IEEE Trans Med Imaging "
       "1998)");
-  marrow::similarity::declare<decltype(node), IntensityOptions>(node);
+  marrow::match::declare<decltype(node), IntensityOptions>(node);
 }

@@ -3,22 +3,22 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
-using marrow::similarity::IntensityOptions;
-using marrow::similarity::Patch;
+using marrow::match::IntensityOptions;
+using marrow::match::Patch;
 
 /// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference
 /// of gradients and A the variance of the image's, over the same sums without the model. That is Penney's sum over a
 /// fixed region, the image, but for constants.
-marrow::similarity::Measure measure_of(const Patch& whole) {
+marrow::match::Measure measure_of(const Patch& whole) {
   Patch unseen = whole;
   unseen.rendered.assign(whole.seen.size(), 0.0f);
-  const marrow::similarity::Gradients image = marrow::similarity::gradients_of(unseen);
+  const marrow::match::Gradients image = marrow::match::gradients_of(unseen);
   const auto variance = [&](const std::vector<float>& gradients) {
-    return std::max(1e-14, std::pow(marrow::similarity::deviation(gradients, image.counts), 2));
+    return std::max(1e-14, std::pow(marrow::match::deviation(gradients, image.counts), 2));
   };
   const double u2 = variance(image.seen_u), v2 = variance(image.seen_v);
   const auto structure = [](double d, double variance) { return d * d / (variance + d * d); };
@@ -26,8 +26,8 @@ marrow::similarity::Measure measure_of(const Patch& whole) {
   for (std::size_t i = 0; i < image.counts.size(); ++i)
     if (image.counts[i]) all += structure(image.seen_u[i], u2) + structure(image.seen_v[i], v2);
   return [=](const Patch& patch) {
-    const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
-    const double scale = marrow::similarity::scale_of(g);
+    const marrow::match::Gradients g = marrow::match::gradients_of(patch);
+    const double scale = marrow::match::scale_of(g);
     if (!(scale > 0) || !(all > 0)) return 1.0;
     double less = 0;
     for (std::size_t i = 0; i < g.counts.size(); ++i) {
@@ -44,7 +44,7 @@ std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector&
                                                         const marrow::List<marrow::Pose>* others,
                                                         const marrow::List<marrow::Projector>* other_projectors,
                                                         const IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2, measure_of);
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2, measure_of);
 }
 
 }  // namespace
@@ -54,5 +54,5 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "Gradients that the difference image has left of the image's (gradient difference), which thin bright lines "
       "hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
-  marrow::similarity::declare<decltype(node), IntensityOptions>(node);
+  marrow::match::declare<decltype(node), IntensityOptions>(node);
 }

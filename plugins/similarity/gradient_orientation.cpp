@@ -3,11 +3,11 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
-using marrow::similarity::Patch;
+using marrow::match::Patch;
 
 /// The median length of the gradients that count and are not zero.
 double median_length(const std::vector<float>& u, const std::vector<float>& v, const std::vector<char>& counts) {
@@ -22,7 +22,7 @@ double median_length(const std::vector<float>& u, const std::vector<float>& v, c
 /// Mean of (1 - cos of the angle) / 2 where both gradients are longer than the median of theirs; over a tenth of the
 /// pixels at least.
 double value(const Patch& patch) {
-  const marrow::similarity::Gradients g = marrow::similarity::gradients_of(patch);
+  const marrow::match::Gradients g = marrow::match::gradients_of(patch);
   const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts),
                least_seen = median_length(g.seen_u, g.seen_v, g.counts);
   double used = 0, sum = 0, all = 0;
@@ -41,8 +41,8 @@ std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector
                                                          const marrow::List<marrow::View>& views,
                                                          const marrow::List<marrow::Pose>* others,
                                                          const marrow::List<marrow::Projector>* other_projectors,
-                                                         const marrow::similarity::IntensityOptions& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1, value);
+                                                         const marrow::match::IntensityOptions& options) {
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 1, value);
 }
 
 }  // namespace
@@ -52,5 +52,5 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for its "
       "logarithm)");
-  marrow::similarity::declare<decltype(node), marrow::similarity::IntensityOptions>(node);
+  marrow::match::declare<decltype(node), marrow::match::IntensityOptions>(node);
 }

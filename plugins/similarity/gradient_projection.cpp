@@ -8,7 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
@@ -71,7 +71,7 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
 
 GradientImage gradients_of(const marrow::View& view, double blur_px) {
   GradientImage image;
-  cv::Mat smooth = marrow::similarity::line_integrals(view.image.pixels);
+  cv::Mat smooth = marrow::match::line_integrals(view.image.pixels);
   image.counts = view.mask.empty() ? cv::Mat(smooth.size(), CV_8U, cv::Scalar(1)) : cv::Mat((view.mask != 0) & 1);
   image.counts.setTo(0, smooth != smooth);
   // Near the mask's end a gradient is in part of what lies beyond.
@@ -115,7 +115,7 @@ class GradientProjection : public marrow::Cost {
     std::vector<double> of_view(images_.size());
     tbb::parallel_for(std::size_t(0), of_view.size(),
                       [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+    return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
   /// Fewer points where an outline's would be further apart; smoother images where pixels would be.
@@ -200,10 +200,10 @@ std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh
   if (volume.grid.frame != mesh.frame)
     throw marrow::Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + volume.grid.frame +
                         "'; give the volume that the mesh was made from");
-  marrow::similarity::check_views(views);
-  marrow::similarity::check_weights(options.weights, views.size());
+  marrow::match::check_views(views);
+  marrow::match::check_weights(options.weights, views.size());
   const marrow::List<marrow::View> own =
-      marrow::similarity::without_shadows(views, marrow::similarity::others_of(projector, others, other_projectors));
+      marrow::match::without_shadows(views, marrow::match::others_of(projector, others, other_projectors));
   const auto scene = std::make_shared<GradientProjection::Scene>(
       GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
   return std::make_shared<GradientProjection>(scene, options.blur_px, 1);

@@ -2,14 +2,14 @@
 #include <marrow/plugin.hpp>
 #include <numeric>
 
-#include "histogram.hpp"
+#include "marrow/toolbox/match/histogram.hpp"
 
 namespace {
 
-using marrow::similarity::bins_of;
-using marrow::similarity::Patch;
+using marrow::match::bins_of;
+using marrow::match::Patch;
 
-struct Options : marrow::similarity::IntensityOptions {
+struct Options : marrow::match::IntensityOptions {
   int bins = 32;
 };
 
@@ -25,8 +25,8 @@ double value(const Patch& patch, int bins) {
     joint[x * std::size_t(bins) + y] += 1, of_a[x] += 1, of_b[y] += 1, n += 1;
   }
   if (n < 16) return 1;
-  const double together = marrow::similarity::entropy(joint, n), rendered = marrow::similarity::entropy(of_a, n),
-               seen = marrow::similarity::entropy(of_b, n);
+  const double together = marrow::match::entropy(joint, n), rendered = marrow::match::entropy(of_a, n),
+               seen = marrow::match::entropy(of_b, n);
   return rendered > 0 && seen > 0 ? 2 - (rendered + seen) / together : 1;
 }
 
@@ -35,8 +35,8 @@ std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& 
                                                        const marrow::List<marrow::Pose>* others,
                                                        const marrow::List<marrow::Projector>* other_projectors,
                                                        const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 1,
-                                            [bins = options.bins](const Patch& patch) { return value(patch, bins); });
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 1,
+                                       [bins = options.bins](const Patch& patch) { return value(patch, bins); });
 }
 
 }  // namespace
@@ -46,6 +46,6 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et al. "
       "1998)");
-  marrow::similarity::declare<decltype(node), Options>(node);
+  marrow::match::declare<decltype(node), Options>(node);
   node.option("bins", &Options::bins, "of the histograms", marrow::at_least(4), marrow::at_most(256));
 }

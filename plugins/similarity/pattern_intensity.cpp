@@ -2,13 +2,13 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
 
-using marrow::similarity::Patch;
+using marrow::match::Patch;
 
-struct Options : marrow::similarity::IntensityOptions {
+struct Options : marrow::match::IntensityOptions {
   int radius_pixels = 3;
   double sigma = 0.5;
 };
@@ -31,8 +31,8 @@ void each_pair(const Patch& patch, int radius, const Of& of) {
 /// and s the given part of the deviation of the image, over the same sum without the model. That is Weese's and
 /// Penney's sum over a fixed region, the image, but for constants; a mean over the model's surroundings would be best
 /// where the image is even.
-marrow::similarity::Measure measure_of(const Patch& whole, const Options& options) {
-  const double deviation = marrow::similarity::deviation(whole.seen, whole.counts),
+marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
+  const double deviation = marrow::match::deviation(whole.seen, whole.counts),
                s2 = std::pow(options.sigma * deviation, 2);
   if (!(s2 > 1e-14)) return [](const Patch&) { return 1.0; };
   const auto structure = [s2](double d) { return d * d / (s2 + d * d); };
@@ -40,7 +40,7 @@ marrow::similarity::Measure measure_of(const Patch& whole, const Options& option
   each_pair(whole, options.radius_pixels,
             [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
   return [=, radius = options.radius_pixels](const Patch& patch) {
-    const float scale = float(marrow::similarity::scale_of(marrow::similarity::gradients_of(patch)));
+    const float scale = float(marrow::match::scale_of(marrow::match::gradients_of(patch)));
     if (!(scale > 0) || !(all > 0)) return 1.0;
     double less = 0;
     each_pair(patch, radius, [&](std::size_t i, std::size_t j) {
@@ -56,8 +56,8 @@ std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& p
                                                       const marrow::List<marrow::Pose>* others,
                                                       const marrow::List<marrow::Projector>* other_projectors,
                                                       const Options& options) {
-  return marrow::similarity::intensity_cost(projector, views, others, other_projectors, options, 2,
-                                            [options](const Patch& whole) { return measure_of(whole, options); });
+  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2,
+                                       [options](const Patch& whole) { return measure_of(whole, options); });
 }
 
 }  // namespace
@@ -67,7 +67,7 @@ MARROW_PLUGIN(plugin) {
   node.summary(
       "Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans Inf "
       "Technol Biomed 1997; Penney et al. 1998)");
-  marrow::similarity::declare<decltype(node), Options>(node);
+  marrow::match::declare<decltype(node), Options>(node);
   node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1),
               marrow::at_most(20))
       .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image",

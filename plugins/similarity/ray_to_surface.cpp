@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "inputs.hpp"
+#include "marrow/toolbox/match/inputs.hpp"
 
 namespace {
 
@@ -134,7 +134,7 @@ class RayToSurface : public marrow::Cost {
       for (const auto& touch : touches) sum += touch ? touch->like * (loss_(touch->distance_mm) - loss_.worst()) : 0;
       of_view.push_back(loss_.worst() + (touches.empty() ? 0 : sum / double(touches.size())));
     }
-    return marrow::similarity::weighted_mean(of_view, scene_->options.weights);
+    return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
   /// Where the least distance along a ray changes, the point where it lies need not be followed: its own motion along
@@ -144,10 +144,10 @@ class RayToSurface : public marrow::Cost {
     Expansion about;
     double weights = 0;
     for (std::size_t i = 0; i < scene_->views.size(); ++i)
-      weights += marrow::similarity::weight_of(scene_->options.weights, i);
+      weights += marrow::match::weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < scene_->views.size(); ++i) {
       const auto touches = touches_of(i, world_from_model);
-      const double share = marrow::similarity::weight_of(scene_->options.weights, i) / weights;
+      const double share = marrow::match::weight_of(scene_->options.weights, i) / weights;
       about.value += share * loss_.worst();
       for (const auto& touch : touches) {
         if (!touch) continue;
@@ -273,8 +273,8 @@ std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& fi
                                                    const marrow::List<marrow::Pose>* others,
                                                    const marrow::List<marrow::Projector>* other_projectors,
                                                    const Options& options) {
-  marrow::similarity::check_edges(views, edges);
-  marrow::similarity::check_weights(options.weights, views.size());
+  marrow::match::check_edges(views, edges);
+  marrow::match::check_weights(options.weights, views.size());
   if (field.values_mm.size() != field.grid.count() ||
       *std::min_element(field.grid.size.begin(), field.grid.size.end()) < 2)
     throw marrow::Error(
@@ -282,9 +282,9 @@ std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& fi
         "segmented fragment");
   if (*std::min_element(field.values_mm.begin(), field.values_mm.end()) >= 0)
     throw marrow::Error("the field has no inside, so no ray can touch its surface; check the segmentation");
-  const marrow::List<marrow::EdgeMap> own = marrow::similarity::without_outlines(
-      views, edges, marrow::similarity::others_of(projector, others, other_projectors),
-      marrow::similarity::kOthersReach_px, options.direction_tolerance_deg);
+  const marrow::List<marrow::EdgeMap> own =
+      marrow::match::without_outlines(views, edges, marrow::match::others_of(projector, others, other_projectors),
+                                      marrow::match::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<RayToSurface::Scene>(RayToSurface::Scene{views, {}, Distance(field), options});
   for (std::size_t i = 0; i < views.size(); ++i) scene->rays.push_back(rays_of(views[i], own[i]));
   return std::make_shared<RayToSurface>(std::move(scene), options.ray_step, options.reach_mm);

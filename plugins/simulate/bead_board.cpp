@@ -1,34 +1,34 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "board_views.hpp"
-#include "random.hpp"
+#include "marrow/toolbox/phantom/board_views.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
 using namespace marrow;
 
-struct Options : simulate::DeviceOptions, simulate::BoardPoses, simulate::Exposure {
+struct Options : phantom::DeviceOptions, phantom::BoardPoses, phantom::Exposure {
   std::filesystem::path board;
 };
 
 struct Simulated {
   List<Image> images;
   List<Camera> cameras;
-  read::Calibration calibration;
+  Calibration calibration;
 };
 
 Simulated bead_board(const Options& options, Context& context) {
-  const camera::Board board = camera::read_board_file(options.board);
+  const calibration::Board board = calibration::read_board_file(options.board);
   Simulated simulated;
-  simulated.calibration = simulate::make_device(options);
-  read::check_distortion(simulated.calibration.intrinsics, simulated.calibration.distortion, options.width_px,
-                         options.height_px, "pincushion_percent");
-  const auto poses = simulate::draw_board_poses(board, options, context.seed());
+  simulated.calibration = phantom::make_device(options);
+  check_distortion(simulated.calibration.intrinsics, simulated.calibration.distortion, options.width_px,
+                   options.height_px, "pincushion_percent");
+  const auto poses = phantom::draw_board_poses(board, options, context.seed());
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::string name = "view" + std::to_string(i + 1);
-    simulated.images.add(name, simulate::expose_board(board, simulated.calibration, poses[i], options,
-                                                      simulate::Random(context.seed(), i)()));
+    simulated.images.add(name, phantom::expose_board(board, simulated.calibration, poses[i], options,
+                                                     phantom::Random(context.seed(), i)()));
     simulated.cameras.add(name, {options.width_px, options.height_px, simulated.calibration.intrinsics, poses[i]});
     context.progress(double(i + 1) / double(poses.size()), "views");
   }

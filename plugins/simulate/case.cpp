@@ -3,13 +3,13 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "phantom.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Fragment;
-using simulate::Phantom;
+using phantom::Fragment;
+using phantom::Phantom;
 
 struct CaseOptions {
   std::vector<std::string> wanted{"distal"};
@@ -31,7 +31,7 @@ std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::V
 }
 
 Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
-  simulate::check_phantom(phantom, "simulate.case");
+  phantom::check_phantom(phantom, "simulate.case");
   check_volume(ct, "simulate.case: CT");
   Case result;
   result.ct = ct;

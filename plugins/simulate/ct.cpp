@@ -7,14 +7,14 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "random.hpp"
-#include "solid.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Interval;
-using simulate::Phantom;
+using phantom::Interval;
+using phantom::Phantom;
 
 struct CtOptions {
   std::array<double, 3> spacing_mm{0.8, 0.8, 1.0};
@@ -106,10 +106,10 @@ class Scanner {
         options_(options),
         raster_(raster_under(grid, options.blur_mm)),
         fill_(phantom.bone),
-        rays_(phantom, raster_.size[1], raster_.size[2], [this](const simulate::Fragment& fragment) {
+        rays_(phantom, raster_.size[1], raster_.size[2], [this](const phantom::Fragment& fragment) {
           return [this, ct_from_bone = fragment.ct_from_bone](const Eigen::Vector3d& point) {
             const Eigen::Vector3d fine = (ct_from_bone * point - raster_.origin_mm).cwiseQuotient(raster_.spacing_mm);
-            return simulate::RayVertex{fine.y(), fine.z(), fine.x()};
+            return phantom::RayVertex{fine.y(), fine.z(), fine.x()};
           };
         }) {
     for (int k = 0; k < 3; ++k)
@@ -170,11 +170,11 @@ class Scanner {
 
   /// Adds what bone changes in one fine row of rays to the plane, in each bin by the length that the bone takes of it.
   /// Returns where.
-  Rectangle draw(std::span<const simulate::Crossing> crossings, int row, std::vector<double>& plane) const {
+  Rectangle draw(std::span<const phantom::Crossing> crossings, int row, std::vector<double>& plane) const {
     Rectangle touched{raster_.size[0], 0, raster_.size[1], 0};
     const double z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
     std::vector<Interval> intervals;
-    simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
+    phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
       rays_.intervals(ray, intervals);
       const int y = int(ray.front().column);
       double* bins = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]);
@@ -233,14 +233,14 @@ class Scanner {
   const Grid& grid_;
   const CtOptions& options_;
   Raster raster_;
-  simulate::Fill fill_;
-  simulate::SolidRays rays_;
+  phantom::Fill fill_;
+  phantom::SolidRays rays_;
   std::array<std::vector<double>, 3> spread_;
   std::vector<double> background_fine_, background_;  ///< without bone, the same for all z
 };
 
 Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) {
-  simulate::check_phantom(phantom, "simulate.ct");
+  phantom::check_phantom(phantom, "simulate.ct");
   for (double spacing : options.spacing_mm)
     if (!(spacing > 0)) throw Error("simulate.ct: spacing_mm must be positive, got " + std::to_string(spacing));
   Volume volume;
@@ -255,7 +255,7 @@ Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) 
     const int first = slab * kSlabSlices, last = std::min(volume.grid.size[2], first + kSlabSlices);
     scanner.scan(first, last, volume.values);
     for (std::size_t i = std::size_t(first) * slice; i < std::size_t(last) * slice; ++i) {
-      simulate::Random random(context.seed(), i);
+      phantom::Random random(context.seed(), i);
       volume.values[i] = std::round(float(volume.values[i] + options.noise_hu * random.normal()));
     }
     context.progress(double(++done) / slabs, "slices");

@@ -4,15 +4,15 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "femur_shape.hpp"
-#include "phantom.hpp"
-#include "polygonise.hpp"
-#include "random.hpp"
+#include "marrow/toolbox/phantom/femur_shape.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/polygonise.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Bone;
+using phantom::Bone;
 
 struct FemurOptions {
   double length_mm = 446;
@@ -36,12 +36,12 @@ struct FemurOptions {
 };
 
 /// Draws each measure from a normal distribution with the spread found among people, within 2 standard deviations.
-simulate::FemurShape drawn(const FemurOptions& options) {
-  simulate::Random random(std::uint64_t(options.shape_seed), 1);
+phantom::FemurShape drawn(const FemurOptions& options) {
+  phantom::Random random(std::uint64_t(options.shape_seed), 1);
   const auto draw = [&](double mean, double spread) {
     return mean + options.variation * spread * std::clamp(random.normal(), -2.0, 2.0);
   };
-  simulate::FemurShape shape;
+  phantom::FemurShape shape;
   shape.length_mm = draw(options.length_mm, 26.6);
   // People's widths go together with their length: half of the spread is common.
   const double size = shape.length_mm / options.length_mm;
@@ -66,17 +66,17 @@ Bone femur(const FemurOptions& options, Context& context) {
     throw Error("simulate.femur: a canal of " + std::to_string(options.canal_diameter_mm) +
                 " mm leaves less than 2 mm of cortex in a shaft of " +
                 std::to_string(std::min(options.shaft_ml_mm, options.shaft_ap_mm)) + " mm; make the canal narrower");
-  const simulate::FemurShape shape = drawn(options);
-  const simulate::FemurField field(shape);
+  const phantom::FemurShape shape = drawn(options);
+  const phantom::FemurField field(shape);
   constexpr double kSteepest = 2;
   Bone bone;
   context.progress(0, "outer surface");
-  bone.outer = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.outer(p); }, field.low_mm(),
-                                    field.high_mm(), options.resolution_mm, kSteepest);
+  bone.outer = phantom::polygonise([&](const Eigen::Vector3d& p) { return field.outer(p); }, field.low_mm(),
+                                   field.high_mm(), options.resolution_mm, kSteepest);
   context.check_cancelled();
   context.progress(0.6, "inner surface");
-  bone.inner = simulate::polygonise([&](const Eigen::Vector3d& p) { return field.inner(p); }, field.low_mm(),
-                                    field.high_mm(), options.resolution_mm, kSteepest);
+  bone.inner = phantom::polygonise([&](const Eigen::Vector3d& p) { return field.inner(p); }, field.low_mm(),
+                                   field.high_mm(), options.resolution_mm, kSteepest);
   bone.outer.frame = bone.inner.frame = "bone";
   // Cancellous bone of 200-500 HU at both ends, marrow alone in the canal.
   const double length = shape.length_mm;
@@ -84,9 +84,9 @@ Bone femur(const FemurOptions& options, Context& context) {
   bone.fill_fraction = {0.30, 0.24, 0.15, 0, 0, 0.16, 0.30};
   bone.thigh_radius_mm = options.thigh_radius_mm;
   bone.fat_mm = options.fat_mm;
-  simulate::place_distal_end(bone, options.isocentre_from_distal_end_mm);
+  phantom::place_distal_end(bone, options.isocentre_from_distal_end_mm);
   bone.thigh_centre_mm = Eigen::Vector2d::Zero();
-  simulate::check_bone(bone, "simulate.femur");
+  phantom::check_bone(bone, "simulate.femur");
   return bone;
 }
 

@@ -10,14 +10,14 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "random.hpp"
-#include "solid.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Interval;
-using simulate::Phantom;
+using phantom::Interval;
+using phantom::Phantom;
 
 struct FluoroscopyOptions {
   double photons = 2000;
@@ -67,11 +67,11 @@ class XRay {
         fill_(phantom.bone),
         detector_to_ray_(camera.intrinsics.inverse()),
         rays_(phantom, camera.width_px * kSubsamples, camera.height_px * kSubsamples,
-              [&](const simulate::Fragment& fragment) { return map(fragment); }) {
+              [&](const phantom::Fragment& fragment) { return map(fragment); }) {
     for (const auto& fragment : phantom.fragments) bone_from_world_.push_back(inverse(fragment.world_from_bone()));
   }
 
-  const simulate::SolidRays& rays() const { return rays_; }
+  const phantom::SolidRays& rays() const { return rays_; }
 
   Ray ray(int column, int row) const {
     const Eigen::Vector2d pixel((column + 0.5) / kSubsamples - 0.5, (row + 0.5) / kSubsamples - 0.5);
@@ -82,7 +82,7 @@ class XRay {
   Lengths soft_tissue(const Ray& ray) const {
     const auto& bone = phantom_.bone;
     const auto inside = [&](double radius) {
-      const auto [from, to] = simulate::through_cylinder(bone.thigh_centre_mm, radius, ray.source, ray.direction);
+      const auto [from, to] = phantom::through_cylinder(bone.thigh_centre_mm, radius, ray.source, ray.direction);
       return std::max(0.0, to - std::max(0.0, from)) * ray.mm_per_depth;
     };
     Lengths lengths;
@@ -130,7 +130,7 @@ class XRay {
   }
 
  private:
-  simulate::SolidRays::Map map(const simulate::Fragment& fragment) const {
+  phantom::SolidRays::Map map(const phantom::Fragment& fragment) const {
     const RigidTransform camera_from_bone = camera_.camera_from_world * fragment.world_from_bone();
     return [this, camera_from_bone, name = fragment.name](const Eigen::Vector3d& point) {
       const Eigen::Vector3d x = camera_from_bone * point;
@@ -140,16 +140,16 @@ class XRay {
             " mm from the X-ray source; it must lie in front of the source, so check the camera's distances and the "
             "fragment's translation");
       const Eigen::Vector2d pixel = (camera_.intrinsics * x).hnormalized();
-      return simulate::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5,
-                                 -1 / x.z()};
+      return phantom::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5,
+                                -1 / x.z()};
     };
   }
 
   const Phantom& phantom_;
   const Camera& camera_;
-  simulate::Fill fill_;
+  phantom::Fill fill_;
   Eigen::Matrix3d detector_to_ray_;
-  simulate::SolidRays rays_;
+  phantom::SolidRays rays_;
   std::vector<RigidTransform> bone_from_world_;
 };
 
@@ -183,7 +183,7 @@ cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& opti
 void add_quantum_noise(cv::Mat1d& expected, std::uint64_t seed) {
   tbb::parallel_for(0, expected.rows, [&](int row) {
     for (int column = 0; column < expected.cols; ++column) {
-      simulate::Random random(seed, std::uint64_t(row) << 32 | std::uint64_t(column));
+      phantom::Random random(seed, std::uint64_t(row) << 32 | std::uint64_t(column));
       double& photons = expected(row, column);
       if (photons > 0) photons = double(std::poisson_distribution<std::int64_t>(photons)(random));
     }
@@ -218,10 +218,10 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
 
 List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options,
                        Context& context) {
-  simulate::check_phantom(phantom, "simulate.fluoroscopy");
+  phantom::check_phantom(phantom, "simulate.fluoroscopy");
   List<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const std::uint64_t seed = simulate::Random(context.seed(), i)();
+    const std::uint64_t seed = phantom::Random(context.seed(), i)();
     views.add(cameras.name(i), expose(cameras.name(i), phantom, cameras[i], options, seed, context));
     context.progress(double(i + 1) / double(cameras.size()), "views");
   }

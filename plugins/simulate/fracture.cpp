@@ -5,16 +5,16 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "phantom.hpp"
-#include "random.hpp"
-#include "solid.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Bone;
-using simulate::Fragment;
-using simulate::Phantom;
+using phantom::Bone;
+using phantom::Fragment;
+using phantom::Phantom;
 
 struct FractureOptions {
   double level = 0.45;
@@ -69,7 +69,7 @@ class Relief {
   Relief(const FractureOptions& options, const Eigen::Vector3d& centre) : centre_(centre) {
     const double slope = std::tan(radians(options.obliquity_deg)), direction = radians(options.direction_deg);
     slope_ = slope * Eigen::Vector2d(std::cos(direction), std::sin(direction));
-    simulate::Random random(std::uint64_t(options.fracture_seed), 3);
+    phantom::Random random(std::uint64_t(options.fracture_seed), 3);
     double power = 0;
     for (Wave& wave : waves_) {
       const double length = 3 * std::pow(40.0 / 3, random.uniform()), angle = 2 * kPi * random.uniform();
@@ -165,20 +165,20 @@ void add_seeds(const Phantom& phantom, const Fragment& fragment, int along, std:
                first_z = box.low.z() + 0.5 * step;
   const int lines = int(box.high[across] - low) + 1;  // 1 mm apart
   // (y, z, x) and (z, x, y) are right-handed.
-  const simulate::SolidRays rays(
+  const phantom::SolidRays rays(
       {phantom.bone, phantom.fracture, {fragment}}, along == 0 ? lines : kHeights, along == 0 ? kHeights : lines,
       [&](const Fragment&) {
         return [=](const Eigen::Vector3d& p) {
           const double side = p[across] - low, up = (p.z() - first_z) / step;
-          return along == 0 ? simulate::RayVertex{side, up, p.x()} : simulate::RayVertex{up, side, p.y()};
+          return along == 0 ? phantom::RayVertex{side, up, p.x()} : phantom::RayVertex{up, side, p.y()};
         };
       });
   std::vector<Eigen::Vector2d> centres;
   for (int i = 0; i < kHeights; ++i) centres.push_back(centre_at(phantom.bone.outer, first_z + i * step));
-  const simulate::Fill fill(phantom.bone);
-  std::vector<simulate::Interval> intervals;
+  const phantom::Fill fill(phantom.bone);
+  std::vector<phantom::Interval> intervals;
   const auto crossings = rays.bundle().crossings(0, rays.bundle().rows());
-  simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
+  phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
     const std::uint32_t line = along == 0 ? ray[0].column : ray[0].row,
                         height = along == 0 ? ray[0].row : ray[0].column;
     if (line != std::uint32_t(std::lround(centres[height][across] - low))) return;
@@ -204,7 +204,7 @@ Vector6d motion(const std::array<double, 3>& rotation_deg, const std::array<doub
 }
 
 Phantom fracture(const Bone& bone, const FractureOptions& options) {
-  simulate::check_bone(bone, "simulate.fracture");
+  phantom::check_bone(bone, "simulate.fracture");
   if (!(options.level >= 0.1 && options.level <= 0.9))
     throw Error("simulate.fracture: the level " + std::to_string(options.level) +
                 " must lie in 0.1 to 0.9 of the bone's length");
@@ -229,7 +229,7 @@ Phantom fracture(const Bone& bone, const FractureOptions& options) {
   }
   for (Fragment& fragment : phantom.fragments)
     for (const int along : {0, 1}) add_seeds(phantom, fragment, along, fragment.seeds_mm);
-  simulate::check_phantom(phantom, "simulate.fracture");
+  phantom::check_phantom(phantom, "simulate.fracture");
   return phantom;
 }
 

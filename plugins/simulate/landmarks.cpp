@@ -4,13 +4,13 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "phantom.hpp"
-#include "random.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Fragment;
+using phantom::Fragment;
 
 struct Options {
   int count = 6;
@@ -50,9 +50,9 @@ std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<
   return points;
 }
 
-List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* cameras, const Options& options,
+List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* cameras, const Options& options,
                           Context& context) {
-  simulate::check_phantom(phantom, "simulate.landmarks");
+  phantom::check_phantom(phantom, "simulate.landmarks");
   const List<Camera> views = cameras ? *cameras : List<Camera>();
   List<Landmarks> all;
   for (std::size_t f = 0; f < phantom.fragments.size(); ++f) {
@@ -66,7 +66,7 @@ List<Landmarks> landmarks(const simulate::Phantom& phantom, const List<Camera>* 
                    std::to_string(options.count) + " landmarks in all of them; it is left out");
       continue;
     }
-    simulate::Random random(context.seed(), f);
+    phantom::Random random(context.seed(), f);
     Landmarks found;
     for (const Eigen::Vector3d& point : points) {
       std::string name = "p";

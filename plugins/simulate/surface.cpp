@@ -5,13 +5,13 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
-#include "phantom.hpp"
-#include "stl.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
 using namespace marrow;
-using simulate::Bone;
+using phantom::Bone;
 
 struct SurfaceOptions {
   std::filesystem::path outer;
@@ -26,7 +26,7 @@ struct SurfaceOptions {
 };
 
 Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
-  Mesh mesh = simulate::read_stl(path);
+  Mesh mesh = files::read_mesh_file(path, 1);
   const auto about = [&](std::size_t k, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(radians(options.rotation_deg[k]), axis).toRotationMatrix();
   };
@@ -60,9 +60,9 @@ Bone surface(const SurfaceOptions& options) {
   bone.fill_fraction = options.fill_fraction;
   bone.thigh_radius_mm = options.thigh_radius_mm;
   bone.fat_mm = options.fat_mm;
-  simulate::place_distal_end(bone, options.isocentre_from_distal_end_mm);
+  phantom::place_distal_end(bone, options.isocentre_from_distal_end_mm);
   bone.thigh_centre_mm = Eigen::Vector2d::Zero();
-  simulate::check_bone(bone, "simulate.surface");
+  phantom::check_bone(bone, "simulate.surface");
   return bone;
 }
 

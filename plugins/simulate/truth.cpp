@@ -2,7 +2,7 @@
 // What is known exactly about a phantom's fragments, for studies of steps that need no CT.
 #include <marrow/plugin.hpp>
 
-#include "phantom.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
 
 namespace {
 
@@ -13,10 +13,10 @@ struct Known {
   List<Truth> truths;
 };
 
-Known truth(const simulate::Phantom& phantom) {
-  simulate::check_phantom(phantom, "simulate.truth");
+Known truth(const phantom::Phantom& phantom) {
+  phantom::check_phantom(phantom, "simulate.truth");
   Known known;
-  for (const simulate::Fragment& fragment : phantom.fragments) {
+  for (const phantom::Fragment& fragment : phantom.fragments) {
     if (fragment.outer.triangles.empty())
       throw Error("simulate.truth: fragment '" + fragment.name +
                   "' has no surface of its own; make it with simulate.fracture");

@@ -6,14 +6,14 @@
 #include <marrow/domain/names.hpp>
 #include <marrow/plugin.hpp>
 
-#include "atomic_write.hpp"
-#include "picture_out.hpp"
-#include "yaml_text.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/picture_out.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace {
 
 namespace fs = std::filesystem;
-using marrow::write::quoted;
+using marrow::files::quoted;
 
 /// PNG for 8 and 16 bits, TIFF for float.
 std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
@@ -26,17 +26,17 @@ struct ViewFiles {
 ViewFiles write_view_files(const marrow::View& view, const fs::path& folder, const std::string& stem) {
   const std::string dot = stem.empty() ? "" : stem + ".";
   ViewFiles files{(stem.empty() ? "image" : stem) + image_name(view.image), dot + "camera.yaml", ""};
-  marrow::write::write_pixels(folder / files.image, view.image.pixels);
-  marrow::write::write_plainly(folder / files.camera, {marrow::write::camera(view.camera)});
+  marrow::files::write_pixels(folder / files.image, view.image.pixels);
+  marrow::files::write_plainly(folder / files.camera, {marrow::files::camera(view.camera)});
   if (!view.mask.empty()) {
     files.mask = dot + "mask.png";
-    marrow::write::write_pixels(folder / files.mask, view.mask);
+    marrow::files::write_pixels(folder / files.mask, view.mask);
   }
   return files;
 }
 
 void view(const marrow::View& view, const std::string& path) {
-  marrow::write::write_atomically(path, [&](const fs::path& folder) {
+  marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
     write_view_files(view, folder, "");
   });
@@ -85,11 +85,11 @@ std::string fragments_text(const marrow::Case& value) {
   std::string text = "fragments:\n";
   for (std::size_t i = 0; i < value.seeds.size(); ++i) {
     const std::string& name = value.seeds.name(i);
-    text += "  " + quoted(name) + ":\n" + marrow::write::seeds(value.seeds[i], "    ");
+    text += "  " + quoted(name) + ":\n" + marrow::files::seeds(value.seeds[i], "    ");
     if (const marrow::Pose* start = value.start.find(name))
-      text += "    start:\n" + marrow::write::transform(start->world_from_model, "      ");
+      text += "    start:\n" + marrow::files::transform(start->world_from_model, "      ");
     if (const marrow::Truth* truth = value.truth.find(name))
-      text += "    truth:\n" + marrow::write::transform(truth->world_from_model, "      ");
+      text += "    truth:\n" + marrow::files::transform(truth->world_from_model, "      ");
   }
   return text;
 }
@@ -124,10 +124,10 @@ void check_case(const marrow::Case& value, const std::string& path) {
 
 void write_case(const marrow::Case& value, const std::string& path) {
   check_case(value, path);
-  marrow::write::write_atomically(path, [&](const fs::path& folder) {
+  marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
-    marrow::write::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
-    marrow::write::write_plainly(folder / "case.yaml",
+    marrow::files::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
+    marrow::files::write_plainly(folder / "case.yaml",
                                  {"marrow-case: 1\nct: ct.mha\n", views_text(value, folder), fragments_text(value)});
   });
 }

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <marrow/plugin.hpp>
 
-#include "atomic_write.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
 
 namespace {
 
@@ -35,7 +35,7 @@ void mesh(const marrow::Mesh& mesh, const std::string& path) {
     append(bytes, std::uint8_t(3));
     for (const std::uint32_t corner : triangle) append(bytes, std::int32_t(corner));
   }
-  marrow::write::write_text(path, bytes);
+  marrow::files::write_text(path, bytes);
 }
 
 }  // namespace

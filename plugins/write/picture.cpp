@@ -2,13 +2,13 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "atomic_write.hpp"
-#include "picture_out.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/picture_out.hpp"
 
 namespace {
 
 void write_png(const std::string& path, const cv::Mat& pixels) {
-  marrow::write::write_atomically(path, [&](const auto& temporary) { marrow::write::write_pixels(temporary, pixels); });
+  marrow::files::write_atomically(path, [&](const auto& temporary) { marrow::files::write_pixels(temporary, pixels); });
 }
 
 /// 8 and 16 bits are kept as they are. PNG has no float, so float is scaled from its least to its greatest value.

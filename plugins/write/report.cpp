@@ -7,8 +7,8 @@
 #include <marrow/plugin.hpp>
 #include <nlohmann/json.hpp>
 
-#include "atomic_write.hpp"
-#include "samples_out.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/samples_out.hpp"
 
 namespace {
 
@@ -49,7 +49,7 @@ ordered_json json_of(const marrow::Scene::Backdrop& view) {
   if (pixels.depth() != CV_8U || (pixels.channels() != 1 && pixels.channels() != 3))
     throw marrow::Error("view '" + view.name + "' of a scene: expected a picture of 8 bits in one or three channels");
   const std::string png =
-      marrow::write::png_of(pixels.cols, pixels.rows, pixels.channels(), marrow::write::Sample::u8, pixels.data);
+      marrow::files::png_of(pixels.cols, pixels.rows, pixels.channels(), marrow::files::Sample::u8, pixels.data);
   return {{"name", view.name},
           {"width_px", view.camera.width_px},
           {"height_px", view.camera.height_px},
@@ -70,7 +70,7 @@ void scene(const marrow::Scene& scene, const std::string& path) {
         json["poses"].push_back(
             {{"mesh", i}, {"name", placement.name}, {"world_from_model", rows(placement.world_from_model)}});
   for (const auto& view : scene.views) json["views"].push_back(json_of(view));
-  marrow::write::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::files::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 void landscape(const marrow::Landscape& landscape, const std::string& path) {
@@ -83,7 +83,7 @@ void landscape(const marrow::Landscape& landscape, const std::string& path) {
     if (profile.truth) one["truth"] = *profile.truth;
     json["profiles"].push_back(one);
   }
-  marrow::write::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+  marrow::files::write_text(path, json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
 }
 
 }  // namespace

@@ -2,26 +2,26 @@
 #include <marrow/plugin.hpp>
 #include <nlohmann/json.hpp>
 
-#include "atomic_write.hpp"
-#include "yaml_text.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace {
 
-using marrow::write::write_text;
+using marrow::files::write_text;
 
-void pose(const marrow::Pose& pose, const std::string& path) { write_text(path, marrow::write::pose(pose)); }
+void pose(const marrow::Pose& pose, const std::string& path) { write_text(path, marrow::files::pose(pose)); }
 
-void truth(const marrow::Truth& truth, const std::string& path) { write_text(path, marrow::write::truth(truth)); }
+void truth(const marrow::Truth& truth, const std::string& path) { write_text(path, marrow::files::truth(truth)); }
 
-void camera(const marrow::Camera& camera, const std::string& path) { write_text(path, marrow::write::camera(camera)); }
+void camera(const marrow::Camera& camera, const std::string& path) { write_text(path, marrow::files::camera(camera)); }
 
 void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
-  write_text(path, marrow::write::shaft_lines(lines));
+  write_text(path, marrow::files::shaft_lines(lines));
 }
 
 void seeds(const marrow::Seeds& seeds, const std::string& path) {
-  write_text(path, "marrow-seeds: 1\nfragments:\n  " + marrow::write::quoted(seeds.fragment) + ":\n" +
-                       marrow::write::seeds(seeds, "    "));
+  write_text(path, "marrow-seeds: 1\nfragments:\n  " + marrow::files::quoted(seeds.fragment) + ":\n" +
+                       marrow::files::seeds(seeds, "    "));
 }
 
 void metrics(const marrow::Metrics& metrics, const std::string& path) {

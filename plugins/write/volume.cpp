@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "atomic_write.hpp"
-#include "picture_out.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/picture_out.hpp"
 
 namespace {
 
 void volume(const marrow::Volume& volume, const std::string& path) {
-  marrow::write::write_atomically(
-      path, [&](const auto& temporary) { marrow::write::write_grid(temporary, volume.grid, volume.values); });
+  marrow::files::write_atomically(
+      path, [&](const auto& temporary) { marrow::files::write_grid(temporary, volume.grid, volume.values); });
 }
 
 void signed_field(const marrow::SignedField& field, const std::string& path) {
-  marrow::write::write_atomically(
-      path, [&](const auto& temporary) { marrow::write::write_grid(temporary, field.grid, field.values_mm); });
+  marrow::files::write_atomically(
+      path, [&](const auto& temporary) { marrow::files::write_grid(temporary, field.grid, field.values_mm); });
 }
 
 }  // namespace

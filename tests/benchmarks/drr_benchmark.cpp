@@ -13,9 +13,9 @@
 #include <fstream>
 #include <random>
 
+#include "marrow/domain/c_arm.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/catalogue.hpp"
-#include "plugins/camera/carm_geometry.hpp"
 
 namespace {
 
@@ -46,8 +46,8 @@ Volume thigh(bool bone_only) {
 
 Camera camera_of(int pixels) {
   // The detector is wholly covered by the volume.
-  const camera::CArm arm{pixels, pixels, Eigen::Vector2d::Constant(230.0 / pixels), 1000, 600, Eigen::Vector3d::Zero()};
-  return camera::carm_camera(arm, camera::world_from_camera_rotation(0, 0));
+  const CArm arm{pixels, pixels, Eigen::Vector2d::Constant(230.0 / pixels), 1000, 600, Eigen::Vector3d::Zero()};
+  return carm_camera(arm, world_from_camera_rotation(0, 0));
 }
 
 std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std::string& name, const Volume& volume,

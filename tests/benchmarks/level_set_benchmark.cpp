@@ -11,7 +11,7 @@
 #include <cstring>
 
 #include "itk_geodesic.hpp"
-#include "plugins/segment/interior.hpp"
+#include "marrow/toolbox/field/interior.hpp"
 #include "plugins/segment/level_set.cpp"
 #include "segment/distal_end.hpp"
 
@@ -120,7 +120,7 @@ void itk_contour(const phantom::DistalEnd& bone, const Volume& volume, const itk
       is_bone[at] = field.values_mm[at] < 0;
       is_other[at] = results[1 - f].field[at] < 0;
     }
-    segment::fill_interior(volume.grid, is_bone, is_other);
+    marrow::field::fill_interior(volume.grid, is_bone, is_other);
     for (std::size_t at = 0; at < is_bone.size(); ++at)
       if (is_bone[at]) field.values_mm[at] = std::min(field.values_mm[at], -0.4f);
     fields.add(list.name(f), std::move(field));

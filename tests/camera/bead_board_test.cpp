@@ -9,6 +9,7 @@
 #include <map>
 
 #include "camera/boards.hpp"
+#include "marrow/toolbox/files/calibration_file.hpp"
 #include "read/files.hpp"
 
 namespace {
@@ -19,23 +20,23 @@ using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
 struct Exposed {
-  camera::Board board = camera::read_board_file(kBoardFile);
-  read::Calibration device;
+  calibration::Board board = calibration::read_board_file(kBoardFile);
+  Calibration device;
   std::vector<RigidTransform> poses;
   List<Image> images;
 };
 
-Exposed expose(std::uint64_t seed, int views, const simulate::DeviceOptions& device = {},
-               const simulate::Exposure& exposure = {}) {
+Exposed expose(std::uint64_t seed, int views, const phantom::DeviceOptions& device = {},
+               const phantom::Exposure& exposure = {}) {
   Exposed exposed;
-  exposed.device = simulate::make_device(device);
-  simulate::BoardPoses poses;
+  exposed.device = phantom::make_device(device);
+  phantom::BoardPoses poses;
   poses.views = views;
-  exposed.poses = simulate::draw_board_poses(exposed.board, poses, seed);
+  exposed.poses = phantom::draw_board_poses(exposed.board, poses, seed);
   for (std::size_t i = 0; i < exposed.poses.size(); ++i)
     exposed.images.add(
         "view" + std::to_string(i + 1),
-        simulate::expose_board(exposed.board, exposed.device, exposed.poses[i], exposure, seed * 100 + i));
+        phantom::expose_board(exposed.board, exposed.device, exposed.poses[i], exposure, seed * 100 + i));
   return exposed;
 }
 
@@ -57,7 +58,7 @@ Image one_bead(double u, double v, double diameter, double gradient) {
 TEST(FindBeads, CentreIsRightToAHundredthOfAPixel) {
   for (double diameter : {5.0, 8.3, 12.0, 17.0})
     for (double off : {0.0, 0.25, 0.5, 0.8}) {
-      const auto found = camera::find_beads(one_bead(30 + off, 33 - off, diameter, 2), {24, 0.2});
+      const auto found = calibration::find_beads(one_bead(30 + off, 33 - off, diameter, 2), {24, 0.2});
       ASSERT_EQ(found.size(), 1u) << diameter;
       EXPECT_LT((found[0].centre_px - Eigen::Vector2d(30 + off, 33 - off)).norm(), 0.02) << diameter << " " << off;
       EXPECT_NEAR(found[0].diameter_px, diameter, 1) << diameter;
@@ -73,10 +74,10 @@ TEST(FindBeads, LeavesOutWhatIsNoDisc) {
   cv::circle(grey, {2, 150}, 6, 300.f, cv::FILLED, cv::LINE_AA);     // cut by the border
   cv::circle(grey, {150, 150}, 40, 300.f, cv::FILLED, cv::LINE_AA);  // too large
   cv::circle(grey, {40, 180}, 6, 300.f, 2, cv::LINE_AA);             // a ring
-  const auto found = camera::find_beads({grey}, {20, 0.2});
+  const auto found = calibration::find_beads({grey}, {20, 0.2});
   ASSERT_EQ(found.size(), 1u);
   EXPECT_LT((found[0].centre_px - Eigen::Vector2d(60, 60)).norm(), 0.05);
-  EXPECT_TRUE(camera::find_beads({cv::Mat1f(50, 50, 7.f)}, {}).empty());
+  EXPECT_TRUE(calibration::find_beads({cv::Mat1f(50, 50, 7.f)}, {}).empty());
 }
 
 TEST(FindBeads, CentresInRenderedImages) {
@@ -84,11 +85,11 @@ TEST(FindBeads, CentresInRenderedImages) {
   double squares = 0, worst = 0;
   int count = 0;
   for (std::size_t n = 0; n < exposed.images.size(); ++n)
-    for (const auto& found : camera::find_beads(exposed.images[n], {})) {
+    for (const auto& found : calibration::find_beads(exposed.images[n], {})) {
       double nearest = 1e9;
       for (const auto& bead : exposed.board.beads)
         nearest = std::min(
-            nearest, (simulate::image_of(exposed.device, exposed.poses[n], bead.centre_mm) - found.centre_px).norm());
+            nearest, (phantom::image_of(exposed.device, exposed.poses[n], bead.centre_mm) - found.centre_px).norm());
       squares += nearest * nearest;
       worst = std::max(worst, nearest);
       ++count;
@@ -105,12 +106,12 @@ TEST(MatchBoard, EveryMatchIsRightAndFewAreMissing) {
     const Exposed exposed = expose(seed, 4);
     for (std::size_t n = 0; n < exposed.images.size(); ++n) {
       const auto match =
-          camera::match_board(exposed.board, camera::find_beads(exposed.images[n], {}), 1024, 1024, "view");
+          calibration::match_board(exposed.board, calibration::find_beads(exposed.images[n], {}), 1024, 1024, "view");
       for (std::size_t i = 0; i < match.beads.size(); ++i)
-        wrong += (simulate::image_of(exposed.device, exposed.poses[n], match.board_mm[i]) - match.pixels[i]).norm() > 2;
+        wrong += (phantom::image_of(exposed.device, exposed.poses[n], match.board_mm[i]) - match.pixels[i]).norm() > 2;
       found += int(match.beads.size());
       for (const auto& bead : exposed.board.beads) {
-        const Eigen::Vector2d at = simulate::image_of(exposed.device, exposed.poses[n], bead.centre_mm);
+        const Eigen::Vector2d at = phantom::image_of(exposed.device, exposed.poses[n], bead.centre_mm);
         expected += at.x() > 10 && at.y() > 10 && at.x() < 1013 && at.y() < 1013;
       }
     }
@@ -153,10 +154,10 @@ TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
   const Exposed exposed = expose(9, 6);
   const BeadBoardResult result = calibrated(exposed.images);
   View view{"view1", exposed.images[0], result.cameras[0], {}};
-  read::apply_calibration(view, result.calibration);
+  apply_calibration(view, result.calibration);
   double worst = 0;
   int count = 0;
-  for (const auto& disc : camera::find_beads(view.image, {})) {
+  for (const auto& disc : calibration::find_beads(view.image, {})) {
     double nearest = 1e9;
     for (const auto& bead : exposed.board.beads)
       nearest = std::min(nearest, (project(view.camera, bead.centre_mm) - disc.centre_px).norm());
@@ -169,7 +170,7 @@ TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
 }
 
 TEST(BeadBoard, NoisyFaintAndBlurredBeads) {
-  simulate::Exposure exposure;
+  phantom::Exposure exposure;
   exposure.photons = 60;
   exposure.attenuation_per_mm = 0.5;
   exposure.blur_px = 1.5;
@@ -206,13 +207,13 @@ TEST(BeadBoard, SaysWhatIsMissing) {
 
 TEST(BeadBoard, WritesWhatReadCalibrationReads) {
   const TemporaryFolder folder;
-  read::Calibration calibration = simulate::make_device({});
+  Calibration calibration = phantom::make_device({});
   calibration.focal_deviation_px = {1.5, 1.25};
   calibration.principal_deviation_px = {0.1, 0.2};
   calibration.distortion_deviation = {0.01, 0.02, 0};
   calibration.residual_px = 0.21;
   write_calibration(calibration, folder / "c.yaml");
-  const read::Calibration back = read::read_calibration_file(folder / "c.yaml");
+  const Calibration back = files::read_calibration_file(folder / "c.yaml");
   EXPECT_EQ(back.intrinsics, calibration.intrinsics);
   EXPECT_EQ(back.distortion.k, calibration.distortion.k);
   EXPECT_EQ(back.focal_deviation_px, calibration.focal_deviation_px);
@@ -235,9 +236,9 @@ TEST(BoardFile, IsCheckedForWhatMakesBeadsFindable) {
   const TemporaryFolder folder;
   const auto read = [&](const std::string& text) {
     put(folder / "board.yaml", text);
-    return camera::read_board_file(folder / "board.yaml");
+    return calibration::read_board_file(folder / "board.yaml");
   };
-  const camera::Board board = read(kPlain);
+  const calibration::Board board = read(kPlain);
   EXPECT_EQ(board.sides, (std::vector<std::string>{"a", "b"}));
   ASSERT_EQ(board.beads.size(), 18u);
   EXPECT_EQ(board.of_side(1, true).size(), 4u);
@@ -277,14 +278,15 @@ TEST(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
     text += "]}\n";
   }
   put(folder / "board.yaml", text);
-  EXPECT_SAYS(camera::read_board_file(folder / "board.yaml"), "side 'a' looks the same when it is turned or mirrored");
+  EXPECT_SAYS(calibration::read_board_file(folder / "board.yaml"),
+              "side 'a' looks the same when it is turned or mirrored");
   std::string alike = kPlain;
   alike = alike.substr(0, alike.find("  b:")) +
           with(alike.substr(alike.find("  a:"), alike.find("  b:") - alike.find("  a:")), "  a:", "  b:");
   const std::size_t second = alike.find("  b:");
   for (std::size_t at; (at = alike.find(", 0]", second)) != std::string::npos;) alike.replace(at, 4, ", 40]");
   put(folder / "board.yaml", alike);
-  EXPECT_SAYS(camera::read_board_file(folder / "board.yaml"), "the two sides look the same");
+  EXPECT_SAYS(calibration::read_board_file(folder / "board.yaml"), "the two sides look the same");
 }
 
 }  // namespace

@@ -3,8 +3,8 @@
 // The board that ships, and views of it whose truth is known.
 #include <random>
 
-#include "plugins/camera/correspondence.hpp"
-#include "plugins/simulate/board_views.hpp"
+#include "marrow/toolbox/calibration/correspondence.hpp"
+#include "marrow/toolbox/phantom/board_views.hpp"
 
 namespace marrow::test {
 
@@ -13,16 +13,16 @@ inline const std::filesystem::path kBoardFile =
 
 /// Where the beads of a board are seen in each pose, with normal noise on each coordinate. Beads outside the image are
 /// left out.
-inline std::vector<camera::ViewPoints> see_board(const camera::Board& board, const read::Calibration& device,
-                                                 const std::vector<RigidTransform>& poses, double noise_px,
-                                                 unsigned seed) {
+inline std::vector<calibration::ViewPoints> see_board(const calibration::Board& board, const Calibration& device,
+                                                      const std::vector<RigidTransform>& poses, double noise_px,
+                                                      unsigned seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, 1);
-  std::vector<camera::ViewPoints> views;
+  std::vector<calibration::ViewPoints> views;
   for (const auto& pose : poses) {
-    camera::ViewPoints view{"view" + std::to_string(views.size() + 1), {}, {}, {}};
+    calibration::ViewPoints view{"view" + std::to_string(views.size() + 1), {}, {}, {}};
     for (std::size_t i = 0; i < board.beads.size(); ++i) {
-      const Eigen::Vector2d at = simulate::image_of(device, pose, board.beads[i].centre_mm);
+      const Eigen::Vector2d at = phantom::image_of(device, pose, board.beads[i].centre_mm);
       const Eigen::Vector2d noise(noise_px * normal(random), noise_px * normal(random));
       if (at.x() < 5 || at.y() < 5 || at.x() > device.width_px - 6 || at.y() > device.height_px - 6) continue;
       view.beads.push_back(int(i));

@@ -6,22 +6,22 @@
 #include <cstdio>
 
 #include "camera/boards.hpp"
-#include "plugins/camera/calibrate.hpp"
+#include "marrow/toolbox/calibration/calibrate.hpp"
 #include "read/files.hpp"
 
 namespace {
 
 using namespace marrow;
-using camera::CalibrationModel;
-using camera::CalibrationResult;
+using calibration::CalibrationModel;
+using calibration::CalibrationResult;
 
 TEST(Calibrate, FindsTheExactDeviceWithoutNoise) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  simulate::DeviceOptions options;
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  phantom::DeviceOptions options;
   options.principal_offset_px = {17, -11};
-  const read::Calibration device = simulate::make_device(options);
-  const auto poses = simulate::draw_board_poses(board, {}, 5);
-  const CalibrationResult fit = camera::calibrate(test::see_board(board, device, poses, 0, 1), 1024, 1024, {});
+  const Calibration device = phantom::make_device(options);
+  const auto poses = phantom::draw_board_poses(board, {}, 5);
+  const CalibrationResult fit = calibration::calibrate(test::see_board(board, device, poses, 0, 1), 1024, 1024, {});
   // The solver takes pixels as 32-bit numbers, which are right to 6e-5.
   EXPECT_NEAR(fit.calibration.intrinsics(0, 0), device.intrinsics(0, 0), 1e-2);
   EXPECT_NEAR(fit.calibration.intrinsics(1, 1), device.intrinsics(1, 1), 1e-2);
@@ -36,15 +36,15 @@ TEST(Calibrate, FindsTheExactDeviceWithoutNoise) {
 }
 
 TEST(Calibrate, ClosedFormIsExactForADeviceWithoutDistortion) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  simulate::DeviceOptions options;
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  phantom::DeviceOptions options;
   options.pincushion_percent = 0;
   options.principal_offset_px = {0, 0};
-  const read::Calibration device = simulate::make_device(options);
-  const auto poses = simulate::draw_board_poses(board, {}, 2);
+  const Calibration device = phantom::make_device(options);
+  const auto poses = phantom::draw_board_poses(board, {}, 2);
   const auto views = test::see_board(board, device, poses, 0, 1);
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto start = camera::closed_form_camera(views[i], {511.5, 511.5});
+    const auto start = calibration::closed_form_camera(views[i], {511.5, 511.5});
     ASSERT_TRUE(start);
     EXPECT_FALSE(start->is_mirrored);
     EXPECT_NEAR(start->focal_px, device.intrinsics(0, 0), 1e-6);
@@ -54,20 +54,20 @@ TEST(Calibrate, ClosedFormIsExactForADeviceWithoutDistortion) {
 }
 
 TEST(Calibrate, TellsAMirroredImage) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  const read::Calibration device = simulate::make_device({});
-  auto views = test::see_board(board, device, simulate::draw_board_poses(board, {}, 3), 0.1, 1);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  const Calibration device = phantom::make_device({});
+  auto views = test::see_board(board, device, phantom::draw_board_poses(board, {}, 3), 0.1, 1);
   for (auto& view : views)
     for (auto& pixel : view.pixels) pixel.x() = 1023 - pixel.x();
-  EXPECT_SAYS(camera::calibrate(views, 1024, 1024, {}),
+  EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}),
               "view 'view1': only a mirrored image explains where the beads are seen");
 }
 
 TEST(Calibrate, OneSideAloneDoesNotDetermineACamera) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  auto views = test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 3), 0.1, 1);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 3), 0.1, 1);
   for (auto& view : views) {
-    camera::ViewPoints front{view.name, {}, {}, {}};
+    calibration::ViewPoints front{view.name, {}, {}, {}};
     for (std::size_t i = 0; i < view.beads.size(); ++i)
       if (board.beads[std::size_t(view.beads[i])].side == 0) {
         front.board_mm.push_back(view.board_mm[i]);
@@ -75,7 +75,7 @@ TEST(Calibrate, OneSideAloneDoesNotDetermineACamera) {
       }
     view = front;
   }
-  EXPECT_SAYS(camera::calibrate(views, 1024, 1024, {}), "do not determine a camera");
+  EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}), "do not determine a camera");
 }
 
 struct Spread {
@@ -102,19 +102,19 @@ struct Spread {
 // length 0.15 %, principal point 0.5 px, residual within 5 % of the noise); what a single run can reach is bounded by
 // the noise itself, so the worst run is held against what that predicts.
 TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   ASSERT_LE(board.beads.size(), 60u);
   constexpr int kSeeds = 200;
   Spread focal, principal, residual, ratio, focal_predicted, principal_predicted;
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    simulate::DeviceOptions options;
+    phantom::DeviceOptions options;
     std::mt19937_64 random(static_cast<unsigned>(seed));
     std::uniform_real_distribution<double> offset(-15, 15);
     options.principal_offset_px = {offset(random), offset(random)};
-    const read::Calibration device = simulate::make_device(options);
-    const auto poses = simulate::draw_board_poses(board, {}, std::uint64_t(seed));
+    const Calibration device = phantom::make_device(options);
+    const auto poses = phantom::draw_board_poses(board, {}, std::uint64_t(seed));
     const auto fit =
-        camera::calibrate(test::see_board(board, device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
+        calibration::calibrate(test::see_board(board, device, poses, 0.2, unsigned(1000 + seed)), 1024, 1024, {});
     const auto& found = fit.calibration;
     for (int i : {0, 1}) {
       focal.add(100 * std::abs(found.intrinsics(i, i) / device.intrinsics(i, i) - 1));
@@ -143,13 +143,13 @@ TEST(Calibrate, ErrorsUnderNoiseAreWhatTheNoisePredicts) {
 }
 
 TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  const read::Calibration device = simulate::make_device({});
-  const auto poses = simulate::draw_board_poses(board, {}, 11);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  const Calibration device = phantom::make_device({});
+  const auto poses = phantom::draw_board_poses(board, {}, 11);
   Spread ratio;
   for (unsigned seed = 1; seed <= 60; ++seed) {
-    const auto fit = camera::calibrate(test::see_board(board, device, poses, 0.2, seed), 1024, 1024,
-                                       {.radial_terms = 2, .square_pixels = true, .principal_point = true});
+    const auto fit = calibration::calibrate(test::see_board(board, device, poses, 0.2, seed), 1024, 1024,
+                                            {.radial_terms = 2, .square_pixels = true, .principal_point = true});
     for (std::size_t n = 0; n < poses.size(); ++n) {
       const RigidTransform& found = fit.views[n].camera_from_world;
       const Eigen::Vector3d turn = vector_from_rotation(found.rotation * poses[n].rotation.transpose());
@@ -163,11 +163,10 @@ TEST(Calibrate, DeviationsOfPosesAreThoseThatOccur) {
 }
 
 TEST(Calibrate, SquarePixelsHaveOneFocalLengthAndOneDeviation) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  const auto views =
-      test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 4), 0.2, 1);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  const auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 4), 0.2, 1);
   const auto fit =
-      camera::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
+      calibration::calibrate(views, 1024, 1024, {.radial_terms = 1, .square_pixels = true, .principal_point = true});
   EXPECT_DOUBLE_EQ(fit.calibration.intrinsics(0, 0), fit.calibration.intrinsics(1, 1));
   EXPECT_GT(fit.calibration.focal_deviation_px[0], 0);
   EXPECT_EQ(fit.calibration.focal_deviation_px[1], fit.calibration.focal_deviation_px[0]);
@@ -179,12 +178,12 @@ TEST(Calibrate, ClosedFormSolvesItsEquationsWhateverIsSeen) {
   std::uniform_real_distribution<double> place_mm(-100, 100), pixel(0, 1023);
   int found = 0;
   for (int trial = 0; trial < 200; ++trial) {
-    camera::ViewPoints view{"view", {}, {}, {}};
+    calibration::ViewPoints view{"view", {}, {}, {}};
     for (int i = 0; i < 12; ++i) {
       view.board_mm.emplace_back(place_mm(random), place_mm(random), place_mm(random));
       view.pixels.emplace_back(pixel(random), pixel(random));
     }
-    const auto start = camera::closed_form_camera(view, {511.5, 511.5});
+    const auto start = calibration::closed_form_camera(view, {511.5, 511.5});
     if (!start || start->is_mirrored) continue;
     ++found;
     double derivative = 0, squares = 0;
@@ -200,11 +199,11 @@ TEST(Calibrate, ClosedFormSolvesItsEquationsWhateverIsSeen) {
 }
 
 TEST(Calibrate, RefusesWithoutEnoughBeads) {
-  const camera::Board board = camera::read_board_file(test::kBoardFile);
-  auto views = test::see_board(board, simulate::make_device({}), simulate::draw_board_poses(board, {}, 3), 0, 1);
+  const calibration::Board board = calibration::read_board_file(test::kBoardFile);
+  auto views = test::see_board(board, phantom::make_device({}), phantom::draw_board_poses(board, {}, 3), 0, 1);
   views[1].board_mm.resize(5);
   views[1].pixels.resize(5);
-  EXPECT_SAYS(camera::calibrate(views, 1024, 1024, {}), "view 'view2': 5 beads are seen; at least 8 are needed");
+  EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}), "view 'view2': 5 beads are seen; at least 8 are needed");
 }
 
 }  // namespace

@@ -7,7 +7,7 @@ namespace {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
-using marrow::camera::world_from_camera_rotation;
+using marrow::world_from_camera_rotation;
 
 marrow::Camera view(double alpha_deg, double beta_deg, Options options = {}) {
   options.names = {"one"};

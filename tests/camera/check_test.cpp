@@ -8,9 +8,9 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "plugins/camera/carm_geometry.hpp"
-#include "plugins/read/camera_file.hpp"
-#include "plugins/read/volume_file.hpp"
+#include "marrow/domain/c_arm.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 
 namespace {
@@ -22,8 +22,8 @@ using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
 Camera camera_at(double alpha_deg, double beta_deg) {
-  camera::CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
-  Camera camera = camera::carm_camera(arm, camera::world_from_camera_rotation(radians(alpha_deg), radians(beta_deg)));
+  CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
+  Camera camera = carm_camera(arm, world_from_camera_rotation(radians(alpha_deg), radians(beta_deg)));
   camera.intrinsics(0, 2) += 9;
   camera.intrinsics(1, 2) -= 6;
   return camera;
@@ -43,7 +43,7 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
 }
 
 void expect_explained(const Camera& camera, const SeenPoints& points, const std::string& said) {
-  const auto sentence = camera::explanation(camera, points);
+  const auto sentence = calibration::explanation(camera, points);
   ASSERT_TRUE(sentence) << said;
   EXPECT_NE(sentence->find(said), std::string::npos) << *sentence;
   const std::size_t at = sentence->find("only ");
@@ -54,8 +54,8 @@ void expect_explained(const Camera& camera, const SeenPoints& points, const std:
 TEST(Explanation, NoneForARightCamera) {
   for (double beta : {0.0, 35.0, 90.0}) {
     const Camera camera = camera_at(12, beta);
-    EXPECT_FALSE(camera::explanation(camera, points_of(camera)));
-    EXPECT_NEAR(camera::reprojection_error_px(camera, points_of(camera)), 0.2 * std::sqrt(2), 0.1);
+    EXPECT_FALSE(calibration::explanation(camera, points_of(camera)));
+    EXPECT_NEAR(calibration::reprojection_error_px(camera, points_of(camera)), 0.2 * std::sqrt(2), 0.1);
   }
 }
 
@@ -129,26 +129,26 @@ TEST(Refit, TellsAMovedPoseFromAWrongMatrix) {
   Camera camera = right;
   camera.camera_from_world.translation_mm += Vector3d(3, -2, 0);
   camera.camera_from_world.rotation = rotation_from_vector({0, 0, radians(1.5)}) * right.camera_from_world.rotation;
-  auto refit = camera::refit_pose(camera, points);
+  auto refit = calibration::refit_pose(camera, points);
   ASSERT_TRUE(refit);
   EXPECT_LT(refit->error_px, 0.4);
   EXPECT_NEAR(refit->turn_deg, 1.5, 0.1);
   EXPECT_NEAR(refit->shift_mm, 3.6, 0.5);
-  EXPECT_FALSE(camera::refit_pose(right, points_of(right, 5)));
+  EXPECT_FALSE(calibration::refit_pose(right, points_of(right, 5)));
 }
 
 TEST(ImplausibleNumbers, AreNamed) {
   const std::vector<Vector3d> object{{-40, -40, -40}, {40, 40, 40}};
-  const auto says = [&](const Camera& camera, const std::string& said, const camera::Device& device = {},
+  const auto says = [&](const Camera& camera, const std::string& said, const calibration::Device& device = {},
                         std::vector<Vector3d> points = {}) {
     std::string all;
-    for (const auto& sentence : camera::implausible_numbers(camera, device, points.empty() ? object : points))
+    for (const auto& sentence : calibration::implausible_numbers(camera, device, points.empty() ? object : points))
       all += sentence + "\n";
     EXPECT_NE(all.find(said), std::string::npos) << "it said: " << all;
   };
   const Camera right = camera_at(0, 0);
-  EXPECT_TRUE(camera::implausible_numbers(right, {1000, 0.5, 330}, object).empty());
-  EXPECT_TRUE(camera::implausible_numbers(right, {}, {}).empty());
+  EXPECT_TRUE(calibration::implausible_numbers(right, {1000, 0.5, 330}, object).empty());
+  EXPECT_TRUE(calibration::implausible_numbers(right, {}, {}).empty());
   Camera camera = right;
   camera.intrinsics(0, 0) = camera.intrinsics(1, 1) = 100;
   says(camera, "the focal length of 100 px opens an image of 640 px to 145.3 degrees");
@@ -312,7 +312,7 @@ TEST(PointsFile, Faults) {
   const std::string good = "marrow-points: 1\npoints:\n  - {name: A, at_mm: [1, 2, 3], seen_px: {one: [4, 5]}}\n";
   const auto read = [&](const std::string& text) {
     put(folder / "p.yaml", text);
-    return camera::read_points_file(folder / "p.yaml");
+    return files::read_points_file(folder / "p.yaml");
   };
   EXPECT_EQ(read(good)[0].seen_px.at("one"), Vector2d(4, 5));
   EXPECT_SAYS(read(with(good, "at_mm: [1, 2, 3], ", "")),
@@ -338,9 +338,9 @@ TEST(CheckNode, RealWristCameras) {
       View view;
       view.name = std::string("cam") + number;
       view.image =
-          read::read_image_file(data / "images" / ("xr_rad_uln_cam" + std::string(number) + "_UND." + frame + ".tif"));
+          files::read_image_file(data / "images" / ("xr_rad_uln_cam" + std::string(number) + "_UND." + frame + ".tif"));
       view.camera =
-          read::read_camera_file(data / "cameras" / ("xr_calib_wrist_cam" + std::string(number) + ".txt")).camera;
+          files::read_camera_file(data / "cameras" / ("xr_calib_wrist_cam" + std::string(number) + ".txt")).camera;
       views.add(view.name, view);
     }
     std::string text = "marrow-points: 1\npoints:\n";
@@ -367,7 +367,7 @@ TEST(CheckNode, RealWristCameras) {
     EXPECT_LT(ran.value("error"), 0.4);
     // As if the images were mirrored, the same cameras are found out.
     std::string mirrored;
-    for (const auto& point : camera::read_points_file(folder / "beads.yaml")) {
+    for (const auto& point : files::read_points_file(folder / "beads.yaml")) {
       const auto list = [](const auto& values) {
         std::string all = "[";
         for (double v : values) all += (all.size() > 1 ? ", " : "") + std::to_string(v);

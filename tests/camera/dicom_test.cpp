@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "plugins/camera/carm_geometry.hpp"
+#include "marrow/domain/c_arm.hpp"
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 
@@ -115,14 +115,14 @@ TEST(DicomCamera, IsocentreDistanceFromTheMagnification) {
 }
 
 TEST(DicomCamera, NamesAllThatIsMissing) {
-  EXPECT_SAYS(
-      read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164, kPrimary, kSecondary})),
-      "x.dcm: its header does not say how it was taken; missing: PositionerPrimaryAngle (0018,1510) (or use "
-      "camera.carm); "
-      "PositionerSecondaryAngle (0018,1511) (or use camera.carm); DistanceSourceToDetector (0018,1110) (or give "
-      "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor "
-      "(0018,1114) (or "
-      "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
+  EXPECT_SAYS(read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164, kPrimary, kSecondary})),
+              "x.dcm: its header does not say how it was taken; missing: PositionerPrimaryAngle (0018,1510) (or "
+              "describe the C-arm yourself); "
+              "PositionerSecondaryAngle (0018,1511) (or describe the C-arm yourself); DistanceSourceToDetector "
+              "(0018,1110) (or give "
+              "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor "
+              "(0018,1114) (or "
+              "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
   Options given;
   given.source_to_detector_mm = 1100;
   given.source_to_isocentre_mm = 700;
@@ -308,7 +308,7 @@ TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
     EXPECT_SAYS(read(moving), "the arm moves during this run of 3 frames");
     Options options;
     options.frame = 3;
-    EXPECT_SAYS(read(moving, options), "use frame 1, or camera.carm with the angles of frame 3");
+    EXPECT_SAYS(read(moving, options), "use frame 1, or describe the C-arm yourself with the angles of frame 3");
     options.frame = 1;
     EXPECT_TRUE(read(moving, options)
                     .camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));

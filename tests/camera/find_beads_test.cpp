@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is a bead and what is not, at each limit; and where beads are found beside others, on slopes and at borders.
-#include "plugins/camera/beads.hpp"
+#include "marrow/toolbox/calibration/beads.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 namespace {
 
-using marrow::camera::BeadImage;
-using marrow::camera::find_beads;
+using marrow::calibration::BeadImage;
+using marrow::calibration::find_beads;
 
 /// An ellipse, darker than the rest by `dark`, with an edge a pixel wide.
 struct Ellipse {

@@ -7,19 +7,19 @@
 
 #include "camera/boards.hpp"
 #include "domain/message_of.hpp"
-#include "plugins/camera/correspondence.hpp"
+#include "marrow/toolbox/calibration/correspondence.hpp"
 
 namespace {
 
 using namespace marrow;
 
 struct Seen {
-  std::vector<camera::BeadImage> discs;
+  std::vector<calibration::BeadImage> discs;
   std::vector<int> beads;  ///< of the disc
 };
 
-const camera::Board& board() {
-  static const camera::Board board = camera::read_board_file(test::kBoardFile);
+const calibration::Board& board() {
+  static const calibration::Board board = calibration::read_board_file(test::kBoardFile);
   return board;
 }
 
@@ -27,26 +27,26 @@ const camera::Board& board() {
 /// no beads.
 Seen see(std::uint64_t seed, std::size_t without_lower, std::size_t without_upper, int others,
          double pincushion_percent, double noise_px = 0.1) {
-  simulate::DeviceOptions options;
+  phantom::DeviceOptions options;
   options.pincushion_percent = pincushion_percent;
-  const read::Calibration device = simulate::make_device(options);
-  simulate::BoardPoses drawn;
+  const Calibration device = phantom::make_device(options);
+  phantom::BoardPoses drawn;
   drawn.views = 1;
   std::mt19937_64 random(seed);
   const auto part = [&] { return double(random() >> 11) / 9007199254740992.0; };
-  const RigidTransform pose = simulate::draw_board_poses(board(), drawn, seed)[0];
+  const RigidTransform pose = phantom::draw_board_poses(board(), drawn, seed)[0];
   Seen seen;
   std::size_t left[] = {without_lower, without_upper};
   for (const bool landmark : {true, false})
     for (std::size_t i = 0; i < board().beads.size(); ++i) {
-      const camera::Bead& bead = board().beads[i];
+      const calibration::Bead& bead = board().beads[i];
       if (bead.landmark != landmark) continue;
       if (!landmark && left[bead.side] > 0 && i % 2 == seed % 2) {
         --left[bead.side];
         continue;
       }
       const Eigen::Vector2d at =
-          simulate::image_of(device, pose, bead.centre_mm) + noise_px * Eigen::Vector2d(2 * part() - 1, 2 * part() - 1);
+          phantom::image_of(device, pose, bead.centre_mm) + noise_px * Eigen::Vector2d(2 * part() - 1, 2 * part() - 1);
       if (at.x() < 5 || at.y() < 5 || at.x() > 1018 || at.y() > 1018) continue;
       seen.discs.push_back({at, landmark ? 17.0 : 8.5, 100});
       seen.beads.push_back(int(i));
@@ -64,10 +64,11 @@ struct Matched {
 
 Matched match(const Seen& seen) {
   Matched matched;
-  const camera::ViewPoints points = camera::match_board(board(), seen.discs, 1024, 1024, "view");
+  const calibration::ViewPoints points = calibration::match_board(board(), seen.discs, 1024, 1024, "view");
   for (std::size_t i = 0; i < points.beads.size(); ++i) {
-    const auto disc = std::find_if(seen.discs.begin(), seen.discs.end(),
-                                   [&](const camera::BeadImage& one) { return one.centre_px == points.pixels[i]; });
+    const auto disc = std::find_if(seen.discs.begin(), seen.discs.end(), [&](const calibration::BeadImage& one) {
+      return one.centre_px == points.pixels[i];
+    });
     const bool is_right = seen.beads[std::size_t(disc - seen.discs.begin())] == points.beads[i];
     (is_right ? matched.right : matched.wrong) += 1;
     EXPECT_EQ(points.board_mm[i], board().beads[std::size_t(points.beads[i])].centre_mm);

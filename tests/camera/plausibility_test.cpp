@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // Each limit of what is said about a camera, just within it and just beyond.
-#include "plugins/camera/plausibility.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <random>
 
-#include "plugins/camera/carm_geometry.hpp"
+#include "marrow/domain/c_arm.hpp"
 
 namespace {
 
 using namespace marrow;
-using camera::Device;
-using camera::SeenPoints;
+using calibration::Device;
+using calibration::SeenPoints;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 Camera right_camera() {
-  const camera::CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
-  return camera::carm_camera(arm, camera::world_from_camera_rotation(radians(12), radians(35)));
+  const CArm arm{640, 512, {0.5, 0.5}, 1000, 600, Vector3d::Zero()};
+  return carm_camera(arm, world_from_camera_rotation(radians(12), radians(35)));
 }
 
 /// Two points near the middle of the camera's image, about 600 mm from the source.
@@ -35,7 +35,7 @@ std::vector<Vector3d> object_seen_by(const Camera& camera) {
 bool says(const std::string& words, const Camera& camera, const Device& device = {},
           std::vector<Vector3d> object = {}) {
   if (object.empty()) object = object_seen_by(camera);
-  const auto sentences = camera::implausible_numbers(camera, device, object);
+  const auto sentences = calibration::implausible_numbers(camera, device, object);
   for (const std::string& sentence : sentences) EXPECT_NE(sentence.find(words), std::string::npos) << sentence;
   EXPECT_LE(sentences.size(), 1u);
   return !sentences.empty();
@@ -123,8 +123,8 @@ TEST(Plausibility, PrincipalPoints) {
     EXPECT_TRUE(says("lies in the middle of an image of " + size,
                      with_principal(320 * factor, 256 * factor - 0.029 * factor * 512)))
         << factor;
-    const auto beyond = camera::implausible_numbers(with_principal(320 * factor + 0.031 * factor * 640, 256 * factor),
-                                                    {}, object_seen_by(right_camera()));
+    const auto beyond = calibration::implausible_numbers(
+        with_principal(320 * factor + 0.031 * factor * 640, 256 * factor), {}, object_seen_by(right_camera()));
     for (const std::string& sentence : beyond)
       EXPECT_EQ(sentence.find("in the middle of an image of"), std::string::npos) << sentence;
   }
@@ -177,13 +177,13 @@ TEST(Plausibility, ObjectsBehindTheSourceOrBesideTheImage) {
 TEST(Reprojection, IsTheRootMeanSquareOfDistances) {
   const Camera camera = right_camera();
   SeenPoints points = points_of(camera, 4);
-  EXPECT_NEAR(camera::reprojection_error_px(camera, points), 0, 1e-9);
+  EXPECT_NEAR(calibration::reprojection_error_px(camera, points), 0, 1e-9);
   points.pixels[1] += Vector2d(3, 4);
   points.pixels[2] -= Vector2d(0, 10);
-  EXPECT_NEAR(camera::reprojection_error_px(camera, points), std::sqrt(125.0 / 4), 1e-9);
+  EXPECT_NEAR(calibration::reprojection_error_px(camera, points), std::sqrt(125.0 / 4), 1e-9);
   points.world_mm[3] = source_position_mm(camera) - 10 * Vector3d(camera.camera_from_world.rotation.row(2).transpose());
-  EXPECT_EQ(camera::reprojection_error_px(camera, points), std::numeric_limits<double>::infinity());
-  EXPECT_EQ(camera::reprojection_error_px(camera, {}), 0);
+  EXPECT_EQ(calibration::reprojection_error_px(camera, points), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(calibration::reprojection_error_px(camera, {}), 0);
 }
 
 TEST(Explanation, OfEveryUnit) {
@@ -192,19 +192,19 @@ TEST(Explanation, OfEveryUnit) {
            {"metres", 1000}, {"centimetres", 10}, {"inches", 25.4}, {"micrometres", 0.001}}) {
     SeenPoints points = points_of(right);
     for (auto& point : points.world_mm) point /= factor;
-    auto sentence = camera::explanation(right, points);
+    auto sentence = calibration::explanation(right, points);
     ASSERT_TRUE(sentence) << unit;
     EXPECT_TRUE(sentence->ends_with("if the points are in " + unit + ", not mm")) << *sentence;
     Camera camera = right;
     camera.camera_from_world.translation_mm /= factor;
-    sentence = camera::explanation(camera, points_of(right));
+    sentence = calibration::explanation(camera, points_of(right));
     ASSERT_TRUE(sentence) << unit;
     EXPECT_TRUE(sentence->ends_with("if the camera's translation is in " + unit + ", not mm")) << *sentence;
   }
   Camera twice = right;
   twice.intrinsics.topRows<2>() *= 2;
   EXPECT_TRUE(
-      camera::explanation(twice, points_of(right))
+      calibration::explanation(twice, points_of(right))
           ->ends_with("if the camera matrix is that of an image twice as large; multiply its first two rows by 0.5"));
 }
 
@@ -217,11 +217,11 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
       points.pixels[i] = Vector2d(639 - points.pixels[i].x(), points.pixels[i].y() + (i % 2 ? noise_px : -noise_px));
     return points;
   };
-  EXPECT_TRUE(camera::explanation(right, mirrored(0)));
-  EXPECT_TRUE(camera::explanation(right, mirrored(12.5))) << "what is left may be a fiftieth of the image";
-  EXPECT_FALSE(camera::explanation(right, mirrored(13.1)));
-  EXPECT_TRUE(camera::explanation(right, mirrored(0, 4)));
-  EXPECT_FALSE(camera::explanation(right, mirrored(0, 3)));
+  EXPECT_TRUE(calibration::explanation(right, mirrored(0)));
+  EXPECT_TRUE(calibration::explanation(right, mirrored(12.5))) << "what is left may be a fiftieth of the image";
+  EXPECT_FALSE(calibration::explanation(right, mirrored(13.1)));
+  EXPECT_TRUE(calibration::explanation(right, mirrored(0, 4)));
+  EXPECT_FALSE(calibration::explanation(right, mirrored(0, 3)));
   // Points near the line about which they are mirrored move little: by d px, and stay off by a part of that.
   const auto near_line = [&](double off_px, double rest_px) {
     SeenPoints points = points_of(right);
@@ -233,18 +233,19 @@ TEST(Explanation, OnlyOfWhatIsFarOffAndThenMuchBetter) {
     }
     return points;
   };
-  EXPECT_TRUE(camera::explanation(right, near_line(6.5, 0)));
-  EXPECT_FALSE(camera::explanation(right, near_line(6.3, 0))) << "less than a hundredth of the image is no mistake";
-  EXPECT_TRUE(camera::explanation(right, near_line(10, 2))) << "five times better: sqrt(104) to 2";
-  EXPECT_FALSE(camera::explanation(right, near_line(10, 2.1)));
+  EXPECT_TRUE(calibration::explanation(right, near_line(6.5, 0)));
+  EXPECT_FALSE(calibration::explanation(right, near_line(6.3, 0)))
+      << "less than a hundredth of the image is no mistake";
+  EXPECT_TRUE(calibration::explanation(right, near_line(10, 2))) << "five times better: sqrt(104) to 2";
+  EXPECT_FALSE(calibration::explanation(right, near_line(10, 2.1)));
 }
 
 TEST(Refit, NeedsSixPoints) {
   const Camera right = right_camera();
   Camera moved = right;
   moved.camera_from_world.translation_mm.x() += 4;
-  EXPECT_FALSE(camera::refit_pose(moved, points_of(right, 5)));
-  const auto refit = camera::refit_pose(moved, points_of(right, 6));
+  EXPECT_FALSE(calibration::refit_pose(moved, points_of(right, 5)));
+  const auto refit = calibration::refit_pose(moved, points_of(right, 6));
   ASSERT_TRUE(refit);
   EXPECT_LT(refit->error_px, 1e-3);
   EXPECT_NEAR(refit->turn_deg, 0, 1e-3);

@@ -127,7 +127,7 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
   }
   edges.pixels.push_back({-20, 30, 1, 0, 1});  // beyond the image, as a detector may say of its border
   edges.pixels.push_back({230, 170, 1, 0, 1});
-  const marrow::evaluate::EdgeSearch search(edges);
+  const EdgeSearch search(edges);
   int none = 0;
   for (int i = 0; i < 3000; ++i) {
     const double u = 203 * part(), v = 149 * part(), angle = 6.28 * part(), reach_px = i % 3 == 0 ? 400 : 60 * part(),

@@ -23,7 +23,7 @@ TEST(Misalignment, NoneWhereNothingMoved) {
 }
 
 TEST(Misalignment, RefusesOtherFragments) {
-  const auto message = [](const marrow::List<marrow::Pose>& poses, const Options& options) -> std::string {
+  const auto message = [](const marrow::List<marrow::Pose>& poses, const FragmentPair& options) -> std::string {
     try {
       misalignment(poses, options);
     } catch (const marrow::Error& error) {

@@ -5,9 +5,9 @@
 #include "plugins/read/case.cpp"
 
 #include "landmarks_node.hpp"
-#include "plugins/camera/board.hpp"
-#include "plugins/camera/points_file.hpp"
-#include "plugins/read/calibration.hpp"
+#include "marrow/toolbox/calibration/board.hpp"
+#include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/toolbox/files/points_file.hpp"
 #include "target.hpp"
 
 namespace {
@@ -31,14 +31,14 @@ void put_case_files() {
 
 void read(char format, std::string_view text) {
   if (format == 'c') put("case/case.yaml", text), read_case({marrow::fuzz::folder() / "case"});
-  if (format == 'm') marrow::read::read_camera_file(put("a.yaml", text));
-  if (format == 'x') marrow::read::read_camera_file(put("a.txt", text));
-  if (format == 'k') marrow::read::read_calibration_file(put("a.yaml", text));
-  if (format == 'b') marrow::camera::read_board_file(put("a.yaml", text));
-  if (format == 'p') marrow::camera::read_points_file(put("a.yaml", text));
+  if (format == 'm') marrow::files::read_camera_file(put("a.yaml", text));
+  if (format == 'x') marrow::files::read_camera_file(put("a.txt", text));
+  if (format == 'k') marrow::files::read_calibration_file(put("a.yaml", text));
+  if (format == 'b') marrow::calibration::read_board_file(put("a.yaml", text));
+  if (format == 'p') marrow::files::read_points_file(put("a.yaml", text));
   if (format == 'l') marrow::fuzz::read_landmarks(put("a.yaml", text));
-  if (format == 's') marrow::read::read_seeds_file(put("a.yaml", text));
-  if (format == 'o') marrow::read::read_pose_file(put("a.yaml", text));
+  if (format == 's') marrow::files::read_seeds_file(put("a.yaml", text));
+  if (format == 'o') marrow::files::read_pose_file(put("a.yaml", text));
 }
 
 }  // namespace

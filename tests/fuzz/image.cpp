@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "target.hpp"
 
 namespace {
@@ -46,6 +46,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   marrow::fuzz::Input input(data, size);
   const int frame = input.choice("12") == '1' ? 0 : 2;
   const std::filesystem::path path = file_of(input);
-  marrow::fuzz::expect_value_or_error([&] { marrow::read::read_image_file(path, frame); });
+  marrow::fuzz::expect_value_or_error([&] { marrow::files::read_image_file(path, frame); });
   return 0;
 }

@@ -2,7 +2,7 @@
 // Volumes: MetaImage, NRRD, NIfTI and TIFF; headers alone, with their samples in a file beside them.
 #include <zlib.h>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "target.hpp"
 
 namespace {
@@ -58,8 +58,8 @@ std::filesystem::path file_of(marrow::fuzz::Input& input) {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   marrow::fuzz::Input input(data, size);
   const std::filesystem::path path = file_of(input);
-  marrow::read::VolumeReading reading;
+  marrow::files::VolumeReading reading;
   if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
-  marrow::fuzz::expect_value_or_error([&] { marrow::read::read_volume_file(path, reading); });
+  marrow::fuzz::expect_value_or_error([&] { marrow::files::read_volume_file(path, reading); });
   return 0;
 }

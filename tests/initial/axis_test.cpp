@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/initial/axis.hpp"
+#include "marrow/toolbox/shaft/axis.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,7 +12,7 @@
 
 namespace {
 
-using namespace marrow::initial;
+using namespace marrow::shaft;
 
 struct Case {
   Eigen::Vector3d point, direction;

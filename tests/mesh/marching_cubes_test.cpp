@@ -16,10 +16,10 @@ TEST(CellTable, EveryPatternUsesExactlyTheEdgesThatTheSurfaceCrosses) {
   for (unsigned inside = 0; inside < 256; ++inside) {
     unsigned expected = 0, used = 0;
     for (int edge = 0; edge < 12; ++edge) {
-      const int start = cells::kEdgeStart[edge], end = start | 1 << edge / 4;
+      const int start = marrow::surface::kEdgeStart[edge], end = start | 1 << edge / 4;
       if ((inside >> start & 1) != (inside >> end & 1)) expected |= 1u << edge;
     }
-    for (const auto& triangle : cells::cell_triangles(inside))
+    for (const auto& triangle : marrow::surface::cell_triangles(inside))
       for (int edge : triangle) used |= 1u << edge;
     EXPECT_EQ(used, expected) << "pattern " << inside;
   }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The distortion of an image is removed once, when its view is read.
-#include "calibration.hpp"
+#include "marrow/toolbox/files/calibration_file.hpp"
 
 #include <gtest/gtest.h>
 
@@ -12,9 +12,9 @@
 
 namespace {
 
+using marrow::Calibration;
 using marrow::Camera;
-using marrow::read::Calibration;
-using marrow::read::RadialDistortion;
+using marrow::RadialDistortion;
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::with;
@@ -120,7 +120,7 @@ TEST(Calibration, OwnMaskIsMovedAlong) {
   read.mask = cv::Mat1b(kHeight, kWidth, std::uint8_t(255));
   const Eigen::Vector2d hidden = distorted_pixel(intrinsics(), kPincushion, {150, 40});
   read.mask(cv::Rect(int(hidden.x()) - 2, int(hidden.y()) - 2, 6, 6)) = 0;
-  marrow::read::remove_distortion(read, kPincushion);
+  marrow::remove_distortion(read, kPincushion);
   EXPECT_EQ(read.mask.at<std::uint8_t>(40, 150), 0);
   EXPECT_EQ(read.mask.at<std::uint8_t>(77, 104), 255);
 }
@@ -131,7 +131,7 @@ TEST(Calibration, WithoutDistortionNothingChanges) {
   const cv::Mat1f image = as_taken();
   read.image.pixels = image;
   read.camera = {kWidth, kHeight, intrinsics(), {"camera", "world", Eigen::Matrix3d::Identity(), {0, 0, 600}}};
-  marrow::read::remove_distortion(read, {});
+  marrow::remove_distortion(read, {});
   EXPECT_LT(cv::norm(read.image.pixels, image, cv::NORM_INF), 1e-3);
   EXPECT_TRUE(read.mask.empty());
 }
@@ -151,7 +151,7 @@ TEST(Calibration, Refusals) {
   EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}),
               "the radial distortion folds the image");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[3, 10]"));
-  EXPECT_SAYS(marrow::read::read_calibration_file(folder / "c.yaml"),
+  EXPECT_SAYS(marrow::files::read_calibration_file(folder / "c.yaml"),
               "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
 }
 

@@ -6,14 +6,15 @@
 
 #include <cstdio>
 
-#include "plugins/camera/board.hpp"
-#include "plugins/camera/points_file.hpp"
-#include "plugins/read/camera_file.hpp"
+#include "marrow/toolbox/calibration/board.hpp"
+#include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/files/points_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+#include "marrow/toolbox/files/xray_header.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 #include "plugins/read/case.cpp"
-#include "plugins/read/mesh_file.hpp"
-#include "plugins/read/volume_file.hpp"
-#include "plugins/read/xray_header.hpp"
-#include "plugins/read/yaml_values.hpp"
 #include "read/damage.hpp"
 #include "read/dicom_text.hpp"
 #include "read/itk_files.hpp"
@@ -21,7 +22,7 @@
 namespace {
 
 using namespace marrow::test;
-using marrow::read::VolumeReading;
+using marrow::files::VolumeReading;
 using Path = std::filesystem::path;
 
 constexpr int kCuts = 40, kFlips = 60;
@@ -57,11 +58,11 @@ std::string little_bytes(std::uint64_t value, int width) {
   return bytes;
 }
 
-void image_at(const Path& path) { marrow::read::read_image_file(path); }
+void image_at(const Path& path) { marrow::files::read_image_file(path); }
 void volume_at(const Path& path) {
   VolumeReading reading;
   if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
-  marrow::read::read_volume_file(path, reading);
+  marrow::files::read_volume_file(path, reading);
 }
 
 ItkGrid<std::uint16_t> picture() {
@@ -176,7 +177,7 @@ TEST(Damaged, MetaImageWithItsDataBeside) {
   cut.header_bytes = std::min(sample.bytes.size(), sample.header_bytes);
   expect_handled(folder, cut, [&](const Path&) {
     try {
-      marrow::read::read_volume_file(folder.path(), {});
+      marrow::files::read_volume_file(folder.path(), {});
     } catch (const marrow::Error& error) {
       throw marrow::Error("a.mhd: " + std::string(error.what()));  // the error may name the data or the folder
     }
@@ -248,7 +249,7 @@ TEST(Damaged, DicomImage) {
       {"CS" + little_bytes(2, 2) + "XA", "CS" + little_bytes(0xFFFE, 2) + "XA"}};
   expect_handled(folder, sample, image_at);
   // The camera needs the header alone, so a file whose pixels are damaged in themselves may pass.
-  expect_handled(folder, sample, [](const Path& path) { marrow::read::read_xray_geometry(path, 1, {}); });
+  expect_handled(folder, sample, [](const Path& path) { marrow::files::read_xray_geometry(path, 1, {}); });
 }
 
 TEST(Damaged, DicomSeries) {
@@ -264,7 +265,7 @@ TEST(Damaged, DicomSeries) {
   sample.header_bytes = sample.bytes.size() - 2048;
   expect_handled(folder, sample, [&](const Path&) {
     try {
-      marrow::read::read_volume_file(folder.path(), {});
+      marrow::files::read_volume_file(folder.path(), {});
     } catch (const marrow::Error& error) {
       throw marrow::Error("s2.dcm: " + std::string(error.what()));  // the error may name its neighbour or the folder
     }
@@ -284,7 +285,7 @@ std::string stl_binary(std::uint32_t triangles) {
 
 TEST(Damaged, Meshes) {
   const TemporaryFolder folder;
-  const auto read = [](const Path& path) { marrow::read::read_mesh_file(path, 1); };
+  const auto read = [](const Path& path) { marrow::files::read_mesh_file(path, 1); };
   expect_handled(folder,
                  {"a.stl",
                   stl_binary(100),
@@ -343,7 +344,7 @@ TEST(Damaged, Texts) {
                               {"900", ".nan"},
                               {"900", "1e999"},
                               {"640", "-640"}}),
-                 [](const Path& path) { marrow::read::read_camera_file(path); });
+                 [](const Path& path) { marrow::files::read_camera_file(path); });
   expect_handled(
       folder,
       text_sample(
@@ -351,35 +352,35 @@ TEST(Damaged, Texts) {
           "image size\n640,480\n\ncamera "
           "matrix\n1000,0,320\n0,1001,240\n0,0,1\n\nrotation\n0,-1,0\n1,0,0\n0,0,1\n\ntranslation\n1\n-2.5\n900\n\n",
           {{"640,480", "64000000,480"}, {"1000,0,320", "1000,0,320,7"}, {"0,-1,0", "0,-1,nan"}}),
-      [](const Path& path) { marrow::read::read_camera_file(path); });
+      [](const Path& path) { marrow::files::read_camera_file(path); });
   expect_handled(folder,
                  text_sample("calibration.yaml",
                              "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics: [[1000, 0, 320], [0, "
                              "1001, 240], [0, 0, 1]]\nradial_distortion: [0.1, 0, 0]\n",
                              {{"640", "1e10"}, {"[0.1, 0, 0]", "[-100, 0, 0]"}}),
-                 [](const Path& path) { marrow::read::read_calibration_file(path); });
+                 [](const Path& path) { marrow::files::read_calibration_file(path); });
   expect_handled(folder,
                  text_sample("board.yaml", bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines/calibration/board.yaml"),
                              {{"[-23, -47.5, 0]", "[-23, -47.5]"}, {"diameter_mm: 3", "diameter_mm: 1e30"}}),
-                 [](const Path& path) { marrow::camera::read_board_file(path); });
+                 [](const Path& path) { marrow::calibration::read_board_file(path); });
   expect_handled(
       folder,
       text_sample("points.yaml", bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines/wrist/beads-0002.points.yaml"),
                   {{"[859.48, 1293.81]", "[859.48, 1293.81, 1]"}}),
-      [](const Path& path) { marrow::camera::read_points_file(path); });
+      [](const Path& path) { marrow::files::read_points_file(path); });
   expect_handled(folder,
                  text_sample("pose.yaml", bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines/wrist/radius-0002.pose.yaml"),
                              {{"target: world", "target: ct"}}),
-                 [](const Path& path) { marrow::read::read_pose_file(path); });
+                 [](const Path& path) { marrow::files::read_pose_file(path); });
   expect_handled(folder,
                  text_sample("seeds.yaml", bytes_of(Path(MARROW_SOURCE_DIR) / "pipelines/wrist/radius.seeds.yaml"),
                              {{"[12.68, 31.3038, 18.75]", "[12.68, inf, 18.75]"}}),
-                 [](const Path& path) { marrow::read::read_seeds_file(path); });
+                 [](const Path& path) { marrow::files::read_seeds_file(path); });
 }
 
 TEST(Damaged, YamlBombs) {
   const TemporaryFolder folder;
-  const auto read = [](const Path& path) { marrow::read::read_camera_file(path); };
+  const auto read = [](const Path& path) { marrow::files::read_camera_file(path); };
   std::string aliases = "a0: &a0 [x, x, x, x, x, x, x, x, x, x]\n";
   for (int i = 1; i < 12; ++i) {
     const std::string before = "*a" + std::to_string(i - 1);

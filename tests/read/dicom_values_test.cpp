@@ -2,7 +2,7 @@
 // What the header of a DICOM file says of its values: where it stands, and where it is missing.
 #include <gtest/gtest.h>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 
@@ -24,14 +24,14 @@ class DicomValues : public testing::Test {
  protected:
   marrow::Image image(const std::string& bytes, int frame = 0) {
     put(folder / "x.dcm", bytes);
-    return marrow::read::read_image_file(folder / "x.dcm", frame);
+    return marrow::files::read_image_file(folder / "x.dcm", frame);
   }
   /// Three slices, the second one as given.
   marrow::Volume series(const Elements& second, const Elements& others = {}) {
     std::filesystem::create_directories(folder / "ct");
     for (int z = 0; z < 3; ++z) put(folder / ("ct/s" + std::to_string(z)), dicom_file(with(ct_slice(z), others)));
     put(folder / "ct/s1", dicom_file(second));
-    return marrow::read::read_volume_file(folder / "ct", {});
+    return marrow::files::read_volume_file(folder / "ct", {});
   }
   TemporaryFolder folder;
 };
@@ -115,7 +115,7 @@ TEST_F(DicomValues, OfACtThatDoesNotScaleThemAreRefused) {
        {std::pair{0x00281052u, "RescaleIntercept (0028,1052)"}, {0x00281053u, "RescaleSlope (0028,1053)"}}) {
     series(ct_slice(1));
     for (int z = 0; z < 3; ++z) put(folder / ("ct/s" + std::to_string(z)), dicom_file(without(ct_slice(z), tag)));
-    EXPECT_SAYS(marrow::read::read_volume_file(folder / "ct", {}),
+    EXPECT_SAYS(marrow::files::read_volume_file(folder / "ct", {}),
                 std::string("s0: its header has no ") + name + ", nor has any other slice's");
   }
   EXPECT_EQ(image(dicom_file(fluoroscopy())).pixels.at<std::uint16_t>(3, 1), 301) << "an X-ray image needs no scale";

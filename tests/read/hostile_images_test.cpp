@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "plugins/read/volume_file.hpp"
-#include "plugins/read/xray_header.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+#include "marrow/toolbox/files/xray_header.hpp"
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
@@ -17,7 +17,7 @@ using namespace marrow::test;
 using namespace std::string_literals;
 using Path = std::filesystem::path;
 
-marrow::Image image_at(const Path& path) { return marrow::read::read_image_file(path); }
+marrow::Image image_at(const Path& path) { return marrow::files::read_image_file(path); }
 
 /// A frontal fluoroscopy of 48 x 32 pixels, grey values that rise and fall, of 8 or 16 bits.
 Elements image_of(int bits) {
@@ -235,7 +235,7 @@ TEST(Damaged, FilesOfTheAudit) {
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const Path path = entry.path();
     if (path.extension() == ".dcm") EXPECT_REFUSED(image_at(path), path.filename(), "");
-    if (path.extension() == ".nrrd") EXPECT_REFUSED(marrow::read::read_volume_file(path, {}), path.filename(), "");
+    if (path.extension() == ".nrrd") EXPECT_REFUSED(marrow::files::read_volume_file(path, {}), path.filename(), "");
   }
 }
 

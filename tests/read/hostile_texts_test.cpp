@@ -6,11 +6,11 @@
 #include <algorithm>
 #include <ctime>
 
-#include "plugins/read/camera_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/files/view_file.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 #include "plugins/read/case.cpp"
-#include "plugins/read/mesh_file.hpp"
-#include "plugins/read/view_file.hpp"
-#include "plugins/read/yaml_values.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
@@ -24,11 +24,11 @@ class HostileTexts : public testing::Test {
  protected:
   void expect_mesh(const std::string& bytes, const std::string& text) {
     put(folder / "a.ply", bytes);
-    EXPECT_REFUSED(marrow::read::read_mesh_file(folder / "a.ply", 1), "a.ply", text);
+    EXPECT_REFUSED(marrow::files::read_mesh_file(folder / "a.ply", 1), "a.ply", text);
   }
   void expect_seeds(const std::string& text, const std::string& said) {
     put(folder / "a.yaml", text);
-    EXPECT_REFUSED(marrow::read::read_seeds_file(folder / "a.yaml"), "a.yaml", said);
+    EXPECT_REFUSED(marrow::files::read_seeds_file(folder / "a.yaml"), "a.yaml", said);
   }
   TemporaryFolder folder;
 };
@@ -111,7 +111,7 @@ double seconds_to_read(const Path& path) {
   double least = 1e9;
   for (int i = 0; i < 5; ++i) {
     const std::clock_t begin = std::clock();
-    EXPECT_EQ(marrow::read::read_mesh_file(path, 1).triangles.size(), 200000u);
+    EXPECT_EQ(marrow::files::read_mesh_file(path, 1).triangles.size(), 200000u);
     least = std::min(least, double(std::clock() - begin) / CLOCKS_PER_SEC);
   }
   return least;
@@ -129,13 +129,13 @@ TEST_F(HostileTexts, PlyIsReadAsFastAsStl) {
 TEST_F(HostileTexts, SurfacesOfNumbersThatAreNone) {
   put(folder / "a.stl",
       "solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 1e999\nendloop\nendfacet\nendsolid\n");
-  EXPECT_REFUSED(marrow::read::read_mesh_file(folder / "a.stl", 1), "a.stl", "a.stl");
+  EXPECT_REFUSED(marrow::files::read_mesh_file(folder / "a.stl", 1), "a.stl", "a.stl");
   put(folder / "a.stl",
       "solid a\nfacet\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 3x\nendloop\nendfacet\nendsolid\n");
-  EXPECT_REFUSED(marrow::read::read_mesh_file(folder / "a.stl", 1), "a.stl",
+  EXPECT_REFUSED(marrow::files::read_mesh_file(folder / "a.stl", 1), "a.stl",
                  "a facet is not three lines 'vertex x y z'");
   ASSERT_EQ(::mkfifo((folder / "b.stl").c_str(), 0600), 0);
-  EXPECT_REFUSED(marrow::read::read_mesh_file(folder / "b.stl", 1), "b.stl", "expected a file, this is none");
+  EXPECT_REFUSED(marrow::files::read_mesh_file(folder / "b.stl", 1), "b.stl", "expected a file, this is none");
 }
 
 TEST_F(HostileTexts, YamlAliasesAreRefused) {
@@ -155,11 +155,11 @@ TEST_F(HostileTexts, ManyFaultsAreCountedNotListed) {
   std::string text = "marrow-seeds: 1\n";
   for (int i = 0; i < 6000; ++i) text += "key" + std::to_string(i) + ": " + std::string(2, 'x') + "\n";
   expect_seeds(text, "unknown key 'key0'; known are marrow-seeds, fragments");
-  const std::string said = message_of([&] { marrow::read::read_seeds_file(folder / "a.yaml"); });
+  const std::string said = message_of([&] { marrow::files::read_seeds_file(folder / "a.yaml"); });
   EXPECT_NE(said.find("\n... and 5951 more"), std::string::npos) << said.substr(0, 500);
   EXPECT_LT(said.size(), 20000u);
   put(folder / "a.yaml", "marrow-seeds: 1\n" + std::string(900, 'k') + ": 1\n");
-  EXPECT_LT(message_of([&] { marrow::read::read_seeds_file(folder / "a.yaml"); }).size(), 1000u);
+  EXPECT_LT(message_of([&] { marrow::files::read_seeds_file(folder / "a.yaml"); }).size(), 1000u);
 }
 
 TEST_F(HostileTexts, ManyFragments) {
@@ -180,10 +180,10 @@ TEST_F(HostileTexts, NamesThatHarm) {
   expect_seeds(named("\"\""), "a name is empty");
   expect_seeds(named(std::string(101, 'n')), "a name has 101 bytes; at most 100 are taken");
   put(folder / "a.yaml", named("R\xC3\xB6hrenknochen, distal"));
-  EXPECT_EQ(marrow::read::read_seeds_file(folder / "a.yaml").name(0), "R\xC3\xB6hrenknochen, distal");
-  marrow::read::ViewSource source;
+  EXPECT_EQ(marrow::files::read_seeds_file(folder / "a.yaml").name(0), "R\xC3\xB6hrenknochen, distal");
+  marrow::files::ViewSource source;
   source.name = "a\n/b";
-  EXPECT_SAYS(marrow::read::read_view_files(source),
+  EXPECT_SAYS(marrow::files::read_view_files(source),
               "the name 'a\\x0a/b' of a view holds a character that cannot be printed; choose another");
 }
 

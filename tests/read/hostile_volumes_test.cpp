@@ -6,7 +6,7 @@
 
 #include <cstring>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
@@ -17,9 +17,9 @@ using namespace marrow::test;
 using Path = std::filesystem::path;
 
 marrow::Volume volume_at(const Path& path) {
-  marrow::read::VolumeReading reading;
+  marrow::files::VolumeReading reading;
   if (path.extension() == ".tif") reading.voxel_size_mm = {1, 1, 1};
-  return marrow::read::read_volume_file(path, reading);
+  return marrow::files::read_volume_file(path, reading);
 }
 
 ItkGrid<std::int16_t> stack() {
@@ -162,9 +162,9 @@ TEST_F(Hostile, MetaImageThatDoesNotSayHowLargeVoxelsAre) {
       "voxel_size_mm";
   expect("b.mha", without, said);
   expect("b.mha", with(bytes, "ElementSpacing", "ElementSpacng"), said);
-  marrow::read::VolumeReading reading;
+  marrow::files::VolumeReading reading;
   reading.voxel_size_mm = {1, 2, 3};
-  EXPECT_EQ(marrow::read::read_volume_file(folder / "b.mha", reading).grid.spacing_mm, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(marrow::files::read_volume_file(folder / "b.mha", reading).grid.spacing_mm, Eigen::Vector3d(1, 2, 3));
   put(folder / "b.mha", with(bytes, "ElementSpacing", "ElementSize"));
   EXPECT_EQ(itk_meta_spacing(folder / "b.mha"), (std::vector<double>{0.5, 0.75, 1.25}));
   EXPECT_EQ(volume_at(folder / "b.mha").grid.spacing_mm, Eigen::Vector3d(0.5, 0.75, 1.25));

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
@@ -33,11 +33,11 @@ class TwoPlaces : public testing::Test {
   }
   marrow::Grid grid_of(const std::string& bytes) {
     put(folder / "b.nii", bytes);
-    return marrow::read::read_volume_file(folder / "b.nii", {}).grid;
+    return marrow::files::read_volume_file(folder / "b.nii", {}).grid;
   }
   void expect_refused(const std::string& bytes, const std::string& text) {
     put(folder / "b.nii", bytes);
-    EXPECT_REFUSED(marrow::read::read_volume_file(folder / "b.nii", {}), "b.nii", text);
+    EXPECT_REFUSED(marrow::files::read_volume_file(folder / "b.nii", {}), "b.nii", text);
   }
   TemporaryFolder folder;
 };

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 
 namespace {
@@ -13,7 +13,7 @@ class Nrrd : public testing::Test {
   marrow::Grid grid_with(const std::string& fields) {
     put(folder / "a.nrrd",
         "NRRD0004\ntype: uchar\ndimension: 3\nsizes: 5 4 3\nencoding: raw\n" + fields + "\n\n" + std::string(60, '\7'));
-    return marrow::read::read_volume_file(folder / "a.nrrd", {}).grid;
+    return marrow::files::read_volume_file(folder / "a.nrrd", {}).grid;
   }
   TemporaryFolder folder;
 };

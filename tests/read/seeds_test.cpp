@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
-#include "volume_file.hpp"
 
 namespace {
 
@@ -28,7 +28,7 @@ TEST(ReadSeeds, SeedsOfTheWristLieInBone) {
   const marrow::List<marrow::Seeds> radius = seeds({file});
   EXPECT_EQ(radius.names(), std::vector<std::string>{"radius"});
   MARROW_NEED_DATA(data, "wrist/volumes/rad_dcm_cropped.tif");
-  const marrow::Volume ct = marrow::read::read_volume_file(data, {{0.39625, 0.39625, 0.625}, {}, -1024, ""});
+  const marrow::Volume ct = marrow::files::read_volume_file(data, {{0.39625, 0.39625, 0.625}, {}, -1024, ""});
   for (const Eigen::Vector3d& point : radius[0].points_mm)
     EXPECT_GT(sample_trilinear(ct.grid, ct.values, ct.grid.index_from_point(point)), 800);
 }

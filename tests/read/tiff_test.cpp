@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "marrow/domain/image.hpp"
-#include "plugins/read/volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 #include "read/hostile.hpp"
 
@@ -60,13 +60,13 @@ class Tiff : public testing::Test {
  protected:
   marrow::Volume volume(const std::vector<Page>& pages) {
     put(folder / "a.tif", tiff(pages));
-    marrow::read::VolumeReading reading;
+    marrow::files::VolumeReading reading;
     reading.voxel_size_mm = {1, 1, 1};
-    return marrow::read::read_volume_file(folder / "a.tif", reading);
+    return marrow::files::read_volume_file(folder / "a.tif", reading);
   }
   marrow::Image image(const std::vector<Page>& pages, int frame = 0) {
     put(folder / "a.tif", tiff(pages));
-    return marrow::read::read_image_file(folder / "a.tif", frame);
+    return marrow::files::read_image_file(folder / "a.tif", frame);
   }
   void expect_no_volume(const std::vector<Page>& pages, const std::string& text) {
     EXPECT_REFUSED(volume(pages), "a.tif", text);

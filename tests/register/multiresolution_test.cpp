@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/register/multiresolution.cpp"
-#include "plugins/register/predicted_covariance.hpp"
-#include "plugins/register/scan.hpp"
+#include "framework/toolbox/search/predicted_covariance.hpp"
+#include "framework/toolbox/search/scan.hpp"
 
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
@@ -28,15 +28,15 @@ marrow::Vector6d motion(double rx, double ry, double rz, double tx, double ty, d
 struct Trial {
   Trial(marrow::Mesh surface, double height_mm) : mesh(std::move(surface)), projector(outline_node(mesh)) {
     truth.frame = marrow::fragment_frame(mesh);
-    truth.world_from_model = marrow::registration::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame,
-                                                                  motion(3, -5, 6, 3, -4, 5));
+    truth.world_from_model =
+        marrow::search::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
   }
   Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
-             const marrow::registration::SearchOptions& options = {}) const {
+             const marrow::search::SearchOptions& options = {}) const {
     const ideal_edges::Scene scene = ideal_edges::scene_of(*projector, truth.world_from_model, angles_deg, faults);
     const auto cost = cost_node(*projector, scene.views, scene.edges);
     marrow::Pose start = truth;
-    start.world_from_model = marrow::registration::moved_by_units(truth.world_from_model, truth.frame, away);
+    start.world_from_model = marrow::search::moved_by_units(truth.world_from_model, truth.frame, away);
     marrow::Context context;
     return multiresolution(*cost, *optimizer_node(), start, options, context);
   }
@@ -83,7 +83,7 @@ TEST(Multiresolution, SurvivesNoiseGapsOutliersAndAFatModel) {
 }
 
 TEST(Multiresolution, ScattersPosesAboutAStartThatIsWrongInAllAxes) {
-  marrow::registration::SearchOptions options;
+  marrow::search::SearchOptions options;
   options.scan_poses = 1000;
   options.scan_rotation_deg = options.scan_translation_mm = 6;
   options.scan_side_deg = options.scan_side_mm = 6;
@@ -105,13 +105,13 @@ TEST(Multiresolution, ScattersPosesAboutAStartThatIsWrongInAllAxes) {
 }
 
 TEST(Multiresolution, ScattersEvenlyWithinTheRanges) {
-  marrow::registration::SearchOptions options;
+  marrow::search::SearchOptions options;
   options.scan_poses = 500;
   options.scan_rotation_deg = 6;
   options.scan_translation_mm = 5;
   options.scan_side_deg = 4;
   options.scan_side_mm = 3;
-  const marrow::registration::Scan scan = marrow::registration::scattered_scan(options);
+  const marrow::search::Scan scan = marrow::search::scattered_scan(options);
   ASSERT_EQ(scan.motions.size(), 500u);
   EXPECT_EQ(scan.motions[0], motion(0, 0, 0, 0, 0, 0));
   const marrow::Vector6d range = motion(4, 4, 6, 3, 3, 5);
@@ -129,7 +129,7 @@ TEST(Multiresolution, ScattersEvenlyWithinTheRanges) {
 
 TEST(Multiresolution, TheLastLevelChoosesAmongTheFinalists) {
   ideal_edges::Faults faults{0.5, 0.25, 800, -1.5, true, 3};
-  marrow::registration::SearchOptions one, three;
+  marrow::search::SearchOptions one, three;
   three.finalists = 3;
   const marrow::Vector6d away = motion(1.5, -1, 10, 2, 2, 10);
   EXPECT_LE(femur().run({0, 90}, faults, away, three).pose.cost, femur().run({0, 90}, faults, away, one).pose.cost);
@@ -193,7 +193,7 @@ TEST(Multiresolution, SameBytesAtAnyNumberOfThreads) {
 }
 
 TEST(Multiresolution, RefusesLevelsThatDoNotAgree) {
-  marrow::registration::SearchOptions options;
+  marrow::search::SearchOptions options;
   options.reach_px = {10, 5};
   try {
     femur().run({0}, {}, motion(0, 0, 0, 0, 0, 0), options);

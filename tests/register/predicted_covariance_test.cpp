@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/register/predicted_covariance.hpp"
+#include "framework/toolbox/search/predicted_covariance.hpp"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@ namespace {
 
 using marrow::Matrix6d;
 using marrow::Vector6d;
-using marrow::registration::PredictedCovariance;
+using marrow::search::PredictedCovariance;
 using well::Bowl;
 
 marrow::FragmentFrame frame() { return {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3})}; }

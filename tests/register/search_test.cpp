@@ -1,25 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of the search: the poses it looks at first, what it asks of the optimizer, and derivatives in its
 // coordinates.
-#include "plugins/register/search.hpp"
+#include "marrow/toolbox/search/search.hpp"
 
 #include <gtest/gtest.h>
 
 #include "bowl.hpp"
-#include "plugins/register/derivatives.hpp"
-#include "plugins/register/predicted_covariance.hpp"
-#include "plugins/register/scan.hpp"
+#include "framework/toolbox/search/derivatives.hpp"
+#include "framework/toolbox/search/predicted_covariance.hpp"
+#include "framework/toolbox/search/scan.hpp"
 
 namespace {
 
 using marrow::Matrix6d;
 using marrow::Pose;
 using marrow::Vector6d;
-using marrow::registration::Found;
-using marrow::registration::kAllAxes;
-using marrow::registration::Scan;
-using marrow::registration::Search;
-using marrow::registration::SearchOptions;
+using marrow::search::Found;
+using marrow::search::kAllAxes;
+using marrow::search::Scan;
+using marrow::search::Search;
+using marrow::search::SearchOptions;
 using well::Bowl;
 using well::Listener;
 using well::pose_at;
@@ -53,7 +53,7 @@ TEST(Scan, OfTheAxisIsAGridWithinItsRanges) {
   options.scan_rotation_step_deg = 2;
   options.scan_translation_mm = 0.3;
   options.scan_translation_step_mm = 0.1;  // three steps, though 0.3 / 0.1 is a little less
-  const Scan scan = marrow::registration::axial_scan(options);
+  const Scan scan = marrow::search::axial_scan(options);
   ASSERT_EQ(scan.motions.size(), 7u * 7);
   EXPECT_TRUE(scan.motions.front().isApprox(motion(0, 0, -6, 0, 0, -0.3), 1e-12));
   EXPECT_TRUE(scan.motions[1].isApprox(motion(0, 0, -6, 0, 0, -0.2), 1e-12));
@@ -74,7 +74,7 @@ TEST(Scan, ScatteredPosesAreHaltons) {
   options.scan_side_mm = 3;
   options.scan_translation_mm = 5;
   options.scan_reach = 0.5;
-  const Scan scan = marrow::registration::scattered_scan(options);
+  const Scan scan = marrow::search::scattered_scan(options);
   ASSERT_EQ(scan.motions.size(), 7u);
   EXPECT_EQ(scan.motions[0], Vector6d(Vector6d::Zero()));
   // Of 1: 1/2, 1/3, 1/5, 1/7, 1/11, 1/13. Of 6, which is 110, 20, 11, 6, 6 and 6 in these bases: 3/8, 2/9, 6/25, 6/7,
@@ -142,7 +142,7 @@ TEST(Search, FollowsTheBestOfItsScanThroughAllLevels) {
   marrow::Context context;
   const Pose start = pose_at(truth(), 0.5, 0, 1, 0, 0, -1);
   Search search(listener, start, options, context);
-  const auto levels = marrow::registration::levels_of(cost, options);
+  const auto levels = marrow::search::levels_of(cost, options);
   const Found found = search.find(levels);
   // The grid's best is the one without the start's axial errors; the optimizer stays there.
   EXPECT_LT((from_truth(found.pose) - motion(0.5, 0, 0, 0, 0, 0)).norm(), 0.01) << from_truth(found.pose).transpose();
@@ -172,7 +172,7 @@ TEST(Search, CandidatesAreNoNeighbours) {
   marrow::Context context;
   const Pose start = truth();
   Search search(listener, start, options, context);
-  search.find(marrow::registration::levels_of(cost, options));
+  search.find(marrow::search::levels_of(cost, options));
   // Of -9, -6 ... 9 degrees: 0, then -9 and 9, which are further than two steps of 3 from it.
   EXPECT_EQ(listener.problems.size(), 3u * 2 + 2);
 }
@@ -201,7 +201,7 @@ TEST(Search, ItsWayIsTheLeastCostSoFar) {
   EXPECT_EQ(pose.convergence.size(), 3u);
   ASSERT_TRUE(pose.covariance.has_value());
   EXPECT_NEAR((*pose.covariance)(3, 3), 1.0 / 4, 1e-6);
-  const marrow::registration::PredictedCovariance predicted(cost, search.pose(), start.frame, 4);
+  const marrow::search::PredictedCovariance predicted(cost, search.pose(), start.frame, 4);
   EXPECT_EQ(pose.evaluations, 28 + predicted.evaluations());
 }
 
@@ -235,13 +235,13 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
   const marrow::FragmentFrame frame = truth().frame;
   const marrow::RigidTransform origin = truth().world_from_model;
   const auto value = [&](const Vector6d& deg_and_mm) {
-    const marrow::RigidTransform pose = marrow::registration::moved_by_units(origin, frame, deg_and_mm);
+    const marrow::RigidTransform pose = marrow::search::moved_by_units(origin, frame, deg_and_mm);
     return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) +
            (pose.rotation * Eigen::Vector3d(20, 30, -10)).dot(Eigen::Vector3d(1, 2, -1));
   };
   for (const Vector6d& at : {motion(0, 0, 0, 0, 0, 0), motion(20, -30, 15, 3, -5, 8), motion(-3, 1, 40, 0, 0, 1)}) {
     // About the pose there, in rad and mm, by differences.
-    const marrow::RigidTransform there = marrow::registration::moved_by_units(origin, frame, at);
+    const marrow::RigidTransform there = marrow::search::moved_by_units(origin, frame, at);
     const auto at_motion = [&](const Vector6d& small) {
       const marrow::RigidTransform pose = marrow::moved(there, frame, small);
       return (pose * Eigen::Vector3d(30, -10, 120)).dot(Eigen::Vector3d(0.4, -0.3, 0.5)) +
@@ -253,7 +253,7 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
       about.gradient[i] = (at_motion(1e-5 * Vector6d::Unit(i)) - at_motion(-1e-5 * Vector6d::Unit(i))) / 2e-5;
     about.curvature = about.gradient * about.gradient.transpose();
     const std::vector<int> axes{4, 0, 2, 1, 5};
-    const auto told = marrow::registration::in_coordinates(about, at, axes);
+    const auto told = marrow::search::in_coordinates(about, at, axes);
     EXPECT_EQ(told.value, 3);
     ASSERT_EQ(told.gradient.size(), 5);
     for (int k = 0; k < 5; ++k) {
@@ -262,5 +262,5 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
     }
     EXPECT_TRUE(told.curvature.isApprox(told.gradient * told.gradient.transpose(), 1e-9));
   }
-  EXPECT_TRUE(std::isnan(marrow::registration::in_coordinates(std::nullopt, motion(0, 0, 0, 0, 0, 0), kAllAxes).value));
+  EXPECT_TRUE(std::isnan(marrow::search::in_coordinates(std::nullopt, motion(0, 0, 0, 0, 0, 0), kAllAxes).value));
 }

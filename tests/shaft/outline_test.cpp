@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/shaft/outline.hpp"
+#include "framework/toolbox/shaft/outline.hpp"
 
 #include <gtest/gtest.h>
 

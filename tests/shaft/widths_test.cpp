@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/shaft/widths.hpp"
+#include "marrow/toolbox/shaft/widths.hpp"
 
 #include <gtest/gtest.h>
 

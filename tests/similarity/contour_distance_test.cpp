@@ -169,7 +169,7 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
                       float(std::sin(angle)), Eigen::Vector3f::Zero()});
   }
   for (const double reach_px : {0.5, 4.0, 9.0}) {
-    const NearestOutline nearest(points, 120, 90, reach_px);
+    const marrow::match::NearestOutline nearest(points, 120, 90, reach_px);
     int within = 0;
     for (float v = -2; v < 94; v += 1.7f)
       for (float u = -2; u < 124; u += 1.9f) {

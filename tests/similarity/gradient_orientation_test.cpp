@@ -6,7 +6,7 @@
 namespace {
 
 std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views) {
-  return gradient_orientation(projector, views, nullptr, nullptr, marrow::similarity::IntensityOptions{});
+  return gradient_orientation(projector, views, nullptr, nullptr, marrow::match::IntensityOptions{});
 }
 
 }  // namespace

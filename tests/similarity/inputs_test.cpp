@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/inputs.hpp"
+#include "marrow/toolbox/match/inputs.hpp"
 
 #include <gtest/gtest.h>
 
@@ -42,7 +42,7 @@ TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
       const int left = is_open_above ? first : 4, right = is_open_above ? last : 8, top = is_open_above ? 4 : first,
                 bottom = is_open_above ? 8 : last;
       const RectangleOutline outline(left, right, top, bottom, is_open_above);
-      const auto masked = marrow::similarity::without_shadows(views, {{&outline, {}}});
+      const auto masked = marrow::match::without_shadows(views, {{&outline, {}}});
       for (int v = 0; v < kRows; ++v)
         for (int u = 0; u < kColumns; ++u)
           EXPECT_EQ(masked[0].mask.at<std::uint8_t>(v, u) == 0, v >= top && v <= bottom && u >= left && u <= right)

@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
 // The parts of which the measures are made, on patches of a few pixels, against values computed by hand.
-#include "plugins/similarity/intensity.hpp"
+#include "marrow/toolbox/match/intensity.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "plugins/similarity/patches.hpp"
+#include "marrow/toolbox/match/patches.hpp"
 
 namespace {
 
-using marrow::similarity::Gradients;
-using marrow::similarity::Patch;
+using marrow::match::Gradients;
+using marrow::match::Patch;
 
 /// Five columns and four rows. The radiograph is 2 u + 3 v, the image 10 u - v; all pixels count.
 Patch ramps() {
@@ -26,7 +26,7 @@ Patch ramps() {
 
 TEST(Gradients, OfARampAreItsSlopes) {
   const Patch patch = ramps();
-  const Gradients gradients = marrow::similarity::gradients_of(patch);
+  const Gradients gradients = marrow::match::gradients_of(patch);
   for (int v = 0; v < 4; ++v)
     for (int u = 0; u < 5; ++u) {
       const std::size_t i = patch.at(u, v);
@@ -39,7 +39,7 @@ TEST(Gradients, OfARampAreItsSlopes) {
       EXPECT_EQ(gradients.seen_v[i], is_inside ? -1 : 0);
     }
   // (2 * 10 + 3 * -1) / (2^2 + 3^2) at each of the six pixels.
-  EXPECT_NEAR(marrow::similarity::scale_of(gradients), 17.0 / 13.0, 1e-12);
+  EXPECT_NEAR(marrow::match::scale_of(gradients), 17.0 / 13.0, 1e-12);
 }
 
 TEST(Gradients, CountWhereAllNinePixelsDo) {
@@ -47,7 +47,7 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
     for (int u = 0; u < 5; ++u) {
       Patch patch = ramps();
       patch.counts[patch.at(u, v)] = 0;
-      const Gradients gradients = marrow::similarity::gradients_of(patch);
+      const Gradients gradients = marrow::match::gradients_of(patch);
       for (int row = 1; row < 3; ++row)
         for (int column = 1; column < 4; ++column)
           EXPECT_EQ(gradients.counts[patch.at(column, row)], std::abs(column - u) > 1 || std::abs(row - v) > 1)
@@ -57,22 +57,22 @@ TEST(Gradients, CountWhereAllNinePixelsDo) {
 
 TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
   Patch patch = ramps();
-  Gradients gradients = marrow::similarity::gradients_of(patch);
+  Gradients gradients = marrow::match::gradients_of(patch);
   gradients.seen_u[patch.at(1, 1)] = 1e6f;
   gradients.counts[patch.at(1, 1)] = 0;
-  EXPECT_NEAR(marrow::similarity::scale_of(gradients), 17.0 / 13.0, 1e-12);
+  EXPECT_NEAR(marrow::match::scale_of(gradients), 17.0 / 13.0, 1e-12);
   gradients.counts.assign(20, 0);
-  EXPECT_EQ(marrow::similarity::scale_of(gradients), 0);
+  EXPECT_EQ(marrow::match::scale_of(gradients), 0);
 }
 
 TEST(LineIntegrals, AreLogarithmsOfWhatIsLeft) {
   const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 3) << 1000, 500, 0);
-  const cv::Mat of_grey = marrow::similarity::line_integrals(grey);
+  const cv::Mat of_grey = marrow::match::line_integrals(grey);
   EXPECT_EQ(of_grey.at<float>(0), 0);
   EXPECT_FLOAT_EQ(of_grey.at<float>(1), std::log(2.0f));
   EXPECT_FLOAT_EQ(of_grey.at<float>(2), std::log(1000.0f)) << "0 is one step of grey";
   const cv::Mat real = (cv::Mat_<float>(1, 3) << 0.5f, 0.25f, -1.0f);
-  const cv::Mat of_real = marrow::similarity::line_integrals(real);
+  const cv::Mat of_real = marrow::match::line_integrals(real);
   EXPECT_FLOAT_EQ(of_real.at<float>(1), std::log(2.0f));
   EXPECT_FLOAT_EQ(of_real.at<float>(2), std::log(1e5f)) << "a hundred-thousandth of the brightest";
 }
@@ -84,16 +84,16 @@ TEST(Moments, OfTheValuesThatCount) {
   std::vector<char> counts(17, 1);
   a[16] = b[16] = odd[16] = 1e6f;
   counts[16] = 0;
-  EXPECT_NEAR(marrow::similarity::correlation(a, a, counts), 1, 1e-12);
-  EXPECT_NEAR(marrow::similarity::correlation(a, b, counts), -1, 1e-12);
+  EXPECT_NEAR(marrow::match::correlation(a, a, counts), 1, 1e-12);
+  EXPECT_NEAR(marrow::match::correlation(a, b, counts), -1, 1e-12);
   // The covariance of i and i % 2 is 1/4; the variances are 255/12 and 1/4.
-  EXPECT_NEAR(marrow::similarity::correlation(a, odd, counts), 0.25 / std::sqrt(255 / 12.0 * 0.25), 1e-12);
-  EXPECT_EQ(marrow::similarity::correlation(a, std::vector<float>(17, 5), counts), 0);
-  EXPECT_NEAR(marrow::similarity::deviation(a, counts), std::sqrt(255 / 12.0), 1e-12);
-  EXPECT_NEAR(marrow::similarity::deviation(odd, counts), 0.5, 1e-12);
+  EXPECT_NEAR(marrow::match::correlation(a, odd, counts), 0.25 / std::sqrt(255 / 12.0 * 0.25), 1e-12);
+  EXPECT_EQ(marrow::match::correlation(a, std::vector<float>(17, 5), counts), 0);
+  EXPECT_NEAR(marrow::match::deviation(a, counts), std::sqrt(255 / 12.0), 1e-12);
+  EXPECT_NEAR(marrow::match::deviation(odd, counts), 0.5, 1e-12);
   counts[3] = 0;
-  EXPECT_EQ(marrow::similarity::correlation(a, a, counts), 0) << "fewer than 16";
-  EXPECT_EQ(marrow::similarity::deviation(a, counts), 0);
+  EXPECT_EQ(marrow::match::correlation(a, a, counts), 0) << "fewer than 16";
+  EXPECT_EQ(marrow::match::deviation(a, counts), 0);
 }
 
 TEST(Patches, WeighEachSquareByItsVariance) {
@@ -113,7 +113,7 @@ TEST(Patches, WeighEachSquareByItsVariance) {
   const double variance_a = middle_a / 2 - 16 * mean_a * mean_a, variance_b = 8 - 0.0, covariance = 4 * 3.0 - 4 * 1.0;
   const double expected =
       (36 * 1 + variance_a * covariance / std::sqrt(variance_a * variance_b) + 4 * -1) / (36 + variance_a + 4);
-  EXPECT_NEAR(marrow::similarity::mean_patch_correlation(patch, a, b, patch.counts, 4), expected, 1e-12);
+  EXPECT_NEAR(marrow::match::mean_patch_correlation(patch, a, b, patch.counts, 4), expected, 1e-12);
 }
 
 TEST(Patches, LieWhereTheyLieInTheImage) {
@@ -122,7 +122,7 @@ TEST(Patches, LieWhereTheyLieInTheImage) {
   std::vector<float> a(24), b(24);
   for (int i = 0; i < 24; ++i)
     a[std::size_t(i)] = float(i * i % 7), b[std::size_t(i)] = i % 6 == 0 || i % 6 == 5 ? 50.0f : float(i * i % 7);
-  EXPECT_NEAR(marrow::similarity::mean_patch_correlation(patch, a, b, patch.counts, 4), 1, 1e-12);
+  EXPECT_NEAR(marrow::match::mean_patch_correlation(patch, a, b, patch.counts, 4), 1, 1e-12);
 }
 
 TEST(Patches, AConstantRadiographSaysNothing) {
@@ -130,8 +130,8 @@ TEST(Patches, AConstantRadiographSaysNothing) {
   std::vector<float> b;
   for (int i = 0; i < 36; ++i) b.push_back(float(i % 5));
   for (int i = 0; i < 100; ++i)  // whatever rounding leaves of it
-    EXPECT_EQ(marrow::similarity::mean_patch_correlation(patch, std::vector<float>(36, 1000.1f + 77.7f * float(i)), b,
-                                                         patch.counts, 6),
+    EXPECT_EQ(marrow::match::mean_patch_correlation(patch, std::vector<float>(36, 1000.1f + 77.7f * float(i)), b,
+                                                    patch.counts, 6),
               -1)
         << i;
 }

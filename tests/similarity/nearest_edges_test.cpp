@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The nearest edge of each pixel and direction, against a search of all edges.
-#include "plugins/similarity/nearest_edges.hpp"
+#include "marrow/toolbox/match/nearest_edges.hpp"
 
 #include <gtest/gtest.h>
 
@@ -46,7 +46,7 @@ Eigen::Vector2i cell_of(float u, float v, int width, int height) {
 
 void compare_with_a_search(int width, int height, int count, unsigned seed) {
   std::mt19937 random(seed);
-  const NearestEdges nearest(random_edges(width, height, count, random), {}, kTolerance_rad);
+  const marrow::match::NearestEdges nearest(random_edges(width, height, count, random), {}, kTolerance_rad);
   ASSERT_EQ(nearest.all().size(), std::size_t(count));
   for (int sector = 0; sector < 16; ++sector) {
     const double angle = 2 * 3.14159265358979 * (sector + 0.4) / 16;
@@ -85,14 +85,14 @@ TEST(NearestEdges, LieInsideTheMaskAndTheImage) {
   edges.width_px = 20, edges.height_px = 10;
   for (const float u : {-0.6f, 2.0f, 12.0f, 19.6f}) edges.pixels.push_back({u, 4, 1, 0, 1});
   for (const float v : {-0.6f, 9.6f}) edges.pixels.push_back({12, v, 1, 0, 1});
-  EXPECT_EQ(NearestEdges(edges, {}, kTolerance_rad).all().size(), 2u);
+  EXPECT_EQ(marrow::match::NearestEdges(edges, {}, kTolerance_rad).all().size(), 2u);
   cv::Mat mask(10, 20, CV_8U, cv::Scalar(0));
   mask(cv::Rect(10, 0, 10, 10)).setTo(1);
-  const NearestEdges inside(edges, mask, kTolerance_rad);
+  const marrow::match::NearestEdges inside(edges, mask, kTolerance_rad);
   ASSERT_EQ(inside.all().size(), 1u);
   EXPECT_EQ(inside.find(0, 0, 1, 0)->u_px, 12);
   EXPECT_EQ(inside.find(0, 0, -1, 0), nullptr) << "seen from the other side";
-  EXPECT_TRUE(NearestEdges(edges, cv::Mat(10, 20, CV_8U, cv::Scalar(0)), kTolerance_rad).empty());
+  EXPECT_TRUE(marrow::match::NearestEdges(edges, cv::Mat(10, 20, CV_8U, cv::Scalar(0)), kTolerance_rad).empty());
 }
 
 TEST(NearestEdges, AreSmoothedAlongTheirBorder) {
@@ -102,7 +102,7 @@ TEST(NearestEdges, AreSmoothedAlongTheirBorder) {
   for (int v = 0; v < 21; ++v) edges.pixels.push_back({v % 2 ? 10.3f : 9.7f, float(v), 1, 0, 1});
   edges.pixels.push_back({12.5f, 10, 1, 0, 1});   // too far away
   edges.pixels.push_back({10.6f, 10, -1, 0, 1});  // another border
-  const NearestEdges nearest(edges, {}, kTolerance_rad);
+  const marrow::match::NearestEdges nearest(edges, {}, kTolerance_rad);
   // Of seven pixels in the middle, three or four lie on either side.
   for (int v = 3; v < 18; ++v)
     EXPECT_NEAR(nearest.all()[std::size_t(v)].u_px, v % 2 ? 10 - 0.3 / 7 : 10 + 0.3 / 7, 1e-5) << v;

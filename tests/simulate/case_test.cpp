@@ -7,7 +7,7 @@
 
 namespace {
 
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 struct Chain {
   Phantom phantom;

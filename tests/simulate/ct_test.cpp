@@ -8,7 +8,7 @@
 
 namespace {
 
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 Phantom tube() {
   Phantom phantom = test::whole(test::cylinder(14, 0, 60), test::cylinder(7, 5, 55));
@@ -135,7 +135,7 @@ TEST(SimulateCt, BadInputIsExplained) {
   EXPECT_EQ(test::message_of([&] {
               scan(Phantom{tube().bone, {}, {}}, CtOptions{}, context);
             }),
-            "simulate.ct: the phantom has no fragments; make it with simulate.fracture");
+            "simulate.ct: the phantom has no fragments; break the bone first");
 }
 
 }  // namespace

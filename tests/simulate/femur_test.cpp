@@ -7,7 +7,7 @@
 
 namespace {
 
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 FemurOptions coarse() {
   FemurOptions options;

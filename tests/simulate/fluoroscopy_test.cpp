@@ -8,7 +8,7 @@
 
 namespace {
 
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 FluoroscopyOptions ideal() { return {.photons = 0, .blur_px = 0, .scatter_to_primary = 0, .scatter_px = 70}; }
 
@@ -62,7 +62,7 @@ TEST(SimulateFluoroscopy, TwoSidesOfAFractureAddUpToTheWholeBone) {
     std::vector<double> result(256 * 256, 0.0);
     std::vector<Interval> intervals;
     const auto crossings = xray.rays().bundle().crossings(0, 256);
-    simulate::for_each_ray(crossings, [&](std::span<const simulate::Crossing> ray) {
+    phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
       xray.rays().intervals(ray, intervals);
       Lengths lengths;
       xray.add_bone(xray.ray(int(ray[0].column), int(ray[0].row)), intervals, lengths);

@@ -7,15 +7,15 @@
 
 namespace {
 
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 Bone shaft() {
   Bone bone;
   // Rings of corners along the cylinder, so that its triangles are small against the fracture.
-  bone.outer = simulate::polygonise(
+  bone.outer = phantom::polygonise(
       [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 14, std::abs(p.z()) - 100); },
       {-20, -20, -104}, {26, 20, 104}, 1.1, 1.5);
-  bone.inner = simulate::polygonise(
+  bone.inner = phantom::polygonise(
       [](const Eigen::Vector3d& p) { return std::max(std::hypot(p.x() - 3, p.y()) - 6, std::abs(p.z()) - 94); },
       {-20, -20, -104}, {26, 20, 104}, 1.1, 1.5);
   return bone;

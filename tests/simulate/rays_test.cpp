@@ -6,14 +6,14 @@
 
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/error.hpp"
-#include "plugins/simulate/solid.hpp"
+#include "marrow/toolbox/phantom/solid.hpp"
 #include "shapes.hpp"
 
 namespace {
 
 using namespace marrow;
-using namespace marrow::simulate;
-namespace shape = marrow::simulate::test;
+using namespace marrow::phantom;
+namespace shape = marrow::phantom::test;
 
 /// Length of bone on the ray of each pixel: {cortical, inner}.
 std::vector<std::array<double, 2>> lengths(const Phantom& phantom, const Camera& camera) {

@@ -3,10 +3,10 @@
 // Bodies whose path lengths and volumes are known.
 #include <cmath>
 
-#include "plugins/simulate/phantom.hpp"
-#include "plugins/simulate/polygonise.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/polygonise.hpp"
 
-namespace marrow::simulate::test {
+namespace marrow::phantom::test {
 
 inline Mesh box(const Eigen::Vector3d& low, const Eigen::Vector3d& high) {
   Mesh mesh;
@@ -77,4 +77,4 @@ std::string message_of(Call&& call) {
   return "no error";
 }
 
-}  // namespace marrow::simulate::test
+}  // namespace marrow::phantom::test

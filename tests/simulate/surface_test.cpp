@@ -11,7 +11,7 @@
 namespace {
 
 namespace fs = std::filesystem;
-namespace test = simulate::test;
+namespace test = phantom::test;
 
 fs::path write_stl(const std::string& name, const Mesh& mesh, bool ascii) {
   const fs::path path = fs::path(testing::TempDir()) / name;
@@ -71,24 +71,24 @@ TEST(SimulateSurface, ReadsBinaryAndAsciiStlScalesAndTurns) {
 TEST(SimulateSurface, BadFilesAreExplained) {
   const auto message = [](const SurfaceOptions& options) { return test::message_of([&] { surface(options); }); };
   const fs::path folder = testing::TempDir();
-  EXPECT_EQ(message(reading(folder / "missing.stl")),
-            "surface file " + (folder / "missing.stl").string() + ": cannot be read; give the path of an STL file");
-  fs::create_directories(folder / "pipe");
-  for (const char* none : {"pipe", "/dev/zero"})
-    EXPECT_EQ(message(reading(folder / none)),
-              "surface file " + (folder / none).string() + ": cannot be read; give the path of an STL file");
+  EXPECT_EQ(message(reading(folder / "missing.stl")), (folder / "missing.stl").string() + ": there is no such file");
+  fs::create_directories(folder / "folder.stl");
+  fs::remove(folder / "zero.stl");
+  fs::create_symlink("/dev/zero", folder / "zero.stl");
+  for (const char* none : {"folder.stl", "zero.stl"})
+    EXPECT_EQ(message(reading(folder / none)), (folder / none).string() + ": expected a file, this is none");
   const Mesh box = test::box({0, 0, 0}, {10, 10, 100});
   const fs::path truncated = write_stl("truncated.stl", box, false);
   fs::resize_file(truncated, 300);
-  EXPECT_EQ(message(reading(truncated)),
-            "surface file " + truncated.string() +
-                ": neither a binary STL (300 bytes, but its header promises 12 triangles, which take "
-                "684) nor an ASCII one; the file may be truncated");
+  EXPECT_EQ(
+      message(reading(truncated)),
+      truncated.string() + ": its header claims 12 triangles, but the file has room for 4; it is cut off, or no STL");
   std::ofstream(folder / "empty.stl");
-  EXPECT_NE(message(reading(folder / "empty.stl")).find("neither a binary STL (0 bytes"), std::string::npos);
-  std::ofstream(folder / "words.stl") << "solid x\nvertex 1 2 three\n";
-  EXPECT_EQ(message(reading(folder / "words.stl")),
-            "surface file " + (folder / "words.stl").string() + ": a 'vertex' is not followed by three numbers");
+  EXPECT_EQ(message(reading(folder / "empty.stl")), (folder / "empty.stl").string() + ": the file is empty");
+  std::ofstream(folder / "words.stl") << "solid x\nfacet\nvertex 1 2 three\n";
+  EXPECT_EQ(
+      message(reading(folder / "words.stl")),
+      (folder / "words.stl").string() + ": a facet is not three lines 'vertex x y z'; the file is cut off or damaged");
   Mesh open = box;
   open.triangles.pop_back();
   EXPECT_NE(message(reading(write_stl("open.stl", open, false))).find("the surface is open"), std::string::npos);

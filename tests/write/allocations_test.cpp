@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <new>
 
-#include "plugins/write/atomic_write.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
 #include "read/files.hpp"
 
 namespace {
@@ -19,14 +19,14 @@ TEST(AtomicWrite, LeavesOldOrNewWhereAnAllocationFails) {
   fs::create_directories(folder / "with a longer name than fits into the text itself");
   for (const char* name : {"a", "with a longer name than fits into the text itself/and another one of that kind.txt"}) {
     const fs::path path = folder / name;
-    marrow::write::write_text(path, "old");
+    marrow::files::write_text(path, "old");
     bool done = false;
     long number = 0;
     for (; !done; ++number) {
       ASSERT_LT(number, 1000);
       left = number;
       try {
-        marrow::write::write_text(path, "new");
+        marrow::files::write_text(path, "new");
         done = left >= 0;  // none was left to fail
       } catch (const std::bad_alloc&) {
       } catch (const marrow::Error&) {

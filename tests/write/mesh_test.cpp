@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "mesh_file.hpp"
+#include "marrow/toolbox/files/mesh_file.hpp"
 #include "write/full_disk.hpp"
 
 namespace {
@@ -17,7 +17,7 @@ marrow::Mesh example() {
 TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
   const marrow::test::TemporaryFolder folder;
   mesh(example(), (folder / "m.ply").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_mesh_file(folder / "m.ply", 1)), marrow::hash_of(example()));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_mesh_file(folder / "m.ply", 1)), marrow::hash_of(example()));
 }
 
 TEST(WriteMesh, NameOfTheFrameAddsNothingToTheHeader) {
@@ -25,7 +25,7 @@ TEST(WriteMesh, NameOfTheFrameAddsNothingToTheHeader) {
   marrow::Mesh value = example();
   value.frame = "ct\nelement vertex 1000000\r\x1b[2J";
   mesh(value, (folder / "m.ply").string());
-  EXPECT_EQ(marrow::read::read_mesh_file(folder / "m.ply", 1).vertices_mm.size(), 4u);
+  EXPECT_EQ(marrow::files::read_mesh_file(folder / "m.ply", 1).vertices_mm.size(), 4u);
 }
 
 TEST(WriteMesh, FullDisk) {

@@ -6,9 +6,9 @@
 
 #include <limits>
 
-#include "camera_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 #include "write/full_disk.hpp"
-#include "yaml_values.hpp"
 
 namespace {
 
@@ -33,7 +33,7 @@ marrow::Pose example_pose() {
 TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
   const TemporaryFolder folder;
   pose(example_pose(), (folder / "pose.yaml").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_pose_file(folder / "pose.yaml")), marrow::hash_of(example_pose()));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_pose_file(folder / "pose.yaml")), marrow::hash_of(example_pose()));
   const std::string text = bytes_of(folder / "pose.yaml");
   EXPECT_NE(text.find("target: world\nsource: ct\nmatrix:  # world_from_ct, mm\n"), std::string::npos) << text;
   EXPECT_NE(text.find("predicted_deviation:"), std::string::npos);
@@ -44,10 +44,10 @@ TEST(WriteText, FramesOfAnyNameReadBack) {
   marrow::Truth value;
   for (const char* name : {"yes", "1", "a: b", "# no comment", "line\nbreak: 1", "", "~"}) {
     value.world_from_model.source = name;
-    const YAML::Node read = YAML::Load(marrow::write::truth(value));
+    const YAML::Node read = YAML::Load(marrow::files::truth(value));
     EXPECT_EQ(read["source"].Scalar(), name);
     EXPECT_EQ(read["source"].Tag(), "!") << "a text, whatever it looks like";
-    EXPECT_EQ(read.size(), 4u) << marrow::write::truth(value);
+    EXPECT_EQ(read.size(), 4u) << marrow::files::truth(value);
   }
 }
 
@@ -57,10 +57,10 @@ TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
   value.covariance.reset();
   value.warnings.clear();
   pose(value, (folder / "pose.yaml").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_pose_file(folder / "pose.yaml")), marrow::hash_of(value));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_pose_file(folder / "pose.yaml")), marrow::hash_of(value));
   value.covariance = marrow::Matrix6d::Constant(std::numeric_limits<double>::infinity());
   pose(value, (folder / "pose.yaml").string());
-  EXPECT_FALSE(marrow::read::read_pose_file(folder / "pose.yaml").covariance);
+  EXPECT_FALSE(marrow::files::read_pose_file(folder / "pose.yaml").covariance);
   EXPECT_NE(bytes_of(folder / "pose.yaml").find("rotation_deg: [.inf, .inf, .inf]"), std::string::npos);
 }
 
@@ -72,10 +72,10 @@ TEST(WriteText, CameraAndSeedsReadBackTheSame) {
                          {"camera", "world", marrow::rotation_from_vector({1, 2, 3}), {1.0 / 3, 2, 600}}};
   written.intrinsics(0, 0) = 1706.484641638225;
   camera(written, (folder / "c.yaml").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_camera_file(folder / "c.yaml").camera), marrow::hash_of(written));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_camera_file(folder / "c.yaml").camera), marrow::hash_of(written));
   const marrow::Seeds points{"distal: \"2\"", {{0.1, 0.2, 1.0 / 3}}, false};
   seeds(points, (folder / "s.yaml").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_seeds_file(folder / "s.yaml")[0]), marrow::hash_of(points));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_seeds_file(folder / "s.yaml")[0]), marrow::hash_of(points));
 }
 
 TEST(WriteText, MetricsAreJson) {

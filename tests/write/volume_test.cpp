@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "volume_file.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "write/full_disk.hpp"
 
 namespace {
@@ -22,9 +22,9 @@ TEST(WriteVolume, ReadsBackTheSame) {
   const TemporaryFolder folder;
   const marrow::Volume written = example(9);
   volume(written, (folder / "ct.mha").string());
-  EXPECT_EQ(marrow::hash_of(marrow::read::read_volume_file(folder / "ct.mha", {})), marrow::hash_of(written));
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_volume_file(folder / "ct.mha", {})), marrow::hash_of(written));
   signed_field({written.grid, written.values}, (folder / "field.mha").string());
-  EXPECT_EQ(marrow::read::read_volume_file(folder / "field.mha", {}).values, written.values);
+  EXPECT_EQ(marrow::files::read_volume_file(folder / "field.mha", {}).values, written.values);
 }
 
 TEST(WriteVolume, FullDisk) {

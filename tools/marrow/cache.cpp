@@ -4,7 +4,7 @@
 #include <set>
 
 #include "commands.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -8,10 +8,10 @@
 
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/diagnostics.hpp"
 #include "marrow/runtime/kinds.hpp"
 #include "marrow/runtime/library.hpp"
-#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {

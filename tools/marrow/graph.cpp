@@ -2,7 +2,7 @@
 #include <cstdio>
 
 #include "commands.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
 namespace {

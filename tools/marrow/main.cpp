@@ -6,10 +6,10 @@
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "number_options.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "runtime/printable.hpp"
 
 namespace {
 

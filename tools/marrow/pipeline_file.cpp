@@ -4,7 +4,7 @@
 
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
 namespace {

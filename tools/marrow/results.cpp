@@ -3,8 +3,8 @@
 #include <cstdio>
 
 #include "commands.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/types.hpp"
-#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {

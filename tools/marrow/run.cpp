@@ -8,10 +8,10 @@
 
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "process.hpp"
 #include "runtime/place_of_results.hpp"
-#include "runtime/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 
-#include "plugins/shaft/pairs.hpp"
+#include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
 

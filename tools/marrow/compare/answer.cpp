@@ -6,7 +6,7 @@
 #include <sstream>
 
 #include "compare/comparison.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -6,10 +6,10 @@
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "process.hpp"
 #include "runtime/no_process.hpp"
 #include "runtime/place_of_results.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {

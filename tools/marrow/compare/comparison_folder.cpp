@@ -10,8 +10,8 @@
 #include <cstring>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {

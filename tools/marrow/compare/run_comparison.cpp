@@ -13,10 +13,10 @@
 #include "compare/pool.hpp"
 #include "compare/unchanged.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "process.hpp"
 #include "report/report.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/remove_tree.hpp"
 
 namespace marrow::cli {

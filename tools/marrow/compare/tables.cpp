@@ -5,7 +5,7 @@
 #include <set>
 
 #include "compare/comparison.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {

@@ -5,7 +5,7 @@
 #include <set>
 
 #include "difference/findings.hpp"
-#include "runtime/printable.hpp"
+#include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "amount_bounds.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/strict_yaml.hpp"
 #include "runtime/written_content.hpp"
 

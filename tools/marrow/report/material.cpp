@@ -6,11 +6,11 @@
 #include <thread>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {

@@ -3,11 +3,11 @@
 #include <optional>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/plain_path.hpp"
-#include "runtime/printable.hpp"
 #include "runtime/text_file.hpp"
 
 namespace marrow::cli {

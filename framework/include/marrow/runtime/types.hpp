@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The value types that every plugin shares. A plugin's own types are registered in the plugin, from its own namespace.
+#include "marrow/domain/calibration.hpp"
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/functions.hpp"
@@ -25,6 +26,7 @@ MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
 MARROW_VALUE_TYPE(marrow::Scene, "scene", 1)
 MARROW_VALUE_TYPE(marrow::Landscape, "landscape", 1)
 MARROW_VALUE_TYPE(marrow::Case, "case", 1)
+MARROW_VALUE_TYPE(marrow::Calibration, "calibration", 1)
 MARROW_FUNCTION_TYPE(marrow::Projector, "projector", 1)
 MARROW_FUNCTION_TYPE(marrow::Cost, "cost", 1)
 MARROW_FUNCTION_TYPE(marrow::Optimizer, "optimizer", 1)
@@ -47,4 +49,5 @@ extern template const Content* content_of<Metrics>();
 extern template const Content* content_of<Scene>();
 extern template const Content* content_of<Landscape>();
 extern template const Content* content_of<Case>();
+extern template const Content* content_of<Calibration>();
 }  // namespace marrow

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/domain/calibration.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow {
+namespace {
+
+/// Distance, over the focal length, of the corner that lies farthest from the principal point, squared.
+double largest_squared_radius(const Eigen::Matrix3d& inverse, int width_px, int height_px) {
+  double largest = 0;
+  for (const double u : {0.0, width_px - 1.0})
+    for (const double v : {0.0, height_px - 1.0})
+      largest = std::max(largest, (inverse * Eigen::Vector3d(u, v, 1)).head<2>().squaredNorm());
+  return largest;
+}
+
+/// Weights of the four samples about a place that lies `t` behind the second: Keys' cubic convolution with a = -1/2
+/// (IEEE Trans. ASSP 1981), which is exact for parabolas. OpenCV's has a = -3/4, which is not, and rounds places to
+/// 1/32 pixel.
+std::array<double, 4> cubic_weights(double t) {
+  return {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (-2.5 + 1.5 * t), t * (0.5 + t * (2 - 1.5 * t)),
+          t * t * (-0.5 + 0.5 * t)};
+}
+
+/// Grey value between the pixels; the border's pixels go on outside.
+double sample_cubic(const cv::Mat1f& image, const Eigen::Vector2d& at) {
+  const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
+  const auto wu = cubic_weights(at.x() - u), wv = cubic_weights(at.y() - v);
+  double sum = 0;
+  for (int row = 0; row < 4; ++row) {
+    const float* line = image[std::clamp(v - 1 + row, 0, image.rows - 1)];
+    for (int column = 0; column < 4; ++column)
+      sum +=
+          wv[std::size_t(row)] * wu[std::size_t(column)] * double(line[std::clamp(u - 1 + column, 0, image.cols - 1)]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+Eigen::Vector2d distorted_pixel(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion,
+                                const Eigen::Vector2d& pixel) {
+  Eigen::Vector3d ideal = intrinsics.inverse() * pixel.homogeneous();
+  ideal.head<2>() *= distortion.factor(ideal.head<2>().squaredNorm());
+  return (intrinsics * ideal).head<2>();
+}
+
+void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px,
+                      int height_px, const std::string& what) {
+  const double largest = largest_squared_radius(intrinsics.inverse(), width_px, height_px);
+  constexpr int kSteps = 256;
+  double before = 0;
+  for (int i = 1; i <= kSteps; ++i) {
+    const double radius = std::sqrt(largest) * i / kSteps, seen = radius * distortion.factor(radius * radius);
+    if (!(seen > before) || !(seen < 2 * std::sqrt(largest)))
+      throw Error(
+          what + ": the radial distortion folds the image or more than doubles it, " +
+          std::to_string(int(100.0 * i / kSteps)) +
+          " % of the way to its corner; check that its terms are of normalised coordinates (pixels from the principal "
+          "point over the focal length), as OpenCV gives them");
+    before = seen;
+  }
+}
+
+void remove_distortion(View& view, const RadialDistortion& distortion) {
+  check_view(view);
+  const Camera& camera = view.camera;
+  check_distortion(camera.intrinsics, distortion, camera.width_px, camera.height_px, "view '" + view.name + "'");
+  cv::Mat1f taken, straight(camera.height_px, camera.width_px, 0.f);
+  view.image.pixels.convertTo(taken, CV_32F);
+  cv::Mat1b mask(camera.height_px, camera.width_px, std::uint8_t(0));
+  const cv::Mat1b own_mask = view.mask;
+  tbb::parallel_for(0, camera.height_px, [&](int v) {
+    for (int u = 0; u < camera.width_px; ++u) {
+      const Eigen::Vector2d seen = distorted_pixel(camera.intrinsics, distortion, {u, v});
+      if (!(seen.x() >= 0 && seen.y() >= 0 && seen.x() <= camera.width_px - 1 && seen.y() <= camera.height_px - 1))
+        continue;
+      straight(v, u) = float(sample_cubic(taken, seen));
+      mask(v, u) = own_mask.empty() ? 255 : own_mask(int(std::lround(seen.y())), int(std::lround(seen.x())));
+    }
+  });
+  cv::Mat pixels;
+  straight.convertTo(pixels, view.image.pixels.type());  // rounds and saturates
+  view.image.pixels = pixels;
+  if (!own_mask.empty() || cv::countNonZero(mask) < mask.rows * mask.cols) view.mask = mask;
+}
+
+void apply_calibration(View& view, const Calibration& calibration) {
+  if (view.image.width() != calibration.width_px || view.image.height() != calibration.height_px)
+    throw Error("view '" + view.name + "': the image has " + std::to_string(view.image.width()) + " x " +
+                std::to_string(view.image.height()) + " pixels, but the calibration is of images of " +
+                std::to_string(calibration.width_px) + " x " + std::to_string(calibration.height_px) +
+                "; calibrate with images as they are used, neither cropped nor resized");
+  view.camera.intrinsics = calibration.intrinsics;
+  remove_distortion(view, calibration.distortion);
+}
+
+}  // namespace marrow

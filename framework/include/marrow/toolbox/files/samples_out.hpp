@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Samples as files, without the domain's types.
+#include <array>
+#include <filesystem>
+#include <string>
+
+namespace marrow::files {
+
+enum class Sample { u8, u16 };
+
+/// A grid of float samples, x fastest, as compressed MHA. Throws Error.
+struct GridOut {
+  std::array<int, 3> size;
+  std::array<double, 3> spacing_mm, origin_mm;
+  std::array<std::array<double, 3>, 3> axes;  ///< axes[k]: direction of grid axis k
+};
+void write_mha(const std::filesystem::path& path, const GridOut& grid, const float* values);
+
+/// An image as the bytes of a PNG file, rows from the top, pixels without gaps, one or three channels of 8 or 16 bits.
+/// Throws Error.
+std::string png_of(int width, int height, int channels, Sample sample, const void* pixels);
+/// The same as a file.
+void write_png(const std::filesystem::path& path, int width, int height, int channels, Sample sample,
+               const void* pixels);
+
+/// The same as TIFF of float. Throws Error.
+void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels);
+
+}  // namespace marrow::files

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The values that marrow keeps in YAML files: transforms, poses, cameras and seeds (docs/case.md).
+#include "marrow/domain/calibration.hpp"
+#include "marrow/domain/camera.hpp"
+#include "marrow/domain/list.hpp"
+#include "marrow/domain/pose.hpp"
+#include "marrow/domain/volume.hpp"
+#include "marrow/toolbox/files/strict_yaml.hpp"
+
+namespace marrow::files {
+
+/// A transform from `target`, `source` and either `rotation` with `translation_mm` or one 4x4 `matrix`. `expected`
+/// holds the frames that it must name. Faults are noted in the map's file.
+std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected);
+/// The keys that transform_from reads.
+const std::vector<std::string>& transform_keys();
+
+/// A camera from the keys width_px, height_px, intrinsics, camera_from_world and, where its images are distorted,
+/// radial_distortion.
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
+
+/// Seeds of one fragment from the map's keys `seeds` and `register`.
+Seeds seeds_from(const YamlMap& map, const std::string& fragment);
+
+/// Notes a fault unless the map has `key: 1`.
+void check_version(const YamlMap& map, const std::string& key);
+
+/// A pose file, as the writer of poses makes it. Throws Error.
+Pose read_pose_file(const std::filesystem::path& path);
+/// A file of seeds. Throws Error.
+List<Seeds> read_seeds_file(const std::filesystem::path& path);
+
+}  // namespace marrow::files

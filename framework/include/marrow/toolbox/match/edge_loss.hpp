@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <cmath>
+
+namespace marrow::match {
+
+/// sqrt(s^2 + d^2) - s: quadratic near zero, then the distance itself as in the chapter, and no more than at the reach.
+class EdgeLoss {
+ public:
+  EdgeLoss(double scale, double reach)
+      : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
+  double worst() const { return worst_; }
+  double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
+  /// Derivative by the distance, divided by it.
+  double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
+  double second_derivative(double distance2) const {
+    return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0;
+  }
+
+ private:
+  double raw(double distance2) const { return std::sqrt(scale2_ + distance2) - scale_; }
+  double scale2_, scale_, reach2_, worst_;
+};
+
+}  // namespace marrow::match

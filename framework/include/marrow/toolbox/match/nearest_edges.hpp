@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <oneapi/tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <marrow/domain/features.hpp>
+#include <marrow/domain/transform.hpp>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace marrow::match {
+
+/// For any pixel and direction the nearest edge whose gradient points about that way. Directions fall into 16 sectors,
+/// and for each a label image (an exact distance transform: Felzenszwalb and Huttenlocher, Theory of Computing 2012)
+/// names the nearest edge of each cell of 2 x 2 pixels.
+class NearestEdges {
+ public:
+  /// Edges are used inside the mask (empty: everywhere), for directions that differ by at most `tolerance_rad` from
+  /// theirs.
+  NearestEdges(const EdgeMap& edges, const cv::Mat& mask, double tolerance_rad)
+      : columns_((edges.width_px + kCell_px - 1) / kCell_px), rows_((edges.height_px + kCell_px - 1) / kCell_px) {
+    for (const EdgePixel& edge : edges.pixels) {
+      const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
+      if (u < 0 || v < 0 || u >= edges.width_px || v >= edges.height_px) continue;
+      if (mask.empty() || mask.at<std::uint8_t>(v, u)) edges_.push_back(edge);
+    }
+    smooth(edges.width_px, edges.height_px);
+    labels_.resize(kSectors * std::size_t(rows_) * std::size_t(columns_));
+    tbb::parallel_for(0, kSectors, [&](int sector) { fill(sector, tolerance_rad); });
+  }
+
+  bool empty() const { return edges_.empty(); }
+  /// Those that are used, where they were moved to.
+  const std::vector<EdgePixel>& all() const { return edges_; }
+
+  /// The nearest edge, or nullptr when there is none in that direction. The pixel must lie inside the image.
+  const EdgePixel* find(float u, float v, float direction_u, float direction_v) const {
+    const int column = int(u + 0.5f) / kCell_px, row = int(v + 0.5f) / kCell_px;
+    const std::int32_t label =
+        labels_[(std::size_t(sector_of(direction_u, direction_v)) * std::size_t(rows_) + std::size_t(row)) *
+                    std::size_t(columns_) +
+                std::size_t(column)];
+    return label < 0 ? nullptr : &edges_[std::size_t(label)];
+  }
+
+ private:
+  static constexpr int kCell_px = 2;
+  static constexpr int kSectors = 16;
+
+  /// Sector of a direction, cheaper than by its angle: u and v of a point on the diamond |u| + |v| = 1.
+  static int sector_of(float u, float v) {
+    const float along = u / (std::abs(u) + std::abs(v) + 1e-30f);
+    const float around = v >= 0 ? 1 - along : 3 + along;  // 0 to 4, rising with the angle
+    return std::min(int(around * (kSectors / 4)), kSectors - 1);
+  }
+  static double middle_of(int sector) {
+    const double around = (sector + 0.5) * 4 / kSectors;
+    const double along = around < 2 ? 1 - around : around - 3;
+    return std::atan2((1 - std::abs(along)) * (around < 2 ? 1 : -1), along);
+  }
+
+  /// Moves each edge along its direction to the mean of its neighbours on the same border, because one cell keeps one
+  /// edge only, and one edge pixel is noisier than a few.
+  void smooth(int width, int height) {
+    constexpr int kReach_px = 3;
+    constexpr float kSameBorder_px = 1.2f, kSameDirection = 0.8f;
+    cv::Mat at(height, width, CV_32S, cv::Scalar(-1));
+    for (std::size_t i = 0; i < edges_.size(); ++i)
+      at.at<int>(int(std::lround(edges_[i].v_px)), int(std::lround(edges_[i].u_px))) = int(i);
+    std::vector<float> shift(edges_.size());
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const EdgePixel& edge = edges_[i];
+      const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
+      float sum = 0, count = 0;
+      for (int y = std::max(0, v - kReach_px); y <= std::min(height - 1, v + kReach_px); ++y)
+        for (int x = std::max(0, u - kReach_px); x <= std::min(width - 1, u + kReach_px); ++x) {
+          const int j = at.at<int>(y, x);
+          if (j < 0) continue;
+          const EdgePixel& other = edges_[std::size_t(j)];
+          const float offset =
+              (other.u_px - edge.u_px) * edge.direction_u + (other.v_px - edge.v_px) * edge.direction_v;
+          const float cosine = other.direction_u * edge.direction_u + other.direction_v * edge.direction_v;
+          if (std::abs(offset) > kSameBorder_px || cosine < kSameDirection) continue;
+          sum += offset;
+          count += 1;
+        }
+      shift[i] = count > 0 ? sum / count : 0;
+    }
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      edges_[i].u_px += shift[i] * edges_[i].direction_u;
+      edges_[i].v_px += shift[i] * edges_[i].direction_v;
+    }
+  }
+
+  void fill(int sector, double tolerance_rad) {
+    std::int32_t* labels = labels_.data() + std::size_t(sector) * std::size_t(rows_) * std::size_t(columns_);
+    std::fill(labels, labels + std::size_t(rows_) * std::size_t(columns_), -1);
+    const double middle = middle_of(sector);
+    const float cu = float(std::cos(middle)), cv = float(std::sin(middle)), least = float(std::cos(tolerance_rad));
+    for (std::size_t i = 0; i < edges_.size(); ++i) {
+      const EdgePixel& edge = edges_[i];
+      if (edge.direction_u * cu + edge.direction_v * cv < least) continue;
+      std::int32_t& label = labels[row_of(edge) * columns_ + column_of(edge)];
+      if (label < 0 || edges_[std::size_t(label)].magnitude < edge.magnitude) label = std::int32_t(i);
+    }
+    nearest_in_columns(labels);
+    for (int row = 0; row < rows_; ++row) nearest_in_row(labels + std::size_t(row) * std::size_t(columns_), row);
+  }
+
+  // The cell of an edge; of one that smoothing moved out of the image, the cell at the border.
+  int column_of(const EdgePixel& edge) const { return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1); }
+  int row_of(const EdgePixel& edge) const { return std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1); }
+  int row_of(std::int32_t label) const { return row_of(edges_[std::size_t(label)]); }
+
+  /// Each cell gets the nearest edge of its own column.
+  void nearest_in_columns(std::int32_t* labels) const {
+    std::vector<std::int32_t> below(std::size_t(rows_) * std::size_t(columns_), -1);
+    for (int row = rows_ - 1; row >= 0; --row)
+      for (int column = 0; column < columns_; ++column) {
+        const std::size_t cell = std::size_t(row) * std::size_t(columns_) + std::size_t(column);
+        below[cell] = labels[cell] >= 0 || row == rows_ - 1 ? labels[cell] : below[cell + std::size_t(columns_)];
+      }
+    std::vector<std::int32_t> above(std::size_t(columns_), -1);
+    for (int row = 0; row < rows_; ++row)
+      for (int column = 0; column < columns_; ++column) {
+        const std::size_t cell = std::size_t(row) * std::size_t(columns_) + std::size_t(column);
+        std::int32_t& last = above[std::size_t(column)];
+        if (labels[cell] >= 0)
+          last = labels[cell];
+        else if (last < 0 || (below[cell] >= 0 && row_of(below[cell]) - row < row - row_of(last)))
+          labels[cell] = below[cell];
+        else
+          labels[cell] = last;
+      }
+  }
+
+  /// Lower envelope of the parabolas (column - q)^2 + (distance within column q)^2.
+  void nearest_in_row(std::int32_t* labels, int row) const {
+    struct Parabola {
+      int centre;
+      float height, from;
+      std::int32_t label;
+    };
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    std::vector<Parabola> envelope;
+    envelope.reserve(std::size_t(columns_));
+    for (int q = 0; q < columns_; ++q) {
+      if (labels[q] < 0) continue;
+      const float distance = float(row_of(labels[q]) - row), h = distance * distance + float(q) * float(q);
+      float start = -kInfinity;
+      while (!envelope.empty()) {
+        start = (h - envelope.back().height) / float(2 * (q - envelope.back().centre));
+        if (start > envelope.back().from) break;
+        envelope.pop_back();
+        start = -kInfinity;
+      }
+      envelope.push_back({q, h, start, labels[q]});
+    }
+    if (envelope.empty()) return;
+    std::size_t k = 0;
+    for (int q = 0; q < columns_; ++q) {
+      while (k + 1 < envelope.size() && envelope[k + 1].from < float(q)) ++k;
+      labels[q] = envelope[k].label;
+    }
+  }
+
+  int columns_, rows_;
+  std::vector<EdgePixel> edges_;
+  std::vector<std::int32_t> labels_;
+};
+
+}  // namespace marrow::match

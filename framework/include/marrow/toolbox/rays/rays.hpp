@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The rays of a view in the volume's own coordinates, and projectors that follow them one by one.
+#include <Eigen/Core>
+#include <functional>
+
+#include "marrow/domain/functions.hpp"
+#include "marrow/toolbox/rays/attenuation.hpp"
+
+namespace marrow::rays {
+
+/// Rays of a camera in fractional voxel indices: point = source + t * (direction_from_pixel * (u, v, 1)).
+struct Rays {
+  Eigen::Vector3d source;
+  Eigen::Matrix3d direction_from_pixel;
+  Eigen::Vector3d spacing_mm;
+
+  Eigen::Vector3d direction(double u, double v) const { return direction_from_pixel * Eigen::Vector3d(u, v, 1); }
+};
+/// Throws Error for a camera that is none.
+Rays rays_of(const Camera& camera, const RigidTransform& world_from_model, const Grid& grid);
+
+/// The part [from, to] of a ray, in units of its direction and in front of the source, inside the box of all points
+/// that interpolation between voxels reaches: one voxel around what attenuates. Empty where from >= to.
+struct Span {
+  double from = 0, to = 0;
+};
+Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last, const Eigen::Vector3d& source,
+                 const Eigen::Vector3d& direction, double margin);
+
+/// A projector that integrates ray by ray.
+class RayProjector : public Projector {
+ public:
+  explicit RayProjector(Attenuation attenuation) : attenuation_(std::move(attenuation)) {}
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
+                                const std::vector<Eigen::Vector2f>& pixels) const override;
+  PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+
+ protected:
+  /// The integral along a ray, in mm of water.
+  virtual float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const = 0;
+  const Attenuation attenuation_;
+};
+
+}  // namespace marrow::rays

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <marrow/domain/error.hpp>
+#include <marrow/domain/mesh.hpp>
+#include <marrow/domain/volume.hpp>
+#include <vector>
+
+namespace marrow::rays {
+
+/// For each vertex of a mesh whether it lies within `voxels` of the faces of the CT volume: there the surface ends
+/// because the scan does, and not because the bone does. All false without a volume.
+inline std::vector<char> vertices_at_volume_border(const Mesh& mesh, const Volume* volume, double voxels) {
+  std::vector<char> at_border(mesh.vertices_mm.size(), 0);
+  if (!volume) return at_border;
+  const Grid& grid = volume->grid;
+  if (grid.frame != mesh.frame)
+    throw Error("the mesh is in frame '" + mesh.frame + "', but the volume in frame '" + grid.frame +
+                "'; give the volume that the mesh was made from");
+  for (std::size_t i = 0; i < at_border.size(); ++i) {
+    const Eigen::Vector3d index = grid.index_from_point(mesh.vertices_mm[i]);
+    for (int axis = 0; axis < 3; ++axis)
+      at_border[i] |= index[axis] < voxels || index[axis] > grid.size[axis] - 1 - voxels;
+  }
+  return at_border;
+}
+
+}  // namespace marrow::rays

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <exception>
+#include <nlopt.hpp>
+#include <vector>
+
+#include "marrow/toolbox/search/evaluations.hpp"
+
+namespace marrow::search {
+
+/// Runs one of NLopt's algorithms without derivatives on a problem. The algorithm works in units of the initial step,
+/// so that coordinates of different scale are alike to it.
+class NloptRun {
+ public:
+  NloptRun(nlopt::algorithm algorithm, const MinimisationProblem& problem)
+      : evaluate_(problem), optimizer_(algorithm, unsigned(problem.start.size())) {
+    optimizer_.set_min_objective(&NloptRun::evaluate, this);
+    optimizer_.set_initial_step(std::vector<double>(std::size_t(problem.start.size()), 1.0));
+    optimizer_.set_xtol_abs(problem.step_tolerance);
+    optimizer_.set_maxeval(problem.max_evaluations);
+    if (problem.lower.size()) optimizer_.set_lower_bounds(scaled(problem.lower));
+    if (problem.upper.size()) optimizer_.set_upper_bounds(scaled(problem.upper));
+  }
+
+  MinimisationResult run() {
+    return evaluate_.run([&](Evaluations&) -> std::string {
+      std::vector<double> y(std::size_t(evaluate_.size()), 0.0);
+      double value = 0;
+      try {
+        return words(optimizer_.optimize(y, value));
+      } catch (const nlopt::roundoff_limited&) {
+        return "rounding errors hide any further progress";
+      } catch (const nlopt::forced_stop&) {
+        // NLopt replaces what the function throws by its own exceptions, so the original is kept here.
+        if (thrown_) std::rethrow_exception(thrown_);
+        throw;
+      }
+    });
+  }
+
+ private:
+  std::vector<double> scaled(const Eigen::VectorXd& bound) const {
+    const Eigen::VectorXd y = evaluate_.in_steps(bound);
+    return {y.begin(), y.end()};
+  }
+
+  static double evaluate(const std::vector<double>& y, std::vector<double>&, void* self) {
+    NloptRun& run = *static_cast<NloptRun*>(self);
+    try {
+      return run.evaluate_(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
+    } catch (...) {  // of the function; or Spent, as not all of NLopt's algorithms keep to their budget
+      run.thrown_ = std::current_exception();
+      run.optimizer_.force_stop();
+      return 0;
+    }
+  }
+
+  static std::string words(nlopt::result result) {
+    switch (result) {
+      case nlopt::XTOL_REACHED:
+        return "steps are below the tolerance";
+      case nlopt::FTOL_REACHED:
+        return "the value changes no more";
+      case nlopt::MAXEVAL_REACHED:
+        return "the budget of evaluations is spent";
+      default:
+        return "converged";
+    }
+  }
+
+  Evaluations evaluate_;
+  nlopt::opt optimizer_;
+  std::exception_ptr thrown_;
+};
+
+}  // namespace marrow::search

@@ -1,0 +1,377 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/field/front.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace marrow::field {
+namespace {
+
+constexpr int kX = 1, kY = 10, kZ = 100;  // neighbours within a halo
+
+/// Gradient by central differences, per mm, in the grid's own axes.
+Eigen::Vector3f gradient(const float* v, const Eigen::Vector3f& per_mm) {
+  return Eigen::Vector3f(v[kX] - v[-kX], v[kY] - v[-kY], v[kZ] - v[-kZ]).cwiseProduct(0.5f * per_mm);
+}
+
+/// div(grad / |grad|), per mm; positive for a ball.
+float curvature(const float* v, const Eigen::Vector3f& per_mm, const Eigen::Vector3f& g) {
+  const auto second = [&](int s, int k) { return (v[s] - 2 * v[0] + v[-s]) * per_mm[k] * per_mm[k]; };
+  const auto mixed = [&](int s, int t, int k, int l) {
+    return (v[s + t] - v[s - t] - v[t - s] + v[-s - t]) * 0.25f * per_mm[k] * per_mm[l];
+  };
+  const float xx = second(kX, 0), yy = second(kY, 1), zz = second(kZ, 2);
+  const float squared = g.squaredNorm();
+  const float numerator = xx * (g.y() * g.y() + g.z() * g.z()) + yy * (g.x() * g.x() + g.z() * g.z()) +
+                          zz * (g.x() * g.x() + g.y() * g.y()) -
+                          2 * (g.x() * g.y() * mixed(kX, kY, 0, 1) + g.x() * g.z() * mixed(kX, kZ, 0, 2) +
+                               g.y() * g.z() * mixed(kY, kZ, 1, 2));
+  return numerator / (squared * std::sqrt(squared));
+}
+
+/// |grad| by Godunov's upwind differences for a front that moves with the sign of `speed`.
+float upwind_gradient(const float* v, const Eigen::Vector3f& per_mm, float speed) {
+  float sum = 0;
+  const int steps[3] = {kX, kY, kZ};
+  for (int k = 0; k < 3; ++k) {
+    const float back = (v[0] - v[-steps[k]]) * per_mm[k], ahead = (v[steps[k]] - v[0]) * per_mm[k];
+    const float first = speed > 0 ? std::max(back, 0.f) : std::min(back, 0.f);
+    const float second = speed > 0 ? std::min(ahead, 0.f) : std::max(ahead, 0.f);
+    sum += first * first + second * second;
+  }
+  return std::sqrt(sum);
+}
+
+/// Smallest solution of |grad u| = 1 given the neighbours' distances (Rouy and Tourin, SIAM J. Numer. Anal. 1992).
+float eikonal(const float* v, float sign, const Eigen::Vector3f& per_mm) {
+  std::array<std::pair<float, float>, 3> neighbours;  // distance, 1 / spacing^2
+  const int steps[3] = {kX, kY, kZ};
+  for (int k = 0; k < 3; ++k)
+    neighbours[k] = {std::max(0.f, std::min(sign * v[steps[k]], sign * v[-steps[k]])), per_mm[k] * per_mm[k]};
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
+  if (neighbours[2].first < neighbours[1].first) std::swap(neighbours[1], neighbours[2]);
+  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
+  float a = 0, b = 0, c = -1, distance = 0;
+  for (int k = 0; k < 3; ++k) {
+    if (k && distance <= neighbours[k].first) break;
+    a += neighbours[k].second;
+    b += neighbours[k].second * neighbours[k].first;
+    c += neighbours[k].second * neighbours[k].first * neighbours[k].first;
+    distance = (b + std::sqrt(std::max(0.f, b * b - a * c))) / a;
+  }
+  return distance;
+}
+
+bool beside_surface(const float* v) {
+  for (int step : {kX, -kX, kY, -kY, kZ, -kZ})
+    if ((v[step] < 0) != (v[0] < 0)) return true;
+  return false;
+}
+
+bool beyond_band(const float* v, float band) {
+  return v[kX] == band && v[-kX] == band && v[kY] == band && v[-kY] == band && v[kZ] == band && v[-kZ] == band;
+}
+
+}  // namespace
+
+Front::Front(const marrow::Grid& grid, double band_mm, const Mask& mask)
+    : grid_(grid),
+      band_mm_(float(band_mm)),
+      near_mm_(float(std::max(grid.spacing_mm.norm() / 2 * 1.2, grid.spacing_mm.maxCoeff()))),
+      voxels_per_mm_(grid.spacing_mm.cwiseInverse().cast<float>()) {
+  for (int k = 0; k < 3; ++k) tiles_[k] = (grid.size[k] + kTile - 1) / kTile;
+  slots_.assign(std::size_t(tiles_[0]) * tiles_[1] * tiles_[2], kOutside);
+  std::vector<std::uint8_t> is_mixed(slots_.size(), 0);
+  tbb::parallel_for(std::size_t(0), slots_.size(), [&](std::size_t tile) {
+    const Extent e = extent(tile);
+    for (int k = 0; k < 3; ++k)
+      if (e.first[k] + kTile < mask.first[k] || e.first[k] >= mask.first[k] + mask.size[k]) return;
+    const bool inside = mask.at(e.first[0], e.first[1], e.first[2]);
+    if (inside) slots_[tile] = kInside;
+    // One voxel beyond the tile, so that a surface between two tiles is seen.
+    for (int z = e.first[2]; z < std::min(e.first[2] + kTile + 1, grid_.size[2]); ++z)
+      for (int y = e.first[1]; y < std::min(e.first[1] + kTile + 1, grid_.size[1]); ++y)
+        for (int x = e.first[0]; x < std::min(e.first[0] + kTile + 1, grid_.size[0]); ++x)
+          is_mixed[tile] |= mask.at(x, y, z) != inside;
+  });
+  for (std::size_t tile = 0; tile < slots_.size(); ++tile)
+    if (is_mixed[tile]) {
+      provide(tile);
+      is_awake_[std::size_t(slots_[tile])] = 1;
+    }
+  choose_active();
+  const float half_voxel_mm = 0.5f * float(grid.spacing_mm.minCoeff());
+  for (const std::uint32_t tile : active_) {
+    const Extent e = extent(tile);
+    float* values = values_mm_.data() + std::size_t(slots_[tile]) * kVoxels;
+    for (int z = 0; z < e.size[2]; ++z)
+      for (int y = 0; y < e.size[1]; ++y)
+        for (int x = 0; x < e.size[0]; ++x)
+          values[(z * kTile + y) * kTile + x] =
+              mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
+  }
+  for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
+  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // the band widens with each step of the front
+  values_before_ = values_mm_;
+}
+
+Front::Extent Front::extent(std::size_t tile) const {
+  const auto t = place_of(tile);
+  Extent extent;
+  for (int k = 0; k < 3; ++k) {
+    extent.first[k] = t[k] * kTile;
+    extent.size[k] = std::min(kTile, grid_.size[k] - t[k] * kTile);
+  }
+  return extent;
+}
+
+/// Gives a tile memory.
+void Front::provide(std::size_t tile) {
+  if (slots_[tile] >= 0) return;
+  const float value = slots_[tile] == kInside ? -band_mm_ : band_mm_;
+  slots_[tile] = std::int32_t(tile_in_slot_.size());
+  tile_in_slot_.push_back(std::uint32_t(tile));
+  is_awake_.push_back(0);
+  values_mm_.resize(values_mm_.size() + kVoxels, value);
+  values_before_.resize(values_mm_.size(), value);
+  speed_.resize(values_mm_.size(), 0.f);
+  shift_mm_.resize(values_mm_.size(), 0.f);
+}
+
+/// The values of a tile and one voxel all around; beyond the grid its border goes on.
+void Front::load(std::size_t tile, Halo& halo) const {
+  const Extent e = extent(tile);
+  const auto t = place_of(tile);
+  for (int z = 0; z < e.size[2] + 2; ++z) {
+    const int k = std::clamp(e.first[2] + z - 1, 0, grid_.size[2] - 1);
+    for (int y = 0; y < e.size[1] + 2; ++y) {
+      const int j = std::clamp(e.first[1] + y - 1, 0, grid_.size[1] - 1);
+      const std::size_t tiles_row = tile_of(0, j / kTile, k / kTile),
+                        local_row = std::size_t((k % kTile) * kTile + j % kTile) * kTile;
+      const auto value = [&](int i) {
+        const std::int32_t slot = slots_[tiles_row + std::size_t(i / kTile)];
+        return slot < 0 ? (slot == kInside ? -band_mm_ : band_mm_)
+                        : values_mm_[std::size_t(slot) * kVoxels + local_row + std::size_t(i % kTile)];
+      };
+      float* out = halo.data() + z * kZ + y * kY;
+      const std::int32_t slot = slots_[tiles_row + std::size_t(t[0])];
+      if (slot >= 0)
+        std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + local_row, e.size[0], out + 1);
+      else
+        std::fill_n(out + 1, e.size[0], slot == kInside ? -band_mm_ : band_mm_);
+      out[0] = value(std::max(e.first[0] - 1, 0));
+      out[e.size[0] + 1] = value(std::min(e.first[0] + e.size[0], grid_.size[0] - 1));
+    }
+  }
+}
+
+/// Calls visit(value and its neighbours, x, y, z, place in next_values_, place in the tiles' memory) for each voxel of
+/// an active tile.
+template <class Visit>
+void Front::for_voxels(std::size_t position, const Visit& visit) {
+  const std::size_t tile = active_[position], slot = std::size_t(slots_[tile]);
+  const Extent e = extent(tile);
+  Halo halo;
+  load(tile, halo);
+  for (int z = 0; z < e.size[2]; ++z)
+    for (int y = 0; y < e.size[1]; ++y)
+      for (int x = 0; x < e.size[0]; ++x) {
+        const std::size_t local = std::size_t(z * kTile + y) * kTile + std::size_t(x);
+        visit(halo.data() + (z + 1) * kZ + (y + 1) * kY + x + 1, e.first[0] + x, e.first[1] + y, e.first[2] + z,
+              position * kVoxels + local, slot * kVoxels + local);
+      }
+}
+
+void Front::write_back() {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    const std::size_t slot = std::size_t(slots_[active_[position]]);
+    std::copy_n(next_values_.data() + position * kVoxels, kVoxels, values_mm_.data() + slot * kVoxels);
+  });
+}
+
+/// Active are the tiles that are awake and those beside them, which get memory.
+void Front::choose_active() {
+  std::vector<std::uint32_t> chosen;
+  for (std::size_t slot = 0; slot < is_awake_.size(); ++slot) {
+    if (!is_awake_[slot]) continue;
+    const auto t = place_of(tile_in_slot_[slot]);
+    const auto choose = [&](int i, int j, int k) {
+      if (i >= 0 && j >= 0 && k >= 0 && i < tiles_[0] && j < tiles_[1] && k < tiles_[2])
+        chosen.push_back(std::uint32_t(tile_of(i, j, k)));
+    };
+    choose(t[0], t[1], t[2]);
+    for (int side : {-1, 1}) {
+      choose(t[0] + side, t[1], t[2]);
+      choose(t[0], t[1] + side, t[2]);
+      choose(t[0], t[1], t[2] + side);
+    }
+  }
+  std::sort(chosen.begin(), chosen.end());
+  chosen.erase(std::unique(chosen.begin(), chosen.end()), chosen.end());
+  for (const std::uint32_t tile : chosen) provide(tile);
+  active_ = std::move(chosen);
+  next_values_.resize(active_.size() * kVoxels);
+}
+
+void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+      if (std::abs(*v) > near_mm_) return;
+      const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
+      const float length = g.norm();
+      if (length < 0.1f) return;
+      const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
+      shift_mm_[at] =
+          float(profile.thin_cortex_shift_mm(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index));
+    });
+  });
+}
+
+void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+      if (std::abs(*v) > near_mm_) return;
+      const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
+      const float length = g.norm();
+      float& speed = speed_[at];
+      speed = 0;
+      if (length < 0.1f) return;
+      const Eigen::Vector3f normal_index = (g / length).cwiseProduct(voxels_per_mm_);
+      const Edge edge = profile.at(volume, Eigen::Vector3f(x, y, z) - *v * normal_index, normal_index);
+      const double ratio = std::max(0.0, edge.drop_hu) / force.edge_hu, open = 1 / (1 + ratio * ratio);
+      const double bone = std::clamp((edge.mean_hu - force.floor_hu) / 50, -1.0, 1.0);
+      const double towards_edge = std::clamp(-(edge.offset_mm + shift_mm_[at]) / grid_.spacing_mm[0], -1.0, 1.0);
+      const double bend = std::clamp(double(curvature(v, voxels_per_mm_, g)), -2.0, 2.0);
+      speed = float(force.advection * bone * open + towards_edge * (1 - open) - force.curvature_mm * bend);
+    });
+  });
+}
+
+void Front::advance(double step_mm) {
+  // The rest of the band gets its distances from these when they are made again.
+  const float moving_mm = std::min(band_mm_, 3 * near_mm_);
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
+      next_values_[place] = *v;
+      if (std::abs(*v) >= moving_mm) return;
+      const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
+      const float length = g.norm();
+      if (length < 0.1f) return;
+      // The speed of the band is that of the closest point of the surface.
+      const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
+      int nearest[3];
+      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
+      const std::int32_t slot = slots_[tile_of(nearest[0] / kTile, nearest[1] / kTile, nearest[2] / kTile)];
+      if (slot < 0) return;
+      const float speed =
+          speed_[std::size_t(slot) * kVoxels + std::size_t((nearest[2] % kTile) * kTile + nearest[1] % kTile) * kTile +
+                 std::size_t(nearest[0] % kTile)];
+      const float moved = *v - float(step_mm) * speed * upwind_gradient(v, voxels_per_mm_, speed);
+      next_values_[place] = std::clamp(moved, -band_mm_, band_mm_);
+    });
+  });
+  write_back();
+}
+
+void Front::redistance_once(bool rescale) {
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    for_voxels(position, [&](const float* v, int, int, int, std::size_t place, std::size_t) {
+      const float sign = *v < 0 ? -1.f : 1.f;
+      if (beside_surface(v)) {
+        const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
+        const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
+        next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // no voxel beside it is farther
+      } else if (beyond_band(v, sign * band_mm_)) {
+        next_values_[place] = sign * band_mm_;
+      } else {
+        next_values_[place] = sign * std::min(eikonal(v, sign, voxels_per_mm_), band_mm_);
+      }
+    });
+  });
+  write_back();
+}
+
+void Front::redistance() {
+  redistance_once(true);
+  redistance_once(false);
+}
+
+void Front::finish() {
+  active_ = tile_in_slot_;
+  std::sort(active_.begin(), active_.end());
+  next_values_.resize(active_.size() * kVoxels);
+  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // what moved last has widened its band already
+}
+
+std::vector<float> Front::values_mm() const {
+  std::vector<float> values(grid_.count());
+  tbb::parallel_for(0, grid_.size[2], [&](int z) {
+    for (int y = 0; y < grid_.size[1]; ++y)
+      for (int x = 0; x < grid_.size[0]; x += kTile) {
+        const std::int32_t slot = slots_[tile_of(x / kTile, y / kTile, z / kTile)];
+        float* out = values.data() + grid_.offset(x, y, z);
+        const int count = std::min(kTile, grid_.size[0] - x);
+        if (slot < 0)
+          std::fill_n(out, count, slot == kInside ? -band_mm_ : band_mm_);
+        else
+          std::copy_n(
+              values_mm_.data() + std::size_t(slot) * kVoxels + std::size_t((z % kTile) * kTile + y % kTile) * kTile,
+              count, out);
+      }
+  });
+  return values;
+}
+
+bool Front::has_vanished() const {
+  return std::none_of(slots_.begin(), slots_.end(), [](std::int32_t slot) { return slot == kInside; }) &&
+         std::none_of(values_mm_.begin(), values_mm_.end(), [](float value) { return value < 0; });
+}
+
+bool Front::rest(double least_motion_mm) {
+  struct Tally {
+    double motion_mm = 0;
+    std::size_t surface = 0, band = 0;
+  };
+  std::vector<Tally> tallies(active_.size());
+  tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
+    Tally& tally = tallies[position];
+    for_voxels(position, [&](const float* v, int, int, int, std::size_t, std::size_t at) {
+      float& before = values_before_[at];
+      tally.band += std::abs(*v) < band_mm_;
+      if (beside_surface(v)) {
+        tally.motion_mm += std::abs(*v - before);
+        ++tally.surface;
+      }
+      before = *v;
+    });
+    is_awake_[std::size_t(slots_[active_[position]])] = tally.motion_mm > least_motion_mm * double(tally.surface);
+  });
+  Tally sum;
+  for (const Tally& tally : tallies) {
+    sum.motion_mm += tally.motion_mm;
+    sum.surface += tally.surface;
+    sum.band += tally.band;
+  }
+  mean_motion_mm_ = sum.surface ? sum.motion_mm / double(sum.surface) : 0;
+  band_voxels_ = sum.band;
+  choose_active();
+  return active_.empty();
+}
+
+void Front::keep_apart(Front& a, Front& b) {
+  tbb::parallel_for(std::size_t(0), a.active_.size(), [&](std::size_t position) {
+    const std::size_t tile = a.active_[position];
+    if (b.slots_[tile] < 0) return;
+    float* of_a = a.values_mm_.data() + std::size_t(a.slots_[tile]) * kVoxels;
+    float* of_b = b.values_mm_.data() + std::size_t(b.slots_[tile]) * kVoxels;
+    for (std::size_t i = 0; i < kVoxels; ++i) {
+      const float overlap = std::min(0.f, 0.5f * (of_a[i] + of_b[i]));
+      of_a[i] -= overlap;
+      of_b[i] -= overlap;
+    }
+  });
+}
+
+}  // namespace marrow::field

@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The elements of a DICOM file, each held against what is left of the file. GDCM reserves as much memory as a damaged
+// length claims, and stops the program at some contradictions, so it is given nothing but compressed pixels.
+#include <array>
+#include <memory>
+
+#include "marrow/toolbox/files/input_file.hpp"
+
+namespace marrow::files {
+
+struct DicomSpan {
+  std::uint64_t begin = 0, bytes = 0;
+};
+
+struct DicomElement {
+  std::uint32_t tag = 0;
+  DicomSpan value;
+  bool big_endian = false;
+  std::array<char, 2> kind{};  ///< its value representation; zeros where the file does not say (implicit)
+  std::vector<std::vector<DicomElement>> items;  ///< of a sequence
+};
+using DicomElements = std::vector<DicomElement>;
+
+/// Whether the tag is that of a sequence in which values that are read may stand: the functional groups of an enhanced
+/// file, and the sequences in them. Implicit files do not say which of their elements are sequences.
+bool is_group_of_values(std::uint32_t tag);
+
+/// The element of that tag, or nullptr. Throws Error where there are two.
+const DicomElement* find_element(const std::filesystem::path& path, const DicomElements& elements, std::uint32_t tag);
+
+class DicomFile {
+ public:
+  /// Throws Error when the file is not DICOM, is of a transfer syntax that is not read, or an element claims more than
+  /// the file holds.
+  explicit DicomFile(const std::filesystem::path& path);
+
+  const InputFile& file() const { return file_; }
+  const std::filesystem::path& path() const { return file_.path(); }
+  const std::string& transfer_syntax() const { return transfer_syntax_; }
+  bool is_big_endian() const { return big_endian_; }
+  const DicomElements& elements() const { return elements_; }
+  /// The pixels: one part where they are plain; where they are compressed the parts after the table of offsets, and the
+  /// table's.
+  bool has_pixels() const { return has_pixels_; }
+  bool is_compressed() const { return is_compressed_; }
+  /// Written as numbers of 2 bytes (OW), also where a pixel has one.
+  bool pixels_are_words() const { return pixels_are_words_; }
+  const std::vector<DicomSpan>& pixel_parts() const { return pixel_parts_; }
+  const DicomSpan& offset_table() const { return offset_table_; }
+
+ private:
+  friend class DicomWalk;
+  InputFile file_;
+  std::string transfer_syntax_;
+  bool big_endian_ = false, has_pixels_ = false, is_compressed_ = false, pixels_are_words_ = false;
+  DicomElements elements_;
+  std::vector<DicomSpan> pixel_parts_;
+  DicomSpan offset_table_;
+};
+
+}  // namespace marrow::files

@@ -1,0 +1,336 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+#include <tuple>
+
+#include "dicom_pixels.hpp"
+#include "header_lines.hpp"
+#include "marrow/domain/error.hpp"
+
+namespace marrow::files {
+namespace {
+
+using Vector = std::array<double, 3>;
+
+constexpr double kFarthestOff_mm = 0.1;  // of a slice from its place in an even, straight grid
+
+constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
+constexpr DicomTag kPatient{0x0010, 0x0020, "PatientID"};
+constexpr DicomTag kStudy{0x0020, 0x000D, "StudyInstanceUID"};
+constexpr DicomTag kFrameOfReference{0x0020, 0x0052, "FrameOfReferenceUID"};
+constexpr DicomTag kDescription{0x0008, 0x103E, "SeriesDescription"};
+constexpr DicomTag kSeries{0x0020, 0x000E, "SeriesInstanceUID"};
+constexpr DicomTag kPosition{0x0020, 0x0032, "ImagePositionPatient"};
+constexpr DicomTag kOrientation{0x0020, 0x0037, "ImageOrientationPatient"};
+constexpr DicomTag kSpacing{0x0028, 0x0030, "PixelSpacing"};
+constexpr DicomTag kRescaleType{0x0028, 0x1054, "RescaleType"};
+
+double dot(const Vector& a, const Vector& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+Vector cross(const Vector& a, const Vector& b) {
+  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
+}
+Vector normalized(const Vector& a) {
+  const double factor = 1 / std::sqrt(dot(a, a));
+  return {factor * a[0], factor * a[1], factor * a[2]};
+}
+
+struct Slice {
+  std::string series, description, modality;
+  std::string patient, study, frame_of_reference;
+  std::string unit;  ///< of its values: HU, US (unspecified), or empty where the header does not say
+  DicomPixels pixels;
+  Samples samples;         ///< without bytes
+  double position_mm = 0;  ///< along the normal of the slices
+  bool is_placed = false;  ///< says where it lies
+
+  const std::filesystem::path& path() const { return pixels.path; }
+};
+
+/// Whether a file that is not DICOM is by its name no slice either: a licence, a note, a picture. Of any other, such as
+/// "IM5", it may be what is left of a slice.
+bool is_no_slice_by_name(const std::filesystem::path& path) {
+  static const std::set<std::string> kNames{"authors",  "changelog", "checksums",  "copying", "dicomdir",
+                                            "lockfile", "licence",   "license",    "md5sum",  "md5sums",
+                                            "notice",   "readme",    "sha256sums", "version"};
+  static const std::set<std::string> kExtensions{
+      ".bat",  ".bmp", ".csv",  ".db",  ".doc",  ".docx",   ".exe",  ".gif", ".htm", ".html", ".inf",  ".ini",
+      ".jpeg", ".jpg", ".json", ".log", ".m",    ".md",     ".md5",  ".mha", ".nii", ".nrrd", ".obj",  ".pdf",
+      ".ply",  ".png", ".py",   ".rtf", ".sh",   ".sha256", ".stl",  ".svg", ".tif", ".tiff", ".toml", ".tsv",
+      ".txt",  ".vtk", ".vtp",  ".xls", ".xlsx", ".xml",    ".yaml", ".yml", ".zip"};
+  const std::string name = in_small_letters(path.filename().string()),
+                    extension = in_small_letters(path.extension().string());
+  return name[0] == '.' || kNames.count(name) > 0 || kExtensions.count(extension) > 0 ||
+         (name.size() > 7 && name.compare(name.size() - 7, 7, ".nii.gz") == 0);
+}
+
+[[noreturn]] void refuse_other_file(const std::filesystem::path& path) {
+  const std::uint64_t bytes = InputFile(path, true).size();
+  throw Error(path.string() + ": this file in the series' folder is no whole DICOM file (" +
+              (bytes == 0    ? "it is empty"
+               : bytes < 132 ? "it has " + std::to_string(bytes) + " bytes, at least 132 expected"
+                             : "it has no 'DICM' at byte 128") +
+              "); if it is a slice, it is damaged at its start: fetch it again; if not, remove it from the folder");
+}
+
+/// Slices of a series lie in one folder: one that lies below would be missed.
+void check_folder_below(const std::filesystem::path& folder) {
+  std::error_code failure, none;
+  for (std::filesystem::recursive_directory_iterator entry(folder, failure), end; entry != end && !failure;
+       entry.increment(failure))
+    if (entry->is_regular_file(none) && (!is_no_slice_by_name(entry->path()) || looks_like_dicom(entry->path())))
+      throw Error(folder.string() + ": this folder inside the series' folder holds files that may be slices ('" +
+                  entry->path().lexically_relative(folder).string() +
+                  "'), and only one folder is read; move them beside the other slices, or this folder elsewhere");
+  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
+}
+
+Vector column(const Samples& samples, int k) {
+  return {samples.direction[k], samples.direction[3 + k], samples.direction[6 + k]};
+}
+
+/// Origin and axes; these are made orthonormal, as a header gives them with few digits.
+void place(const DicomHeader& header, Slice& slice) {
+  const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6),
+             spacing = header.numbers(kSpacing, 2);
+  slice.is_placed = position && orientation;
+  if (!slice.is_placed) return;
+  if (!spacing)
+    throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
+  slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // a row's distance is a pixel's height
+  std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
+  const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]},
+      down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
+  if (std::abs(dot(row, row) - 1) > 1e-2 || std::abs(dot(down, down) - 1) > 1e-2 || std::abs(dot(row, down)) > 1e-3)
+    throw Error(slice.path().string() + ": " + kOrientation.text() +
+                " is no pair of axes at right angles; it is damaged");
+  const Vector z = normalized(cross(row, down)), x = normalized(cross(down, z)), y = cross(z, x);
+  for (std::size_t k = 0; k < 3; ++k) {
+    slice.samples.direction[3 * k] = x[k];
+    slice.samples.direction[3 * k + 1] = y[k];
+    slice.samples.direction[3 * k + 2] = z[k];
+  }
+  slice.position_mm = dot(slice.samples.origin_mm, z);
+}
+
+Slice read_slice(const std::filesystem::path& path) {
+  const DicomFile file(path);
+  const DicomHeader header(file, 1);
+  Slice slice;
+  slice.pixels = read_dicom_pixels(file, 1);
+  slice.series = header.text(kSeries).value_or("");
+  slice.description = header.text(kDescription).value_or("");
+  slice.modality = header.text(kModality).value_or("");
+  slice.patient = header.text(kPatient).value_or("");
+  slice.study = header.text(kStudy).value_or("");
+  slice.frame_of_reference = header.text(kFrameOfReference).value_or("");
+  slice.unit = header.text(kRescaleType).value_or("");
+  if (slice.pixels.frames != 1)
+    throw Error(path.string() + ": is a multi-frame DICOM file; convert it to NIfTI or MHA (dcm2niix does)");
+  if (slice.pixels.channels != 1) throw Error(path.string() + ": has colours; a CT slice has one value per pixel");
+  slice.samples.size = {slice.pixels.columns, slice.pixels.rows, 1};
+  place(header, slice);
+  return slice;
+}
+
+/// All that lies in a folder, sorted, without what is neither a file nor a folder.
+std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
+  std::set<std::filesystem::path> paths;
+  std::error_code failure, none;
+  for (std::filesystem::directory_iterator entry(folder, failure), end; entry != end && !failure;
+       entry.increment(failure)) {
+    check_stays_inside(folder, entry->path());
+    if (entry->is_regular_file(none) || entry->is_directory(none)) paths.insert(entry->path());
+  }
+  if (failure) throw Error(folder.string() + ": cannot be read (" + failure.message() + ")");
+  return paths;
+}
+
+/// The DICOM files of a folder by series. Other files are passed over only where their names say what they are: a slice
+/// that was cut or emptied is the end of a series as easily as a gap in it, and would not be missed there.
+std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
+  std::map<std::string, std::vector<Slice>> series;
+  std::error_code none;
+  std::vector<std::filesystem::path> folders;
+  for (const auto& path : entries_of(folder)) {
+    if (std::filesystem::is_directory(path, none)) {
+      folders.push_back(path);
+    } else if (in_small_letters(path.filename().string()) == "dicomdir") {
+      continue;
+    } else if (looks_like_dicom(path)) {
+      Slice slice = read_slice(path);
+      series[slice.series].push_back(std::move(slice));
+    } else if (!is_no_slice_by_name(path)) {
+      refuse_other_file(path);
+    }
+  }
+  for (const auto& below : folders) check_folder_below(below);
+  return series;
+}
+
+std::vector<Slice> choose_series(const std::filesystem::path& folder, const std::string& series_uid) {
+  auto series = read_folder(folder);
+  if (series.empty()) throw Error(folder.string() + ": holds no DICOM file");
+  std::string all;
+  for (const auto& [uid, slices] : series)
+    all += "\n    " + uid + " (" + slices[0].modality + ", " + std::to_string(slices.size()) + " slices" +
+           (slices[0].description.empty() ? "" : ", " + slices[0].description) + ")";
+  if (series_uid.empty() && series.size() > 1)
+    throw Error(folder.string() + ": holds " + std::to_string(series.size()) +
+                " series; name one with series_uid:" + all);
+  const auto chosen = series_uid.empty() ? series.begin() : series.find(series_uid);
+  if (chosen == series.end()) throw Error(folder.string() + ": holds no series " + series_uid + "; it holds:" + all);
+  return std::move(chosen->second);
+}
+
+std::string millimetres(double length) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g mm", length);
+  return text;
+}
+
+/// Where one slice says how its values become HU and another does not, one of them lost it.
+void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
+  for (const auto& [name, is_given, first_is_given] :
+       {std::tuple{"RescaleSlope", slice.gives_slope, first.gives_slope},
+        std::tuple{"RescaleIntercept", slice.gives_intercept, first.gives_intercept}}) {
+    if (is_given == first_is_given) continue;
+    const auto& [with, without] = is_given ? std::tie(slice.path, first.path) : std::tie(first.path, slice.path);
+    throw Error(without.string() + ": its header has no " + name + ", but that of " + with.string() +
+                " has one; a series has it in all slices or in none: export it again");
+  }
+}
+
+/// A slice that lost what its pixels are, or was replaced, may still read as good numbers.
+void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
+  if (slice.is_signed == first.is_signed && slice.bits_stored == first.bits_stored) return;
+  const auto kind = [](const DicomPixels& pixels) {
+    return std::to_string(pixels.bits_stored) + " bits " + (pixels.is_signed ? "with" : "without") + " a sign";
+  };
+  throw Error(slice.path.string() + ": its pixels have " + kind(slice) + ", those of " + first.path.string() + " " +
+              kind(first) + "; slices of one series have the same: export the series again");
+}
+
+/// Slices of two patients, or of two places of one, lie in no common grid, whatever their positions say.
+void check_same_patient(const Slice& slice, const Slice& first) {
+  const std::tuple<const DicomTag&, const std::string&, const std::string&> all[] = {
+      {kPatient, slice.patient, first.patient},
+      {kStudy, slice.study, first.study},
+      {kFrameOfReference, slice.frame_of_reference, first.frame_of_reference}};
+  for (const auto& [tag, value, first_value] : all)
+    if (value != first_value)
+      throw Error(slice.path().string() + ": has another " + tag.text() + " than " + first.path().string() +
+                  "; slices of one series have the same: export the series again");
+}
+
+/// The distance between slices of the volume that is made of them.
+double spacing_of(const std::vector<Slice>& slices) {
+  return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
+}
+
+/// Steps that are each a little off add up over a long bone.
+void check_places(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
+  const Slice& first = slices[0];
+  const Vector normal = column(first.samples, 2);
+  const double spacing_mm = spacing_of(slices);
+  double sideways_mm = 0, along_mm = 0;
+  for (std::size_t i = 1; i < slices.size(); ++i) {
+    Vector off = slices[i].samples.origin_mm;
+    for (std::size_t k = 0; k < 3; ++k) off[k] -= first.samples.origin_mm[k];
+    const double along = dot(off, normal);
+    sideways_mm = std::max(sideways_mm, std::sqrt(std::max(0.0, dot(off, off) - along * along)));
+    along_mm = std::max(along_mm, std::abs(along - spacing_mm * double(i)));
+  }
+  if (sideways_mm > kFarthestOff_mm)
+    throw Error(folder.string() + ": the slices are shifted sideways, by up to " + millimetres(sideways_mm) +
+                " (a tilted gantry); resample the series to a straight grid first");
+  if (along_mm > kFarthestOff_mm)
+    throw Error(folder.string() + ": the slices are unevenly spaced; some lie up to " + millimetres(along_mm) +
+                " from where even ones of " + millimetres(spacing_mm) +
+                " would; resample the series to an even grid first");
+}
+
+/// That the slices belong to one grid: same size, same directions, evenly spaced along their normal.
+void check_slices(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
+  const Slice& first = slices[0];
+  if (slices.size() < 2) throw Error(folder.string() + ": the series has 1 slice; a volume needs at least 2");
+  for (const Slice& slice : slices) {
+    if (slice.modality != "CT")
+      throw Error(slice.path().string() + ": is of modality '" + slice.modality +
+                  "'; expected CT, whose values are Hounsfield units");
+    if (!slice.unit.empty() && slice.unit != "HU" && slice.unit != "US")
+      throw Error(slice.path().string() + ": its values are no Hounsfield units: " + kRescaleType.text() + " is '" +
+                  shown(slice.unit) + "', expected HU; choose the series with the CT itself");
+    if (!slice.is_placed)
+      throw Error(slice.path().string() +
+                  ": the slice does not say where it lies (ImagePositionPatient, ImageOrientationPatient are missing)");
+    if (slice.pixels.has_table)
+      throw Error(slice.path().string() +
+                  ": its values go through a table (ModalityLUTSequence), which is not read; export it as HU");
+    check_same_patient(slice, first);
+    check_same_scaling(slice.pixels, first.pixels);
+    check_same_pixels(slice.pixels, first.pixels);
+    bool same = slice.samples.size == first.samples.size;
+    for (int i = 0; i < 9; ++i) same = same && std::abs(slice.samples.direction[i] - first.samples.direction[i]) < 1e-4;
+    for (int i = 0; i < 2; ++i)
+      same = same && std::abs(slice.samples.spacing_mm[i] - first.samples.spacing_mm[i]) < 1e-5;
+    if (!same)
+      throw Error(slice.path().string() + ": has another size, spacing or direction than " + first.path().string());
+  }
+  if (!first.pixels.gives_slope || !first.pixels.gives_intercept)
+    throw Error(
+        first.path().string() + ": its header has no " +
+        (first.pixels.gives_slope ? "RescaleIntercept (0028,1052)" : "RescaleSlope (0028,1053)") +
+        ", nor has any other slice's, so which values are Hounsfield units is not known; export the series again");
+  std::vector<double> gaps;
+  for (std::size_t i = 1; i < slices.size(); ++i) gaps.push_back(slices[i].position_mm - slices[i - 1].position_mm);
+  std::vector<double> sorted = gaps;
+  std::nth_element(sorted.begin(), sorted.begin() + sorted.size() / 2, sorted.end());
+  const double usual = sorted[sorted.size() / 2];
+  for (std::size_t i = 0; i < gaps.size(); ++i) {
+    const std::string between =
+        slices[i].path().filename().string() + " and " + slices[i + 1].path().filename().string();
+    if (gaps[i] < 1e-3)
+      throw Error(folder.string() + ": " + between + " lie at the same place; the series has a slice twice");
+    if (std::abs(gaps[i] - usual) > 0.01 * usual + 1e-3)
+      throw Error(folder.string() + ": " + millimetres(gaps[i]) + " between " + between + ", " + millimetres(usual) +
+                  " between most slices; a slice is missing or the series is unevenly spaced");
+    for (int k = 0; k < 3; ++k) {
+      const double step = slices[i + 1].samples.origin_mm[k] - slices[i].samples.origin_mm[k];
+      if (std::abs(step - gaps[i] * column(first.samples, 2)[k]) > 0.02 * usual + 1e-2)
+        throw Error(folder.string() + ": the slices are shifted sideways between " + between +
+                    " (a tilted gantry); resample the series to a straight grid first");
+    }
+  }
+  check_places(folder, slices);
+}
+
+}  // namespace
+
+bool looks_like_dicom(const std::filesystem::path& path) {
+  const InputFile file(path, true);
+  return file.size() >= 132 && file.text(128, 4) == "DICM";
+}
+
+VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::string& series_uid) {
+  std::vector<Slice> slices = choose_series(folder, series_uid);
+  std::stable_sort(slices.begin(), slices.end(),
+                   [](const Slice& a, const Slice& b) { return a.position_mm < b.position_mm; });
+  check_slices(folder, slices);
+  VolumeSamples series;
+  series.geometry = slices[0].samples;
+  series.geometry.dimensions = 3;
+  series.geometry.size[2] = int(slices.size());
+  series.geometry.spacing_mm[2] = spacing_of(slices);
+  const std::size_t pixels = slices[0].samples.count();
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    const Samples slice = read_dicom_frame(slices[k].pixels, 1);
+    if (series.values.empty()) series.values.resize(pixels * slices.size());
+    scaled_values(slices[k].pixels, slice, series.values.data() + k * pixels);
+    make_padding_air(slices[k].pixels, series.values.data() + k * pixels, pixels);
+  }
+  return series;
+}
+
+}  // namespace marrow::files

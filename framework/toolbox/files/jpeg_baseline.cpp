@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: Apache-2.0
+// Baseline JPEG through libjpeg. What it would only warn of, as data that end too early, is an error.
+#include <csetjmp>
+#include <cstdio>
+#include <memory>
+
+#include "jpeg_stream.hpp"
+// jpeglib.h needs stdio.h before it.
+#include <jpeglib.h>
+
+namespace marrow::files {
+namespace {
+
+struct Failure {
+  jpeg_error_mgr manager;
+  std::jmp_buf back;
+  char text[JMSG_LENGTH_MAX];
+};
+
+void on_error(j_common_ptr state) {
+  Failure& failure = *reinterpret_cast<Failure*>(state->err);
+  state->err->format_message(state, failure.text);
+  std::longjmp(failure.back, 1);
+}
+void on_message(j_common_ptr state, int level) {
+  if (level < 0) on_error(state);
+}
+
+/// Nothing with a destructor lives between setjmp and the calls that may jump back to it.
+bool decode(jpeg_decompress_struct& state, Failure& failure, const CodedImage& image, std::byte* to) {
+  if (setjmp(failure.back)) return false;
+  jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(image.bytes.data()), image.bytes.size());
+  jpeg_read_header(&state, TRUE);
+  if (int(state.image_width) != image.columns || int(state.image_height) != image.rows || state.num_components != 1) {
+    std::snprintf(failure.text, sizeof failure.text, "the compressed pixels tell of two sizes");
+    return false;
+  }
+  state.out_color_space = JCS_GRAYSCALE;
+  jpeg_start_decompress(&state);
+  while (state.output_scanline < state.output_height) {
+    JSAMPROW row = reinterpret_cast<JSAMPROW>(to) + std::size_t(state.output_scanline) * std::size_t(image.columns);
+    jpeg_read_scanlines(&state, &row, 1);
+  }
+  jpeg_finish_decompress(&state);
+  return true;
+}
+
+}  // namespace
+
+std::vector<std::byte> decode_jpeg_baseline(const CodedImage& image) {
+  JpegSegments segments(image.bytes);
+  int marker = segments.next();
+  while (marker < 0xC0 || marker > 0xCF || marker == 0xC4 || marker == 0xCC) {
+    if (marker == 0xDA) throw CodecError("the compressed pixels have no frame header");
+    marker = segments.next();
+  }
+  if (marker != 0xC0) throw CodecError("the pixels are compressed by another kind of JPEG than the header says");
+  if (frame_precision(segments, image) != 8 || image.bits_allocated != 8) throw CodecError("baseline JPEG has 8 bits");
+  std::vector<std::byte> bytes(std::size_t(image.columns) * std::size_t(image.rows));
+  Failure failure;
+  jpeg_decompress_struct state{};
+  state.err = jpeg_std_error(&failure.manager);
+  failure.manager.error_exit = on_error;
+  failure.manager.emit_message = on_message;
+  jpeg_create_decompress(&state);
+  const bool good = decode(state, failure, image, bytes.data());
+  jpeg_destroy_decompress(&state);
+  if (!good) throw CodecError(failure.text);
+  return bytes;
+}
+
+}  // namespace marrow::files

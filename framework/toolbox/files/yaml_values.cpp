@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/files/yaml_values.hpp"
+
+#include <cmath>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::files {
+namespace {
+
+void check_frame(const YamlMap& map, const std::string& key, const std::string& expected) {
+  const auto frame = map.text(key);
+  if (frame && *frame != expected)
+    map.fault(key,
+              key + ": expected the frame '" + expected + "', got '" + *frame + "'; this file holds another transform");
+}
+
+std::optional<FragmentFrame> frame_from(const YAML::Node& node, YamlFile& file) {
+  const YamlMap map(file, node, "fragment_frame", {"origin_mm", "axes"});
+  const auto origin = map.vector3("origin_mm");
+  const auto axes = map.matrix("axes", 3, 3);
+  if (!origin || !axes) return std::nullopt;
+  try {
+    check_rigid({"ct", "fragment", *axes, *origin}, "fragment_frame: axes");
+  } catch (const Error& error) {
+    map.fault("axes", error.what());
+    return std::nullopt;
+  }
+  return FragmentFrame{*origin, *axes};
+}
+
+}  // namespace
+
+const std::vector<std::string>& transform_keys() {
+  static const std::vector<std::string> kKeys{"target", "source", "rotation", "translation_mm", "matrix"};
+  return kKeys;
+}
+
+std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected) {
+  if (!map.valid()) return std::nullopt;
+  RigidTransform transform = expected;
+  check_frame(map, "target", expected.target);
+  check_frame(map, "source", expected.source);
+  if (map.has("matrix")) {
+    for (const char* key : {"rotation", "translation_mm"})
+      if (map.has(key)) map.fault(key, std::string(key) + ": 'matrix' already gives it; keep one of the two");
+    const auto matrix = map.matrix("matrix", 4, 4);
+    if (!matrix) return std::nullopt;
+    if (matrix->row(3) != Eigen::RowVector4d(0, 0, 0, 1)) {
+      map.fault("matrix", "matrix: the last row of a rigid transform is [0, 0, 0, 1]");
+      return std::nullopt;
+    }
+    transform.rotation = matrix->topLeftCorner<3, 3>();
+    transform.translation_mm = matrix->topRightCorner<3, 1>();
+  } else {
+    const auto rotation = map.matrix("rotation", 3, 3);
+    const auto translation = map.vector3("translation_mm");
+    if (!rotation || !translation) return std::nullopt;
+    transform.rotation = *rotation;
+    transform.translation_mm = *translation;
+  }
+  try {
+    check_rigid(transform, map.has("matrix") ? "matrix" : "rotation");
+  } catch (const Error& error) {
+    map.fault(map.has("matrix") ? "matrix" : "rotation", error.what());
+    return std::nullopt;
+  }
+  return transform;
+}
+
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
+  const YamlMap map(file, node, "camera",
+                    {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world"});
+  if (map.has("marrow-camera")) check_version(map, "marrow-camera");
+  const auto width = map.integer("width_px");
+  const auto height = map.integer("height_px");
+  const auto intrinsics = map.matrix("intrinsics", 3, 3);
+  const auto transform_node = map.required("camera_from_world");
+  if (!transform_node) return std::nullopt;
+  const YamlMap transform_map(file, *transform_node, "camera_from_world", transform_keys());
+  const auto transform = transform_from(transform_map, Camera{}.camera_from_world);
+  if (!width || !height || !intrinsics || !transform) return std::nullopt;
+  DistortedCamera result{{*width, *height, *intrinsics, *transform}, {}};
+  if (map.has("radial_distortion")) {
+    const auto terms = map.vector3("radial_distortion");
+    if (!terms) return std::nullopt;
+    for (int i = 0; i < 3; ++i) result.distortion.k[std::size_t(i)] = (*terms)[i];
+  }
+  try {
+    check_camera(result.camera, "camera");
+    check_distortion(*intrinsics, result.distortion, *width, *height, "camera");
+  } catch (const Error& error) {
+    file.fault(node.Mark(), error.what());
+    return std::nullopt;
+  }
+  return result;
+}
+
+Seeds seeds_from(const YamlMap& map, const std::string& fragment) {
+  return {fragment, map.points("seeds"), map.boolean_or("register", true)};
+}
+
+void check_version(const YamlMap& map, const std::string& key) {
+  const auto version = map.integer(key);
+  if (version && *version != 1)
+    map.fault(key, key + ": this program reads version 1, the file is of version " + std::to_string(*version));
+}
+
+Pose read_pose_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  std::vector<std::string> keys = transform_keys();
+  for (const char* key :
+       {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost", "evaluations"})
+    keys.push_back(key);
+  const YamlMap map(file, file.root(), "pose", keys);
+  check_version(map, "marrow-pose");
+  Pose pose;
+  if (const auto transform = transform_from(map, pose.world_from_model)) pose.world_from_model = *transform;
+  if (map.has("fragment_frame"))
+    if (const auto frame = frame_from(map.node("fragment_frame"), file)) pose.frame = *frame;
+  // predicted_deviation is for people; the covariance says the same in full.
+  if (map.has("covariance"))
+    if (const auto covariance = map.matrix("covariance", 6, 6)) pose.covariance = *covariance;
+  pose.warnings = map.texts_or_none("warnings");
+  if (map.has("cost")) pose.cost = map.number("cost").value_or(0);
+  if (map.has("evaluations")) pose.evaluations = map.integer("evaluations").value_or(0);
+  file.finish();
+  return pose;
+}
+
+List<Seeds> read_seeds_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  const YamlMap map(file, file.root(), "seeds", {"marrow-seeds", "fragments"});
+  check_version(map, "marrow-seeds");
+  List<Seeds> seeds;
+  if (const auto fragments = map.required("fragments")) {
+    const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
+    if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name");
+    for (const std::string& name : by_name.keys())
+      seeds.add(name,
+                seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));
+  }
+  file.finish();
+  return seeds;
+}
+
+}  // namespace marrow::files

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/match/inputs.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <optional>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/toolbox/match/nearest_outline.hpp"
+
+namespace marrow::match {
+namespace {
+
+/// The row or the column of an image between two points of an outline that both end the bone outwards.
+void fill_line(std::vector<std::pair<float, bool>>& ends, int size, const std::function<void(int)>& mark) {
+  std::sort(ends.begin(), ends.end());
+  for (std::size_t i = 0; i + 1 < ends.size(); ++i)
+    if (!ends[i].second && ends[i + 1].second)  // the bone begins here and ends there
+      for (int at = std::max(0, int(std::ceil(ends[i].first))); at <= std::min(size - 1, int(ends[i + 1].first)); ++at)
+        mark(at);
+}
+
+/// Marks what lies inside an outline: in a row or in a column between two of its points. It may be open where the CT
+/// ends.
+void fill_outline(const std::vector<OutlinePoint>& outline, cv::Mat& mask) {
+  std::vector<std::vector<std::pair<float, bool>>> rows(std::size_t(mask.rows)), columns(std::size_t(mask.cols));
+  for (const OutlinePoint& p : outline) {
+    const int u = std::clamp(int(std::lround(p.u_px)), 0, mask.cols - 1),
+              v = std::clamp(int(std::lround(p.v_px)), 0, mask.rows - 1);
+    if (std::abs(p.normal_u) > 0.5f) rows[std::size_t(v)].emplace_back(p.u_px, p.normal_u > 0);
+    if (std::abs(p.normal_v) > 0.5f) columns[std::size_t(u)].emplace_back(p.v_px, p.normal_v > 0);
+  }
+  for (int v = 0; v < mask.rows; ++v)
+    fill_line(rows[std::size_t(v)], mask.cols, [&](int u) { mask.at<std::uint8_t>(v, u) = 1; });
+  for (int u = 0; u < mask.cols; ++u)
+    fill_line(columns[std::size_t(u)], mask.rows, [&](int v) { mask.at<std::uint8_t>(v, u) = 1; });
+}
+
+/// The region of a fragment's radiograph; nothing for one that is drawn as an outline.
+std::optional<PixelGrid> region_of(const Other& other, const Camera& camera) {
+  try {
+    return other.projector->region(camera, other.world_from_model);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+void add_shadow(const Other& other, const Camera& camera, cv::Mat& mask) {
+  const std::optional<PixelGrid> region = region_of(other, camera);
+  if (!region) return fill_outline(other.projector->outline(camera, other.world_from_model, 0.5), mask);
+  const std::vector<float> values = other.projector->radiograph(camera, other.world_from_model, *region);
+  for (int row = 0; row < region->rows; ++row)
+    for (int column = 0; column < region->columns; ++column)
+      if (values[std::size_t(row) * std::size_t(region->columns) + std::size_t(column)] > 0)
+        mask.at<std::uint8_t>(int(region->v_px) + row, int(region->u_px) + column) = 1;
+}
+
+}  // namespace
+
+void check_views(const List<View>& views) {
+  if (views.size() == 0) throw Error("there is no view to compare the model with");
+  for (const View& view : views) {
+    check_view(view);
+    check_camera(view.camera, "view '" + view.name + "'");
+  }
+}
+
+void check_weights(const std::vector<double>& weights, std::size_t views) {
+  if (!weights.empty() && weights.size() != views)
+    throw Error("weights has " + std::to_string(weights.size()) + " numbers, but there are " + std::to_string(views) +
+                " views; give one for each");
+  double sum = 0;
+  for (const double weight : weights) {
+    if (!(weight >= 0)) throw Error("weights: each must be 0 or more, got " + std::to_string(weight));
+    sum += weight;
+  }
+  if (!weights.empty() && !(sum > 0)) throw Error("weights: one at least must be above 0");
+}
+
+void check_edges(const List<View>& views, const List<EdgeMap>& edges) {
+  if (views.size() == 0) throw Error("there is no view to compare the model with");
+  if (views.size() != edges.size())
+    throw Error("there are " + std::to_string(views.size()) + " views, but edge maps of " +
+                std::to_string(edges.size()) + "; give the edges of each view");
+  const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    check_camera(views[i].camera, "view '" + views.name(i) + "'");
+    if (edges[i].pixels.empty())
+      throw Error("view '" + views.name(i) +
+                  "': the edge map is empty, so nothing can be compared; lower the thresholds of the edge detector, or "
+                  "check that the image shows the bone");
+    const Camera& camera = views[i].camera;
+    if (edges[i].width_px != camera.width_px || edges[i].height_px != camera.height_px)
+      throw Error("view '" + views.name(i) + "': the edge map has " + size(edges[i].width_px, edges[i].height_px) +
+                  " pixels, but the camera " + size(camera.width_px, camera.height_px) +
+                  "; give the edges of this view's own image");
+  }
+}
+
+double weighted_mean(const std::vector<double>& of_view, const std::vector<double>& weights) {
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < of_view.size(); ++i) {
+    sum += weight_of(weights, i) * of_view[i];
+    total += weight_of(weights, i);
+  }
+  return sum / total;
+}
+
+std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors) {
+  std::vector<Other> others;
+  if (!projectors != !poses)
+    throw Error(std::string("there are ") +
+                (poses ? "poses of other fragments, but nothing draws them; wire 'other_projectors'"
+                       : "projectors of other fragments, but no poses; wire 'others'"));
+  if (!projectors) return others;
+  if (!own)
+    throw Error(
+        "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that "
+        "draws this fragment");
+  for (std::size_t i = 0; i < projectors->size(); ++i) {
+    if (&(*projectors)[i] == own) continue;
+    const Pose* pose = poses->find(projectors->name(i));
+    if (!pose)
+      throw Error("other_projectors has the fragment '" + projectors->name(i) +
+                  "', but others has no pose of it; give the poses of the same fragments");
+    others.push_back({&(*projectors)[i], pose->world_from_model});
+  }
+  return others;
+}
+
+List<View> without_shadows(const List<View>& views, const std::vector<Other>& others) {
+  if (others.empty()) return views;
+  List<View> left;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    View view = views[i];
+    cv::Mat shadow = cv::Mat::zeros(view.image.pixels.size(), CV_8U);
+    for (const Other& other : others) add_shadow(other, view.camera, shadow);
+    cv::Mat mask = view.mask.empty() ? cv::Mat(view.image.pixels.size(), CV_8U, cv::Scalar(255)) : view.mask.clone();
+    mask.setTo(0, shadow);
+    view.mask = mask;
+    left.add(views.name(i), std::move(view));
+  }
+  return left;
+}
+
+List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others,
+                               double reach_px, double tolerance_deg) {
+  if (others.empty()) return edges;
+  List<EdgeMap> left;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Camera& camera = views[i].camera;
+    EdgeMap kept = edges[i];
+    for (const Other& other : others) {
+      const std::vector<OutlinePoint> outline = other.projector->outline(camera, other.world_from_model, 1);
+      const NearestOutline nearest(outline, camera.width_px, camera.height_px, reach_px);
+      const float least_cosine = float(std::cos(radians(tolerance_deg)));
+      std::erase_if(kept.pixels,
+                    [&](const EdgePixel& edge) { return nearest.find(edge, reach_px, least_cosine) >= 0; });
+    }
+    left.add(edges.name(i), std::move(kept));
+  }
+  return left;
+}
+
+}  // namespace marrow::match

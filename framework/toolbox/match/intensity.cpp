@@ -1,0 +1,198 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/match/intensity.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::match {
+namespace {
+
+class IntensityCost : public Cost {
+ public:
+  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst,
+                MeasureOf measure_of)
+      : projector_(projector), views_(views), options_(options), worst_(worst), measure_of_(std::move(measure_of)) {
+    for (const View& view : views) {
+      images_.push_back(image_of(view));
+      measures_.push_back(measure_of_(images_.back()));
+    }
+  }
+
+  double value(const RigidTransform& world_from_model) const override {
+    std::vector<double> of_view(views_.size());
+    tbb::parallel_for(std::size_t(0), views_.size(),
+                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
+    for (double& value : of_view)
+      if (!std::isfinite(value)) value = worst_;
+    return weighted_mean(of_view, options_.weights);
+  }
+
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
+    if (level.pixel_step <= 0 || level.pixel_step == options_.pixel_step) return std::make_shared<IntensityCost>(*this);
+    IntensityOptions options = options_;
+    options.pixel_step = level.pixel_step;
+    return std::make_shared<IntensityCost>(projector_, views_, options, worst_, measure_of_);
+  }
+
+ private:
+  /// Every step-th pixel of a view's smoothed line integrals.
+  Patch image_of(const View& view) const {
+    const int step = options_.pixel_step;
+    cv::Mat smooth = line_integrals(view.image.pixels);
+    if (const double sigma = options_.blur_px * step; sigma > 0.1)
+      cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
+    Patch image{(smooth.cols + step - 1) / step, (smooth.rows + step - 1) / step, 0, 0, {}, {}, {}};
+    for (int row = 0; row < image.rows; ++row)
+      for (int column = 0; column < image.columns; ++column) {
+        const float value = smooth.at<float>(row * step, column * step);
+        const bool is_out =
+            !std::isfinite(value) || (!view.mask.empty() && !view.mask.at<std::uint8_t>(row * step, column * step));
+        image.seen.push_back(value);
+        image.counts.push_back(!is_out);
+      }
+    return image;
+  }
+
+  double value_in(std::size_t index, const RigidTransform& world_from_model) const {
+    const Camera& camera = views_[index].camera;
+    const Patch& image = images_[index];
+    const PixelGrid region = projector_.region(camera, world_from_model);
+    if (region.count() == 0) return worst_;
+    const int step = options_.pixel_step, margin = options_.margin_px;
+    const int left = std::max(0, (int(region.u_px) - margin) / step),
+              top = std::max(0, (int(region.v_px) - margin) / step);
+    const int right = std::min(image.columns - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
+              bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
+    if (right - left < 3 || bottom - top < 3) return worst_;
+    Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
+    patch.rendered = projector_.radiograph(
+        camera, world_from_model,
+        PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
+    patch.seen.resize(patch.rendered.size());
+    patch.counts.resize(patch.rendered.size());
+    for (int row = 0; row < patch.rows; ++row) {
+      const auto from = std::ptrdiff_t(image.at(left, top + row)), to = std::ptrdiff_t(patch.at(0, row));
+      std::copy_n(image.seen.begin() + from, patch.columns, patch.seen.begin() + to);
+      std::copy_n(image.counts.begin() + from, patch.columns, patch.counts.begin() + to);
+    }
+    return measures_[index](patch);
+  }
+
+  const Projector& projector_;
+  const List<View> views_;
+  const IntensityOptions options_;
+  const double worst_;
+  const MeasureOf measure_of_;
+  std::vector<Patch> images_;
+  std::vector<Measure> measures_;
+};
+
+}  // namespace
+
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, MeasureOf measure_of) {
+  check_views(views);
+  check_weights(options.weights, views.size());
+  const List<View> own = without_shadows(views, others_of(&projector, others, other_projectors));
+  return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
+}
+
+std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<Projector>* other_projectors,
+                                           const IntensityOptions& options, double worst, Measure measure) {
+  return intensity_cost(projector, views, others, other_projectors, options, worst,
+                        [measure = std::move(measure)](const Patch&) { return measure; });
+}
+
+cv::Mat line_integrals(const cv::Mat& image) {
+  cv::Mat values;
+  image.convertTo(values, CV_32F);
+  double brightest = 0;
+  cv::minMaxLoc(values, nullptr, &brightest);
+  // A step of grey of integer images; of others a hundred-thousandth of the brightest.
+  const float least = image.depth() == CV_32F ? float(std::max(1e-5 * brightest, 1e-30)) : 1;
+  for (int row = 0; row < values.rows; ++row)
+    for (int column = 0; column < values.cols; ++column) {
+      float& value = values.at<float>(row, column);
+      value = -std::log(std::max(value, least) / std::max(float(brightest), least));
+    }
+  return values;
+}
+
+Gradients gradients_of(const Patch& patch) {
+  Gradients g;
+  const std::size_t count = patch.rendered.size();
+  for (auto* values : {&g.rendered_u, &g.rendered_v, &g.seen_u, &g.seen_v}) values->assign(count, 0.0f);
+  g.counts.assign(count, 0);
+  const std::ptrdiff_t down = patch.columns;
+  for (int row = 1; row + 1 < patch.rows; ++row)
+    for (int column = 1; column + 1 < patch.columns; ++column) {
+      const std::size_t i = patch.at(column, row);
+      const char* c = patch.counts.data() + i;
+      g.counts[i] =
+          c[-down - 1] && c[-down] && c[-down + 1] && c[-1] && c[0] && c[1] && c[down - 1] && c[down] && c[down + 1];
+      const auto sobel = [&](const float* p, float& du, float& dv) {
+        const float a = p[-down - 1], b = p[-down], d = p[-down + 1], e = p[-1], f = p[1], h = p[down - 1], k = p[down],
+                    m = p[down + 1];
+        du = 0.125f * (d - a + 2 * (f - e) + m - h);
+        dv = 0.125f * (h - a + 2 * (k - b) + m - d);
+      };
+      sobel(patch.rendered.data() + i, g.rendered_u[i], g.rendered_v[i]);
+      sobel(patch.seen.data() + i, g.seen_u[i], g.seen_v[i]);
+    }
+  return g;
+}
+
+double scale_of(const Gradients& g) {
+  double products = 0, squares = 0;
+  for (std::size_t i = 0; i < g.counts.size(); ++i) {
+    if (!g.counts[i]) continue;
+    products += double(g.rendered_u[i]) * g.seen_u[i] + double(g.rendered_v[i]) * g.seen_v[i];
+    squares += double(g.rendered_u[i]) * g.rendered_u[i] + double(g.rendered_v[i]) * g.rendered_v[i];
+  }
+  return squares > 0 ? products / squares : 0;
+}
+
+namespace {
+
+struct Moments {
+  double n = 0, a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+};
+
+Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
+  Moments m;
+  // About the first value that counts, so that a constant of any size leaves no rounding errors.
+  const auto first = std::find(counts.begin(), counts.end(), 1);
+  if (first == counts.end()) return m;
+  const std::size_t at = std::size_t(first - counts.begin());
+  const double a0 = a[at], b0 = b[at];
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    if (!counts[i]) continue;
+    const double x = a[i] - a0, y = b[i] - b0;
+    m.n += 1, m.a += x, m.b += y, m.aa += x * x, m.bb += y * y, m.ab += x * y;
+  }
+  return m;
+}
+
+}  // namespace
+
+double correlation(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
+  const Moments m = moments_of(a, b, counts);
+  if (m.n < 16) return 0;
+  const double aa = m.aa - m.a * m.a / m.n, bb = m.bb - m.b * m.b / m.n, ab = m.ab - m.a * m.b / m.n;
+  if (!(aa > 1e-12 * std::max(m.aa, 1e-30)) || !(bb > 1e-12 * std::max(m.bb, 1e-30))) return 0;
+  return std::clamp(ab / std::sqrt(aa * bb), -1.0, 1.0);
+}
+
+double deviation(const std::vector<float>& values, const std::vector<char>& counts) {
+  const Moments m = moments_of(values, values, counts);
+  return m.n < 16 ? 0 : std::sqrt(std::max(0.0, m.aa - m.a * m.a / m.n) / m.n);
+}
+
+}  // namespace marrow::match

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/match/patches.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace marrow::match {
+namespace {
+
+struct Correlation {
+  double weight = 0, value = 0;
+};
+
+Correlation correlation_in(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                           const std::vector<char>& counts, int left, int top, int side) {
+  constexpr double kLeastPixels = 16;
+  double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
+  for (int row = top; row < top + side; ++row)
+    for (std::size_t i = patch.at(left, row); i < patch.at(left, row) + std::size_t(side); ++i) {
+      if (!counts[i]) continue;  // it may not be a number
+      const double x = a[i], y = b[i];
+      n += 1, sa += x, sb += y, aa += x * x, bb += y * y, ab += x * y;
+    }
+  if (n < kLeastPixels) return {};
+  const double va = aa - sa * sa / n, vb = bb - sb * sb / n, cov = ab - sa * sb / n;
+  if (!(va > 1e-9 + 1e-12 * aa)) return {};
+  return {va, vb > 1e-14 + 1e-12 * bb ? std::clamp(cov / std::sqrt(va * vb), -1.0, 1.0) : 0};
+}
+
+}  // namespace
+
+double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                              const std::vector<char>& counts, int side) {
+  double sum = 0, weights = 0;
+  const int step = std::max(1, side / 2);
+  // The squares lie where they lie in the image, wherever the compared part begins: else each pixel that a pose moves
+  // that part by would change them all, and with them the cost.
+  const auto first = [step](int origin) { return (step - origin % step) % step; };
+  for (int top = first(patch.top); top + side <= patch.rows; top += step)
+    for (int left = first(patch.left); left + side <= patch.columns; left += step) {
+      const Correlation one = correlation_in(patch, a, b, counts, left, top, side);
+      weights += one.weight;
+      sum += one.weight * one.value;
+    }
+  return weights > 0 ? sum / weights : -1;
+}
+
+}  // namespace marrow::match

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/phantom/femur_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "marrow/toolbox/phantom/random.hpp"
+
+namespace marrow::phantom {
+namespace {
+
+using Eigen::Vector3d;
+using Node = std::pair<double, double>;
+
+/// Piecewise linear curve through nodes, constant beyond them.
+double along(std::span<const Node> nodes, double x) {
+  if (x <= nodes.front().first) return nodes.front().second;
+  for (std::size_t i = 1; i < nodes.size(); ++i)
+    if (x <= nodes[i].first) {
+      const double t = (x - nodes[i - 1].first) / (nodes[i].first - nodes[i - 1].first);
+      return nodes[i - 1].second + t * (nodes[i].second - nodes[i - 1].second);
+    }
+  return nodes.back().second;
+}
+
+/// The same with its corners rounded, by averaging over +-0.025.
+double smooth_along(std::span<const Node> nodes, double x) {
+  constexpr double kHalfWidth = 0.025;
+  double sum = 0;
+  for (int i = -2; i <= 2; ++i) sum += along(nodes, x + i * kHalfWidth / 2);
+  return sum / 5;
+}
+
+/// Union and intersection with a fillet of about `fillet` mm (polynomial smooth minimum).
+double join(double a, double b, double fillet) {
+  const double h = std::max(fillet - std::abs(a - b), 0.0) / fillet;
+  return std::min(a, b) - h * h * fillet / 4;
+}
+double cut(double a, double b, double fillet) { return -join(-a, -b, fillet); }
+
+double ellipsoid(const Vector3d& p, const Vector3d& radii) {
+  const double k0 = p.cwiseQuotient(radii).norm(), k1 = p.cwiseQuotient(radii.cwiseProduct(radii)).norm();
+  return k1 > 1e-9 ? k0 * (k0 - 1) / k1 : -radii.minCoeff();
+}
+
+/// A disc with its axis along x and rounded rims.
+double disc(const Vector3d& p, double radius, double half_width, double rim) {
+  const double across = std::hypot(p.y(), p.z()) - (radius - rim), beside = std::abs(p.x()) - (half_width - rim);
+  return std::hypot(std::max(across, 0.0), std::max(beside, 0.0)) + std::min(std::max(across, beside), 0.0) - rim;
+}
+
+/// A cone with rounded ends between two points.
+double capsule(const Vector3d& p, const Vector3d& a, const Vector3d& b, double radius_a, double radius_b) {
+  const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
+  return (p - a - t * (b - a)).norm() - (radius_a + t * (radius_b - radius_a));
+}
+
+// Relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured femora, FACTS).
+constexpr std::array<Node, 13> kWidth{{{0.05, 2.2},
+                                       {0.09, 2.05},
+                                       {0.13, 1.68},
+                                       {0.20, 1.31},
+                                       {0.25, 1.186},
+                                       {0.30, 1.096},
+                                       {0.35, 1.04},
+                                       {0.45, 1.0},
+                                       {0.55, 1.007},
+                                       {0.65, 1.04},
+                                       {0.75, 1.12},
+                                       {0.83, 1.32},
+                                       {0.88, 1.50}}};
+constexpr std::array<Node, 12> kDepth{{{0.05, 1.40},
+                                       {0.09, 1.35},
+                                       {0.13, 1.22},
+                                       {0.20, 1.07},
+                                       {0.25, 1.033},
+                                       {0.30, 1.007},
+                                       {0.35, 0.993},
+                                       {0.50, 1.0},
+                                       {0.60, 0.993},
+                                       {0.75, 1.033},
+                                       {0.83, 1.08},
+                                       {0.88, 1.12}}};
+// Height of the linea aspera, relative to its greatest.
+constexpr std::array<Node, 6> kLinea{{{0.22, 0.0}, {0.32, 0.6}, {0.42, 1.0}, {0.62, 1.0}, {0.72, 0.7}, {0.82, 0.0}}};
+// Half the canal's width relative to the isthmus: canal flare index about 3.7 (Noble et al., CORR 1988).
+constexpr std::array<Node, 9> kCanal{{{0.06, 12.0},
+                                      {0.12, 4.5},
+                                      {0.20, 2.35},
+                                      {0.30, 1.45},
+                                      {0.42, 1.0},
+                                      {0.60, 1.0},
+                                      {0.75, 1.5},
+                                      {0.83, 2.6},
+                                      {0.90, 12.0}}};
+
+}  // namespace
+
+FemurField::FemurField(const FemurShape& shape) : shape_(shape), scale_(shape.bicondylar_width_mm / 82) {
+  const double head_radius = 0.5 * shape.head_diameter_mm;
+  const double out = shape.neck_length_mm * std::sin(shape.neck_shaft_rad),
+               up = -shape.neck_length_mm * std::cos(shape.neck_shaft_rad);
+  const double z = shape.length_mm - head_radius;
+  neck_base_ = {0, bow(z - up), z - up};
+  head_ = neck_base_ + Vector3d(out * std::cos(shape.anteversion_rad), -out * std::sin(shape.anteversion_rad), up);
+  Random random(shape.seed, 7);
+  for (Wave& wave : waves_) {
+    const Vector3d direction(random.normal(), random.normal(), random.normal());
+    wave = {direction.normalized() * 2 * 3.14159265358979323846 / (35 + 65 * random.uniform()),
+            2 * 3.14159265358979323846 * random.uniform()};
+  }
+}
+
+/// How far back the shaft's axis lies: an arc, convex to the front, through x = y = 0 at a fifth of the length.
+double FemurField::bow(double z) const {
+  const double middle = 0.52 * shape_.length_mm, reference = 0.2 * shape_.length_mm;
+  return ((z - middle) * (z - middle) - (reference - middle) * (reference - middle)) / (2 * shape_.bow_radius_mm);
+}
+
+Vector3d FemurField::anatomical(const Vector3d& point) const {
+  return {shape_.medial_x * point.x(), point.y(), point.z()};
+}
+
+double FemurField::shaft(const Vector3d& p) const {
+  const double at = p.z() / shape_.length_mm;
+  const double ridge = shape_.linea_aspera_mm * smooth_along(kLinea, at);
+  const double half_width = 0.5 * shape_.shaft_ml_mm * smooth_along(kWidth, at);
+  const double half_depth = 0.5 * (shape_.shaft_ap_mm * smooth_along(kDepth, at) - ridge);
+  const double x = p.x(), y = p.y() - bow(p.z()) + 0.5 * ridge;
+  const double angle = std::atan2(x, y);  // 0 = straight back
+  const double grown = std::exp(-0.5 * angle * angle / (0.24 * 0.24)) * ridge;
+  const double radius = std::hypot(x, y), relative = std::hypot(x / half_width, y / half_depth);
+  const double wall = relative > 1e-9 ? radius - radius / relative - grown : -half_depth;
+  return cut(wall, std::max(0.055 * shape_.length_mm - p.z(), p.z() - neck_base_.z() - 4), 8);
+}
+
+double FemurField::distal(const Vector3d& p) const {
+  const double s = scale_, half = 0.5 * shape_.bicondylar_width_mm;
+  const double axis = bow(0.06 * shape_.length_mm) - 4;
+  const Vector3d q(p.x(), p.y() - axis, p.z());
+  // Each condyle is two discs, a small one behind and a large one before it: the radius of curvature grows to the
+  // front.
+  const double medial_x = half - 16 * s, lateral_x = -half + 17 * s;
+  const double medial = join(disc(q - Vector3d(medial_x, 17 * s, 21 * s), 20.5 * s, 14 * s, 9 * s),
+                             disc(q - Vector3d(medial_x - 2 * s, -2 * s, 26 * s), 26 * s, 14 * s, 10 * s), 8 * s);
+  const double lateral = join(disc(q - Vector3d(lateral_x, 14 * s, 23.5 * s), 19.5 * s, 14.5 * s, 9 * s),
+                              disc(q - Vector3d(lateral_x + 1 * s, -6 * s, 30 * s), 28 * s, 15 * s, 9 * s), 8 * s);
+  const double trochlea = ellipsoid(q - Vector3d(-2 * s, -9 * s, 33 * s), Vector3d(30, 22, 21) * s);
+  const double epicondyles = std::min(ellipsoid(q - Vector3d(half - 9 * s, 4 * s, 33 * s), Vector3d(7, 11, 12) * s),
+                                      ellipsoid(q - Vector3d(-half + 9 * s, 5 * s, 30 * s), Vector3d(7, 10, 10) * s));
+  double all = join(join(medial, lateral, 4 * s), join(trochlea, epicondyles, 4 * s), 9 * s);
+  const double notch = ellipsoid(q - Vector3d(0, 20 * s, 8 * s), Vector3d(11, 26, 25) * s);
+  all = cut(all, -notch, 5 * s);
+  const double groove =
+      capsule(q, Vector3d(-2 * s, -42 * s, 20 * s), Vector3d(-2 * s, -45 * s, 60 * s), 11 * s, 11 * s);
+  return cut(all, -groove, 6 * s);
+}
+
+double FemurField::proximal(const Vector3d& p) const {
+  const double s = shape_.head_diameter_mm / 46.6;
+  const double head = (p - head_).norm() - 0.5 * shape_.head_diameter_mm;
+  const double neck = capsule(p, neck_base_, head_, 17 * s, 14 * s);
+  const Vector3d foot(0, bow(neck_base_.z()), 0);
+  const double greater =
+      ellipsoid(p - foot - Vector3d(-19 * s, 7 * s, neck_base_.z() + 6 * s), Vector3d(14, 18, 27) * s);
+  const double lesser = ellipsoid(p - foot - Vector3d(13 * s, 15 * s, head_.z() - 54 * s), Vector3d(9, 9, 13) * s);
+  const double crest = capsule(p, foot + Vector3d(-16 * s, 20 * s, neck_base_.z() + 14 * s),
+                               foot + Vector3d(11 * s, 17 * s, head_.z() - 50 * s), 5 * s, 5 * s);
+  return join(join(join(head, neck, 6 * s), greater, 12 * s), join(lesser, crest, 5 * s), 8 * s);
+}
+
+double FemurField::outer_at(const Vector3d& p) const {
+  double field = shaft(p);
+  if (p.z() < 0.3 * shape_.length_mm) field = join(field, distal(p), 14 * scale_);
+  if (p.z() > 0.65 * shape_.length_mm) field = join(field, proximal(p), 12);
+  return field;
+}
+
+double FemurField::outer(const Vector3d& point) const {
+  const Vector3d p = anatomical(point);
+  double field = outer_at(p);
+  if (shape_.ripple_mm > 0 && std::abs(field) < 20) {
+    double ripple = 0;
+    for (const Wave& wave : waves_) ripple += std::sin(wave.number.dot(p) + wave.phase);
+    field += shape_.ripple_mm * ripple / std::sqrt(0.5 * double(waves_.size()));
+  }
+  return field;
+}
+
+double FemurField::inner(const Vector3d& point) const {
+  const Vector3d p = anatomical(point);
+  const double canal = std::hypot(p.x(), p.y() - bow(p.z()) + 0.3 * shape_.linea_aspera_mm) -
+                       0.5 * shape_.canal_mm * smooth_along(kCanal, p.z() / shape_.length_mm);
+  return cut(outer(point) + shape_.shell_mm, canal, 3);
+}
+
+Vector3d FemurField::low_mm() const { return Vector3d(-70 * scale_ - 20, -70, -12); }
+Vector3d FemurField::high_mm() const { return Vector3d(70 * scale_ + 20, 90, shape_.length_mm + 12); }
+
+}  // namespace marrow::phantom

@@ -1,0 +1,184 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/search/search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "derivatives.hpp"
+#include "predicted_covariance.hpp"
+#include "scan.hpp"
+
+namespace marrow::search {
+
+void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels,
+                      const std::string& like, const std::string& advice) {
+  if (values.empty() || values.size() != levels)
+    throw Error(name + " has " + std::to_string(values.size()) + " numbers, but " + like + " has " +
+                std::to_string(levels) + "; " + advice);
+  for (const double value : values)
+    if (!(value > 0)) throw Error(name + ": each number must be positive");
+}
+
+void check_options(const SearchOptions& options) {
+  const auto check = [&](const std::vector<double>& values, const char* name) {
+    check_level_list(values, name, options.contour_spacing_px.size(), "contour_spacing_px",
+                     "give reach_px and the four options of steps as many, one for each level");
+  };
+  check(options.contour_spacing_px, "contour_spacing_px");
+  check(options.reach_px, "reach_px");
+  if (!options.pixel_step.empty()) check(options.pixel_step, "pixel_step");
+  check(options.step_deg, "step_deg");
+  check(options.step_axial_deg, "step_axial_deg");
+  check(options.step_mm, "step_mm");
+  check(options.step_tolerance, "step_tolerance");
+}
+
+Levels levels_of(const Cost& cost, const SearchOptions& options) {
+  Levels levels;
+  for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
+    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i],
+                                    options.pixel_step.empty() ? 0 : int(options.pixel_step[i])}));
+  return levels;
+}
+
+Search::Search(const Optimizer& optimizer, const Pose& initial, const SearchOptions& options, Context& context)
+    : optimizer_(optimizer),
+      frame_(initial.frame),
+      pose_(initial.world_from_model),
+      options_(options),
+      context_(context) {}
+
+std::vector<Pose::Progress> Search::convergence(const Cost& cost) const {
+  std::vector<RigidTransform> poses;
+  for (const auto& [evaluations, pose] : path_) poses.push_back(pose);
+  const std::vector<double> values = cost.values(poses);
+  std::vector<Pose::Progress> steps;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (steps.empty() || values[i] < steps.back().cost) steps.push_back({path_[i].first, values[i]});
+  return steps;
+}
+
+std::vector<RigidTransform> Search::scan(const Cost& cost) {
+  const Scan scan = options_.scan_poses > 0 ? scattered_scan(options_) : axial_scan(options_);
+  std::vector<RigidTransform> poses;
+  for (const Vector6d& motion : scan.motions) poses.push_back(moved_by_units(pose_, frame_, motion));
+  const std::vector<double> values = cost.values(poses);
+  evaluations_ += int(poses.size());
+  std::vector<int> order(poses.size()), chosen;
+  std::iota(order.begin(), order.end(), 0);
+  std::sort(order.begin(), order.end(), [&](int a, int b) {
+    return values[std::size_t(a)] != values[std::size_t(b)] ? values[std::size_t(a)] < values[std::size_t(b)] : a < b;
+  });
+  std::vector<RigidTransform> candidates;
+  for (const int i : order) {
+    if (int(candidates.size()) == options_.candidates) break;
+    if (std::any_of(chosen.begin(), chosen.end(), [&](int other) { return scan.near(i, other); })) continue;
+    chosen.push_back(i);
+    candidates.push_back(poses[std::size_t(i)]);
+  }
+  return candidates;
+}
+
+double Search::refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share) {
+  const auto n = Eigen::Index(axes.size());
+  const auto motion_at = [&](const Eigen::VectorXd& x) {
+    Vector6d motion = Vector6d::Zero();
+    for (Eigen::Index i = 0; i < n; ++i) motion[axes[std::size_t(i)]] = x[i];
+    return motion;
+  };
+  const auto pose_at = [&](const Eigen::VectorXd& x) { return moved_by_units(pose_, frame_, motion_at(x)); };
+  MinimisationProblem problem;
+  problem.start = Eigen::VectorXd::Zero(n);
+  problem.initial_step.resize(n);
+  for (Eigen::Index i = 0; i < n; ++i) {
+    const int axis = axes[std::size_t(i)];
+    problem.initial_step[i] = axis == kAxialRotation ? steps.axial_deg : axis < 3 ? steps.deg : steps.mm;
+  }
+  problem.max_evaluations = options_.max_evaluations;
+  problem.step_tolerance = steps.tolerance;
+  problem.function = [&](const Eigen::VectorXd& x) {
+    context_.check_cancelled();
+    return cost.value(pose_at(x));
+  };
+  if (cost.expansion(pose_, frame_))
+    problem.expansion = [&](const Eigen::VectorXd& x) {
+      context_.check_cancelled();
+      return in_coordinates(cost.expansion(pose_at(x), frame_), motion_at(x), axes);
+    };
+  double least = std::numeric_limits<double>::infinity();
+  problem.observer = [&](int evaluation, const Eigen::VectorXd& x, double value) {
+    if (value < least) note(evaluations_ + evaluation, pose_at(x));
+    least = std::min(least, value);
+    if (evaluation % 50 == 0)
+      context_.progress(done + share * std::min(1.0, double(evaluation) / options_.max_evaluations), "registration");
+  };
+  const MinimisationResult result = optimizer_.minimise(problem);
+  evaluations_ += result.evaluations;
+  pose_ = pose_at(result.x);
+  path_.push_back({evaluations_, pose_});
+  return result.value;
+}
+
+Found Search::best_of(const std::vector<RigidTransform>& candidates, const Levels& levels) {
+  const std::size_t finalists = std::min(candidates.size(), std::size_t(options_.finalists));
+  const double share = 1.0 / double(candidates.size() + finalists * (levels.size() - 1));
+  double done = 0;
+  std::vector<Found> found;
+  for (const RigidTransform& candidate : candidates) {
+    go_to(candidate);
+    refine(*levels.front(), {kAxialRotation, kAxialTranslation}, steps_of(0), done, share / 2);
+    const RigidTransform axial = pose_;
+    const double value = refine(*levels.front(), kAllAxes, steps_of(0), done + share / 2, share / 2);
+    found.push_back({value, axial, pose_});
+    done += share;
+  }
+  const auto better = [](const Found& a, const Found& b) { return a.value < b.value; };
+  std::stable_sort(found.begin(), found.end(), better);
+  found.resize(finalists);
+  for (Found& finalist : found) {
+    go_to(finalist.pose);
+    for (std::size_t i = 1; i < levels.size(); ++i, done += share)
+      finalist.value = refine(*levels[i], kAllAxes, steps_of(i), done, share);
+    finalist.pose = pose_;
+  }
+  return *std::min_element(found.begin(), found.end(), better);
+}
+
+/// Keeps a pose of the way, one in ten evaluations at most.
+void Search::note(int evaluations, const RigidTransform& pose) {
+  if (path_.empty() || evaluations >= path_.back().first + 10) path_.push_back({evaluations, pose});
+}
+
+Steps Search::steps_of(std::size_t level) const {
+  return {options_.step_deg[level], options_.step_axial_deg[level], options_.step_mm[level],
+          options_.step_tolerance[level]};
+}
+
+Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {
+  Pose pose = initial;
+  pose.world_from_model = search.pose();
+  pose.covariance.reset();
+  pose.cost = cost.value(search.pose());
+  pose.evaluations = search.evaluations();
+  return pose;
+}
+
+Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
+                   Context& context) {
+  Pose pose = pose_of(search, initial, cost);
+  pose.convergence = search.convergence(cost);
+  if (const auto factor = cost.likelihood_factor(search.pose())) {
+    const PredictedCovariance predicted(cost, search.pose(), initial.frame, *factor);
+    pose.covariance = predicted.covariance();
+    pose.evaluations += predicted.evaluations();
+    for (const std::string& warning : predicted.warnings(options.warn_above_deg, options.warn_above_mm)) {
+      context.warn(warning);
+      pose.warnings.push_back(warning);
+    }
+  }
+  return pose;
+}
+
+}  // namespace marrow::search

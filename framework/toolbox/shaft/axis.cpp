@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/shaft/axis.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdio>
+#include <marrow/domain/error.hpp>
+#include <string>
+
+namespace marrow::shaft {
+namespace {
+
+Eigen::Vector3d line_through(const LineSegment& segment) {
+  return segment.from_px.homogeneous().cross(segment.to_px.homogeneous());
+}
+
+}  // namespace
+
+Plane bisecting_plane(const Camera& camera, const LineSegment& left, const LineSegment& right) {
+  const Plane one = back_project_line(camera, line_through(left)),
+              other = back_project_line(camera, line_through(right));
+  Plane plane;
+  plane.normal = (one.normal + other.normal).normalized();  // both borders run the same way, so these normals agree
+  plane.offset_mm = plane.normal.dot(source_position_mm(camera));
+  return plane;
+}
+
+Axis axis_of_planes(const std::vector<Plane>& planes) {
+  Eigen::MatrixXd normals(planes.size(), 3);
+  Eigen::VectorXd offsets(planes.size());
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    normals.row(Eigen::Index(i)) = planes[i].normal.transpose();
+    offsets(Eigen::Index(i)) = planes[i].offset_mm;
+  }
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(normals.transpose() * normals);  // ascending
+  const double spread = planes.size() < 2 ? 0 : std::sqrt(squares.eigenvalues()(1) / squares.eigenvalues()(2));
+  // Two planes at an angle a have squared singular values 1 +- cos a, of ratio tan(a / 2) squared.
+  const double angle_deg = degrees(2 * std::atan(spread));
+  if (angle_deg < 10) {
+    char text[20];
+    std::snprintf(text, sizeof text, "%.1f", angle_deg);
+    throw Error("the " + std::to_string(planes.size()) +
+                " views see the shaft from nearly the same side: the planes of its " + "axis meet at " + text +
+                " degrees, where 10 are needed; use views farther apart, or a single one");
+  }
+  Axis axis;
+  axis.direction = squares.eigenvectors().col(0);
+  const Eigen::Vector3d right = normals.transpose() * offsets;
+  for (Eigen::Index i = 1; i < 3; ++i)  // the pseudo-inverse of rank two
+    axis.point_mm +=
+        squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
+  return axis;
+}
+
+RigidTransform world_from_world_move(const Axis& model, const Axis& target, const Eigen::Vector3d& anchor) {
+  const Eigen::Vector3d target_z =
+      target.direction.dot(model.direction) < 0 ? Eigen::Vector3d(-target.direction) : target.direction;
+  const Eigen::Matrix3d turn = Eigen::Quaterniond::FromTwoVectors(model.direction, target_z).toRotationMatrix();
+  const Eigen::Vector3d model_x = model.direction.unitOrthogonal();
+
+  const auto frame_at = [](const Eigen::Vector3d& origin, const Eigen::Vector3d& x, const Eigen::Vector3d& z) {
+    RigidTransform world_from_frame{"world", "axis"};
+    world_from_frame.rotation << x, z.cross(x), z;
+    world_from_frame.translation_mm = origin;
+    return world_from_frame;
+  };
+  const Eigen::Vector3d model_origin = model.nearest_to(anchor);
+  const RigidTransform world_from_model_axis = frame_at(model_origin, model_x, model.direction);
+  const RigidTransform world_from_target_axis = frame_at(target.nearest_to(model_origin), turn * model_x, target_z);
+  return world_from_target_axis * inverse(world_from_model_axis);
+}
+
+}  // namespace marrow::shaft

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/shaft/model_borders.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace marrow::shaft {
+namespace {
+
+constexpr double kStep_px = 2;
+
+/// The outermost point of the model on one side, at one position along the pair.
+struct Extreme {
+  double across = 0;      ///< pixels
+  Eigen::Vector3d world;  ///< the point of the surface
+  bool seen = false;
+};
+
+/// Positions along and across a pair of borders, from the middle between its ends.
+struct PairFrame {
+  Eigen::Vector2d origin, along, across;
+  double length = 0;
+
+  explicit PairFrame(const ShaftLines& lines) {
+    origin = 0.5 * (lines.left.from_px + lines.right.from_px);
+    const Eigen::Vector2d end = 0.5 * (lines.left.to_px + lines.right.to_px);
+    length = (end - origin).norm();
+    along = (end - origin) / length;
+    across = {-along.y(), along.x()};  // to the right
+  }
+  Eigen::Vector2d in_pair(const Eigen::Vector2d& pixel) const {
+    return {along.dot(pixel - origin), across.dot(pixel - origin)};
+  }
+  Eigen::Vector2d pixel(double s, double t) const { return origin + s * along + t * across; }
+};
+
+/// For each side the extremes at positions 0, 2, 4, ... along the pair, where triangle edges cross them.
+std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTransform& world_from_model,
+                                                const Camera& camera, const PairFrame& pair) {
+  const std::size_t count = std::size_t(pair.length / kStep_px) + 1;
+  std::array<std::vector<Extreme>, 2> sides{std::vector<Extreme>(count), std::vector<Extreme>(count)};
+  std::vector<Eigen::Vector2d> flat(model.vertices_mm.size());
+  const RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
+  for (std::size_t i = 0; i < flat.size(); ++i) {
+    const Eigen::Vector3d x = camera_from_model * model.vertices_mm[i];
+    flat[i] = x.z() > 0 ? pair.in_pair((camera.intrinsics * x).hnormalized())
+                        : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
+  }
+  const auto cross = [&](std::uint32_t a, std::uint32_t b) {
+    if (flat[a].x() > flat[b].x()) std::swap(a, b);
+    const double from = flat[a].x(), to = flat[b].x();
+    if (!(to > from) || to < 0 || from > pair.length) return;
+    const long last = std::min(long(count) - 1, long(std::floor(to / kStep_px)));
+    for (long k = std::max(0L, long(std::ceil(from / kStep_px))); k <= last; ++k) {
+      const double part = (double(k) * kStep_px - from) / (to - from);
+      const double across = flat[a].y() + part * (flat[b].y() - flat[a].y());
+      for (int side = 0; side < 2; ++side) {
+        Extreme& extreme = sides[side][std::size_t(k)];
+        if (extreme.seen && (side == 0 ? across >= extreme.across : across <= extreme.across)) continue;
+        extreme = {across, model.vertices_mm[a] + part * (model.vertices_mm[b] - model.vertices_mm[a]), true};
+      }
+    }
+  };
+  for (const auto& triangle : model.triangles)
+    for (int k = 0; k < 3; ++k)
+      // Each edge belongs to two triangles; the one that runs upwards crosses for both. An open border is crossed
+      // anyway by the other edges of its triangle.
+      if (triangle[k] < triangle[(k + 1) % 3]) cross(triangle[k], triangle[(k + 1) % 3]);
+  for (auto& side : sides)
+    for (Extreme& extreme : side)
+      if (extreme.seen) extreme.world = world_from_model * extreme.world;
+  return sides;
+}
+
+/// across = at_start + slope * s through the extremes, leaving out those farther than the tolerance from the line
+/// before.
+struct Line {
+  double at_start = 0, slope = 0;
+  double at(double s) const { return at_start + slope * s; }
+};
+Line fitted(const std::vector<Extreme>& side, double tolerance_px) {
+  Line line;
+  double reach = std::numeric_limits<double>::infinity();
+  for (int round = 0; round < 6; ++round) {
+    double n = 0, sum_s = 0, sum_t = 0, sum_ss = 0, sum_st = 0;
+    for (std::size_t k = 0; k < side.size(); ++k) {
+      const double s = double(k) * kStep_px, t = side[k].across;
+      if (!side[k].seen || std::abs(t - line.at(s)) > reach) continue;
+      n += 1, sum_s += s, sum_t += t, sum_ss += s * s, sum_st += s * t;
+    }
+    const double spread = n * sum_ss - sum_s * sum_s;
+    if (n < 3 || !(spread > 0)) break;
+    line.slope = (n * sum_st - sum_s * sum_t) / spread;
+    line.at_start = (sum_t - line.slope * sum_s) / n;
+    reach = tolerance_px * std::max(1.0, 8.0 / (1 << round));  // from coarse to fine
+  }
+  return line;
+}
+
+/// The line of least squares through the middles between the surface points of both sides.
+Axis axis_of_middles(const std::array<std::vector<Extreme>, 2>& sides) {
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+  double n = 0;
+  for (std::size_t k = 0; k < sides[0].size(); ++k) {
+    if (!sides[0][k].seen) continue;
+    const Eigen::Vector3d middle = 0.5 * (sides[0][k].world + sides[1][k].world);
+    n += 1, first += middle, second += middle * middle.transpose();
+  }
+  Axis axis;
+  axis.point_mm = first / n;
+  axis.direction =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / n - axis.point_mm * axis.point_mm.transpose())
+          .eigenvectors()
+          .col(2);
+  return axis;
+}
+
+}  // namespace
+
+std::optional<ModelBorders> model_borders(const Mesh& model, const RigidTransform& world_from_model,
+                                          const Camera& camera, const ShaftLines& lines, double tolerance_px) {
+  const PairFrame pair(lines);
+  const auto sides = extremes_of(model, world_from_model, camera, pair);
+  const auto seen =
+      std::count_if(sides[0].begin(), sides[0].end(), [](const Extreme& extreme) { return extreme.seen; });
+  if (seen < 5 || std::size_t(3 * seen) < sides[0].size()) return std::nullopt;
+  const Line left = fitted(sides[0], tolerance_px), right = fitted(sides[1], tolerance_px);
+  ModelBorders borders;
+  borders.left = {pair.pixel(0, left.at(0)), pair.pixel(pair.length, left.at(pair.length))};
+  borders.right = {pair.pixel(0, right.at(0)), pair.pixel(pair.length, right.at(pair.length))};
+  borders.axis = axis_of_middles(sides);
+  borders.width_px = right.at(pair.length / 2) - left.at(pair.length / 2);
+  return borders;
+}
+
+}  // namespace marrow::shaft
