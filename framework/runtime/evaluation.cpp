@@ -43,7 +43,6 @@ bool is_of(const Value& value, const PortInfo& output) {
 struct MissingInput {
   Status status;
   std::string missing;
-  std::string port;
 };
 
 /// Gives data its content hash; gives a function its recipe's key and keeps its inputs alive as long as it.
@@ -124,16 +123,15 @@ class Evaluation::DeferredSource : public Source {
       }
     }
     const CallResult& result = call_->result();
-    if (result.status == Status::failed)
-      throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' failed", ""};
-    if (result.status != Status::done) throw MissingInput{result.status, result.reason, ""};
+    if (result.status == Status::failed) throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' failed"};
+    if (result.status != Status::done) throw MissingInput{result.status, result.reason};
     std::size_t at = 0;
     std::shared_ptr<const void> data;
     for (const Value& output : result.outputs)
       for_leaves(output, [&](const Value& leaf) {
         if (at++ == leaf_) data = leaf.data;
       });
-    if (!data) throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' made none", ""};
+    if (!data) throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' made none"};
     return data;
   }
 
@@ -315,7 +313,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     report(RunEvent::Kind::finished, node, item, "", 1, seconds);
   } catch (const MissingInput& missing) {
     result.status = missing.status;
-    result.reason = "its input '" + missing.port + "' is missing: " + missing.missing;
+    result.reason = missing.missing;
   } catch (const Cancelled&) {
     result.status = Status::cancelled;
     result.reason = "stopped before it was done";
@@ -360,12 +358,7 @@ void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value
   for (std::size_t i = 0; i < inputs.size(); ++i)
     for_leaves(inputs[i], [&](Value& leaf) {
       if (leaf.data || !leaf.source) return;
-      try {
-        leaf.data = leaf.source->data(definition.info.inputs[i].type);
-      } catch (MissingInput& missing) {
-        missing.port = definition.info.inputs[i].name;
-        throw;
-      }
+      leaf.data = leaf.source->data(definition.info.inputs[i].type);
     });
 }
 

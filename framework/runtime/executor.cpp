@@ -17,6 +17,7 @@
 #include "evaluation.hpp"
 #include "mapping.hpp"
 #include "no_process.hpp"
+#include "stopped_nodes.hpp"
 #include "thread_supply.hpp"
 
 namespace marrow {
@@ -76,6 +77,7 @@ class Executor {
     if (fault_) std::rethrow_exception(fault_);
     arena.execute([&] { make_outputs(); });
     arena.terminate();
+    count_stopped_nodes(pipeline_, result_.nodes);
     result_.seconds = seconds_since(start_);
     return std::move(result_);
   }
@@ -336,7 +338,7 @@ class Executor {
         for (const Value& item : value->items) leaves.push_back(&item);
         if (!value->is_absent()) continue;
         status = Status::not_run;
-        if (!value->missing.empty()) return "its input '" + port.name + "' is missing: " + value->missing;
+        if (!value->missing.empty()) return value->missing;  // the first cause, however far off
         status = Status::skipped;
         if (!port.optional) return "there is no '" + port.name + "'";
       }

@@ -150,6 +150,7 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
             {"random", node.info.random},
             {"files", files_of(record)}};
   if (!record.reason.empty()) j["reason"] = record.reason;
+  if (record.stopped > 0) j["not_run_because_of_it"] = record.stopped;
   if (const LibraryInfo* library = catalogue.library_of(node.info.name)) {
     j["library"] = library->file.filename().string();
     j["build_id"] = library->build_id.hex();

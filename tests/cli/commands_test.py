@@ -208,6 +208,24 @@ class Commands(Case):
         )
         self.assertTrue((self.scratch / "out" / "outputs" / "number.json").exists())
 
+    def test_a_failure_is_said_once_and_what_it_stops_is_counted(self):
+        nodes = "  f: {uses: test.fail_above, in: {a: c}, with: {value: 1}}\n  g: {uses: test.add, in: {a: f}}\n"
+        text = NUMBER.replace("outputs:", nodes + "  h: {uses: test.add, in: {a: g}}\noutputs:")
+        text = text.replace("number: c", "number: c, h: h")
+        result = marrow("run", self.write("p.yaml", text), "--out", self.scratch / "out", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 1)
+        said = result.stdout + result.stderr
+        self.assertEqual(said.count("the number is too large"), 1, said)
+        self.assertIn("2 nodes were not run because of it\n", result.stdout)
+        self.assertIn("  h: not made: node 'f' failed\n", result.stdout)
+        self.assertNotIn("is missing", said)
+        nodes = {node["id"]: node for node in json.loads((self.scratch / "out" / "run.json").read_text())["nodes"]}
+        self.assertEqual(nodes["f"]["not_run_because_of_it"], 2)
+        self.assertEqual(nodes["h"]["reason"], "node 'f' failed")
+        report = marrow("show", self.scratch / "out", plugins=[TEST_PLUGINS])
+        self.assertEqual(report.returncode, 0, report.stderr)
+        self.assertIn("2 nodes were not run because of it", (self.scratch / "out" / "report.html").read_text())
+
     def test_two_slow_nodes_overlap(self):
         path = self.write("p.yaml", WORK)
         # A busy machine, or the one that it is a guest of, may put both threads on one core, or let one of them wait.

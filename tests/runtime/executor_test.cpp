@@ -116,9 +116,24 @@ TEST_F(ExecutorTest, FailureNamesNodeInputsAndReasonAndLeavesOthersGoing) {
       "node 'f' (test.fail_above) for b failed: the number is too large; give a smaller one (its inputs: a = s.both)");
   const marrow::Value g = output(result, 0);
   EXPECT_EQ(g.items[0].as<marrow::Metrics>().items[0].value, 10) << "the item that did not fail goes on";
-  EXPECT_EQ(g.items[1].missing, "its input 'a' is missing: node 'f' failed");
+  EXPECT_EQ(g.items[1].missing, "node 'f' failed");
   EXPECT_EQ(result.nodes[3].status, Status::not_run);
   EXPECT_EQ(number(result, 2), 1);
+}
+
+TEST_F(ExecutorTest, WhatIsBehindAFailureNamesItsFirstCauseAndIsCounted) {
+  const RunResult result =
+      run("  c: {uses: test.constant}\n  f: {uses: test.fail_above, in: {a: c}, with: {value: 0}}\n"
+          "  g: {uses: test.add, in: {a: f}}\n  h: {uses: test.add, in: {a: g}}\n  i: {uses: test.add, in: {a: h}}\n",
+          "i: i, c: c");
+  EXPECT_EQ(result.nodes[1].stopped, 3);
+  EXPECT_EQ(result.nodes[0].stopped, 0);
+  for (const int node : {2, 3, 4}) {
+    EXPECT_TRUE(result.nodes[std::size_t(node)].was_stopped());
+    EXPECT_EQ(result.nodes[std::size_t(node)].reason, "node 'f' failed");
+  }
+  EXPECT_EQ(marrow::not_run_text(3), "3 nodes were not run because of it");
+  EXPECT_EQ(marrow::not_run_text(1), "1 node was not run because of it");
 }
 
 TEST_F(ExecutorTest, WhatIsNotThereIsSkippedAndNoFailure) {

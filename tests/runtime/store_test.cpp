@@ -172,7 +172,7 @@ TEST_F(StoreTest, AFailedFunctionIsNamedByWhatNeedsIt) {
   EXPECT_TRUE(result.failed());
   EXPECT_EQ(result.nodes[1].status, marrow::NodeRecord::Status::failed);
   EXPECT_EQ(result.nodes[2].status, marrow::NodeRecord::Status::not_run);
-  EXPECT_EQ(result.nodes[2].reason, "its input 'adder' is missing: node 'f' failed");
+  EXPECT_EQ(result.nodes[2].reason, "node 'f' failed");
   EXPECT_EQ(messages, "node 'f' (test.failing_adder) failed: it cannot add (its inputs: amount = c)\n");
 }
 

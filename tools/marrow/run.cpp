@@ -127,10 +127,12 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
   std::printf("\n%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& record = result.nodes[i];
-    if (record.status == NodeRecord::Status::not_needed) continue;
+    if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
+    // Why a node failed was said when it did.
+    const std::string reason = record.status == NodeRecord::Status::failed ? "" : printable_lines(record.reason);
     std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
-                record.seconds, record.calls, status_text(record).c_str(), record.reason.empty() ? "" : ": ",
-                printable_lines(record.reason).c_str());
+                record.seconds, record.calls, status_text(record).c_str(), reason.empty() ? "" : ": ", reason.c_str());
+    if (record.stopped > 0) std::printf("%-16s %s\n", "", not_run_text(record.stopped).c_str());
   }
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);

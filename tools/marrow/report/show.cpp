@@ -70,8 +70,11 @@ json graph_of_run(const fs::path& file) {
 
 std::string reason_of(const json& record) {
   for (const json& node : record.value("nodes", json::array()))
-    if (node.value("status", "") == "failed")
-      return "node '" + node.value("id", "") + "' (" + node.value("uses", "") + ") failed: " + node.value("reason", "");
+    if (node.value("status", "") == "failed") {
+      const int stopped = node.value("not_run_because_of_it", 0);
+      return "node '" + node.value("id", "") + "' (" + node.value("uses", "") +
+             ") failed: " + node.value("reason", "") + (stopped > 0 ? "\n" + not_run_text(stopped) : "");
+    }
   return "it was stopped before it was done";
 }
 

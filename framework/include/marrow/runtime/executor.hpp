@@ -53,6 +53,7 @@ struct NodeRecord {
   enum class Status { not_needed, done, skipped, failed, not_run, cancelled };
   Status status = Status::not_needed;
   std::string reason;          ///< of anything but done
+  int stopped = 0;             ///< of one that failed or was cancelled: the nodes that were not run because of it
   double start_s = 0;          ///< after the run's start
   double seconds = 0;          ///< of its calls together, wall time
   int calls = 0;               ///< how often its function was called: once per item, once where recipes are the same
@@ -62,8 +63,13 @@ struct NodeRecord {
   std::vector<Value> outputs;  ///< in the order of the node's outputs
   std::map<std::string, Digest>
       files;  ///< content of what its options named when it was read; zero: not there or not to be read
+
+  /// No item of it was begun, because a node before it failed or the run was stopped.
+  bool was_stopped() const;
 };
 const char* status_name(NodeRecord::Status status);
+/// "3 nodes were not run because of it".
+std::string not_run_text(int nodes);
 
 struct RunResult {
   std::vector<NodeRecord> nodes;  ///< in the order of Pipeline::nodes
