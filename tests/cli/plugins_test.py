@@ -38,6 +38,27 @@ class Plugins(Case):
         )
         self.assertEqual(checked.returncode, 0, checked.stderr)
 
+    @unittest.skipIf(IS_SANITIZED, "as above")
+    def test_a_plugin_outside_the_tree_builds_on_the_toolbox(self):
+        folder = self.scratch / "mine"
+        folder.mkdir()
+        text = (SOURCE / "plugins" / "edges" / "sobel.cpp").read_text()
+        (folder / "mine.cpp").write_text(text.replace("edges.sobel", "edges.mine"))
+        (folder / "CMakeLists.txt").write_text(
+            "cmake_minimum_required(VERSION 3.25)\nproject(mine CXX C)\n"
+            "find_package(marrow REQUIRED COMPONENTS toolbox)\n"
+            "marrow_add_plugin(edges_mine mine.cpp LINK marrow::image)\n"
+        )
+        configure = ["cmake", "-S", folder, "-B", folder / "build", "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
+        subprocess.run(configure, check=True, capture_output=True)
+        subprocess.run(["cmake", "--build", folder / "build"], check=True, stdout=subprocess.DEVNULL)
+        listed = marrow("list", "edges", plugins=[folder / "build"])
+        self.assertIn("edges.mine", listed.stdout)
+        checked = marrow(
+            "check", SOURCE / "pipelines" / "femur.yaml", "--set", "edges.uses=edges.mine", plugins=[folder / "build"]
+        )
+        self.assertEqual(checked.returncode, 0, checked.stderr)
+
     def refused(self, name, make):
         folder = self.scratch / "plugins"
         folder.mkdir()
