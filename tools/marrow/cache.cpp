@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <set>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/printable.hpp"
 
@@ -53,6 +54,8 @@ bool can_keep_results(const std::string& fault_of_store, bool quiet) {
     std::fprintf(stderr, "marrow: note: results are not kept: %s\n", printable_lines(fault_of_store).c_str());
   return fault_of_store.empty();
 }
+
+namespace {
 
 int cache_info() {
   const Store store;
@@ -111,6 +114,29 @@ int cache_collect(double keep_gb) {
   if (freed.fault.empty() || freed.entries)
     std::printf("%zu results removed, %.2f MB freed\n", freed.entries, megabytes(freed.bytes));
   return code_after(freed.fault);
+}
+
+}  // namespace
+
+void add_cache(CLI::App& app, int& code) {
+  const auto key = std::make_shared<std::string>();
+  const auto keep_gb = std::make_shared<double>(10);
+  CLI::App* command = app.add_subcommand(
+      "cache", "look at the store of results (MARROW_CACHE, else ~/.cache/marrow/store), and tidy it up");
+  command->require_subcommand(1);
+  command->add_subcommand("info", "how much is kept, and of which nodes")->callback([&code] { code = cache_info(); });
+  CLI::App* why = command->add_subcommand("why", "what a kept result was made from");
+  why->add_option("key", *key, "key of a result or of one of its outputs (run.json shows those), or its first digits")
+      ->required();
+  why->callback([key, &code] { code = cache_why(*key); });
+  CLI::App* gc = command->add_subcommand("gc", "remove the least recently used results");
+  const auto take_keep_gb = [keep_gb](const std::string& text) {
+    *keep_gb = number("--keep-gb", text, 0, 1e6, "gigabytes", "; nothing is removed");
+  };
+  show_default(gc->add_option_function<std::string>("--keep-gb", take_keep_gb, "size to keep, in gigabytes")
+                   ->type_name("NUMBER"),
+               *keep_gb);
+  gc->callback([keep_gb, &code] { code = cache_collect(*keep_gb); });
 }
 
 }  // namespace marrow::cli

@@ -6,6 +6,7 @@
 #include <optional>
 #include <sstream>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -159,6 +160,8 @@ std::string range_text(const OptionInfo& option) {
   return option.unit.empty() ? text : text + " [" + option.unit + "]";
 }
 
+namespace {
+
 int list(const std::string& kind, bool as_json) {
   const Catalogue catalogue;
   json all = json::array();
@@ -269,6 +272,51 @@ int describe(const std::filesystem::path& file, bool write) {
   for (const NodeInfo& node : info.nodes) all.push_back(node_json(node));
   std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
   return 0;
+}
+
+}  // namespace
+
+void add_list(CLI::App& app, int& code) {
+  const auto kind = std::make_shared<std::string>();
+  const auto as_json = std::make_shared<bool>(false);
+  CLI::App* command = app.add_subcommand("list", "list the nodes that can be used");
+  command->add_option("kind", *kind, "only this kind");
+  command->add_flag("--json", *as_json, "as JSON");
+  command->callback([kind, as_json, &code] { code = list(*kind, *as_json); });
+  say_that_libraries_are_described(command);
+}
+
+void add_inspect(CLI::App& app, int& code) {
+  struct Given {
+    std::string node;
+    bool yaml = false, as_json = false;
+  };
+  const auto given = std::make_shared<Given>();
+  CLI::App* command = app.add_subcommand("inspect", "show a node: inputs, outputs, options");
+  command->add_option("node", given->node, "kind.name")->required();
+  command->add_flag("--yaml", given->yaml, "print a snippet to paste into a pipeline");
+  command->add_flag("--json", given->as_json, "as JSON");
+  command->callback([given, &code] { code = inspect(given->node, given->yaml, given->as_json); });
+  say_that_libraries_are_described(command);
+}
+
+void add_doctor(CLI::App& app, int& code) {
+  const auto as_json = std::make_shared<bool>(false);
+  CLI::App* command =
+      app.add_subcommand("doctor", "show the folders searched and the libraries found or refused, and why");
+  command->add_flag("--json", *as_json, "as JSON");
+  command->callback([as_json, &code] { code = doctor(*as_json); });
+  say_that_libraries_are_described(command);
+}
+
+void add_describe(CLI::App& app, int& code) {
+  const auto library = std::make_shared<std::filesystem::path>();
+  const auto write = std::make_shared<bool>(false);
+  CLI::App* command =
+      app.add_subcommand("describe", "load one plugin library in a process of its own and print its manifest");
+  command->add_option("library", *library, "the .so file")->required();
+  command->add_flag("--write", *write, "write the manifest beside the library instead");
+  command->callback([library, write, &code] { code = describe(*library, *write); });
 }
 
 }  // namespace marrow::cli

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The commands of the program, a file each. Each returns the exit code: 0 done, 1 a node or a library failed, 2 the
-// request or a file is at fault, 130 stopped by Ctrl-C.
+// The commands of the program, and what they share. Exit codes: 0 done, 1 a node or a library failed, 2 the request or
+// a file is at fault, 130 stopped by Ctrl-C.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -9,6 +9,10 @@
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/pipeline.hpp"
 #include "marrow/runtime/run_folder.hpp"
+
+namespace CLI {
+class App;
+}
 
 namespace marrow::cli {
 
@@ -37,28 +41,28 @@ struct RerunRequest {
   FileLimits file_limits;  ///< instead of those of the run
 };
 
-int run(const RunRequest& request);
-/// 0: the same pipeline and seed gave the same results; 1: they did not, or a node failed.
-int rerun(const RerunRequest& request);
-/// 0: the runs came out the same; 1: they did not.
-int diff(const std::filesystem::path& before, const std::filesystem::path& now, bool as_json);
-int plan(const PipelineRequest& request, std::uint64_t seed);
-int cache_info();
-int cache_why(const std::string& key);
-int cache_collect(double keep_gb);
-int check(const PipelineRequest& request, bool json);
-int list(const std::string& kind, bool json);
-int inspect(const std::string& node, bool yaml, bool json);
-int graph(const PipelineRequest& request, bool dot);
-int schema(const std::filesystem::path& file);
-int doctor(bool json);
-/// Nodes, kinds or libraries; each node must pass the checks of its kind that are named, or all where none are.
-int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& checks);
-/// Takes single checks from the standard input; started by conformance.
-int check_worker(const std::filesystem::path& files_folder);
+/// Each adds one command to the program: its options, its help and what it does. That sets `code`.
+void add_run(CLI::App& app, int& code);
+void add_compare(CLI::App& app, int& code);
+void add_cell(CLI::App& app, int& code);
+void add_worker(CLI::App& app, int& code);
+void add_rerun(CLI::App& app, int& code);
+void add_diff(CLI::App& app, int& code);
+void add_show(CLI::App& app, int& code);
+void add_check(CLI::App& app, int& code);
+void add_plan(CLI::App& app, int& code);
+void add_cache(CLI::App& app, int& code);
+void add_list(CLI::App& app, int& code);
+void add_inspect(CLI::App& app, int& code);
+void add_graph(CLI::App& app, int& code);
+void add_schema(CLI::App& app, int& code);
+void add_doctor(CLI::App& app, int& code);
+void add_conformance(CLI::App& app, int& code);
+void add_check_worker(CLI::App& app, int& code);
+void add_describe(CLI::App& app, int& code);
+
 /// The checks that a node of this kind must pass, with their limits.
 void print_limits(const NodeInfo& node);
-int describe(const std::filesystem::path& library, bool write);
 
 /// Whether results can be kept. Says why not, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/printable.hpp"
 
@@ -71,8 +72,6 @@ void print_dot(const Pipeline& pipeline) {
   std::printf("}\n");
 }
 
-}  // namespace
-
 int graph(const PipelineRequest& request, bool dot) {
   const Catalogue catalogue;
   Pipeline pipeline;
@@ -82,6 +81,19 @@ int graph(const PipelineRequest& request, bool dot) {
   else
     print_text(pipeline);
   return 0;
+}
+
+}  // namespace
+
+void add_graph(CLI::App& app, int& code) {
+  const auto request = std::make_shared<PipelineRequest>();
+  const auto dot = std::make_shared<bool>(false);
+  CLI::App* command =
+      app.add_subcommand("graph", "show a pipeline's graph, with what is called for each view or fragment");
+  add_pipeline_arguments(command, *request);
+  command->add_flag("--dot", *dot, "as a DOT file for Graphviz");
+  command->callback([request, dot, &code] { code = graph(*request, *dot); });
+  say_that_libraries_are_described(command);
 }
 
 }  // namespace marrow::cli

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -51,6 +52,8 @@ bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& 
   return false;
 }
 
+namespace {
+
 int check(const PipelineRequest& request, bool json) {
   const Catalogue catalogue;
   Pipeline pipeline;
@@ -68,6 +71,18 @@ int check(const PipelineRequest& request, bool json) {
     if (!needed[i]) std::printf("  note: %s feeds no output and is not run\n", pipeline.nodes[i].id.c_str());
   for (const std::string& note : pipeline.notes) std::printf("  note: %s\n", printable(note).c_str());
   return 0;
+}
+
+}  // namespace
+
+void add_check(CLI::App& app, int& code) {
+  const auto request = std::make_shared<PipelineRequest>();
+  const auto as_json = std::make_shared<bool>(false);
+  CLI::App* command = app.add_subcommand("check", "check a pipeline and show every fault; runs nothing");
+  add_pipeline_arguments(command, *request);
+  command->add_flag("--json", *as_json, "print the faults as JSON");
+  command->callback([request, as_json, &code] { code = check(*request, *as_json); });
+  say_that_libraries_are_described(command);
 }
 
 }  // namespace marrow::cli

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/printable.hpp"
 
@@ -27,8 +28,6 @@ std::string text_of(const PlannedNode& node) {
   return "runs unless " + names + (node.waits_for.size() == 1 ? " comes" : " come") + " out unchanged";
 }
 
-}  // namespace
-
 int plan(const PipelineRequest& request, std::uint64_t seed) {
   const Catalogue catalogue;
   Pipeline pipeline;
@@ -53,6 +52,18 @@ int plan(const PipelineRequest& request, std::uint64_t seed) {
   if (seconds > 0) std::printf("; what runs took %.1f s the last time", seconds);
   std::printf("\n");
   return 0;
+}
+
+}  // namespace
+
+void add_plan(CLI::App& app, int& code) {
+  const auto request = std::make_shared<PipelineRequest>();
+  const auto seed = std::make_shared<std::uint64_t>(1);
+  CLI::App* command = app.add_subcommand("plan", "show what a run would compute, what it would read back, and why");
+  add_pipeline_arguments(command, *request);
+  show_default(add_whole_number(command, "--seed", *seed, "seed of all randomness"), *seed);
+  command->callback([request, seed, &code] { code = plan(*request, *seed); });
+  say_that_libraries_are_described(command);
 }
 
 }  // namespace marrow::cli

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <cstdio>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "difference/findings.hpp"
 
 namespace marrow::cli {
+namespace {
 
 int rerun(const RerunRequest& request) {
   RunRecord before = read_run(request.run);
@@ -35,6 +37,22 @@ int rerun(const RerunRequest& request) {
   else
     print(findings);
   return findings.identical() && !outcome.is_faulty ? 0 : 1;
+}
+
+}  // namespace
+
+void add_rerun(CLI::App& app, int& code) {
+  const auto request = std::make_shared<RerunRequest>();
+  CLI::App* command = app.add_subcommand(
+      "rerun", "repeat a run from its folder, computing everything anew, and say whether the results are the same");
+  command->add_option("run", request->run, "folder of the run, or of a cell of a comparison")->required();
+  command->add_option(
+      "--out", request->folder,
+      "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... where that is there)");
+  command->add_flag("--quiet", request->quiet, "no progress");
+  command->add_flag("--json", request->json, "print the differences as JSON");
+  add_file_limits(command, request->file_limits, "as the run had it");
+  command->callback([request, &code] { code = rerun(*request); });
 }
 
 }  // namespace marrow::cli

@@ -6,6 +6,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -207,6 +208,8 @@ void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& fo
                          "set MARROW_CACHE to another folder, or give --no-cache");
 }
 
+namespace {
+
 int run(const RunRequest& request) {
   const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
@@ -228,6 +231,23 @@ int run(const RunRequest& request) {
   else if (!request.quiet)
     print_summary(pipeline, outcome.result, outcome.written, folder);
   return outcome.result.cancelled() ? 130 : outcome.is_faulty ? 1 : 0;
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, int& code) {
+  const auto request = std::make_shared<RunRequest>();
+  CLI::App* command = app.add_subcommand("run", "run a pipeline and write a folder with its results");
+  add_pipeline_arguments(command, request->pipeline);
+  command->add_option("--out", request->folder,
+                      "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
+  show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
+  add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
+  command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
+  command->add_flag("--quiet", request->quiet, "print only errors");
+  command->add_flag("--json", request->json, "print events as JSON, one a line");
+  add_file_limits(command, request->file_limits);
+  command->callback([request, &code] { code = run(*request); });
 }
 
 }  // namespace marrow::cli

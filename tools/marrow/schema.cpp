@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "runtime/text_file.hpp"
 
@@ -109,8 +110,6 @@ json pipeline_schema(const Catalogue& catalogue) {
             {"outputs", {{"type", "object"}, {"additionalProperties", {{"type", "string"}}}}}}}};
 }
 
-}  // namespace
-
 int schema(const std::filesystem::path& file) {
   const std::string text = pipeline_schema(Catalogue()).dump(1) + "\n";
   if (file.empty()) {
@@ -119,6 +118,17 @@ int schema(const std::filesystem::path& file) {
   }
   write_text_file(file, text, Kinds::files_and_pipes);
   return 0;
+}
+
+}  // namespace
+
+void add_schema(CLI::App& app, int& code) {
+  const auto file = std::make_shared<std::filesystem::path>();
+  CLI::App* command =
+      app.add_subcommand("schema", "print the JSON Schema of pipelines, by which editors complete and check");
+  command->add_option("--out", *file, "write it to this file; one that is there is replaced");
+  command->callback([file, &code] { code = schema(*file); });
+  say_that_libraries_are_described(command);
 }
 
 }  // namespace marrow::cli

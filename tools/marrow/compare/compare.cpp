@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "compare/comparison.hpp"
 #include "compare/comparison_folder.hpp"
@@ -70,8 +71,6 @@ std::string fault_of_id(const Experiment& experiment, const std::string& id) {
   return "there is " + fault;
 }
 
-}  // namespace
-
 int compare_variants(const CompareRequest& asked) {
   CompareRequest request = asked;
   stop_on_signals();
@@ -122,6 +121,46 @@ int run_cell(const CompareRequest& request, const std::string& id) {
                  printable_lines(error.what()).c_str());
   }
   return 0;
+}
+
+}  // namespace
+
+void add_experiment_arguments(CLI::App* command, CompareRequest& request) {
+  command->add_option("experiment", request.file, "experiment file (YAML)")->required();
+  command->add_option("--out", request.folder,
+                      "folder of the comparison, new or to be continued (default: runs/compare/NAME)");
+  show_default(add_whole_number(command, "--threads", request.threads, "threads of each cell", 1, 1024),
+               request.threads);
+  command->add_flag("--no-cache", request.no_cache, "neither read nor keep results of nodes");
+  add_file_limits(command, request.file_limits);
+}
+
+void add_compare(CLI::App& app, int& code) {
+  const auto request = std::make_shared<CompareRequest>();
+  CLI::App* command =
+      app.add_subcommand("compare", "run an experiment: variants of a pipeline on the same cases, and which is better");
+  add_experiment_arguments(command, *request);
+  add_whole_number(command, "--jobs", request->jobs, "cells at once (default: as many as there are cores)", 1, 1024);
+  show_default(add_amount(command, "--time-limit", request->time_limit_s, "seconds", "seconds that one cell may take"),
+               request->time_limit_s);
+  show_default(
+      add_amount(command, "--memory-limit", request->memory_limit_mb, "megabytes", "megabytes that one cell may use"),
+      request->memory_limit_mb);
+  show_default(add_whole_number(command, "--shown", request->shown,
+                                "cases and starts whose pictures go into the report", 0, 10000),
+               request->shown);
+  command->add_flag("--dry-run", request->dry_run, "say what there is to do, and how long that took before");
+  command->add_flag("--quiet", request->quiet, "no progress");
+  command->callback([request, &code] { code = compare_variants(*request); });
+}
+
+void add_cell(CLI::App& app, int& code) {
+  const auto request = std::make_shared<CompareRequest>();
+  const auto id = std::make_shared<std::string>();
+  CLI::App* command = app.add_subcommand("cell", "run one cell of an experiment, as VARIANT/CASE/START");
+  add_experiment_arguments(command, *request);
+  command->add_option("id", *id, "the cell")->required();
+  command->callback([request, id, &code] { code = run_cell(*request, *id); });
 }
 
 }  // namespace marrow::cli

@@ -10,6 +10,10 @@
 #include "marrow/compare/experiment.hpp"
 #include "marrow/compare/statistics.hpp"
 
+namespace CLI {
+class App;
+}
+
 namespace marrow::cli {
 
 struct CompareRequest {
@@ -24,10 +28,8 @@ struct CompareRequest {
   FileLimits file_limits;
 };
 
-int compare_variants(const CompareRequest& request);
-/// Runs one cell and writes its row, as a worker would; for cluster engines.
-int run_cell(const CompareRequest& request, const std::string& id);
-int worker(const CompareRequest& request);
+/// What the commands that take an experiment have in common.
+void add_experiment_arguments(CLI::App* command, CompareRequest& request);
 /// All cells that are not there yet, then times, tables, pictures and the report. The folder is the experiment's own.
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder);

@@ -2,6 +2,7 @@
 // A worker process of a comparison: makes cases and runs, times and draws cells.
 #include <algorithm>
 
+#include "command_options.hpp"
 #include "compare/comparison.hpp"
 #include "compare/pool.hpp"
 #include "marrow/domain/error.hpp"
@@ -70,8 +71,6 @@ json run_cell(CellRunner& runner, const json& asked, WorkerReports& reports) {
   return json::parse(compare::to_json(row));
 }
 
-}  // namespace
-
 int worker(const CompareRequest& request) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
@@ -105,6 +104,16 @@ int worker(const CompareRequest& request) {
          });
        }},
   });
+}
+
+}  // namespace
+
+void add_worker(CLI::App& app, int& code) {
+  const auto request = std::make_shared<CompareRequest>();
+  CLI::App* command = app.add_subcommand("worker", "take cells from the standard input; started by compare");
+  command->group("");
+  add_experiment_arguments(command, *request);
+  command->callback([request, &code] { code = worker(*request); });
 }
 
 }  // namespace marrow::cli

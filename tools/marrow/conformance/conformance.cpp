@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "command_options.hpp"
 #include "commands.hpp"
 #include "conformance/camera_files.hpp"
 #include "conformance/suite.hpp"
@@ -149,6 +150,8 @@ void print_limits(const NodeInfo& node) {
   }
 }
 
+namespace {
+
 int check_worker(const std::filesystem::path& files_folder) {
   conformance::write_files_to(files_folder);
   const Catalogue catalogue;
@@ -160,8 +163,6 @@ int check_worker(const std::filesystem::path& files_folder) {
                           return json(measured(node, options, conformance::checks_of(suite).at(request.at("check"))));
                         }}});
 }
-
-namespace {
 
 /// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is
 /// searched as well.
@@ -206,8 +207,6 @@ void check_node(const std::string& node, const Suite& suite, const std::vector<s
   }
 }
 
-}  // namespace
-
 int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& wanted) try {
   search_folders_of(subjects);
   const Catalogue catalogue;
@@ -231,6 +230,27 @@ int run_conformance(const std::vector<std::string>& subjects, const std::vector<
 } catch (const Cancelled&) {
   std::fprintf(stderr, "marrow: %s\n", stopped_text().c_str());
   return 130;
+}
+
+}  // namespace
+
+void add_conformance(CLI::App& app, int& code) {
+  const auto subjects = std::make_shared<std::vector<std::string>>(),
+             checks = std::make_shared<std::vector<std::string>>();
+  CLI::App* command = app.add_subcommand("conformance", "check that nodes do what every node of their kind must do");
+  command->add_option("subject", *subjects, "node, kind or library (.so file)")->required();
+  command->add_option("--check", *checks, "only this of the checks that marrow inspect NODE lists; may be given again")
+      ->allow_extra_args(false);
+  command->callback([subjects, checks, &code] { code = run_conformance(*subjects, *checks); });
+  say_that_libraries_are_described(command);
+}
+
+void add_check_worker(CLI::App& app, int& code) {
+  const auto folder = std::make_shared<std::filesystem::path>();
+  CLI::App* command = app.add_subcommand("check-worker", "take checks from the standard input; started by conformance");
+  command->group("");
+  command->add_option("folder", *folder, "where checks may write files")->required();
+  command->callback([folder, &code] { code = check_worker(*folder); });
 }
 
 }  // namespace marrow::cli

@@ -57,7 +57,4 @@ void write_report(const compare::Experiment& experiment, const std::vector<compa
                   const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
                   const CompareRequest& request, const std::filesystem::path& folder);
 
-/// Writes the page of a single run; empty `file` = RUN/report.html.
-int show(const std::filesystem::path& run_folder, std::filesystem::path file);
-
 }  // namespace marrow::cli

@@ -2,6 +2,7 @@
 #include <cstdio>
 #include <optional>
 
+#include "command_options.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "report/report.hpp"
@@ -130,8 +131,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   return data;
 }
 
-}  // namespace
-
+/// Writes the page of a single run; empty `file` = RUN/report.html.
 int show(const fs::path& folder, fs::path file) {
   std::error_code error;
   if (!fs::exists(folder / "run.json", error))
@@ -151,6 +151,16 @@ int show(const fs::path& folder, fs::path file) {
   material.print_left_out();
   std::printf("%s\n", printable(plain_path(fs::absolute(file)).string()).c_str());
   return 0;
+}
+
+}  // namespace
+
+void add_show(CLI::App& app, int& code) {
+  const auto run = std::make_shared<fs::path>(), file = std::make_shared<fs::path>();
+  CLI::App* command = app.add_subcommand("show", "write a page that shows a run: figures, pictures, 3D view");
+  command->add_option("run", *run, "folder of the run")->required();
+  command->add_option("--out", *file, "HTML file to write; one that is there is replaced (default: RUN/report.html)");
+  command->callback([run, file, &code] { code = show(*run, *file); });
 }
 
 }  // namespace marrow::cli

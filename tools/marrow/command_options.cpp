@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "command_options.hpp"
+
+namespace marrow::cli {
+
+void add_pipeline_arguments(CLI::App* command, PipelineRequest& request) {
+  command->add_option("pipeline", request.file, "pipeline file (YAML)")->required();
+  command->add_option("inputs", request.inputs, "values of the pipeline's inputs, as name=value");
+  command
+      ->add_option("--set", request.overrides,
+                   "override, as node.option=value, node.uses=kind.name or node.in.port=reference")
+      ->take_all()
+      ->expected(1)
+      ->type_name("NODE.OPTION=VALUE");
+}
+
+void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise) {
+  const std::string end = " that reading a file may use (default: " + otherwise + ")";
+  add_amount(command, "--file-memory", limits.memory_mb, "megabytes", "megabytes" + end);
+  add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time" + end);
+}
+
+void say_that_libraries_are_described(CLI::App* command) {
+  command->footer(
+      "A plugin library that is not known yet is loaded once, in a process of its own, to be described; where nobody "
+      "else may put one: see 'marrow doctor' and MARROW_PLUGIN_PATH.");
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Options that several commands have.
+#include "commands.hpp"
+#include "number_options.hpp"
+
+namespace marrow::cli {
+
+/// The pipeline's file, its inputs and --set.
+void add_pipeline_arguments(CLI::App* command, PipelineRequest& request);
+/// --file-memory and --file-seconds.
+void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise = "by its size");
+/// Says below the help that the command may load libraries to describe them.
+void say_that_libraries_are_described(CLI::App* command);
+
+}  // namespace marrow::cli
