@@ -56,8 +56,7 @@ std::string stamp_mismatch(const AbiStamp& theirs) {
     return differs(
         "Eigen and OpenCV", std::to_string(theirs.eigen_version) + " and " + std::to_string(theirs.opencv_version),
         std::to_string(ours.eigen_version) + " and " + std::to_string(ours.opencv_version), "use the same versions");
-  if (std::memcmp(theirs.sizes, ours.sizes, sizeof ours.sizes) != 0)
-    return "was built against other headers (a domain type has another size); rebuild it with this marrow's headers";
+  if (theirs.headers != ours.headers) return "was built against other headers; rebuild it with this marrow's headers";
   return "";
 }
 

@@ -84,7 +84,7 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("register.sequence", sequence);
   node.summary("First by one cost, coarse to fine; then by another from there: contour, then grey values")
-      .in("cost", "what a pose costs, told from afar")
+      .in("cost", "the cost of a pose")
       .in("finer_cost", "what a pose costs, told from near")
       .in("optimizer", "minimiser")
       .in("finer_optimizer", "minimiser of finer_cost; none: the same")

@@ -79,6 +79,12 @@ class Plugins(Case):
             self.refused("a.so", lambda path: shutil.copy(BAD / "other_api.so", path)),
         )
 
+    def test_other_headers(self):
+        self.assertIn(
+            "was built against other headers; rebuild it with this marrow's headers",
+            self.refused("a.so", lambda path: shutil.copy(BAD / "other_headers.so", path)),
+        )
+
     def test_debug_mode(self):
         self.assertIn(
             "_GLIBCXX_DEBUG (debug mode) on",

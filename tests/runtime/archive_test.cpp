@@ -13,12 +13,11 @@ namespace tested {
 enum class Side : std::int8_t { left, right };
 bool is_valid(Side side) { return side == Side::left || side == Side::right; }
 
-struct Item {
+struct alignas(512) Item {  // takes more memory than packed
   std::string name;
   bool is_seen = false;
   Side side = Side::left;
   std::optional<double> value;
-  std::array<double, 40> room{};
   static constexpr auto fields() { return std::make_tuple(&Item::name, &Item::is_seen, &Item::side, &Item::value); }
 };
 
@@ -49,7 +48,7 @@ std::string fault_of(const std::string& bytes) {
 }
 
 TEST(Archive, ReadsBackWhatItTook) {
-  const Item item{"name", true, Side::right, 2.5, {}};
+  const Item item{"name", true, Side::right, 2.5};
   const Item back = Unpacker(packed(item)).get<Item>();
   EXPECT_EQ(back.name, "name");
   EXPECT_TRUE(back.is_seen);
@@ -119,7 +118,7 @@ TEST(Archive, AnyBytesAreAValueOrASentence) {
   expect_that_any_bytes_do(view, chance);
   expect_that_any_bytes_do(pose, chance);
   expect_that_any_bytes_do(marrow::Mesh{{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, {{0, 1, 2}}, "ct"}, chance);
-  expect_that_any_bytes_do(std::vector<Item>(5, {"name", true, Side::right, 2.5, {}}), chance);
+  expect_that_any_bytes_do(std::vector<Item>(5, {"name", true, Side::right, 2.5}), chance);
 }
 
 }  // namespace

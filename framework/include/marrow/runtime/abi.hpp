@@ -7,9 +7,7 @@
 #include <cstdint>
 #include <opencv2/core/version.hpp>
 
-#include "marrow/domain/case.hpp"
-#include "marrow/domain/features.hpp"
-#include "marrow/domain/functions.hpp"
+#include "marrow/runtime/headers_digest.hpp"
 
 #ifndef MARROW_API_MAJOR
 #define MARROW_API_MAJOR 1  ///< raised when plugins must be changed
@@ -29,7 +27,7 @@ struct AbiStamp {
   std::int32_t eigen_max_align;
   std::int32_t eigen_version;
   std::int32_t opencv_version;
-  std::uint32_t sizes[12];  ///< of the main domain types
+  std::uint64_t headers;  ///< digest of all headers that plugins of this version are built with
 };
 
 /// The one thing that a plugin exports, by the C function marrow_plugin_entry().
@@ -66,17 +64,15 @@ struct PluginEntry {
 
 /// The stamp of the code that is being compiled.
 constexpr AbiStamp abi_stamp() {
-  return {
-      MARROW_COMPILER,
-      __cplusplus,
-      _GLIBCXX_USE_CXX11_ABI,
-      MARROW_GLIBCXX_DEBUG,
-      MARROW_SANITIZE_ADDRESS | MARROW_SANITIZE_THREAD,
-      EIGEN_MAX_ALIGN_BYTES,
-      EIGEN_WORLD_VERSION * 10000 + EIGEN_MAJOR_VERSION * 100 + EIGEN_MINOR_VERSION,
-      CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100,
-      {sizeof(Image), sizeof(Volume), sizeof(SignedField), sizeof(Mesh), sizeof(Camera), sizeof(View), sizeof(EdgeMap),
-       sizeof(ShaftLines), sizeof(Pose), sizeof(Case), sizeof(MinimisationProblem), sizeof(RigidTransform)}};
+  return {MARROW_COMPILER,
+          __cplusplus,
+          _GLIBCXX_USE_CXX11_ABI,
+          MARROW_GLIBCXX_DEBUG,
+          MARROW_SANITIZE_ADDRESS | MARROW_SANITIZE_THREAD,
+          EIGEN_MAX_ALIGN_BYTES,
+          EIGEN_WORLD_VERSION * 10000 + EIGEN_MAJOR_VERSION * 100 + EIGEN_MINOR_VERSION,
+          CV_VERSION_MAJOR * 10000 + CV_VERSION_MINOR * 100,
+          MARROW_HEADERS_DIGEST};
 }
 
 }  // namespace marrow

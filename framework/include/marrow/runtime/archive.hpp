@@ -19,6 +19,7 @@
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/list.hpp"
+#include "marrow/runtime/fields.hpp"
 
 namespace marrow {
 namespace detail {
@@ -38,10 +39,6 @@ concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
 };
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
-template <class T>
-concept HasFields = requires {
-  T::fields();
-};
 
 /// Of memory that is about to be filled: to touch 800 MB for the first time takes half as long in large pages.
 void use_large_pages(void* data, std::size_t size);
@@ -61,7 +58,7 @@ class Archive {
     if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {
-      std::apply([&](auto... member) { (add(value.*member), ...); }, T::fields());
+      std::apply([&](auto... member) { (add(value.*member), ...); }, detail::fields_of<T>());
     } else {
       add_container(value);
     }
@@ -145,7 +142,7 @@ class Unpacker {
     } else if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {
-      std::apply([&](auto... member) { (read(value.*member), ...); }, T::fields());
+      std::apply([&](auto... member) { (read(value.*member), ...); }, detail::fields_of<T>());
     } else {
       read_container(value);
     }

@@ -36,7 +36,7 @@ struct IntensityOptions {
 /// The mean of a measure over the views, by their weights. Each view is compared where the model may be seen, and
 /// margin_px around it; a view that does not show the model counts as `worst`. At a level of pixel_step, every so many
 /// pixels are compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments
-/// do not count. Throws Error for views that are none.
+/// do not count. Throws Error for views that are not valid.
 std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
                                            const List<Pose>* others, const List<Projector>* other_projectors,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);

@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The members of a value type, as its fields() lists them. A member that it forgot would be neither hashed nor stored.
+#include <cstddef>
+#include <tuple>
+#include <type_traits>
+
+namespace marrow::detail {
+
+template <class T>
+concept HasFields = requires {
+  T::fields();
+};
+
+/// Compiles only for a type that has as many members as `Count`, up to 16. Where the compiler says that a structured
+/// binding has too few or too many names, the type's fields() leaves out a member or names one twice.
+template <std::size_t Count, class T>
+void has_as_many_members([[maybe_unused]] const T& value) {
+  static_assert(Count >= 1 && Count <= 16,
+                "fields() lists 1 to 16 members; make a struct of some that belong together");
+  if constexpr (Count == 1) {
+    const auto& [a] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 2) {
+    const auto& [a, b] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 3) {
+    const auto& [a, b, c] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 4) {
+    const auto& [a, b, c, d] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 5) {
+    const auto& [a, b, c, d, e] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 6) {
+    const auto& [a, b, c, d, e, f] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 7) {
+    const auto& [a, b, c, d, e, f, g] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 8) {
+    const auto& [a, b, c, d, e, f, g, h] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 9) {
+    const auto& [a, b, c, d, e, f, g, h, i] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 10) {
+    const auto& [a, b, c, d, e, f, g, h, i, j] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 11) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 12) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k, l] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 13) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 14) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 15) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o] = value;
+    static_cast<void>(a);
+  }
+  if constexpr (Count == 16) {
+    const auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p] = value;
+    static_cast<void>(a);
+  }
+}
+
+/// fields() of a type, which must list every member. (A type with constructors or private members cannot be counted,
+/// and is taken at its word.)
+template <HasFields T>
+constexpr auto fields_of() {
+  if constexpr (std::is_aggregate_v<T>) {
+    [[maybe_unused]] constexpr auto check = &has_as_many_members<std::tuple_size_v<decltype(T::fields())>, T>;
+  }
+  return T::fields();
+}
+
+}  // namespace marrow::detail
