@@ -2,12 +2,15 @@
 #pragma once
 // Calls nodes as they are shipped: by name, out of their libraries. So a test is compiled in a moment, and says no more
 // of a node than a pipeline could.
+#include <algorithm>
 #include <map>
 #include <marrow/domain/error.hpp>
+#include <marrow/runtime/attributes.hpp>
 #include <marrow/runtime/catalogue.hpp>
 #include <marrow/runtime/types.hpp>
 #include <memory>
 #include <string>
+#include <vector>
 
 namespace shipped {
 
@@ -25,12 +28,25 @@ marrow::Value list(const marrow::List<T>& items, const std::string& axis) {
   return marrow::Value::of<T>(items, axis);
 }
 
+inline const marrow::NodeDefinition& definition_of(const std::string& node) {
+  static const marrow::Catalogue catalogue;
+  return catalogue.load(node);
+}
+
+/// Whether a node declares that its options are so to each other. What then happens to a pipeline that breaks it, the
+/// tests of the runtime say.
+inline bool declares(const std::string& node, const marrow::RelationInfo& relation) {
+  const std::vector<marrow::RelationInfo>& all = definition_of(node).info.relations;
+  return std::any_of(all.begin(), all.end(), [&](const marrow::RelationInfo& declared) {
+    return declared.type == relation.type && declared.names == relation.names;
+  });
+}
+
 /// The outputs of a node by port, with the options given and its defaults for the others. Exceptions of the node pass
 /// through; ports and options that it has not are an Error.
 inline Outputs call(const std::string& node, const Inputs& inputs, const Options& options = {},
                     marrow::Context context = marrow::Context()) {
-  static const marrow::Catalogue catalogue;
-  const marrow::NodeDefinition& definition = catalogue.load(node);
+  const marrow::NodeDefinition& definition = definition_of(node);
   const std::shared_ptr<void> settings = definition.make_options();
   std::size_t known = 0;
   for (std::size_t i = 0; i < definition.info.options.size(); ++i)

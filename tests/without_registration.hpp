@@ -23,6 +23,14 @@ struct NoNode {
   NoNode& option(Any&&...) {
     return *this;
   }
+  template <class... Any>
+  NoNode& relation(Any&&...) {
+    return *this;
+  }
+  template <class... Any>
+  NoNode& trait(Any&&...) {
+    return *this;
+  }
   NoNode& random() { return *this; }
 };
 struct NoPlugin {

@@ -3,30 +3,9 @@
 
 #include <oneapi/tbb/parallel_for.h>
 
-#include "marrow/domain/error.hpp"
-
 namespace marrow {
-namespace {
-
-[[noreturn]] void refuse_radiograph() {
-  throw Error("the projector draws outlines only; wire one that makes radiographs of a volume");
-}
-
-}  // namespace
-
-Projector::~Projector() = default;
-std::vector<OutlinePoint> Projector::outline(const Camera&, const RigidTransform&, double) const {
-  throw Error("the projector makes radiographs only; wire one that draws the outline of a mesh");
-}
-std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&, const PixelGrid&) const {
-  refuse_radiograph();
-}
-std::vector<float> Projector::radiograph(const Camera&, const RigidTransform&,
-                                         const std::vector<Eigen::Vector2f>&) const {
-  refuse_radiograph();
-}
-PixelGrid Projector::region(const Camera&, const RigidTransform&) const { refuse_radiograph(); }
-
+OutlineProjector::~OutlineProjector() = default;
+RadiographProjector::~RadiographProjector() = default;
 Cost::~Cost() = default;
 Optimizer::~Optimizer() = default;
 

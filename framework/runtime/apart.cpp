@@ -15,7 +15,6 @@
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/abi.hpp"
-#include "marrow/runtime/kinds.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "named_files.hpp"
 #include "no_process.hpp"
@@ -29,11 +28,6 @@ using nlohmann::json;
 /// A sanitizer makes everything several times slower and larger.
 constexpr double kSlower = abi_stamp().sanitizers ? 20 : 1;
 constexpr double kMostMemory_mb = 4096;
-
-Kind::Apart apart_of(const PipelineNode& node) {
-  const Kind* kind = find_kind(node.info.kind());
-  return kind ? kind->apart : Kind::Apart::no;
-}
 
 bool has_function(const std::vector<PortInfo>& ports) {
   return std::any_of(ports.begin(), ports.end(), [](const PortInfo& port) { return port.type.is_function; });
@@ -212,7 +206,7 @@ std::string failure_of(const std::string& file, const WorkerEnd& end, const Call
 }
 
 bool runs_apart(const PipelineNode& node) {
-  return apart_of(node) != Kind::Apart::no && !paths_of(node).empty() && !has_function(node.info.inputs) &&
+  return node.apart != Apart::no && !paths_of(node).empty() && !has_function(node.info.inputs) &&
          !has_function(node.info.outputs);
 }
 
@@ -220,7 +214,7 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
   const double megabytes = bytes / 1e6;
   CallLimits limits;
   const double most_mb = std::max(kMostMemory_mb, 256 + 8 * megabytes);
-  if (apart_of(node) == Kind::Apart::parses) {
+  if (node.apart == Apart::parses) {
     // No compression in use packs an image that is not empty to less than a thousandth.
     limits.memory_mb = std::min(most_mb, 192 + 1024 * megabytes);
     limits.processor_s = 1.5 + megabytes;

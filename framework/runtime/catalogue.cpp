@@ -3,10 +3,11 @@
 
 #include <algorithm>
 #include <cstdlib>
+#include <set>
 #include <sstream>
 
+#include "contract.hpp"
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/kinds.hpp"
 
 namespace marrow {
 
@@ -24,6 +25,13 @@ std::vector<fs::path> Catalogue::default_folders() {
 }
 
 Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders)) {
+  find_libraries();
+  do {
+    enter_names();
+  } while (refuse_broken_contracts());
+}
+
+void Catalogue::find_libraries() {
   const Digest framework = file_digest(framework_file());
   const auto refuse = [&](const fs::path& file, const std::string& reason) {
     libraries_.push_back({});
@@ -46,12 +54,42 @@ Catalogue::Catalogue(std::vector<fs::path> folders) : folders_(std::move(folders
       }
     }
   }
+}
+
+void Catalogue::enter_names() {
+  kinds_.clear();
+  nodes_.clear();
+  writers_.clear();
   for (std::size_t l = 0; l < libraries_.size(); ++l) {
+    for (std::size_t i = 0; i < libraries_[l].kinds.size(); ++i)
+      kinds_.try_emplace(libraries_[l].kinds[i].name, Entry{l, i});
     for (std::size_t i = 0; i < libraries_[l].nodes.size(); ++i)
       nodes_.try_emplace(libraries_[l].nodes[i].name, Entry{l, i});
     for (std::size_t i = 0; i < libraries_[l].writers.size(); ++i)
       writers_.try_emplace(libraries_[l].writers[i].type.id, Entry{l, i});
   }
+}
+
+bool Catalogue::refuse_broken_contracts() {
+  std::vector<std::string> reasons;
+  bool any = false;
+  for (const LibraryInfo& library : libraries_) {
+    std::string faults;
+    for (const NodeInfo& node : library.nodes)
+      for (const std::string& fault : contract_faults(node, find_kind(node.kind())))
+        faults += (faults.empty() ? "" : "; ") + node.name + ": " + fault;
+    any = any || !faults.empty();
+    reasons.push_back(std::move(faults));
+  }
+  for (std::size_t l = 0; l < libraries_.size(); ++l) {
+    if (reasons[l].empty()) continue;
+    LibraryInfo& library = libraries_[l];
+    library.refused = "declares its nodes wrongly: " + reasons[l];
+    library.kinds.clear();
+    library.nodes.clear();
+    library.writers.clear();
+  }
+  return any;
 }
 
 Catalogue::~Catalogue() = default;
@@ -72,25 +110,38 @@ const LibraryInfo* Catalogue::library_of(const std::string& name) const {
   return found == nodes_.end() ? nullptr : &libraries_[found->second.library];
 }
 
-std::vector<PortInfo> Catalogue::ports_of_kind(const std::string& kind) const {
-  std::vector<PortInfo> ports;
-  const auto add = [&](PortInfo port) {
-    if (std::none_of(ports.begin(), ports.end(), [&](const PortInfo& p) { return p.name == port.name; }))
-      ports.push_back(std::move(port));
-  };
+std::vector<std::string> Catalogue::kind_names() const {
+  std::set<std::string> names;
+  for (const auto& [name, entry] : kinds_) names.insert(name);
+  for (const auto& [name, entry] : nodes_) names.insert(name.substr(0, name.find('.')));
+  return {names.begin(), names.end()};
+}
+
+const KindInfo* Catalogue::find_kind(const std::string& name) const {
+  const auto found = kinds_.find(name);
+  return found == kinds_.end() ? nullptr : &libraries_[found->second.library].kinds[found->second.index];
+}
+
+const LibraryInfo* Catalogue::library_of_kind(const std::string& name) const {
+  const auto found = kinds_.find(name);
+  return found == kinds_.end() ? nullptr : &libraries_[found->second.library];
+}
+
+std::vector<KindPort> Catalogue::ports_of_kind(const std::string& kind) const {
+  std::vector<KindPort> ports;
+  if (const KindInfo* contract = find_kind(kind)) ports = contract->inputs;
   for (const auto& [name, entry] : nodes_) {
     const NodeInfo& node = libraries_[entry.library].nodes[entry.index];
-    if (node.kind() == kind)
-      for (const PortInfo& port : node.inputs) add(port);
-  }
-  if (const Kind* contract = find_kind(kind))
-    for (const KindPort& port : contract->inputs) {
-      PortInfo info;
-      info.name = port.name;
-      info.type.id = port.type;
-      info.axis = port.axis;
-      add(std::move(info));
+    if (node.kind() != kind) continue;
+    for (const PortInfo& port : node.inputs) {
+      const auto known =
+          std::find_if(ports.begin(), ports.end(), [&](const KindPort& one) { return one.name == port.name; });
+      if (known == ports.end())
+        ports.push_back({port.name, port.help, {port.type}, port.axis});
+      else if (std::find(known->types.begin(), known->types.end(), port.type) == known->types.end())
+        known->types.push_back(port.type);
     }
+  }
   return ports;
 }
 
@@ -111,6 +162,11 @@ const Plugin& Catalogue::load_plugin(std::size_t library) const {
 const NodeDefinition& Catalogue::load(const std::string& name) const {
   const Entry& entry = nodes_.at(name);
   return load_plugin(entry.library).nodes.at(entry.index);
+}
+
+const KindDefinition& Catalogue::load_kind(const std::string& name) const {
+  const Entry& entry = kinds_.at(name);
+  return load_plugin(entry.library).kinds.at(entry.index);
 }
 
 const WriterDefinition& Catalogue::load_writer(const TypeInfo& type) const {

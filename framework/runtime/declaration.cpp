@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of a node's declaration when its plugin registers it: a wrong default or port is found without running
-// anything.
+// Checks of the declaration of nodes and kinds when a plugin registers them: a wrong default or port is found without
+// running anything.
 #include <algorithm>
 #include <array>
 #include <cctype>
@@ -10,7 +10,7 @@
 #include <set>
 
 #include "marrow/plugin.hpp"
-#include "marrow/runtime/kinds.hpp"
+#include "marrow/runtime/diagnostics.hpp"
 
 namespace marrow::detail {
 namespace {
@@ -86,21 +86,65 @@ void check_ports(const std::vector<PortInfo>& ports, const char* what, std::vect
   }
 }
 
-/// That every port of the node is one of the contract's.
-void check_against(const std::vector<PortInfo>& ports, const std::vector<KindPort>& contract, const std::string& kind,
-                   const char* what, std::vector<std::string>& faults) {
-  for (const PortInfo& port : ports) {
-    const auto found =
-        std::find_if(contract.begin(), contract.end(), [&](const KindPort& p) { return p.name == port.name; });
-    if (found == contract.end()) {
-      faults.push_back(std::string(what) + " '" + port.name + "': the kind '" + kind + "' has none of that name");
-    } else if (found->type != port.type.id || found->axis != port.axis) {
-      const auto say = [](const std::string& type, const std::string& axis) {
-        return axis.empty() ? type : "list of " + type + " over " + axis;
-      };
-      faults.push_back(std::string(what) + " '" + port.name + "': the kind '" + kind + "' has it as " +
-                       say(found->type, found->axis) + ", not " + say(port.type.id, port.axis));
-    }
+const char* name_of(RelationType type) {
+  static constexpr const char* kNames[] = {"not_above", "below", "same_length", "as_many_or_none", "exactly_one"};
+  return kNames[int(type)];
+}
+
+/// Of a name in a relation: what is wrong with it; empty where nothing is.
+std::string fault_in_relation(const NodeInfo& node, RelationType type, const std::string& name) {
+  if (type == RelationType::exactly_one && name.starts_with("in.")) {
+    for (const PortInfo& port : node.inputs)
+      if (port.name == name.substr(3)) return port.optional ? "" : "input '" + port.name + "' is always wired";
+    return "there is no input '" + name.substr(3) + "'";
+  }
+  const auto option =
+      std::find_if(node.options.begin(), node.options.end(), [&](const OptionInfo& info) { return info.name == name; });
+  if (option == node.options.end()) {
+    std::vector<std::string> known;
+    for (const OptionInfo& info : node.options) known.push_back(info.name);
+    return "there is no option '" + name + "'; " + suggestion(name, known);
+  }
+  const OptionType is = option->type;
+  const bool is_number = is == OptionType::number || is == OptionType::integer;
+  const bool is_list = is == OptionType::numbers || is == OptionType::texts || is == OptionType::paths;
+  if ((type == RelationType::not_above || type == RelationType::below) && !is_number)
+    return "option '" + name + "' is no number";
+  if ((type == RelationType::same_length || type == RelationType::as_many_or_none) && !is_list)
+    return "option '" + name + "' is no list";
+  if (type == RelationType::exactly_one && (is_number || is == OptionType::boolean))
+    return "option '" + name + "' is never empty, so it is always given";
+  return "";
+}
+
+void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vector<std::string>& faults) {
+  const std::string what = std::string("relation ") + name_of(relation.type) + ": ";
+  const bool is_of_many = relation.type == RelationType::same_length || relation.type == RelationType::exactly_one;
+  if (relation.names.size() < 2 || (!is_of_many && relation.names.size() > 2))
+    faults.push_back(what + (is_of_many ? "it needs two names or more" : "it needs two names"));
+  for (const std::string& name : relation.names)
+    if (const std::string fault = fault_in_relation(node, relation.type, name); !fault.empty())
+      faults.push_back(what + fault);
+}
+
+void check_kind_ports(const std::vector<KindPort>& ports, const char* what, std::vector<std::string>& faults) {
+  for (std::size_t i = 0; i < ports.size(); ++i) {
+    const std::string port = std::string(what) + " '" + ports[i].name + "'";
+    if (!is_name(ports[i].name)) faults.push_back(port + ": names are lower_case");
+    if (ports[i].types.empty()) faults.push_back(port + ": has no type");
+    check_texts(port, {ports[i].help, ports[i].axis}, faults);
+    for (const TypeInfo& type : ports[i].types) check_texts(port, {type.id}, faults);
+    for (std::size_t j = 0; j < i; ++j)
+      if (ports[j].name == ports[i].name) faults.push_back(port + " is named twice");
+  }
+}
+
+/// Names that may not stand twice: of traits, of checks.
+void check_names(const std::vector<std::string>& names, const std::string& what, std::vector<std::string>& faults) {
+  std::set<std::string> seen;
+  for (const std::string& name : names) {
+    if (!is_name(name)) faults.push_back(what + " '" + name + "': names are lower_case");
+    if (!seen.insert(name).second) faults.push_back(what + " '" + name + "' is named twice");
   }
 }
 
@@ -133,17 +177,30 @@ void check_declaration(NodeDefinition& node) {
     if (!names.insert(option.name).second) faults.push_back("option '" + option.name + "' is named twice");
   }
 
-  const Kind* kind = find_kind(info.kind());
-  if (!kind || !kind->sees_truth)
-    for (const PortInfo& port : info.inputs)
-      if (port.type.id == TypeInfo::of<Truth>().id)
-        faults.push_back("input '" + port.name + "': only nodes that evaluate or render may be given the truth");
-  if (!kind || kind->open) return;
-  check_against(info.inputs, kind->inputs, kind->name, "input", faults);
-  check_against(info.outputs, kind->outputs, kind->name, "output", faults);
-  for (const KindPort& port : kind->outputs)
-    if (std::none_of(info.outputs.begin(), info.outputs.end(), [&](const PortInfo& p) { return p.name == port.name; }))
-      faults.push_back("output '" + port.name + "' is missing: every node of the kind '" + kind->name + "' has it");
+  for (const RelationInfo& relation : info.relations) check_relation(info, relation, faults);
+  check_names(info.traits, "trait", faults);
+}
+
+void check_declaration(KindDefinition& kind) {
+  std::vector<std::string>& faults = kind.faults;
+  const KindInfo& info = kind.info;
+  if (!is_name(info.name)) faults.push_back("a kind's name is lower_case, without a dot");
+  if (info.summary.empty()) faults.push_back("has no summary");
+  check_texts("summary", {info.summary}, faults);
+  check_kind_ports(info.inputs, "input", faults);
+  check_kind_ports(info.outputs, "output", faults);
+  std::vector<std::string> traits, checks;
+  for (const TraitInfo& trait : info.traits) {
+    traits.push_back(trait.name);
+    check_texts("trait '" + trait.name + "'", {trait.help}, faults);
+  }
+  for (const CheckInfo& check : info.checks) {
+    checks.push_back(check.name);
+    check_texts("check '" + check.name + "'", {check.what, check.unit}, faults);
+    if (!std::isfinite(check.limit)) faults.push_back("check '" + check.name + "': its limit is not a finite number");
+  }
+  check_names(traits, "trait", faults);
+  check_names(checks, "check", faults);
 }
 
 }  // namespace marrow::detail

@@ -35,7 +35,16 @@ std::string place_in(const std::string& text, std::size_t byte) {
   return std::to_string(line) + ":" + std::to_string(before == std::string::npos ? at + 1 : at - before);
 }
 
+/// From the leaves up: an empty list or object ends without allocating.
+void take_apart(nlohmann::json& value) {
+  if (!value.is_structured()) return;
+  for (nlohmann::json& item : value) take_apart(item);
+  value.clear();
+}
+
 }  // namespace
+
+JsonDocument::~JsonDocument() { take_apart(value_); }
 
 nlohmann::json parse_json(const std::string& text, const std::string& what) {
   if (levels_of(text) > kMostLevels)

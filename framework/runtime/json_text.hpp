@@ -14,4 +14,18 @@ nlohmann::json parse_json(const std::string& text, const std::string& what);
 /// A whole number from `least` to `most`. Throws Error for any other value; `what` names it ("run.json: 'threads'").
 std::int64_t integer_of(const nlohmann::json& value, std::int64_t least, std::int64_t most, const std::string& what);
 
+/// A parsed document. Its end needs no memory: that of a list or object of the library allocates, and a lack of memory
+/// would then end the process.
+class JsonDocument {
+ public:
+  explicit JsonDocument(nlohmann::json value) : value_(std::move(value)) {}
+  ~JsonDocument();
+  JsonDocument(const JsonDocument&) = delete;
+  JsonDocument& operator=(const JsonDocument&) = delete;
+  nlohmann::json& value() { return value_; }
+
+ private:
+  nlohmann::json value_;
+};
+
 }  // namespace marrow

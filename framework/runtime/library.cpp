@@ -101,9 +101,18 @@ void* open_library(const fs::path& file, int mode) {
 void run_registration(Plugin& plugin, const PluginEntry& entry) {
   entry.register_nodes(plugin);
   std::string faults;
-  for (const NodeDefinition& node : plugin.nodes)
-    for (const std::string& fault : node.faults) faults += (faults.empty() ? "" : "; ") + node.info.name + ": " + fault;
+  const auto add = [&](const std::string& name, const std::vector<std::string>& of_one) {
+    for (const std::string& fault : of_one) faults += (faults.empty() ? "" : "; ") + name + ": " + fault;
+  };
+  for (const KindDefinition& kind : plugin.kinds) add("kind " + kind.info.name, kind.faults);
+  for (const NodeDefinition& node : plugin.nodes) add(node.info.name, node.faults);
   if (!faults.empty()) throw Error("declares its nodes wrongly: " + faults);
+}
+
+void add_registered(const Plugin& plugin, LibraryInfo& info) {
+  for (const KindDefinition& kind : plugin.kinds) info.kinds.push_back(kind.info);
+  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
+  for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
 }
 
 /// Runs in a worker: what the library holds, or a refusal.
@@ -123,8 +132,7 @@ LibraryInfo describe_here(const fs::path& file) {
     info.linked = linked_libraries(handle);
     Plugin plugin;
     run_registration(plugin, entry);
-    for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
-    for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
+    add_registered(plugin, info);
   } catch (const std::exception& error) {
     info = LibraryInfo{};
     info.refused = error.what();
@@ -169,8 +177,7 @@ LibraryInfo describe_apart(const fs::path& file) {
 /// What a loaded library registers, and the libraries that it found.
 LibraryInfo registered(const Plugin& plugin, void* handle) {
   LibraryInfo info;
-  for (const NodeDefinition& node : plugin.nodes) info.nodes.push_back(node.info);
-  for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
+  add_registered(plugin, info);
   info.linked = linked_libraries(handle);
   return info;
 }

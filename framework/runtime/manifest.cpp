@@ -16,8 +16,10 @@ namespace marrow {
 namespace {
 
 using nlohmann::json;
-constexpr int kManifestVersion = 2;  // 2: with the libraries that others of the plugin need
+constexpr int kManifestVersion = 3;  // 3: with kinds, traits and relations of options
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
+constexpr const char* kRelationTypes[] = {"not_above", "below", "same_length", "as_many_or_none", "exactly_one"};
+constexpr const char* kApart[] = {"no", "parses", "computes"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
 constexpr std::size_t kMostLinked = 1000;
 
@@ -40,6 +42,26 @@ json json_of(const OptionInfo& option) {
             {"choices", option.choices},   {"length", option.length}};
   if (option.minimum) j["minimum"] = *option.minimum;
   if (option.maximum) j["maximum"] = *option.maximum;
+  return j;
+}
+
+json json_of(const KindPort& port) {
+  json j = {{"name", port.name}, {"help", port.help}, {"axis", port.axis}, {"types", json::array()}};
+  for (const TypeInfo& type : port.types) j["types"].push_back(json_of(type));
+  return j;
+}
+
+json json_of(const KindInfo& kind) {
+  json j = {{"name", kind.name},
+            {"summary", kind.summary},
+            {"sees_truth", kind.sees_truth},
+            {"apart", kApart[int(kind.apart)]}};
+  j["inputs"] = j["outputs"] = j["traits"] = j["checks"] = json::array();
+  for (const KindPort& port : kind.inputs) j["inputs"].push_back(json_of(port));
+  for (const KindPort& port : kind.outputs) j["outputs"].push_back(json_of(port));
+  for (const TraitInfo& trait : kind.traits) j["traits"].push_back({{"name", trait.name}, {"help", trait.help}});
+  for (const CheckInfo& check : kind.checks)
+    j["checks"].push_back({{"name", check.name}, {"what", check.what}, {"limit", check.limit}, {"unit", check.unit}});
   return j;
 }
 
@@ -136,15 +158,21 @@ OptionValue default_from(const Fields& fields, OptionType type) {
   }
 }
 
+/// The place of a text in a list of names.
+template <std::size_t Count>
+int one_of(const char* const (&names)[Count], const std::string& text, const std::string& what) {
+  const auto found = std::find(std::begin(names), std::end(names), text);
+  if (found == std::end(names)) damaged("there is no " + what + " '" + text + "'");
+  return int(found - std::begin(names));
+}
+
 OptionInfo option_from(const json& j) {
   const Fields fields(j, "an option", 8 + j.contains("minimum") + j.contains("maximum"));
   OptionInfo option;
   option.name = fields.text("name");
   option.help = fields.text("help");
   option.unit = fields.text("unit");
-  const auto type = std::find(std::begin(kOptionTypes), std::end(kOptionTypes), fields.text("type"));
-  if (type == std::end(kOptionTypes)) damaged("there is no type of options '" + fields.text("type") + "'");
-  option.type = OptionType(type - std::begin(kOptionTypes));
+  option.type = OptionType(one_of(kOptionTypes, fields.text("type"), "type of options"));
   option.required = fields.boolean("required");
   option.default_value = default_from(fields, option.type);
   option.choices = fields.texts("choices");
@@ -157,9 +185,14 @@ OptionInfo option_from(const json& j) {
   return option;
 }
 
+RelationInfo relation_from(const json& j) {
+  const Fields fields(j, "a relation", 2);
+  return {RelationType(one_of(kRelationTypes, fields.text("type"), "relation")), fields.texts("names")};
+}
+
 /// Held to the same rules as when a library registers it.
 NodeInfo node_from(const json& j) {
-  const Fields fields(j, "a node", 6);
+  const Fields fields(j, "a node", 8);
   NodeDefinition node;
   node.info.name = fields.text("name");
   node.info.summary = fields.text("summary");
@@ -167,9 +200,42 @@ NodeInfo node_from(const json& j) {
   for (const json& port : fields.list("inputs")) node.info.inputs.push_back(port_from(port));
   for (const json& port : fields.list("outputs")) node.info.outputs.push_back(port_from(port));
   for (const json& option : fields.list("options")) node.info.options.push_back(option_from(option));
+  for (const json& relation : fields.list("relations")) node.info.relations.push_back(relation_from(relation));
+  node.info.traits = fields.texts("traits");
   detail::check_declaration(node);
   if (!node.faults.empty()) damaged(node.info.name + ": " + node.faults.front());
   return std::move(node.info);
+}
+
+KindPort kind_port_from(const json& j) {
+  const Fields fields(j, "a port of a kind", 4);
+  KindPort port{fields.text("name"), fields.text("help"), {}, fields.text("axis")};
+  for (const json& type : fields.list("types")) port.types.push_back(type_from(type));
+  return port;
+}
+
+/// Held to the same rules as when a library registers it.
+KindInfo kind_from(const json& j) {
+  const Fields fields(j, "a kind", 8);
+  KindDefinition kind;
+  kind.info.name = fields.text("name");
+  kind.info.summary = fields.text("summary");
+  kind.info.sees_truth = fields.boolean("sees_truth");
+  kind.info.apart = Apart(one_of(kApart, fields.text("apart"), "way to run apart"));
+  for (const json& port : fields.list("inputs")) kind.info.inputs.push_back(kind_port_from(port));
+  for (const json& port : fields.list("outputs")) kind.info.outputs.push_back(kind_port_from(port));
+  for (const json& trait : fields.list("traits")) {
+    const Fields of_trait(trait, "a trait", 2);
+    kind.info.traits.push_back({of_trait.text("name"), of_trait.text("help")});
+  }
+  for (const json& check : fields.list("checks")) {
+    const Fields of_check(check, "a check", 4);
+    kind.info.checks.push_back(
+        {of_check.text("name"), of_check.text("what"), of_check.number("limit"), of_check.text("unit")});
+  }
+  detail::check_declaration(kind);
+  if (!kind.faults.empty()) damaged("kind " + kind.info.name + ": " + kind.faults.front());
+  return std::move(kind.info);
 }
 
 WriterInfo writer_from(const json& j) {
@@ -191,15 +257,17 @@ LinkedLibrary linked_from(const json& j) {
   return {path, std::uint64_t(fields.integer("size", 0, INT64_MAX))};
 }
 
-/// The document without its checksum.
-json checked_document(const std::string& text) {
+json parsed(const std::string& text) {
   if (text.size() > kMostManifest_bytes) damaged("it has " + std::to_string(text.size()) + " bytes");
-  json j;
   try {
-    j = parse_json(text, "its text");
+    return parse_json(text, "its text");
   } catch (const Error& error) {
     damaged(error.what());
   }
+}
+
+/// Takes the checksum out of the document that it belongs to.
+void check(json& j) {
   if (!j.is_object()) damaged("it is not an object");
   if (!j.contains("marrow_manifest") || j["marrow_manifest"] != kManifestVersion)
     throw Error("it was written by another version of marrow");
@@ -207,7 +275,6 @@ json checked_document(const std::string& text) {
   const std::string checksum = j["checksum"].get<std::string>();
   j.erase("checksum");
   if (hash_of(j.dump()).hex() != checksum) throw Error("it was edited by hand");
-  return j;
 }
 
 /// Where two documents part; `path` names the place.
@@ -243,18 +310,22 @@ json json_of(const OptionValue& value) {
 
 json json_of(const NodeInfo& node) {
   json j = {{"name", node.name}, {"summary", node.summary}, {"random", node.random}};
-  j["inputs"] = j["outputs"] = j["options"] = json::array();
+  j["inputs"] = j["outputs"] = j["options"] = j["relations"] = json::array();
   for (const PortInfo& port : node.inputs) j["inputs"].push_back(json_of(port));
   for (const PortInfo& port : node.outputs) j["outputs"].push_back(json_of(port));
   for (const OptionInfo& option : node.options) j["options"].push_back(json_of(option));
+  for (const RelationInfo& relation : node.relations)
+    j["relations"].push_back({{"type", kRelationTypes[int(relation.type)]}, {"names", relation.names}});
+  j["traits"] = node.traits;
   return j;
 }
 
 std::string manifest_text(const LibraryInfo& info) {
   json j = {{"marrow_manifest", kManifestVersion}, {"library", info.digest.hex()}, {"refused", info.refused}};
-  j["linked"] = j["nodes"] = j["writers"] = json::array();
+  j["linked"] = j["kinds"] = j["nodes"] = j["writers"] = json::array();
   for (const LinkedLibrary& library : info.linked)
     j["linked"].push_back({{"path", library.path}, {"size", library.size}});
+  for (const KindInfo& kind : info.kinds) j["kinds"].push_back(json_of(kind));
   for (const NodeInfo& node : info.nodes) j["nodes"].push_back(json_of(node));
   for (const WriterInfo& writer : info.writers) j["writers"].push_back(json_of(writer));
   j["checksum"] = hash_of(j.dump()).hex();
@@ -262,8 +333,9 @@ std::string manifest_text(const LibraryInfo& info) {
 }
 
 LibraryInfo manifest_from_text(const std::string& text) {
-  const json document = checked_document(text);
-  const Fields fields(document, "it", 6);
+  JsonDocument document(parsed(text));
+  check(document.value());
+  const Fields fields(document.value(), "it", 7);
   LibraryInfo info;
   const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
   if (!digest) damaged("the library's digest is not 32 hexadecimal digits");
@@ -272,20 +344,25 @@ LibraryInfo manifest_from_text(const std::string& text) {
   if (fields.list("linked").size() > kMostLinked)
     damaged("it names more than " + std::to_string(kMostLinked) + " linked libraries");
   for (const json& library : fields.list("linked")) info.linked.push_back(linked_from(library));
-  std::set<std::string> names;
+  std::set<std::string> kinds, names;
+  for (const json& kind : fields.list("kinds")) {
+    info.kinds.push_back(kind_from(kind));
+    if (!kinds.insert(info.kinds.back().name).second) damaged("it has the kind '" + info.kinds.back().name + "' twice");
+  }
   for (const json& node : fields.list("nodes")) {
     info.nodes.push_back(node_from(node));
     if (!names.insert(info.nodes.back().name).second) damaged("it has the node '" + info.nodes.back().name + "' twice");
   }
   for (const json& writer : fields.list("writers")) info.writers.push_back(writer_from(writer));
-  if (!info.refused.empty() && !(info.nodes.empty() && info.writers.empty()))
+  if (!info.refused.empty() && !(info.kinds.empty() && info.nodes.empty() && info.writers.empty()))
     damaged("it has nodes of a library that it refuses");
   return info;
 }
 
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered) {
   const auto document = [](const LibraryInfo& info) {
-    json j = {{"nodes", json::object()}, {"writers", json::object()}};
+    json j = {{"kinds", json::object()}, {"nodes", json::object()}, {"writers", json::object()}};
+    for (const KindInfo& kind : info.kinds) j["kinds"][kind.name] = json_of(kind);
     for (const NodeInfo& node : info.nodes) j["nodes"][node.name] = json_of(node);
     for (const WriterInfo& writer : info.writers) j["writers"][writer.type.id] = json_of(writer);
     return j;
@@ -293,12 +370,13 @@ std::string difference(const LibraryInfo& described, const LibraryInfo& register
   std::string found = difference(document(described), document(registered), "");
   const auto names = [](const LibraryInfo& info) {
     std::vector<std::string> result;
+    for (const KindInfo& kind : info.kinds) result.push_back(kind.name);
     for (const NodeInfo& node : info.nodes) result.push_back(node.name);
     for (const WriterInfo& writer : info.writers) result.push_back(writer.type.id);
     return result;
   };
   if (found.empty() && names(described) != names(registered))
-    found = "the order or number of its nodes is another in its description";
+    found = "the order or number of its kinds, nodes and writers is another in its description";
   return found;
 }
 

@@ -8,13 +8,15 @@
 #include <set>
 #include <sstream>
 
+#include "contract.hpp"
 #include "file_names.hpp"
 #include "input_texts.hpp"
 #include "marrow/domain/printable.hpp"
-#include "marrow/runtime/kinds.hpp"
-#include "pipeline_order.hpp"
+#include "marrow/runtime/types.hpp"
+#include "pipeline_axes.hpp"
 #include "pipeline_text.hpp"
 #include "plain_path.hpp"
+#include "relations.hpp"
 
 namespace marrow {
 namespace {
@@ -46,10 +48,17 @@ std::string joined(const std::vector<std::string>& list, const char* separator) 
   return text;
 }
 
+std::string with_article(const std::string& noun) { return (noun.find_first_of("aeiou") == 0 ? "an " : "a ") + noun; }
+
 class Resolver {
  public:
-  Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics)
-      : written_(written), catalogue_(catalogue), diagnostics_(diagnostics), input_texts_(written, diagnostics) {}
+  /// `is_trial`: whether the result is only asked for its faults.
+  Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics, bool is_trial = false)
+      : written_(written),
+        catalogue_(catalogue),
+        diagnostics_(diagnostics),
+        tries_others_(!is_trial && diagnostics.empty()),
+        input_texts_(written, diagnostics) {}
 
   Pipeline resolve() {
     pipeline_.name = written_.name;
@@ -64,10 +73,7 @@ class Resolver {
     for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
     for (const auto& [name, value] : written_.outputs) resolve_output(name, value);
     point_at_renamed();
-    if (diagnostics_.empty()) sort_nodes();
-    if (diagnostics_.empty())
-      for (std::size_t i = 0; i < pipeline_.nodes.size(); ++i) find_axes(i);
-    if (diagnostics_.empty()) check_outputs();
+    if (diagnostics_.empty()) order_and_find_axes(pipeline_, diagnostics_);
     return std::move(pipeline_);
   }
 
@@ -78,6 +84,7 @@ class Resolver {
     node.place = written.place;
     if (const NodeInfo* info = catalogue_.find(written.uses)) {
       node.info = *info;
+      if (const KindInfo* kind = catalogue_.find_kind(info->kind())) node.apart = kind->apart;
       resolve_options(written, node);
     } else if (!written.uses.empty()) {
       const std::vector<std::string>& names = node_names();
@@ -100,7 +107,7 @@ class Resolver {
     return node_names_;
   }
 
-  const std::vector<PortInfo>& ports_of_kind(const std::string& kind) {
+  const std::vector<KindPort>& ports_of_kind(const std::string& kind) {
     const auto found = ports_.find(kind);
     return found != ports_.end() ? found->second : ports_.emplace(kind, catalogue_.ports_of_kind(kind)).first->second;
   }
@@ -132,8 +139,12 @@ class Resolver {
         };
         auto converted = yaml.option(value.value, value.place, option,
                                      "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
-        if (converted) result = in_folder(std::move(*converted), option.type, value.folder);
+        if (converted)
+          result = in_folder(std::move(*converted), option.type, value.folder);
+        else
+          unknown_values_.insert({&written, option.name});
       } else if (option.required) {
+        unknown_values_.insert({&written, option.name});
         diagnostics_.add(written.place,
                          "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name +
                              " must be given",
@@ -141,6 +152,35 @@ class Resolver {
       }
       node.options.push_back(std::move(result));
     }
+  }
+
+  /// Options against each other, where each of them could be read. The fault is shown at the last one that the file
+  /// gives.
+  void check_relations(const WrittenNode& written, const PipelineNode& node) {
+    const auto value = [&](const std::string& name) -> const OptionValue* {
+      for (std::size_t i = 0; i < node.options.size(); ++i)
+        if (node.info.options[i].name == name) return &node.options[i];
+      return nullptr;
+    };
+    const auto is_wired = [&](const std::string& name) { return is_written(written.wires, name); };
+    for (const RelationInfo& relation : node.info.relations) {
+      Place place = written.place;
+      bool is_known = true;
+      for (const std::string& name : relation.names) {
+        is_known = is_known && !unknown_values_.contains({&written, name});
+        const bool is_input = name.starts_with("in.");
+        for (const auto& [other, given] : is_input ? written.wires : written.options)
+          if (other == (is_input ? name.substr(3) : name)) place = given.place;
+      }
+      if (!is_known) continue;
+      if (const auto fault = broken(relation, node.info.name, value, is_wired))
+        diagnostics_.add(place, fault->message, fault->hint);
+    }
+  }
+
+  template <class Written>
+  static bool is_written(const Written& list, const std::string& name) {
+    return std::any_of(list.begin(), list.end(), [&](const auto& item) { return item.first == name; });
   }
 
   static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
@@ -155,34 +195,36 @@ class Resolver {
     const WrittenNode& written = written_.nodes[index];
     PipelineNode& node = pipeline_.nodes[index];
     if (node.info.name.empty()) return;
-    const std::vector<PortInfo>& of_kind = ports_of_kind(node.info.kind());
+    const std::vector<KindPort>& of_kind = ports_of_kind(node.info.kind());
     for (const auto& [name, value] : written.wires) {
       const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(),
                                      [&, n = name](const PortInfo& p) { return p.name == n; });
       const bool own = port != node.info.inputs.end();
       const auto sibling =
-          std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+          std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const KindPort& p) { return p.name == n; });
       if (!own && sibling == of_kind.end()) {
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
                          suggested(name, names_of(of_kind)));
         continue;
       }
       // A port that only siblings use is checked like any other, and then left unwired.
-      Wire wire = resolve_wire(value, own ? *port : *sibling, node);
+      Wire wire =
+          resolve_wire(value, own ? KindPort{port->name, port->help, {port->type}, port->axis} : *sibling, index);
       if (!own) continue;
       wire.port = int(port - node.info.inputs.begin());
       node.wires.push_back(std::move(wire));
     }
     for (const PortInfo& port : node.info.inputs)
-      if (!port.optional && std::none_of(written.wires.begin(), written.wires.end(),
-                                         [&](const auto& wire) { return wire.first == port.name; }))
+      if (!port.optional && !is_written(written.wires, port.name))
         diagnostics_.add(written.place,
                          "node " + in_quotes(node.id) + ": input " + in_quotes(port.name) + " of " + node.info.name +
                              " is not wired",
-                         "add  in: {" + port.name + ": ...}  with a " + port.type.id + " (" + port.help + ")");
+                         "add  in: {" + port.name + ": ...}  with " + with_article(types_text({port.type}, port.axis)) +
+                             " (" + port.help + ")" + or_another(index));
+    check_relations(written, node);
   }
 
-  Wire resolve_wire(const WrittenValue& value, const PortInfo& port, const PipelineNode& node) {
+  Wire resolve_wire(const WrittenValue& value, const KindPort& port, std::size_t index) {
     Wire wire;
     const auto add = [&](const YAML::Node& text, const Place& place) {
       if (!text.IsScalar()) {
@@ -190,8 +232,8 @@ class Resolver {
                          "write it as  " + port.name + ": node  or  node.output");
         return;
       }
-      Reference source = resolve_reference(text.Scalar(), place, &port.type);
-      check_type(source, port, node);
+      Reference source = resolve_reference(text.Scalar(), place, &port.types);
+      check_type(source, port, index);
       wire.sources.push_back(std::move(source));
     };
     if (!value.value.IsSequence()) {
@@ -200,8 +242,8 @@ class Resolver {
     }
     wire.is_list_literal = true;
     if (port.axis.empty()) {
-      diagnostics_.add(value.place, "input " + in_quotes(port.name) + " of " + node.info.name + " takes one " +
-                                        port.type.id + ", not a list");
+      diagnostics_.add(value.place, "input " + in_quotes(port.name) + " of " + pipeline_.nodes[index].info.name +
+                                        " takes one " + types_text(port.types, "") + ", not a list");
       return wire;
     }
     const StrictYaml yaml = yaml_of(value);
@@ -209,7 +251,7 @@ class Resolver {
     return wire;
   }
 
-  Reference resolve_reference(const std::string& text, const Place& place, const TypeInfo* type) {
+  Reference resolve_reference(const std::string& text, const Place& place, const std::vector<TypeInfo>* types) {
     Reference source{text, place, -1, -1, {}};
     const std::vector<std::string> parts = split(text);
     const std::string id = parts.empty() ? text : parts[0];
@@ -230,17 +272,17 @@ class Resolver {
     if (output >= 0) {
       used = 2;
     } else {
-      output = default_output(outputs, type, parts.size() > 1);
+      output = default_output(outputs, types, parts.size() > 1);
     }
     if (output < 0) {
       if (parts.size() > 1)
         diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]),
                          suggested(parts[1], names_of(outputs)));
       else
-        diagnostics_.add(
-            place,
-            "node " + in_quotes(parts[0]) + " has several outputs" + (type ? " and not just one " + type->id : ""),
-            "say which: " + parts[0] + "." + joined(names_of(outputs), ", "));
+        diagnostics_.add(place,
+                         "node " + in_quotes(parts[0]) + " has several outputs" +
+                             (types ? " and not just one " + types_text(*types, "") : ""),
+                         "say which: " + parts[0] + "." + joined(names_of(outputs), ", "));
       return source;
     }
     source.node = int(index);
@@ -249,36 +291,81 @@ class Resolver {
     return source;
   }
 
-  /// The output that a bare node's name means: its only one, or the only one of the wanted type.
-  static int default_output(const std::vector<PortInfo>& outputs, const TypeInfo* type, bool picks_item) {
+  /// The output that a bare node's name means: its only one, or the only one of the wanted types.
+  static int default_output(const std::vector<PortInfo>& outputs, const std::vector<TypeInfo>* types, bool picks_item) {
     if (outputs.size() == 1) return 0;
-    if (picks_item || !type) return -1;
+    if (picks_item || !types) return -1;
     int found = -1;
     for (std::size_t i = 0; i < outputs.size(); ++i)
-      if (outputs[i].type.id == type->id) {
+      if (has_id(*types, outputs[i].type.id)) {
         if (found >= 0) return -1;
         found = int(i);
       }
     return found;
   }
 
-  void check_type(const Reference& source, const PortInfo& port, const PipelineNode& node) {
+  static bool has_id(const std::vector<TypeInfo>& types, const std::string& id) {
+    return std::any_of(types.begin(), types.end(), [&](const TypeInfo& type) { return type.id == id; });
+  }
+
+  void check_type(const Reference& source, const KindPort& port, std::size_t index) {
     if (source.node < 0) return;
+    const PipelineNode& node = pipeline_.nodes[index];
     const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
     const PortInfo& output = from.info.outputs[std::size_t(source.output)];
-    const bool contract_only = port.type.size == 0;
-    const Kind* kind = find_kind(node.info.kind());
-    if (output.type.id == "truth" && (!kind || !kind->sees_truth)) {
+    const KindInfo* kind = catalogue_.find_kind(node.info.kind());
+    if (output.type.id == TypeInfo::of<Truth>().id && (!kind || !kind->sees_truth)) {
       diagnostics_.add(source.place,
-                       "the truth may be wired only to nodes that evaluate or render, not to " + node.info.name,
+                       "the truth may be wired only to nodes of a kind that may see it, not to " + node.info.name,
                        "a method that sees the truth proves nothing");
-    } else if (contract_only ? output.type.id != port.type.id : output.type != port.type) {
-      const bool layout = output.type.id == port.type.id;
+    } else if (std::find(port.types.begin(), port.types.end(), output.type) == port.types.end()) {
+      std::string hint = "the two plugins were built with different versions of this type; rebuild both";
+      if (!has_id(port.types, output.type.id)) hint = fitting(std::size_t(source.node), index);
       diagnostics_.add(source.place,
-                       "input " + in_quotes(port.name) + " of " + node.info.name + " expects " + port.type.id +
-                           ", but " + in_quotes(source.text) + " is " + output.type.id + " (" + output.help + ")",
-                       layout ? "the two plugins were built with different versions of this type; rebuild both" : "");
+                       "input " + in_quotes(port.name) + " of " + node.info.name + " expects " +
+                           types_text(port.types, "") + ", but " + in_quotes(source.text) + " is " + output.type.id +
+                           " (" + output.help + ")",
+                       hint);
     }
+  }
+
+  /// Nodes with which the pipeline would have no fault, of the kinds of these two: "kind.one fits in place of
+  /// kind.other". Empty where there are none.
+  std::string fitting(std::size_t source, std::size_t user) {
+    for (const std::size_t index : {source, user}) {
+      const std::vector<std::string>& names = names_that_fit(index);
+      if (!names.empty())
+        return joined(names, ", ") + (names.size() == 1 ? " fits" : " fit") + " in place of " +
+               written_.nodes[index].uses;
+    }
+    return "";
+  }
+
+  std::string or_another(std::size_t index) {
+    const std::vector<std::string>& names = names_that_fit(index);
+    return names.empty() ? "" : ", or use " + joined(names, ", ");
+  }
+
+  /// Nodes of the same kind with which the whole pipeline would be good. Each is tried, so of few nodes only, and not
+  /// in very long pipelines.
+  const std::vector<std::string>& names_that_fit(std::size_t index) {
+    constexpr std::size_t kMostNodes = 300, kMostTried = 4;
+    static const std::vector<std::string> kNone;
+    if (!tries_others_ || written_.nodes.size() > kMostNodes) return kNone;
+    if (const auto known = fitting_.find(index); known != fitting_.end()) return known->second;
+    if (fitting_.size() == kMostTried) return kNone;
+    std::vector<std::string>& names = fitting_[index];
+    const std::string& used = written_.nodes[index].uses;
+    for (const std::string& name : node_names()) {
+      if (name == used || !name.starts_with(used.substr(0, used.find('.') + 1))) continue;
+      WrittenPipeline other = written_;
+      other.nodes[index].uses = name;
+      other.nodes[index].options.clear();
+      Diagnostics faults;
+      Resolver(other, catalogue_, faults, true).resolve();
+      if (faults.empty()) names.push_back(name);
+    }
+    return names;
   }
 
   void resolve_output(const std::string& name, const WrittenValue& value) {
@@ -311,74 +398,16 @@ class Resolver {
     }
   }
 
-  /// Sources before users, in the file's order otherwise.
-  void sort_nodes() {
-    std::vector<PipelineNode>& nodes = pipeline_.nodes;
-    std::vector<std::size_t> stuck;
-    const std::vector<std::size_t> order = pipeline_order(nodes, stuck);
-    if (!stuck.empty()) {
-      std::vector<std::string> names;
-      for (const std::size_t i : stuck) names.push_back(nodes[i].id);
-      diagnostics_.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names, ", "));
-      return;
-    }
-    std::vector<int> place_of(nodes.size());
-    std::vector<PipelineNode> sorted;
-    for (const std::size_t i : order) {
-      place_of[i] = int(sorted.size());
-      sorted.push_back(std::move(nodes[i]));
-    }
-    for (PipelineNode& node : sorted)
-      for (Wire& wire : node.wires)
-        for (Reference& source : wire.sources) source.node = place_of[std::size_t(source.node)];
-    for (PipelineOutput& output : pipeline_.outputs) output.source.node = place_of[std::size_t(output.source.node)];
-    nodes = std::move(sorted);
-  }
-
-  void check_picks(const Reference& source) {
-    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
-    const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
-    if (source.items.size() > axes)
-      diagnostics_.add(source.place,
-                       in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
-                           (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
-  }
-
-  void find_axes(std::size_t index) {
-    PipelineNode& node = pipeline_.nodes[index];
-    for (const Wire& wire : node.wires) {
-      const std::string& consumed = node.info.inputs[std::size_t(wire.port)].axis;
-      for (const Reference& source : wire.sources) {
-        check_picks(source);
-        if (!diagnostics_.empty()) return;
-        for (const std::string& axis : pipeline_.axes_of(source)) {
-          if (axis == consumed && wire.is_list_literal)
-            diagnostics_.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis),
-                             "pick one item of it");
-          else if (axis != consumed && !contains(node.mapped_axes, axis))
-            node.mapped_axes.push_back(axis);
-        }
-      }
-    }
-    for (const PortInfo& output : node.info.outputs)
-      if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
-        diagnostics_.add(node.place,
-                         "node " + in_quotes(node.id) + " is called for each item along " + in_quotes(output.axis) +
-                             ", but its output '" + output.name + "' is itself a list over it",
-                         "pick one item of its input");
-  }
-
-  void check_outputs() {
-    for (const PipelineOutput& output : pipeline_.outputs) check_picks(output.source);
-  }
-
   const WrittenPipeline& written_;
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
+  const bool tries_others_;  ///< not of a file that could not be read in full: its nodes may be half
   Pipeline pipeline_;
   std::vector<std::string> ids_, node_names_;
   std::map<std::string, std::size_t> index_;  ///< of nodes, by their ids
-  std::map<std::string, std::vector<PortInfo>> ports_;
+  std::map<std::string, std::vector<KindPort>> ports_;
+  std::set<std::pair<const WrittenNode*, std::string>> unknown_values_;  ///< options whose values could not be read
+  std::map<std::size_t, std::vector<std::string>> fitting_;              ///< by node
   InputTexts input_texts_;
   std::set<std::string> used_nodes_, unknown_nodes_;  ///< by references
 };

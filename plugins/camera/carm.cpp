@@ -32,26 +32,17 @@ marrow::Camera camera_at(const Options& options, double alpha_deg, double beta_d
                              marrow::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
 }
 
-void check_options(const Options& options) {
-  const std::size_t count = options.names.size();
-  if (count == 0) throw marrow::Error("names: no view is named; name at least one");
-  if (options.alpha_deg.size() != count || options.beta_deg.size() != count)
-    throw marrow::Error("names has " + std::to_string(count) + " views, alpha_deg " +
-                        std::to_string(options.alpha_deg.size()) + " and beta_deg " +
-                        std::to_string(options.beta_deg.size()) + " angles; give one of each per view");
-  if (std::set<std::string>(options.names.begin(), options.names.end()).size() != count)
+void check_names(const std::vector<std::string>& names) {
+  if (names.empty()) throw marrow::Error("names: no view is named; name at least one");
+  if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
     throw marrow::Error("names: two views have the same name");
-  if (options.source_to_isocentre_mm >= options.source_to_detector_mm)
-    throw marrow::Error("source_to_isocentre_mm (" + std::to_string(options.source_to_isocentre_mm) +
-                        ") must be less than source_to_detector_mm (" + std::to_string(options.source_to_detector_mm) +
-                        "): the detector lies behind the isocentre");
 }
 
 marrow::List<marrow::Camera> carm(const Options& options) {
-  check_options(options);
+  check_names(options.names);
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
-    marrow::Camera camera = camera_at(options, options.alpha_deg[i], options.beta_deg[i]);
+    marrow::Camera camera = camera_at(options, options.alpha_deg.at(i), options.beta_deg.at(i));
     marrow::check_camera(camera, "view '" + options.names[i] + "'");
     cameras.add(options.names[i], std::move(camera));
   }
@@ -71,9 +62,11 @@ MARROW_PLUGIN(plugin) {
       .option("beta_deg", &Options::beta_deg,
               "right/left anterior angle per view, positive with the detector towards the patient's left",
               marrow::at_least(-180), marrow::at_most(180))
+      .relation(marrow::same_length({"names", "alpha_deg", "beta_deg"}))
       .option("source_to_detector_mm", &Options::source_to_detector_mm, "source to detector", marrow::at_least(1))
       .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm, "source to the centre of rotation",
               marrow::at_least(1))
+      .relation(marrow::below("source_to_isocentre_mm", "source_to_detector_mm"))
       .option("width_px", &Options::width_px, "image width", marrow::at_least(1), marrow::at_most(16384))
       .option("height_px", &Options::height_px, "image height", marrow::at_least(1), marrow::at_most(16384))
       .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector", marrow::at_least(0.001))

@@ -18,12 +18,9 @@ struct Options {
 
 marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& context) {
   if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
-  if (!options.names.empty() && options.names.size() != options.paths.size())
-    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, paths " +
-                        std::to_string(options.paths.size()) + " files; give one name per image, or none");
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
-    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
+    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
     marrow::check_item_name("view", name);
     if (cameras.find(name)) throw marrow::Error("names: two views are named '" + name + "'; name each differently");
     const auto geometry = marrow::files::read_xray_geometry(
@@ -44,6 +41,7 @@ MARROW_PLUGIN(plugin) {
            marrow::over("view"))
       .option("paths", &Options::paths, "DICOM files, the same that read.views takes as images", marrow::required())
       .option("names", &Options::names, "one name per view; without names, the files' names without extension")
+      .relation(marrow::as_many_or_none("names", "paths"))
       .option("frame", &Options::frame,
               "frame of a multi-frame file, from 1, the one that read.views takes; 0 = there is only one, or all were "
               "taken alike",

@@ -130,9 +130,6 @@ cv::Mat large_components(cv::Mat& labels, int min_pixels) {
 }
 
 marrow::EdgeMap adaptive_relaxation(const marrow::View& view, const Options& options) {
-  if (options.low > options.high)
-    throw marrow::Error("the lower percentile " + std::to_string(options.low) + " is above the upper one " +
-                        std::to_string(options.high));
   const Prepared image = prepare(view, options.sigma_px, options.logarithm);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
   const Thresholds thresholds = local_thresholds(image, gradient, options);
@@ -155,6 +152,7 @@ MARROW_PLUGIN(plugin) {
               marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
       .option("high", &Options::high, "upper threshold: percentile of the gradient's magnitude in the window",
               marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
+      .relation(marrow::not_above("low", "high"))
       .option("window_px", &Options::window_px, "side of the local window, in effect an odd multiple of 16",
               marrow::at_least(16))
       .option("noise_low", &Options::noise_low,

@@ -26,9 +26,6 @@ struct Options {
 constexpr float kUnit = 64;  // of the 16 bit gradient that OpenCV wants, per standard deviation of the noise
 
 marrow::EdgeMap canny(const marrow::View& view, const Options& options) {
-  if (options.low > options.high)
-    throw marrow::Error("the lower threshold " + std::to_string(options.low) + " is above the upper one " +
-                        std::to_string(options.high));
   const Prepared image = prepare(view, options.sigma_px, options.logarithm);
   const Gradient gradient = gaussian_gradient(image.values, options.sigma_px);
   const cv::Mat noise = block_noise(image, gradient);
@@ -72,5 +69,6 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0))
       .option("high", &Options::high,
               "upper hysteresis threshold above the window's median, in standard deviations of the noise",
-              marrow::at_least(0));
+              marrow::at_least(0))
+      .relation(marrow::not_above("low", "high"));
 }

@@ -93,7 +93,7 @@ bool in_mask(const marrow::View& view, const marrow::OutlinePoint& point) {
   return view.mask.at<unsigned char>(v, u) != 0;
 }
 
-Distances measure(const marrow::RigidTransform& world_from_model, const marrow::Projector& projector,
+Distances measure(const marrow::RigidTransform& world_from_model, const marrow::OutlineProjector& projector,
                   const marrow::View& view, const marrow::EdgeMap& edges, const Options& options) {
   const EdgeSearch search(edges);
   const double least_cosine = std::cos(marrow::radians(options.angle_deg));
@@ -132,7 +132,7 @@ void report(const std::string& prefix, const Distances& distances, marrow::Metri
   add("spread_px", quantile(spread_px, 0.5), "px");
 }
 
-marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Projector& projector,
+marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::OutlineProjector& projector,
                                  const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
                                  const Options& options, marrow::Context& context) {
   marrow::check_rigid(pose.world_from_model, "pose");

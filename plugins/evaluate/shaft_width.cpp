@@ -86,5 +86,6 @@ MARROW_PLUGIN(plugin) {
            "isocentre; a warning where it is no shaft's diameter")
       .option("width_mm", &Options::width_mm,
               "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, by level")
-      .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations");
+      .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations")
+      .relation(marrow::same_length({"width_mm", "width_deviation_mm"}));
 }

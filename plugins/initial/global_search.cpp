@@ -87,7 +87,9 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
       .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .relation(marrow::same_length({"contour_spacing_px", "reach_px"}))
       .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared")
+      .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost for each search of a level",
               marrow::at_least(1));
 }

@@ -138,6 +138,7 @@ std::shared_ptr<const marrow::Optimizer> cma_es(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.cma_es", cma_es)
       .summary("Covariance matrix adaptation (Hansen and Ostermeier, Evolutionary Computation 2001; Hansen 2016)")
+      .trait("needs_start")
       .out("optimizer", "minimiser without derivatives, for rugged functions")
       .option("population", &Options::population, "points in a generation; 0: 4 + 3 log n", marrow::at_least(0),
               marrow::at_most(10000))

@@ -57,6 +57,7 @@ std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.grid", grid)
       .summary("All points of a grid, then of a finer one about the best")
+      .trait("needs_start")
       .out("optimizer", "minimiser without derivatives")
       .option("points", &Options::points, "along each coordinate, odd", marrow::at_least(3), marrow::at_most(101));
 }

@@ -129,5 +129,6 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "Quasi-Newton steps by the gradients of the last eight (L-BFGS: Liu and Nocedal 1989), as the cost tells "
           "them or by differences")
+      .trait("needs_start")
       .out("optimizer", "minimiser for smooth functions");
 }

@@ -125,5 +125,6 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "Damped Gauss-Newton steps where the cost knows its derivatives, damped Newton steps by differences "
           "elsewhere (Marquardt 1963)")
+      .trait("needs_start")
       .out("optimizer", "minimiser for smooth functions");
 }

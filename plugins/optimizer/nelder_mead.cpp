@@ -19,5 +19,6 @@ std::shared_ptr<const marrow::Optimizer> nelder_mead() { return std::make_shared
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.nelder_mead", nelder_mead)
       .summary("Downhill simplex (Nelder and Mead, Computer Journal 1965; NLopt)")
+      .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

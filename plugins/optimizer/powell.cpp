@@ -102,5 +102,6 @@ std::shared_ptr<const marrow::Optimizer> powell() { return std::make_shared<Powe
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.powell", powell)
       .summary("Line searches along directions that become conjugate (Powell, Computer Journal 1964)")
+      .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

@@ -36,8 +36,9 @@ class JosephProjector : public RayProjector {
   const Bricks bricks_;
 };
 
-std::shared_ptr<const marrow::Projector> joseph(const marrow::Volume& volume, const marrow::SignedField* field,
-                                                const AttenuationOptions& options) {
+std::shared_ptr<const marrow::RadiographProjector> joseph(const marrow::Volume& volume,
+                                                          const marrow::SignedField* field,
+                                                          const AttenuationOptions& options) {
   return std::make_shared<JosephProjector>(attenuation_of(volume, field, options));
 }
 

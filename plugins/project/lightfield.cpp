@@ -168,9 +168,10 @@ class LightField : public marrow::rays::RayProjector {
   std::vector<Field> fields_;
 };
 
-std::shared_ptr<const marrow::Projector> lightfield(const marrow::Volume& volume, const marrow::SignedField* field,
-                                                    const marrow::List<marrow::View>& views, marrow::Context& context,
-                                                    const Options& options) {
+std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volume& volume,
+                                                              const marrow::SignedField* field,
+                                                              const marrow::List<marrow::View>& views,
+                                                              marrow::Context& context, const Options& options) {
   if (views.size() == 0)
     throw marrow::Error("there is no view, so it is not known about which directions to integrate; wire 'views'");
   for (const marrow::View& view : views) check_camera(view.camera, "view '" + view.name + "'");

@@ -59,8 +59,9 @@ class RayCastingProjector : public RayProjector {
   const double step_mm_;
 };
 
-std::shared_ptr<const marrow::Projector> ray_casting(const marrow::Volume& volume, const marrow::SignedField* field,
-                                                     const Options& options) {
+std::shared_ptr<const marrow::RadiographProjector> ray_casting(const marrow::Volume& volume,
+                                                               const marrow::SignedField* field,
+                                                               const Options& options) {
   return std::make_shared<RayCastingProjector>(attenuation_of(volume, field, options), options.step_mm);
 }
 

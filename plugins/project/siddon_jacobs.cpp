@@ -52,8 +52,9 @@ class SiddonProjector : public RayProjector {
   }
 };
 
-std::shared_ptr<const marrow::Projector> siddon_jacobs(const marrow::Volume& volume, const marrow::SignedField* field,
-                                                       const AttenuationOptions& options) {
+std::shared_ptr<const marrow::RadiographProjector> siddon_jacobs(const marrow::Volume& volume,
+                                                                 const marrow::SignedField* field,
+                                                                 const AttenuationOptions& options) {
   return std::make_shared<SiddonProjector>(attenuation_of(volume, field, options));
 }
 

@@ -57,7 +57,7 @@ cv::Point2d chain_normal(const std::vector<cv::Point>& chain, std::size_t i, dou
   return length > 0 ? cv::Point2d(tangent.y, -tangent.x) * (sense / length) : cv::Point2d(0, 0);
 }
 
-class SilhouetteProjector : public marrow::Projector {
+class SilhouetteProjector : public marrow::OutlineProjector {
  public:
   SilhouetteProjector(const marrow::Mesh& mesh, std::vector<char> at_border)
       : mesh_(mesh), at_border_(std::move(at_border)) {}
@@ -126,8 +126,8 @@ class SilhouetteProjector : public marrow::Projector {
   const std::vector<char> at_border_;
 };
 
-std::shared_ptr<const marrow::Projector> silhouette(const marrow::Mesh& mesh, const marrow::Volume* volume,
-                                                    const Options& options) {
+std::shared_ptr<const marrow::OutlineProjector> silhouette(const marrow::Mesh& mesh, const marrow::Volume* volume,
+                                                           const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
   return std::make_shared<SilhouetteProjector>(
       mesh, marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels));

@@ -277,7 +277,7 @@ class OuterOutline {
   std::vector<marrow::OutlinePoint> points_;
 };
 
-class SilhouetteEdges : public marrow::Projector {
+class SilhouetteEdges : public marrow::OutlineProjector {
  public:
   SilhouetteEdges(SurfacePatches surface, SurfacePatches coarse)
       : surface_(std::move(surface)), coarse_(std::move(coarse)) {}
@@ -297,8 +297,8 @@ class SilhouetteEdges : public marrow::Projector {
   SurfacePatches surface_, coarse_;
 };
 
-std::shared_ptr<const marrow::Projector> silhouette_edges(const marrow::Mesh& mesh, const marrow::Volume* volume,
-                                                          const Options& options) {
+std::shared_ptr<const marrow::OutlineProjector> silhouette_edges(const marrow::Mesh& mesh, const marrow::Volume* volume,
+                                                                 const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
   constexpr std::size_t kWorthIt = 20000;  // triangles
   const std::vector<char> at_border = marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels);

@@ -14,12 +14,9 @@ struct Options {
 
 marrow::List<marrow::Image> images(const Options& options) {
   if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
-  if (!options.names.empty() && options.names.size() != options.paths.size())
-    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, paths " +
-                        std::to_string(options.paths.size()) + " files; give one name per image, or none");
   marrow::List<marrow::Image> images;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
-    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names[i];
+    const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
     marrow::check_item_name("view", name);
     if (images.find(name)) throw marrow::Error("names: two images are named '" + name + "'; name each differently");
     images.add(name, marrow::files::read_image_file(options.paths[i], options.frame));
@@ -35,6 +32,7 @@ MARROW_PLUGIN(plugin) {
       .out("images", "grey values, as read.image gives them", marrow::over("view"))
       .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
       .option("names", &Options::names, "one name per image; without names, the files' names without extension")
+      .relation(marrow::as_many_or_none("names", "paths"))
       .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
               marrow::at_least(0));
 }

@@ -14,9 +14,8 @@ struct Options {
 };
 
 marrow::View view(const marrow::Camera* camera, const Options& options) {
-  if (bool(camera) == !options.camera.empty())
-    throw marrow::Error("view '" + options.name +
-                        "': give its camera either as the option (a file) or as the input (a value)");
+  if (!camera && options.camera.empty())
+    throw marrow::Error("view '" + options.name + "': the node that is wired to 'camera' gave none");
   return marrow::files::read_view_files(
       {options.name, options.image, camera, options.camera, options.calibration, options.frame});
 }
@@ -31,6 +30,7 @@ MARROW_PLUGIN(plugin) {
       .option("name", &Options::name, "name of the view")
       .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
       .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)")
+      .relation(marrow::exactly_one({"in.camera", "camera"}))
       .option("calibration", &Options::calibration,
               "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image")
       .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",

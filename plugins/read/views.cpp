@@ -14,19 +14,11 @@ struct Options {
   int frame = 0;
 };
 
-void check_options(const marrow::List<marrow::Camera>* cameras, const Options& options) {
-  if (options.names.empty()) throw marrow::Error("names: no view is named; name at least one");
-  if (options.images.size() != options.names.size())
-    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, images " +
-                        std::to_string(options.images.size()) + " files; give one image per view");
-  for (std::size_t i = 0; i < options.names.size(); ++i)
-    if (std::count(options.names.begin(), options.names.end(), options.names[i]) > 1)
-      throw marrow::Error("names: two views are named '" + options.names[i] + "'");
-  if (bool(cameras) == !options.cameras.empty())
-    throw marrow::Error("give the cameras either as the option (files) or as the input (values)");
-  if (!cameras && options.cameras.size() != options.names.size())
-    throw marrow::Error("names has " + std::to_string(options.names.size()) + " views, cameras " +
-                        std::to_string(options.cameras.size()) + " files; give one camera per view");
+void check_names(const std::vector<std::string>& names) {
+  if (names.empty()) throw marrow::Error("names: no view is named; name at least one");
+  for (const std::string& name : names)
+    if (std::count(names.begin(), names.end(), name) > 1)
+      throw marrow::Error("names: two views are named '" + name + "'");
 }
 
 const marrow::Camera& camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
@@ -37,13 +29,15 @@ const marrow::Camera& camera_of(const std::string& name, const marrow::List<marr
 }
 
 marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
-  check_options(cameras, options);
+  check_names(options.names);
+  if (!cameras && options.cameras.empty()) throw marrow::Error("the node that is wired to 'camera' gave none");
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     const std::string& name = options.names[i];
-    views.add(name, marrow::files::read_view_files(
-                        {name, options.images[i], cameras ? &camera_of(name, *cameras) : nullptr,
-                         cameras ? std::filesystem::path() : options.cameras[i], options.calibration, options.frame}));
+    views.add(name,
+              marrow::files::read_view_files(
+                  {name, options.images.at(i), cameras ? &camera_of(name, *cameras) : nullptr,
+                   cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame}));
   }
   return views;
 }
@@ -57,7 +51,10 @@ MARROW_PLUGIN(plugin) {
       .out("views", "the views", marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
       .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
+      .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view")
+      .relation(marrow::exactly_one({"in.camera", "cameras"}))
+      .relation(marrow::as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,
               "calibration file of the device that took all views: its camera matrix replaces the cameras', its "
               "distortion is "

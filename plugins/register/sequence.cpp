@@ -29,8 +29,7 @@ void check_finer(const Options& options) {
         std::pair(&options.finer_step_axial_deg, "finer_step_axial_deg"),
         std::pair(&options.finer_step_mm, "finer_step_mm"),
         std::pair(&options.finer_step_tolerance, "finer_step_tolerance")})
-    marrow::search::check_level_list(*values, name, options.finer_pixel_step.size(), "finer_pixel_step",
-                                     "give all options that begin with finer_ as many, one for each level");
+    marrow::search::check_level_list(*values, name);
 }
 
 /// A sentence where the second cost leads far from what the first one found: then one of them is wrong.
@@ -63,8 +62,8 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   std::shared_ptr<const marrow::Cost> level;
   const double share = 1.0 / double(options.finer_pixel_step.size());
   for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
-    const marrow::search::Steps steps{options.finer_step_deg[i], options.finer_step_axial_deg[i],
-                                      options.finer_step_mm[i], options.finer_step_tolerance[i]};
+    const marrow::search::Steps steps{options.finer_step_deg.at(i), options.finer_step_axial_deg.at(i),
+                                      options.finer_step_mm.at(i), options.finer_step_tolerance.at(i)};
     level = finer_cost.at_level(
         {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
     search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
@@ -100,6 +99,8 @@ MARROW_PLUGIN(plugin) {
       .option("finer_step_mm", &Options::finer_step_mm, "per level: first step of the translations")
       .option("finer_step_tolerance", &Options::finer_step_tolerance,
               "per level: it ends when steps fall below this part of its first step")
+      .relation(marrow::same_length(
+          {"finer_pixel_step", "finer_step_deg", "finer_step_axial_deg", "finer_step_mm", "finer_step_tolerance"}))
       .option("most_apart_deg", &Options::most_apart_deg,
               "rotation between the results of the two costs that gives a warning", marrow::at_least(0))
       .option("most_apart_mm", &Options::most_apart_mm, "shift between them that gives a warning", marrow::at_least(0));

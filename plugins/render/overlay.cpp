@@ -25,8 +25,9 @@ struct Layer {
   std::vector<marrow::OutlinePoint> outline;
 };
 
-Layer make_layer(const std::string& text, const cv::Scalar& colour, int thickness, const marrow::Projector& projector,
-                 const marrow::View& view, const marrow::RigidTransform& pose, const Options& options) {
+Layer make_layer(const std::string& text, const cv::Scalar& colour, int thickness,
+                 const marrow::OutlineProjector& projector, const marrow::View& view,
+                 const marrow::RigidTransform& pose, const Options& options) {
   marrow::check_rigid(pose, "pose '" + text + "'");
   Layer layer{text, colour, thickness, projector.outline(view.camera, pose, options.spacing_px)};
   if (layer.outline.empty()) layer.text += ": outside the image";
@@ -71,7 +72,7 @@ cv::Mat draw(const marrow::View& view, const std::string& title, const std::vect
   return panel.pixels;
 }
 
-marrow::Picture overlay(const marrow::Pose& pose, const marrow::Projector& projector, const marrow::View& view,
+marrow::Picture overlay(const marrow::Pose& pose, const marrow::OutlineProjector& projector, const marrow::View& view,
                         const marrow::Pose* start, const marrow::Truth* truth, const marrow::EdgeMap* edges,
                         const marrow::ShaftLines* lines, const Options& options) {
   marrow::check_view(view);

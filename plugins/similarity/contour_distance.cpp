@@ -47,7 +47,7 @@ struct Matches {
 
 /// What does not depend on the level: made once, shared by all.
 struct Scene {
-  const marrow::Projector* projector;
+  const marrow::OutlineProjector* projector;
   marrow::List<marrow::View> views;
   std::vector<marrow::match::NearestEdges> edges;
   Options options;
@@ -275,11 +275,11 @@ class ContourDistance : public marrow::Cost {
   const marrow::match::EdgeLoss loss_;
 };
 
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjector& projector,
                                                      const marrow::List<marrow::View>& views,
                                                      const marrow::List<marrow::EdgeMap>& edges,
                                                      const marrow::List<marrow::Pose>* others,
-                                                     const marrow::List<marrow::Projector>* other_projectors,
+                                                     const marrow::List<marrow::OutlineProjector>* other_projectors,
                                                      const Options& options) {
   marrow::match::check_edges(views, edges);
   marrow::match::check_weights(options.weights, views.size());
@@ -309,6 +309,7 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "Mean distance from the points of the projected outline to the nearest edges of like direction, over all "
           "views")
+      .trait("derivatives")
       .in("projector", "draws the outline of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))

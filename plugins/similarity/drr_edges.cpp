@@ -72,7 +72,7 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
 
 /// What does not depend on the level: made once, shared by all.
 struct Scene {
-  const marrow::Projector* projector;
+  const marrow::RadiographProjector* projector;
   marrow::List<marrow::View> views;
   std::vector<marrow::match::NearestEdges> edges;
   Options options;
@@ -142,15 +142,16 @@ class DrrEdges : public marrow::Cost {
   const marrow::match::EdgeLoss loss_;
 };
 
-std::shared_ptr<const marrow::Cost> drr_edges(const marrow::Projector& projector,
+std::shared_ptr<const marrow::Cost> drr_edges(const marrow::RadiographProjector& projector,
                                               const marrow::List<marrow::View>& views,
                                               const marrow::List<marrow::EdgeMap>& edges,
+                                              const marrow::OutlineProjector* outline,
                                               const marrow::List<marrow::Pose>* others,
-                                              const marrow::List<marrow::Projector>* other_projectors,
+                                              const marrow::List<marrow::OutlineProjector>* other_projectors,
                                               const Options& options) {
   marrow::match::check_edges(views, edges);
   marrow::match::check_weights(options.weights, views.size());
-  const auto other = marrow::match::others_of(&projector, others, other_projectors);
+  const auto other = marrow::match::others_of(outline, others, other_projectors, "outline");
   const marrow::List<marrow::EdgeMap> own = marrow::match::without_outlines(
       views, edges, other, marrow::match::kOthersReach_px, options.direction_tolerance_deg);
   auto scene = std::make_shared<Scene>();
@@ -172,6 +173,7 @@ MARROW_PLUGIN(plugin) {
       .in("projector", "makes radiographs of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
+      .in("outline", "draws this fragment's outline: tells it from the others")
       .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
       .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
       .out("cost", "mean distance [px]")

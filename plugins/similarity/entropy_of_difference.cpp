@@ -14,7 +14,8 @@ struct Options : marrow::match::IntensityOptions {
 
 /// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part
 /// of the image's own range, and go as far below it, where the difference may lie.
-marrow::match::Measure measure_of(const Patch& whole, int bins) {
+marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
+  const int bins = options.bins;
   marrow::match::Bins within = bins_of(whole.seen, whole.counts, bins);
   if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
   within.low -= (bins + 0.5) / within.per_unit;  // the brightest, often the background, in the middle of its bin
@@ -37,23 +38,17 @@ marrow::match::Measure measure_of(const Patch& whole, int bins) {
   };
 }
 
-std::shared_ptr<const marrow::Cost> entropy_of_difference(const marrow::Projector& projector,
-                                                          const marrow::List<marrow::View>& views,
-                                                          const marrow::List<marrow::Pose>* others,
-                                                          const marrow::List<marrow::Projector>* other_projectors,
-                                                          const Options& options) {
-  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2,
-                                       [bins = options.bins](const Patch& whole) { return measure_of(whole, bins); });
-}
+constexpr auto entropy_of_difference = marrow::match::intensity_node<measure_of, Options>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.entropy_of_difference", entropy_of_difference);
   node.summary(
-      "Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med "
-      "Imaging 1998)");
-  marrow::match::declare<decltype(node), Options>(node);
+          "Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med "
+          "Imaging 1998)")
+      .trait("unmoved_by_gain");
+  marrow::match::declare<Options>(node);
   node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4),
               marrow::at_most(1024));
 }

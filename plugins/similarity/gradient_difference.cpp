@@ -7,7 +7,6 @@
 
 namespace {
 
-using marrow::match::IntensityOptions;
 using marrow::match::Patch;
 
 /// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference
@@ -39,20 +38,15 @@ marrow::match::Measure measure_of(const Patch& whole) {
   };
 }
 
-std::shared_ptr<const marrow::Cost> gradient_difference(const marrow::Projector& projector,
-                                                        const marrow::List<marrow::View>& views,
-                                                        const marrow::List<marrow::Pose>* others,
-                                                        const marrow::List<marrow::Projector>* other_projectors,
-                                                        const IntensityOptions& options) {
-  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2, measure_of);
-}
+constexpr auto gradient_difference = marrow::match::intensity_node<measure_of>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_difference", gradient_difference);
   node.summary(
-      "Gradients that the difference image has left of the image's (gradient difference), which thin bright lines "
-      "hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)");
-  marrow::match::declare<decltype(node), IntensityOptions>(node);
+          "Gradients that the difference image has left of the image's (gradient difference), which thin bright lines "
+          "hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)")
+      .trait("unmoved_by_gain");
+  marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

@@ -37,20 +37,15 @@ double value(const Patch& patch) {
   return used > 0 ? 1 - sum / std::max(used, 0.1 * all) : 1;
 }
 
-std::shared_ptr<const marrow::Cost> gradient_orientation(const marrow::Projector& projector,
-                                                         const marrow::List<marrow::View>& views,
-                                                         const marrow::List<marrow::Pose>* others,
-                                                         const marrow::List<marrow::Projector>* other_projectors,
-                                                         const marrow::match::IntensityOptions& options) {
-  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 1, value);
-}
+constexpr auto gradient_orientation = marrow::match::intensity_node<value, marrow::match::IntensityOptions, 1>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_orientation", gradient_orientation);
   node.summary(
-      "How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for its "
-      "logarithm)");
-  marrow::match::declare<decltype(node), marrow::match::IntensityOptions>(node);
+          "How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for "
+          "its logarithm)")
+      .trait("unmoved_by_gain");
+  marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

@@ -189,12 +189,11 @@ class GradientProjection : public marrow::Cost {
   std::vector<GradientImage> images_;
 };
 
-std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh, const marrow::Volume& volume,
-                                                        const marrow::List<marrow::View>& views,
-                                                        const marrow::Projector* projector,
-                                                        const marrow::List<marrow::Pose>* others,
-                                                        const marrow::List<marrow::Projector>* other_projectors,
-                                                        const Options& options) {
+std::shared_ptr<const marrow::Cost> gradient_projection(
+    const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::List<marrow::View>& views,
+    const marrow::RadiographProjector* projector, const marrow::List<marrow::Pose>* others,
+    const marrow::List<marrow::RadiographProjector>* other_projectors,
+    const marrow::List<marrow::OutlineProjector>* other_outlines, const Options& options) {
   marrow::check_mesh(mesh, "the mesh of the bone");
   marrow::check_volume(volume, "the volume that the mesh was made from");
   if (volume.grid.frame != mesh.frame)
@@ -202,8 +201,8 @@ std::shared_ptr<const marrow::Cost> gradient_projection(const marrow::Mesh& mesh
                         "'; give the volume that the mesh was made from");
   marrow::match::check_views(views);
   marrow::match::check_weights(options.weights, views.size());
-  const marrow::List<marrow::View> own =
-      marrow::match::without_shadows(views, marrow::match::others_of(projector, others, other_projectors));
+  const marrow::List<marrow::View> own = marrow::match::without_shadows(
+      views, marrow::match::shadows_of(projector, others, other_projectors, other_outlines));
   const auto scene = std::make_shared<GradientProjection::Scene>(
       GradientProjection::Scene{own, points_of(volume, mesh, options.points), options});
   return std::make_shared<GradientProjection>(scene, options.blur_px, 1);
@@ -216,13 +215,16 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "1 - likeness of the images' gradients, projected back, and the CT's where rays touch the bone (Tomazevic et "
           "al.; Livyatan et al., IEEE TMI 2003)")
+      .trait("unmoved_by_gain")
       .in("mesh", "surface of the bone")
       .in("volume", "CT that the surface was made from")
       .in("views", "views with their cameras and masks", marrow::over("view"))
-      .in("projector", "draws this fragment: tells it from others")
+      .in("projector", "makes radiographs of this fragment: tells it from the others")
       .in("others", "where other fragments are, whose shadows are left out", marrow::over("fragment"))
       .in("other_projectors", "draw them, and maybe this one", marrow::over("fragment"))
-      .out("cost", "how badly the gradients agree, 0 to 1; unmoved by gain and offset of the line integrals")
+      .in("other_outlines", "draw other bodies that are known as surfaces only; their shadows are left out",
+          marrow::over("fragment"))
+      .out("cost", "how badly the gradients agree, 0 to 1")
       .option("points", &Options::points, "spread over the surface, of which those near its outlines count",
               marrow::at_least(100), marrow::at_most(1000000))
       .option("blur_px", &Options::blur_px, "smoothing of the images: standard deviation of a Gaussian",

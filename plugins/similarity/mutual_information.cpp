@@ -14,7 +14,8 @@ struct Options : marrow::match::IntensityOptions {
 };
 
 /// 2 - (H(a) + H(b)) / H(a, b): 0 where one tells the other, 1 where neither tells anything of the other.
-double value(const Patch& patch, int bins) {
+double value(const Patch& patch, const Options& options) {
+  const int bins = options.bins;
   const auto a = bins_of(patch.rendered, patch.counts, bins), b = bins_of(patch.seen, patch.counts, bins);
   std::vector<double> joint(std::size_t(bins) * std::size_t(bins)), of_a(static_cast<std::size_t>(bins)),
       of_b(static_cast<std::size_t>(bins));
@@ -30,22 +31,16 @@ double value(const Patch& patch, int bins) {
   return rendered > 0 && seen > 0 ? 2 - (rendered + seen) / together : 1;
 }
 
-std::shared_ptr<const marrow::Cost> mutual_information(const marrow::Projector& projector,
-                                                       const marrow::List<marrow::View>& views,
-                                                       const marrow::List<marrow::Pose>* others,
-                                                       const marrow::List<marrow::Projector>* other_projectors,
-                                                       const Options& options) {
-  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 1,
-                                       [bins = options.bins](const Patch& patch) { return value(patch, bins); });
-}
+constexpr auto mutual_information = marrow::match::intensity_node<value, Options, 1>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.mutual_information", mutual_information);
   node.summary(
-      "2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et al. "
-      "1998)");
-  marrow::match::declare<decltype(node), Options>(node);
+          "2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et "
+          "al. 1998)")
+      .trait("unmoved_by_gain");
+  marrow::match::declare<Options>(node);
   node.option("bins", &Options::bins, "of the histograms", marrow::at_least(4), marrow::at_most(256));
 }

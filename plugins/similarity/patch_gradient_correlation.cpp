@@ -7,25 +7,21 @@ using marrow::match::mean_patch_correlation;
 using marrow::match::Patch;
 using marrow::match::PatchOptions;
 
-std::shared_ptr<const marrow::Cost> patch_gradient_correlation(const marrow::Projector& projector,
-                                                               const marrow::List<marrow::View>& views,
-                                                               const marrow::List<marrow::Pose>* others,
-                                                               const marrow::List<marrow::Projector>* other_projectors,
-                                                               const PatchOptions& options) {
-  return marrow::match::intensity_cost(
-      projector, views, others, other_projectors, options, 2, [side = options.patch_pixels](const Patch& patch) {
-        const marrow::match::Gradients g = marrow::match::gradients_of(patch);
-        return 1 - 0.5 * (mean_patch_correlation(patch, g.rendered_u, g.seen_u, g.counts, side) +
-                          mean_patch_correlation(patch, g.rendered_v, g.seen_v, g.counts, side));
-      });
+double value(const Patch& patch, const PatchOptions& options) {
+  const marrow::match::Gradients g = marrow::match::gradients_of(patch);
+  return 1 - 0.5 * (mean_patch_correlation(patch, g.rendered_u, g.seen_u, g.counts, options.patch_pixels) +
+                    mean_patch_correlation(patch, g.rendered_v, g.seen_v, g.counts, options.patch_pixels));
 }
+
+constexpr auto patch_gradient_correlation = marrow::match::intensity_node<value, PatchOptions>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.patch_gradient_correlation", patch_gradient_correlation);
   node.summary(
-      "1 - correlation of gradients within small squares, weighted by the radiograph's (Grupp et al., IEEE Trans "
-      "Biomed Eng 2020)");
+          "1 - correlation of gradients within small squares, weighted by the radiograph's (Grupp et al., IEEE Trans "
+          "Biomed Eng 2020)")
+      .trait("unmoved_by_gain");
   marrow::match::declare_patches(node);
 }

@@ -51,23 +51,17 @@ marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
   };
 }
 
-std::shared_ptr<const marrow::Cost> pattern_intensity(const marrow::Projector& projector,
-                                                      const marrow::List<marrow::View>& views,
-                                                      const marrow::List<marrow::Pose>* others,
-                                                      const marrow::List<marrow::Projector>* other_projectors,
-                                                      const Options& options) {
-  return marrow::match::intensity_cost(projector, views, others, other_projectors, options, 2,
-                                       [options](const Patch& whole) { return measure_of(whole, options); });
-}
+constexpr auto pattern_intensity = marrow::match::intensity_node<measure_of, Options>;
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.pattern_intensity", pattern_intensity);
   node.summary(
-      "Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans Inf "
-      "Technol Biomed 1997; Penney et al. 1998)");
-  marrow::match::declare<decltype(node), Options>(node);
+          "Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans "
+          "Inf Technol Biomed 1997; Penney et al. 1998)")
+      .trait("unmoved_by_gain");
+  marrow::match::declare<Options>(node);
   node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1),
               marrow::at_most(20))
       .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image",

@@ -269,9 +269,9 @@ std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges)
 std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& field,
                                                    const marrow::List<marrow::View>& views,
                                                    const marrow::List<marrow::EdgeMap>& edges,
-                                                   const marrow::Projector* projector,
+                                                   const marrow::OutlineProjector* projector,
                                                    const marrow::List<marrow::Pose>* others,
-                                                   const marrow::List<marrow::Projector>* other_projectors,
+                                                   const marrow::List<marrow::OutlineProjector>* other_projectors,
                                                    const Options& options) {
   marrow::match::check_edges(views, edges);
   marrow::match::check_weights(options.weights, views.size());
@@ -297,10 +297,11 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "How far the rays through the images' edges pass the surface (Lavallee and Szeliski, IEEE PAMI 1995), with "
           "derivatives")
+      .trait("derivatives")
       .in("field", "signed distance to the surface")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
-      .in("projector", "draws this fragment: tells it from others")
+      .in("projector", "draws this fragment's outline: tells it from the others")
       .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
       .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
       .out("cost", "mean of Tukey's biweight of the distances [mm^2]")

@@ -38,10 +38,6 @@ Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
 }
 
 Bone surface(const SurfaceOptions& options) {
-  if (options.fill_at.size() != options.fill_fraction.size() || options.fill_at.empty())
-    throw Error("simulate.surface: fill_at has " + std::to_string(options.fill_at.size()) +
-                " positions, but fill_fraction has " + std::to_string(options.fill_fraction.size()) +
-                " values; give as many of each");
   Bone bone;
   bone.outer = placed(options.outer, options);
   if (!options.inner.empty()) bone.inner = placed(options.inner, options);
@@ -82,6 +78,7 @@ MARROW_PLUGIN(plugin) {
               unit(""))
       .option("fill_fraction", &SurfaceOptions::fill_fraction,
               "share of bone inside the inner surface at these heights; the rest is marrow", unit(""))
+      .relation(same_length({"fill_at", "fill_fraction"}))
       .option("isocentre_from_distal_end_mm", &SurfaceOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
       .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none",

@@ -50,8 +50,8 @@ Camera camera_of(int pixels) {
   return carm_camera(arm, world_from_camera_rotation(0, 0));
 }
 
-std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std::string& name, const Volume& volume,
-                                           double step_mm = 0) {
+std::shared_ptr<const RadiographProjector> projector(const Catalogue& catalogue, const std::string& name,
+                                                     const Volume& volume, double step_mm = 0) {
   const NodeDefinition& node = catalogue.load(name);
   std::vector<Value> inputs;
   for (const PortInfo& port : node.info.inputs) {
@@ -73,7 +73,7 @@ std::shared_ptr<const Projector> projector(const Catalogue& catalogue, const std
   Context::Hooks hooks;
   hooks.log = [](std::string_view message, bool) { std::printf("%.*s\n", int(message.size()), message.data()); };
   Context context(std::move(hooks));
-  return std::static_pointer_cast<const Projector>(node.call(inputs, options.get(), context).at(0).data);
+  return std::static_pointer_cast<const RadiographProjector>(node.call(inputs, options.get(), context).at(0).data);
 }
 
 double median_ms(const std::function<void()>& work) {
@@ -116,7 +116,7 @@ double rms(const std::vector<float>& a, const std::vector<float>& b) {
 }
 
 /// Looked up, of a bone that is turned by a few degrees against what was kept; `fine` draws the truth.
-void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const Projector& fine,
+void lookup(const Catalogue& catalogue, const Volume& volume, const std::string& what, const RadiographProjector& fine,
             const char* folder) {
   const auto start = std::chrono::steady_clock::now();
   const std::clock_t processor = std::clock();

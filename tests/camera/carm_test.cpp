@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "shipped.hpp"
+
 namespace {
 
 using Eigen::Vector2d;
@@ -105,17 +107,15 @@ std::string message(const Options& options) {
   return "";
 }
 
-TEST(CarmCamera, DiagnosesWrongOptions) {
+TEST(CarmCamera, DeclaresAnglesForEachViewAndTheDetectorBehindTheIsocentre) {
+  EXPECT_TRUE(shipped::declares("camera.carm", marrow::same_length({"names", "alpha_deg", "beta_deg"})));
+  EXPECT_TRUE(shipped::declares("camera.carm", marrow::below("source_to_isocentre_mm", "source_to_detector_mm")));
+}
+
+TEST(CarmCamera, DiagnosesWrongNames) {
   Options options;
-  options.alpha_deg = {0};
-  EXPECT_EQ(message(options), "names has 2 views, alpha_deg 1 and beta_deg 2 angles; give one of each per view");
-  options = {};
   options.names = {"a", "a"};
   EXPECT_EQ(message(options), "names: two views have the same name");
-  options = {};
-  options.source_to_isocentre_mm = 1200;
-  EXPECT_NE(message(options).find("must be less than source_to_detector_mm"), std::string::npos);
-  options = {};
   options.names.clear();
   EXPECT_EQ(message(options), "names: no view is named; name at least one");
 }

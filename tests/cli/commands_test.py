@@ -226,6 +226,28 @@ class Commands(Case):
         self.assertEqual(report.returncode, 0, report.stderr)
         self.assertIn("2 nodes were not run because of it", (self.scratch / "out" / "report.html").read_text())
 
+    def test_options_that_do_not_go_together_are_a_fault_of_the_file(self):
+        cameras = "marrow: 1\nnodes:\n  c: {uses: camera.carm, with: {beta_deg: [0, 60, 90]}}\noutputs: {cameras: c}\n"
+        path = self.write("p.yaml", cameras)
+        for command, *arguments in (["check"], ["run", "--out", self.scratch / "out"]):
+            result = marrow(command, path, *arguments)
+            self.assertEqual(result.returncode, 2, command)
+            self.assertIn(
+                "p.yaml:3:33: error: options 'names' (2), 'alpha_deg' (2) and 'beta_deg' (3) of camera.carm must have"
+                " the same length\n    c: {uses: camera.carm, with: {beta_deg: [0, 60, 90]}}\n",
+                result.stderr,
+            )
+        self.assertFalse((self.scratch / "out").exists())
+        mended = ["check", path, "--set", "c.beta_deg=[0, 60]"]
+        self.assertEqual(marrow(*mended).returncode, 0)
+        result = marrow(*mended, "--set", "c.source_to_isocentre_mm=1000")
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(
+            "option 'source_to_isocentre_mm' of camera.carm is 1000, which is not below option"
+            " 'source_to_detector_mm' (1000)",
+            result.stderr,
+        )
+
     def test_two_slow_nodes_overlap(self):
         path = self.write("p.yaml", WORK)
         # A busy machine, or the one that it is a guest of, may put both threads on one core, or let one of them wait.

@@ -11,7 +11,7 @@ PIPELINE = """marrow: 1
 inputs: {case: {type: path}}
 nodes:
   s: {uses: test.work, with: {value: 0, path: $case}}
-  r: {uses: read.test_number, with: {path: other.txt}}
+  r: {uses: parse.test_number, with: {path: other.txt}}
 outputs: {number: r, work: s}
 """
 HEAD = """experiment: 1
@@ -120,7 +120,7 @@ class Changes(Case):
         self.write(
             "s.yaml",
             (
-                "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
+                "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: bone}}\n  s: {uses: test.sides}\n"
                 "  sum: {uses: test.add, in: {a: s.both, b: r}}\noutputs: {case: sum}\n"
             ),
         )
@@ -222,7 +222,7 @@ class Changes(Case):
             library.with_suffix(".json").unlink()  # what it holds is asked anew
 
         said = self.changed_meanwhile(rebuild)
-        self.assertIn("the plugin of read.test_number was changed while the comparison ran", said)
+        self.assertIn("the plugin of parse.test_number was changed while the comparison ran", said)
         self.assertEqual({row for cell, row in self.figures("out", "status").items() if "/1/" not in cell}, {"failed"})
         self.assertIn(
             "depends on changed while the comparison ran; run it again", self.figures("out", "reason")["a/2/0"]

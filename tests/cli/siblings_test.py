@@ -22,6 +22,17 @@ from cases import (
 from marrow_cli import Case, main, marrow
 
 
+# It runs, but at this case's coarse voxels it takes part of the other fragment, as the chapter says: the shaft of that
+# model is not where the images show it, and the start is refused.
+WRONG_HERE = {"segment.region_growing"}
+# They run, but end elsewhere here.
+NOT_AS_EXACT = {
+    "evaluate.mtre",  # it has other figures
+    "optimizer.direct",  # it looks everywhere: a few hundred evaluations in six dimensions are not enough
+    "optimizer.grid",
+}
+
+
 class Siblings(Case):
     @classmethod
     def setUpClass(cls):
@@ -102,21 +113,16 @@ class Siblings(Case):
         self.check_errors(out, "distal", "by intensity")
 
     def test_every_node_replaced_by_each_sibling(self):
-        nodes = {node["name"]: node for node in json.loads(marrow("list", "--json").stdout)}
         replaced = set()
-        for name, node in yaml.safe_load(FEMUR.read_text())["nodes"].items():
-            for other in siblings(nodes, node):
-                if other == "segment.region_growing":
-                    continue  # at this case's coarse voxels it takes part of the other fragment, as the chapter says
-                if other == "evaluate.mtre":
-                    continue  # it has other figures
-                if other in ("optimizer.direct", "optimizer.grid"):
-                    continue  # they look everywhere: a few hundred evaluations in six dimensions are not enough
-                if other.startswith(("project.", "similarity.")) and "radiograph" in json.dumps(nodes[other]).lower():
-                    continue  # outlines and radiographs do not go together: test_by_intensity
+        for name in yaml.safe_load(FEMUR.read_text())["nodes"]:
+            for other in fitting(FEMUR, name):
+                if other in WRONG_HERE:
+                    continue
                 setting = "%s.uses=%s" % (name, other)
                 with self.subTest(setting):
-                    self.check_errors(self.run_femur(self.case, "--set", setting, out=setting), "distal", setting)
+                    out = self.run_femur(self.case, "--set", setting, out=setting)
+                    if other not in NOT_AS_EXACT:
+                        self.check_errors(out, "distal", setting)
                 replaced.add(other)
         self.assertLessEqual(
             {
@@ -148,21 +154,11 @@ class Siblings(Case):
         self.assertEqual(poses, contents(other / "outputs" / "pose"))
 
 
-def siblings(nodes, used):
-    """The nodes of the same kind that give the same outputs and are given all inputs that they need."""
-
-    def ports(name):
-        return [(port["name"], port["type"], port["axis"]) for port in nodes[name]["outputs"]]
-
-    for name, node in nodes.items():
-        if (
-            name == used["uses"]
-            or name.split(".")[0] != used["uses"].split(".")[0]
-            or ports(name) != ports(used["uses"])
-        ):
-            continue
-        if all(port["optional"] or port["name"] in used.get("in", {}) for port in node["inputs"]):
-            yield name
+def fitting(pipeline, node):
+    """The nodes that fit in place of this one as it is wired."""
+    result = marrow("list", "--fits", pipeline, node, "--json")
+    assert result.returncode == 0, result.stderr
+    return [fit["node"] for fit in json.loads(result.stdout) if fit["fits"] == "yes"]
 
 
 if __name__ == "__main__":

@@ -6,14 +6,12 @@
 static marrow::EdgeMap find_edges(const marrow::View& view) { return canny(view, Options{}); }
 
 #include "edges/checks.hpp"
+#include "shipped.hpp"
 
 namespace {
 
-TEST(Canny, RefusesThresholdsInTheWrongOrder) {
-  Options options;
-  options.low = 9;
-  const auto view = drawn(64, [](double u, double) { return u < 30 ? 500.0 : 900.0; });
-  EXPECT_EQ(error_of([&] { canny(view, options); }), "the lower threshold 9.000000 is above the upper one 5.000000");
+TEST(Canny, DeclaresTheOrderOfItsThresholds) {
+  EXPECT_TRUE(shipped::declares("edges.canny", marrow::not_above("low", "high")));
 }
 
 }  // namespace

@@ -10,7 +10,7 @@
 namespace {
 
 /// An outline that is the vertical line u = 100 from v = 20 to 119, normal to the right; it ignores the pose.
-class LineProjector : public marrow::Projector {
+class LineProjector : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform&,
                                             double) const override {

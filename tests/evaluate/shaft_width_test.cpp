@@ -5,6 +5,7 @@
 
 #include "edges/radiograph.hpp"
 #include "initial/tube.hpp"
+#include "shipped.hpp"
 
 namespace {
 
@@ -47,6 +48,10 @@ double figure(const marrow::Metrics& metrics, const std::string& name) {
     if (item.name == name) return item.value;
   ADD_FAILURE() << "no figure " << name;
   return 0;
+}
+
+TEST(ShaftWidth, DeclaresADeviationForEachWidth) {
+  EXPECT_TRUE(shipped::declares("evaluate.shaft_width", marrow::same_length({"width_mm", "width_deviation_mm"})));
 }
 
 TEST(ShaftWidth, IsExactWhereTheMagnificationIsNot) {

@@ -12,7 +12,7 @@ void put_neighbours() {
   fuzz::put("pipeline.yaml",
             "marrow: 1\ninputs:\n  case: {type: path, default: .}\n  amount: {type: number, default: 1}\nnodes:\n  "
             "one: {uses: test.constant, with: {value: $amount}}\n"
-            "  start: {uses: test.displaced}\n  judge: {uses: evaluate.test, in: {of: one}}\n  all: {uses: "
+            "  start: {uses: test.displaced}\n  judge: {uses: judge.test, in: {of: one}}\n  all: {uses: "
             "test.sides}\noutputs: {errors: judge, start: start, sides: all.both}\n");
   fuzz::put("simulate.yaml",
             "marrow: 1\ninputs:\n  seed: {type: integer, default: 1}\n  shift: {type: number, default: 0}\nnodes:\n  "

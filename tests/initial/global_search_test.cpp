@@ -70,11 +70,16 @@ TEST(GlobalSearch, SameBytesAtAnyNumberOfThreads) {
   EXPECT_EQ(a.world_from_model.translation_mm, b.world_from_model.translation_mm);
 }
 
+TEST(GlobalSearch, DeclaresAsManyNumbersForEachLevel) {
+  const std::string node = "initial.global_search";
+  EXPECT_TRUE(shipped::declares(node, marrow::same_length({"contour_spacing_px", "reach_px"})));
+  EXPECT_TRUE(shipped::declares(node, marrow::as_many_or_none("pixel_step", "contour_spacing_px")));
+}
+
 TEST(GlobalSearch, SaysWhatIsWrong) {
   Trial trial;
-  EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"reach_px", std::vector<double>{60, 24}}}),
-            "reach_px has 2 numbers, but contour_spacing_px has 3; give reach_px and the four options of steps as "
-            "many, one for each level");
+  EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"reach_px", std::vector<double>{60, 24, 0}}}),
+            "reach_px: each number must be positive");
   trial.inputs["model"] = shipped::item(marrow::Mesh{});
   EXPECT_NE(shipped::refusal("initial.global_search", trial.inputs).find("model"), std::string::npos);
 }

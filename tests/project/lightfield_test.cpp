@@ -4,7 +4,7 @@
 
 namespace {
 
-using marrow::Projector;
+using marrow::RadiographProjector;
 using marrow::Volume;
 
 shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
@@ -17,17 +17,17 @@ shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
 }
 
 /// The projector keeps what it was made from.
-std::shared_ptr<const Projector> made(const std::string& node, const shipped::Inputs& in,
-                                      const shipped::Options& options = {}) {
+std::shared_ptr<const RadiographProjector> made(const std::string& node, const shipped::Inputs& in,
+                                                const shipped::Options& options = {}) {
   const auto kept =
       std::make_shared<std::pair<shipped::Inputs, shipped::Outputs>>(in, shipped::call(node, in, options));
-  return {kept, &kept->second.at("projector").as<Projector>()};
+  return {kept, &kept->second.at("projector").as<RadiographProjector>()};
 }
-std::shared_ptr<const Projector> make_medium(const Volume& volume, const marrow::SignedField* field) {
+std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, const marrow::SignedField* field) {
   return made("project.lightfield", inputs(volume, field), {{"step_mm", 2.0}, {"step_deg", 1.5}, {"range_deg", 2.0}});
 }
 /// In a moment.
-std::shared_ptr<const Projector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
+std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
   return made("project.lightfield", inputs(volume, field), {{"step_mm", 5.0}, {"step_deg", 4.0}, {"range_deg", 2.0}});
 }
 

@@ -5,7 +5,8 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Projector> make(const marrow::Volume& volume, const marrow::SignedField* field) {
+std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& volume,
+                                                        const marrow::SignedField* field) {
   return ray_casting(volume, field, Options{});
 }
 

@@ -5,7 +5,7 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Projector> make(const marrow::Mesh& mesh, const marrow::Volume* volume) {
+std::shared_ptr<const marrow::OutlineProjector> make(const marrow::Mesh& mesh, const marrow::Volume* volume) {
   return silhouette_edges(mesh, volume, Options{});
 }
 

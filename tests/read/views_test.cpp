@@ -5,6 +5,7 @@
 
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "shipped.hpp"
 
 namespace {
 
@@ -44,7 +45,6 @@ TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
   cameras.add("two", camera);
   camera.camera_from_world.translation_mm.z() = 1;
   cameras.add("one", camera);
-  EXPECT_SAYS(views(&cameras, options), "give the cameras either as the option (files) or as the input (values)");
   options.cameras.clear();
   EXPECT_EQ(views(&cameras, options)[0].camera.camera_from_world.translation_mm.z(), 1);
   options.names[1] = "three";
@@ -54,15 +54,22 @@ TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
 TEST_F(ReadViews, DiagnosesFaults) {
   write_itk(folder / "b.png", ItkGrid<std::uint8_t>{.size = {6, 5}, .samples = std::vector<std::uint8_t>(30, 9)});
   EXPECT_SAYS(views(nullptr, options), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
-  options.cameras.pop_back();
-  EXPECT_SAYS(views(nullptr, options), "names has 2 views, cameras 1 files; give one camera per view");
-  options.images.pop_back();
-  EXPECT_SAYS(views(nullptr, options), "names has 2 views, images 1 files; give one image per view");
   options.names = {"one", "one"};
-  options.images = {folder / "a.png", folder / "b.png"};
   EXPECT_SAYS(views(nullptr, options), "names: two views are named 'one'");
   options = {};
   EXPECT_SAYS(views(nullptr, options), "names: no view is named");
+}
+
+TEST_F(ReadViews, DeclaresAnImageAndACameraForEachName) {
+  EXPECT_TRUE(shipped::declares("read.views", marrow::same_length({"names", "images"})));
+  EXPECT_TRUE(shipped::declares("read.views", marrow::exactly_one({"in.camera", "cameras"})));
+  EXPECT_TRUE(shipped::declares("read.views", marrow::as_many_or_none("cameras", "names")));
+  options.cameras.pop_back();
+  EXPECT_THROW(views(nullptr, options), std::out_of_range) << "nothing is read past the end of a list";
+}
+
+TEST(ReadImages, DeclaresANameForEachOrNone) {
+  EXPECT_TRUE(shipped::declares("read.images", marrow::as_many_or_none("names", "paths")));
 }
 
 TEST_F(ReadViews, RealWristPairs) {

@@ -2,7 +2,7 @@
 #include "nodes.hpp"
 #include "plugins/similarity/contour_distance.cpp"
 
-std::shared_ptr<const marrow::Cost> cost_node(const marrow::Projector& projector,
+std::shared_ptr<const marrow::Cost> cost_node(const marrow::OutlineProjector& projector,
                                               const marrow::List<marrow::View>& views,
                                               const marrow::List<marrow::EdgeMap>& edges) {
   Options options;

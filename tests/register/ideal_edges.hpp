@@ -21,7 +21,7 @@ struct Faults {
   unsigned seed = 1;
 };
 
-inline marrow::EdgeMap edges_of(const marrow::Projector& projector, const marrow::Camera& camera,
+inline marrow::EdgeMap edges_of(const marrow::OutlineProjector& projector, const marrow::Camera& camera,
                                 const marrow::RigidTransform& world_from_model, const Faults& faults) {
   std::mt19937 random(faults.seed);
   std::normal_distribution<double> normal;
@@ -56,7 +56,7 @@ struct Scene {
   marrow::List<marrow::EdgeMap> edges;
 };
 
-inline Scene scene_of(const marrow::Projector& projector, const marrow::RigidTransform& world_from_model,
+inline Scene scene_of(const marrow::OutlineProjector& projector, const marrow::RigidTransform& world_from_model,
                       const std::vector<double>& angles_deg, const Faults& faults = {}) {
   Scene scene;
   for (const double angle : angles_deg) {

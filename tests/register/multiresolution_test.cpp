@@ -8,6 +8,7 @@
 
 #include "ideal_edges.hpp"
 #include "nodes.hpp"
+#include "shipped.hpp"
 
 namespace {
 
@@ -42,7 +43,7 @@ struct Trial {
   }
 
   marrow::Mesh mesh;
-  std::shared_ptr<const marrow::Projector> projector;
+  std::shared_ptr<const marrow::OutlineProjector> projector;
   marrow::Pose truth;
 };
 
@@ -192,17 +193,11 @@ TEST(Multiresolution, SameBytesAtAnyNumberOfThreads) {
   EXPECT_EQ(*a.covariance, *b.covariance);
 }
 
-TEST(Multiresolution, RefusesLevelsThatDoNotAgree) {
-  marrow::search::SearchOptions options;
-  options.reach_px = {10, 5};
-  try {
-    femur().run({0}, {}, motion(0, 0, 0, 0, 0, 0), options);
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "reach_px has 2 numbers, but contour_spacing_px has 3; give reach_px and the four options of steps "
-                 "as many, one for each level");
-  }
+TEST(Multiresolution, DeclaresAsManyNumbersForEachLevel) {
+  const std::string node = "register.multiresolution";
+  EXPECT_TRUE(shipped::declares(node, marrow::same_length({"contour_spacing_px", "reach_px", "step_deg",
+                                                           "step_axial_deg", "step_mm", "step_tolerance"})));
+  EXPECT_TRUE(shipped::declares(node, marrow::as_many_or_none("pixel_step", "contour_spacing_px")));
 }
 
 TEST(Multiresolution, StopsWhenCancelled) {

@@ -162,6 +162,27 @@ TEST(Search, FollowsTheBestOfItsScanThroughAllLevels) {
   EXPECT_EQ(cost.levels[1].pixel_step, 0);
 }
 
+TEST(Search, RefusesLevelsWithoutPositiveNumbers) {
+  const auto said = [](const SearchOptions& options) -> std::string {
+    try {
+      marrow::search::check_options(options);
+    } catch (const marrow::Error& error) {
+      return error.what();
+    }
+    return "";
+  };
+  SearchOptions options;
+  EXPECT_EQ(said(options), "");
+  options.step_mm = {3, 0, 0.3};
+  EXPECT_EQ(said(options), "step_mm: each number must be positive");
+  options.contour_spacing_px.clear();
+  EXPECT_EQ(said(options), "contour_spacing_px: there is no level; give a number for one at least");
+  options = {};
+  options.reach_px = {24, 12};
+  EXPECT_THROW(marrow::search::levels_of(bowl(), options), std::out_of_range)
+      << "nothing is read past the end of a list that is too short";
+}
+
 TEST(Search, CandidatesAreNoNeighbours) {
   SearchOptions options;
   options.scan_rotation_deg = 9;

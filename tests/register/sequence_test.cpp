@@ -95,11 +95,17 @@ TEST(Sequence, SaysWhereTheCostsDoNotAgree) {
   EXPECT_TRUE(trial.run({{"most_apart_mm", 4.0}}).at("pose").as<Pose>().warnings.empty());
 }
 
+TEST(Sequence, DeclaresAsManyNumbersForEachLevel) {
+  const std::string node = "register.sequence";
+  EXPECT_TRUE(shipped::declares(node, marrow::same_length({"contour_spacing_px", "reach_px", "step_deg",
+                                                           "step_axial_deg", "step_mm", "step_tolerance"})));
+  EXPECT_TRUE(shipped::declares(node, marrow::as_many_or_none("pixel_step", "contour_spacing_px")));
+  EXPECT_TRUE(shipped::declares(node, marrow::same_length({"finer_pixel_step", "finer_step_deg", "finer_step_axial_deg",
+                                                           "finer_step_mm", "finer_step_tolerance"})));
+}
+
 TEST(Sequence, SaysWhatIsWrong) {
   Trial trial(truth(), truth());
-  EXPECT_EQ(shipped::refusal("register.sequence", trial.inputs, {{"finer_step_mm", std::vector<double>{1}}}),
-            "finer_step_mm has 1 numbers, but finer_pixel_step has 2; give all options that begin with finer_ as many, "
-            "one for each level");
   EXPECT_EQ(shipped::refusal("register.sequence", trial.inputs, {{"finer_step_deg", std::vector<double>{1, -1}}}),
             "finer_step_deg: each number must be positive");
   Pose broken = truth();

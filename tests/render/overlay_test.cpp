@@ -6,7 +6,7 @@
 namespace {
 
 /// A square outline of 40 px about the image point of the model's origin.
-class SquareProjector : public marrow::Projector {
+class SquareProjector : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera,
                                             const marrow::RigidTransform& world_from_model, double) const override {

@@ -23,7 +23,7 @@ class ApartTest : public testing::Test {
     file = scratch.write("file.txt", word);
     marrow::Diagnostics diagnostics;
     const auto path = scratch.write(
-        "p.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: file.txt, value: 1.25}" + more +
+        "p.yaml", "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25}" + more +
                       "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
     pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
@@ -155,7 +155,7 @@ TEST_F(ApartTest, FileThatChangesWhileItIsReadGivesNoResult) {
   EXPECT_EQ(failure("change"), " changed while it was read; run it again");
   const auto entries = store.entries();
   EXPECT_TRUE(std::none_of(entries.begin(), entries.end(),
-                           [](const auto& entry) { return entry.provenance.node == "read.test_number"; }));
+                           [](const auto& entry) { return entry.provenance.node == "parse.test_number"; }));
 }
 
 TEST_F(ApartTest, FileThatIsAsBeforeWhenItHasBeenReadMayHaveBeenAnotherOne) {
@@ -170,7 +170,7 @@ TEST_F(ApartTest, NodesOfOneRunDoNotMixContents) {
     marrow::Diagnostics diagnostics;
     const auto path =
         scratch.write("p.yaml", std::string("marrow: 1\nnodes:\n  c: {uses: test.constant, with: {path: ") + first +
-                                    "}}\n  r: {uses: read.test_number, in: {added: c}, with: {path: " + second +
+                                    "}}\n  r: {uses: parse.test_number, in: {added: c}, with: {path: " + second +
                                     "}}\noutputs: {r: r, c: c}\n");
     pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
@@ -203,7 +203,7 @@ TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
   std::filesystem::create_directory_symlink(scratch.path / "elsewhere", scratch.path / "case" / "link");
   settings.threads = 2;
   const auto path = scratch.write(
-      "p2.yaml", "marrow: 1\nnodes:\n  r: {uses: read.test_number, with: {path: case}}\noutputs: {r: r}\n");
+      "p2.yaml", "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: case}}\noutputs: {r: r}\n");
   marrow::Diagnostics diagnostics;
   pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
   const RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), settings);

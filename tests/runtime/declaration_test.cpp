@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <set>
 
 #include "marrow/plugin.hpp"
 
@@ -122,17 +123,40 @@ TEST(Declaration, UnregisteredReturnType) {
   plugin.node("test.nothing", nothing_registered).summary("s").out("a", "h");
   EXPECT_NE(faults(plugin).find("the returned type is not registered with MARROW_VALUE_TYPE"), std::string::npos);
 }
-TEST(Declaration, TruthOnlyWhereItMayBeSeen) {
+TEST(Declaration, Traits) {
   Plugin plugin;
-  plugin.node("register.cheat", sees).summary("s").in("truth", "h").out("pose", "h");
-  EXPECT_NE(faults(plugin).find("input 'truth': only nodes that evaluate or render may be given the truth"),
-            std::string::npos);
+  plugin.node("test.plain", plain).summary("s").in("a", "h").out("b", "h").trait("Fast").trait("good").trait("good");
+  EXPECT_NE(faults(plugin).find("trait 'Fast': names are lower_case"), std::string::npos);
+  EXPECT_NE(faults(plugin).find("trait 'good' is named twice"), std::string::npos);
 }
-TEST(Declaration, KindContract) {
+TEST(Declaration, Kinds) {
   Plugin plugin;
-  plugin.node("edges.other", edges).summary("s").in("view", "h").out("map", "h");
-  EXPECT_NE(faults(plugin).find("output 'map': the kind 'edges' has none of that name"), std::string::npos);
-  EXPECT_NE(faults(plugin).find("output 'edges' is missing: every node of the kind 'edges' has it"), std::string::npos);
+  plugin.kind("edges.x")
+      .in<marrow::View>("view", "h")
+      .in<marrow::View>("view", "h")
+      .in<>("Nothing", "h")
+      .trait("fast", "h")
+      .trait("fast", "\x1b");
+  const std::vector<std::string> expected{"a kind's name is lower_case, without a dot",
+                                          "has no summary",
+                                          "input 'view' is named twice",
+                                          "input 'Nothing': names are lower_case",
+                                          "input 'Nothing': has no type",
+                                          "trait 'fast': its texts must be UTF-8 without control characters",
+                                          "trait 'fast' is named twice"};
+  std::vector<std::string> found = plugin.kinds.front().faults;
+  EXPECT_EQ(std::set<std::string>(found.begin(), found.end()), std::set<std::string>(expected.begin(), expected.end()));
+}
+TEST(Declaration, ChecksOfAKind) {
+  Plugin plugin;
+  marrow::conformance::Suite suite;
+  suite.sample = [] { return marrow::conformance::Inputs{}; };
+  suite.trials = {{"contract", nullptr}};
+  suite.accuracy = {{{"bias", "how far off", std::numeric_limits<double>::infinity(), "mm"}, nullptr}};
+  plugin.kind("test").summary("s").suite(suite);
+  EXPECT_EQ(plugin.kinds.front().info.checks.size(), 5u);
+  EXPECT_EQ(plugin.kinds.front().faults, (std::vector<std::string>{"check 'bias': its limit is not a finite number",
+                                                                   "check 'contract' is named twice"}));
 }
 
 }  // namespace

@@ -78,8 +78,7 @@ TEST_F(LibraryTest, NoEntry) {
 TEST_F(LibraryTest, WrongDeclaration) {
   expect_refused(kBad / "wrong_declaration.so",
                  "declares its nodes wrongly: edges.wrong: option 'low': its default is outside its own range; "
-                 "edges.wrong: input 'picture': the "
-                 "kind 'edges' has none of that name");
+                 "edges.wrong: trait 'fast' is named twice");
 }
 TEST_F(LibraryTest, TextFile) {
   expect_refused(scratch.write("text.so", "hello\n"), "is not a shared library (it does not begin with an ELF header)");

@@ -62,7 +62,20 @@ marrow::LibraryInfo library() {
   node.options[2].maximum = 1;
   node.options[3].choices = {"one", "two"};
   node.options[5].length = 3;
+  node.relations = {{marrow::RelationType::not_above, {"integer", "number"}},
+                    {marrow::RelationType::same_length, {"numbers", "texts", "paths"}}};
+  node.traits = {"fast"};
   info.nodes = {node};
+  marrow::KindInfo kind;
+  kind.name = "test";
+  kind.summary = "has everything that a kind can have";
+  kind.inputs = {{"a", "a port", {type("metrics", 24, false), type("mesh", 80, false)}, ""}};
+  kind.outputs = {{"c", "a port", {type("cost", 8, true)}, "view"}};
+  kind.sees_truth = true;
+  kind.apart = marrow::Apart::computes;
+  kind.traits = {{"fast", "takes no time"}};
+  kind.checks = {{"bias", "how far off it is", 0.25, "mm"}};
+  info.kinds = {kind};
   info.writers.resize(1);
   info.writers[0].type = type("mesh", 80, false);
   info.writers[0].extension = ".ply";
@@ -176,9 +189,29 @@ TEST(Manifest, NamesAndTextsAreThoseOfADeclaration) {
   expect_refused([](json& j) { j["linked"] = std::vector<json>(1001, j["linked"][0]); },
                  "it names more than 1000 linked libraries");
 }
+TEST(Manifest, KindsAreThoseOfADeclaration) {
+  const auto kind = [](const char* key, json value) { return [=](json& j) { j["kinds"][0][key] = value; }; };
+  expect_refused(kind("name", "a.b"), "kind a.b: a kind's name is lower_case, without a dot");
+  expect_refused(kind("apart", "sometimes"), "there is no way to run apart 'sometimes'");
+  expect_refused(kind("sees_truth", 1), "'sees_truth' is neither true nor false");
+  expect_refused(kind("more", 1), "a kind has 9 fields, expected 8");
+  expect_refused([](json& j) { j["kinds"][0]["inputs"][0]["types"] = json::array(); }, "input 'a': has no type");
+  expect_refused([](json& j) { j["kinds"][0]["traits"].push_back(j["kinds"][0]["traits"][0]); },
+                 "trait 'fast' is named twice");
+  expect_refused([](json& j) { j["kinds"][0]["checks"][0]["limit"] = "none"; }, "'limit' is not a number");
+  expect_refused([](json& j) { j["kinds"].push_back(j["kinds"][0]); }, "it has the kind 'test' twice");
+}
+TEST(Manifest, RelationsAreThoseOfADeclaration) {
+  const auto names = [](json value) { return [=](json& j) { j["nodes"][0]["relations"][0]["names"] = value; }; };
+  expect_refused(names({"integer", "nothing"}), "relation not_above: there is no option 'nothing'");
+  expect_refused(names({"integer"}), "relation not_above: it needs two names");
+  expect_refused(names({"integer", "number", "number"}), "relation not_above: it needs two names");
+  expect_refused(names({"integer", "text"}), "relation not_above: option 'text' is no number");
+  expect_refused([](json& j) { j["nodes"][0]["relations"][0]["type"] = "like"; }, "there is no relation 'like'");
+}
 TEST(Manifest, HasAllFieldsAndNoOthers) {
-  expect_refused([](json& j) { j["more"] = 1; }, "it has 7 fields, expected 6");
-  expect_refused([](json& j) { j["nodes"][0].erase("random"); }, "a node has 5 fields, expected 6");
+  expect_refused([](json& j) { j["more"] = 1; }, "it has 8 fields, expected 7");
+  expect_refused([](json& j) { j["nodes"][0].erase("random"); }, "a node has 7 fields, expected 8");
   expect_refused([](json& j) { j["nodes"] = "none"; }, "'nodes' is not a list");
   expect_refused([](json& j) { j["nodes"] = {1}; }, "a node is not an object");
   expect_refused([](json& j) { j["refused"] = "is bad"; }, "it has nodes of a library that it refuses");
@@ -199,8 +232,16 @@ TEST(Manifest, DifferencesAreNamed) {
          "nodes/test.all/inputs: the library has 2 of them, its description has 1 of them");
   expect([](auto& i) { i.nodes[0].name = "test.other"; },
          "nodes/test.other: the library has none, its description has it");
+  expect([](auto& i) { i.nodes[0].traits = {}; },
+         "nodes/test.all/traits: the library has 1 of them, its description has 0 of them");
+  expect([](auto& i) { i.nodes[0].relations[0].type = marrow::RelationType::below; },
+         "nodes/test.all/relations/1/type: the library has \"not_above\", its description has \"below\"");
+  expect([](auto& i) { i.kinds[0].sees_truth = false; },
+         "kinds/test/sees_truth: the library has true, its description has false");
+  expect([](auto& i) { i.kinds[0].checks[0].limit = 9; },
+         "kinds/test/checks/bias/limit: the library has 0.25, its description has 9.0");
   expect([](auto& i) { i.writers.push_back(i.writers[0]); },
-         "the order or number of its nodes is another in its description");
+         "the order or number of its kinds, nodes and writers is another in its description");
 }
 
 /// All values of a document.

@@ -267,9 +267,9 @@ TEST_F(PipelineTest, WrongType) {
 }
 TEST_F(PipelineTest, TruthOnlyForEvaluation) {
   expect_fault("marrow: 1\nnodes:\n  t: {uses: test.truth}\n  a: {uses: test.add, in: {a: t}}\noutputs: {o: a}\n", 4,
-               28, "the truth may be wired only to nodes that evaluate or render, not to test.add");
+               28, "the truth may be wired only to nodes of a kind that may see it, not to test.add");
   read(
-      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: evaluate.test, in: {of: c, "
+      "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  c: {uses: test.constant}\n  a: {uses: judge.test, in: {of: c, "
       "truth: t}}\noutputs: {o: a}\n");
   EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
 }

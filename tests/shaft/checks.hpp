@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every shaft node must do. A test program defines `find_shaft(edges, view, options = {})` before it includes this
-// header.
+// What every shaft node must do. A test program defines `find_shaft(edges, view, options = {})` and the node's name
+// `kNode` before it includes this header.
 #include <chrono>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 
 #include "shaft/scenes.hpp"
+#include "shipped.hpp"
 
 namespace {
 
@@ -60,6 +61,10 @@ TEST(Shaft, FindsTheShaftOfARadiographAndRejectsCanalAndThigh) {
     }
 }
 
+TEST(Shaft, DeclaresADeviationForEachWidth) {
+  EXPECT_TRUE(shipped::declares(kNode, marrow::same_length({"width_mm", "width_deviation_mm"})));
+}
+
 TEST(Shaft, SaysWhatIsWrongWithItsInputs) {
   EXPECT_EQ(error_of([&] { find_shaft(no_edges(), empty_view()); }),
             "view 'frontal': the edge map is empty, so there is no shaft in it; look at the image, and lower the "
@@ -70,11 +75,6 @@ TEST(Shaft, SaysWhatIsWrongWithItsInputs) {
   EXPECT_EQ(
       error_of([&] { find_shaft(edges, empty_view(256)); }),
       "view 'frontal': the edge map is for 512 x 512 pixels, the view has 256 x 256; wire the edges of this view");
-  LineOptions options;
-  options.width_mm = {28, 30};
-  options.width_deviation_mm = {3};
-  EXPECT_EQ(error_of([&] { find_shaft(edges, empty_view(), options); }),
-            "width_mm has 2 numbers and width_deviation_mm 1; give one deviation for each width");
   marrow::View behind = empty_view();
   behind.camera.camera_from_world.translation_mm = {0, 0, -600};
   EXPECT_EQ(error_of([&] { find_shaft(edges, behind); }),

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/shaft/ransac.cpp"
 
+static const char* const kNode = "shaft.ransac";
+
 static marrow::ShaftLines find_shaft(const marrow::EdgeMap& edges, const marrow::View& view,
                                      const LineOptions& lines = {}) {
   Options options;

@@ -32,6 +32,7 @@ TEST(Widths, MayBeThoseOfAnotherBone) {
   EXPECT_NEAR(tibia.log_likelihood(33, 0), -0.5, 1e-9);
   EXPECT_EQ(tibia.range(), "19.0 to 39.0 mm");
   EXPECT_FALSE(tibia.is_possible(40));
+  EXPECT_THROW(Widths({25, 30}, {2}, 0), std::out_of_range) << "nothing is read past the end of a list";
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ constexpr double kDepth_mm = 600, kFocal_px = 1000 / 0.586, kMiddle_px = 255.5;
 
 /// Three sides of a rectangle, each in a plane through the source, so that it stays a straight line of the image at any
 /// depth: left and right at -+40 mm, and the upper one at 50 mm. Of the view from the side another one.
-class Sides : public marrow::Projector {
+class Sides : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
                                             double spacing_px) const override {
@@ -64,9 +64,10 @@ marrow::EdgeMap edges_outside(double offset_px, bool frontal) {
 
 /// A cost, and what it refers to.
 struct Held {
-  Held(const marrow::Projector* projector, const List<marrow::View>& views, const List<marrow::EdgeMap>& edges,
+  Held(const marrow::OutlineProjector* projector, const List<marrow::View>& views, const List<marrow::EdgeMap>& edges,
        const shipped::Options& options)
-      : inputs{{"projector", marrow::Value::of<marrow::Projector>(std::shared_ptr<const marrow::Projector>(projector))},
+      : inputs{{"projector", marrow::Value::of<marrow::OutlineProjector>(
+                                 std::shared_ptr<const marrow::OutlineProjector>(projector))},
                {"views", shipped::list(views, "view")},
                {"edges", shipped::list(edges, "view")}},
         made(shipped::call("similarity.contour_distance", inputs, options).at("cost")) {}
@@ -169,7 +170,7 @@ TEST(ContourDerivatives, TheCurvatureIsThatOfTheValueAtTheBottom) {
 namespace {
 
 /// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
-class Line : public marrow::Projector {
+class Line : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const RigidTransform& pose,
                                             double) const override {

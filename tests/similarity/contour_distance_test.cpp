@@ -10,7 +10,7 @@
 namespace {
 
 /// An outline that is a straight upright line at u = 100 + the pose's x in mm, for v from 50 to 149, facing left.
-class LineProjector : public marrow::Projector {
+class LineProjector : public marrow::OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
                                             double spacing_px) const override {
@@ -60,7 +60,7 @@ Options fixed_offset(double offset_px = 0) {
 const LineProjector kLine;
 
 /// Of one fragment alone.
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::Projector& projector,
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjector& projector,
                                                      const marrow::List<marrow::View>& views,
                                                      const marrow::List<marrow::EdgeMap>& edges,
                                                      const Options& options) {

@@ -3,68 +3,56 @@
 #include <marrow/domain/features.hpp>
 
 #include "intensity_behaviour.hpp"
+#include "other_fragment.hpp"
 #include "shipped.hpp"
 
 namespace {
 
 using intensity_behaviour::at;
-using marrow::Projector;
+using marrow::RadiographProjector;
+using pixelwise_projector::PixelwiseProjector;
 
 constexpr double kWidth_px = 2.5;
 
 /// An upright wall at u = 100 + x that the ray crosses to the right of it, blurred by an error function.
-class WallProjector : public Projector {
+class WallProjector : public PixelwiseProjector {
  public:
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column)
-        values.push_back(float(20 + 20 * std::erf((grid.pixel(column, row).x() - 100 - pose.translation_mm.x()) /
-                                                  (std::sqrt(2.0) * kWidth_px))));
-    return values;
-  }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform& pose) const override {
     return std::abs(pose.translation_mm.x()) < 60 ? marrow::PixelGrid{60, 20, 1, 80, 130} : marrow::PixelGrid{};
+  }
+
+ protected:
+  double integral(const Eigen::Vector2d& pixel, const marrow::RigidTransform& pose) const override {
+    return 20 + 20 * std::erf((pixel.x() - 100 - pose.translation_mm.x()) / (std::sqrt(2.0) * kWidth_px));
   }
 };
 
 /// A wall whose normal points 30 degrees downwards, through (100 + x, 80).
-class ObliqueWallProjector : public Projector {
+class ObliqueWallProjector : public PixelwiseProjector {
  public:
   static Eigen::Vector2d normal() { return {std::cos(marrow::radians(30)), std::sin(marrow::radians(30))}; }
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform& pose,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column) {
-        const double across =
-            normal().dot(grid.pixel(column, row) - Eigen::Vector2d(100 + pose.translation_mm.x(), 80));
-        values.push_back(float(20 + 20 * std::erf(across / (std::sqrt(2.0) * kWidth_px))));
-      }
-    return values;
-  }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
     return {70, 50, 1, 60, 60};
+  }
+
+ protected:
+  double integral(const Eigen::Vector2d& pixel, const marrow::RigidTransform& pose) const override {
+    const double across = normal().dot(pixel - Eigen::Vector2d(100 + pose.translation_mm.x(), 80));
+    return 20 + 20 * std::erf(across / (std::sqrt(2.0) * kWidth_px));
   }
 };
 
 /// A square whose region ends with it, or further out.
-class SquareProjector : public Projector {
+class SquareProjector : public PixelwiseProjector {
  public:
   explicit SquareProjector(int around_px) : around_px_(around_px) {}
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column) {
-        const Eigen::Vector2d p = grid.pixel(column, row);
-        values.push_back(p.x() >= 80 && p.x() < 120 && p.y() >= 60 && p.y() < 100 ? 10.0f : 0.0f);
-      }
-    return values;
-  }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
     return {80.0 - around_px_, 60.0 - around_px_, 1, 40 + 2 * around_px_, 40 + 2 * around_px_};
+  }
+
+ protected:
+  double integral(const Eigen::Vector2d& p, const marrow::RigidTransform&) const override {
+    return p.x() >= 80 && p.x() < 120 && p.y() >= 60 && p.y() < 100 ? 10 : 0;
   }
 
  private:
@@ -77,7 +65,7 @@ shipped::Inputs inputs(double u, float direction = -1) {
   for (int v = 0; v < 170; ++v) map.pixels.push_back({float(u), float(v), direction, 0, 1});
   marrow::List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
-  return {{"projector", marrow::Value::of<Projector>(std::make_shared<const WallProjector>())},
+  return {{"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const WallProjector>())},
           {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
           {"edges", shipped::list(edges, "view")}};
 }
@@ -107,7 +95,7 @@ TEST(DrrEdges, DistancesAreAcrossAnObliqueEdge) {
   marrow::List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
   shipped::Inputs in = inputs(100);
-  in["projector"] = marrow::Value::of<Projector>(std::make_shared<const ObliqueWallProjector>());
+  in["projector"] = marrow::Value::of<RadiographProjector>(std::make_shared<const ObliqueWallProjector>());
   in["edges"] = shipped::list(edges, "view");
   for (const double x : {-4.0, 0.0, 2.0}) EXPECT_NEAR(value(in, at(x, 0)), loss(x * normal.x()), 0.05) << x;
 }
@@ -134,12 +122,33 @@ TEST(DrrEdges, WhatDoesNotMatchIsTheWorst) {
 TEST(DrrEdges, BlurReachesBeyondTheRegion) {
   const auto value_with = [](int around_px, double blur_px) {
     shipped::Inputs in = inputs(81);
-    in["projector"] = marrow::Value::of<Projector>(std::make_shared<const SquareProjector>(around_px));
+    in["projector"] = marrow::Value::of<RadiographProjector>(std::make_shared<const SquareProjector>(around_px));
     const marrow::Value cost =
         shipped::call("similarity.drr_edges", in, {{"blur_px", blur_px}, {"reach_px", 10.0}}).at("cost");
     return cost.as<marrow::Cost>().value(at(0, 0));
   };
   for (const double blur_px : {1.5, 4.0}) EXPECT_NEAR(value_with(0, blur_px), value_with(30, blur_px), 1e-3) << blur_px;
+}
+
+TEST(DrrEdges, AnotherFragmentsEdgesDoNotCount) {
+  // Edges of the square's left border alone, which the wall meets as well.
+  marrow::EdgeMap map{200, 170, {}};
+  for (int v = 60; v < 90; ++v) map.pixels.push_back({101, float(v), -1, 0, 1});
+  marrow::List<marrow::EdgeMap> edges;
+  edges.add("frontal", map);
+  shipped::Inputs in = inputs(100);
+  in["edges"] = shipped::list(edges, "view");
+  EXPECT_LT(value(in, at(1, 0)), loss(10) - 1);
+  const auto own = std::make_shared<const other_fragment::SquareOutline>(),
+             other = std::make_shared<const other_fragment::SquareOutline>();
+  shipped::Inputs told = other_fragment::Fragments<marrow::OutlineProjector>{own, other}.with(in);
+  told["outline"] = told.at("projector");
+  told["projector"] = in.at("projector");
+  EXPECT_NEAR(value(told, at(1, 0)), loss(10), 1e-9);
+  told.erase("outline");
+  EXPECT_EQ(shipped::refusal("similarity.drr_edges", told),
+            "there are other fragments, but it is not known which of them is this one; wire 'outline', the one that "
+            "draws this fragment");
 }
 
 TEST(DrrEdges, Levels) {

@@ -5,8 +5,9 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views) {
-  return entropy_of_difference(projector, views, nullptr, nullptr, Options{});
+std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
+                                         const marrow::List<marrow::View>& views) {
+  return entropy_of_difference(projector, views, nullptr, nullptr, nullptr, Options{});
 }
 
 }  // namespace

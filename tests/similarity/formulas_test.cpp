@@ -96,8 +96,9 @@ double value(const std::string& measure, double du, double dv, shipped::Options 
   options["blur_px"] = 0.0;
   options["pixel_step"] = std::int64_t(1);
   options["margin_px"] = std::int64_t(kMargin_px);
-  const shipped::Inputs in{{"projector", marrow::Value::of<marrow::Projector>(std::make_shared<const Everywhere>())},
-                           {"views", shipped::list(intensity_behaviour::views_of(view()), "view")}};
+  const shipped::Inputs in{
+      {"projector", marrow::Value::of<marrow::RadiographProjector>(std::make_shared<const Everywhere>())},
+      {"views", shipped::list(intensity_behaviour::views_of(view()), "view")}};
   const marrow::Value cost = shipped::call("similarity." + measure, in, options).at("cost");
   return cost.as<marrow::Cost>().value(intensity_behaviour::at(du, dv));
 }
@@ -203,8 +204,8 @@ TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
   for (const std::string measure : {"pattern_intensity", "gradient_difference", "entropy_of_difference"}) {
     const auto near = [&](double du, double dv) {
       const shipped::Inputs in{
-          {"projector",
-           marrow::Value::of<marrow::Projector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
+          {"projector", marrow::Value::of<marrow::RadiographProjector>(
+                            std::make_shared<const intensity_behaviour::BlobProjector>())},
           {"views",
            shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of(50000, 0.02, 0)), "view")}};
       return shipped::call("similarity." + measure, in,

@@ -5,8 +5,9 @@
 
 namespace {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views) {
-  return gradient_orientation(projector, views, nullptr, nullptr, marrow::match::IntensityOptions{});
+std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
+                                         const marrow::List<marrow::View>& views) {
+  return gradient_orientation(projector, views, nullptr, nullptr, nullptr, marrow::match::IntensityOptions{});
 }
 
 }  // namespace

@@ -153,9 +153,15 @@ TEST(GradientProjection, WhatIsMaskedDoesNotCount) {
 }
 
 TEST(GradientProjection, AnotherFragmentsShadowDoesNotCount) {
-  const auto own = std::make_shared<const other_fragment::SquareOutline>();
-  const other_fragment::Fragments fragments{own, std::make_shared<const other_fragment::SquareProjector>()};
-  const auto value = [&](double grey, bool told) {
+  const other_fragment::Fragments<marrow::RadiographProjector> fragments{
+      std::make_shared<const other_fragment::SquareProjector>(),
+      std::make_shared<const other_fragment::SquareProjector>()};
+  const auto unknown = [](const shipped::Inputs& in) { return in; };
+  const auto as_radiograph = [&](const shipped::Inputs& in) { return fragments.with(in); };
+  const auto as_outline = [](const shipped::Inputs& in) {
+    return other_fragment::with_outline(in, std::make_shared<const other_fragment::SquareOutline>());
+  };
+  const auto value = [](double grey, const auto& told) {
     marrow::List<marrow::View> views;
     for (const double angle : {0.0, 90.0}) {
       marrow::View view = view_of(angle);
@@ -164,12 +170,12 @@ TEST(GradientProjection, AnotherFragmentsShadowDoesNotCount) {
     }
     shipped::Inputs in = inputs();
     in["views"] = shipped::list(views, "view");
-    const marrow::Value made =
-        shipped::call("similarity.gradient_projection", told ? fragments.with(in) : in).at("cost");
+    const marrow::Value made = shipped::call("similarity.gradient_projection", told(in)).at("cost");
     return made.as<marrow::Cost>().value(shifted(0, 0, 9));
   };
-  EXPECT_GT(std::abs(value(5000, false) - value(39000, false)), 0.01);
-  EXPECT_NEAR(value(5000, true), value(39000, true), 1e-9);
+  EXPECT_GT(std::abs(value(5000, unknown) - value(39000, unknown)), 0.01);
+  EXPECT_NEAR(value(5000, as_radiograph), value(39000, as_radiograph), 1e-9);
+  EXPECT_NEAR(value(5000, as_outline), value(39000, as_outline), 1e-9);
 }
 
 TEST(GradientProjection, AnEvenImageIsTheWorst) {

@@ -7,7 +7,7 @@ namespace {
 
 /// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the
 /// image, against the contract.
-class RectangleOutline : public marrow::Projector {
+class RectangleOutline : public marrow::OutlineProjector {
  public:
   RectangleOutline(int left, int right, int top, int bottom, bool is_open_above)
       : left_(left), right_(right), top_(top), bottom_(bottom), is_open_above_(is_open_above) {}

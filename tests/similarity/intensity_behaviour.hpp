@@ -8,6 +8,7 @@
 #include <random>
 
 #include "marrow/plugin.hpp"
+#include "similarity/pixelwise_projector.hpp"
 
 namespace intensity_behaviour {
 
@@ -15,10 +16,10 @@ using marrow::Camera;
 using marrow::Cost;
 using marrow::List;
 using marrow::PixelGrid;
-using marrow::Projector;
+using marrow::RadiographProjector;
 using marrow::RigidTransform;
 using marrow::View;
-using Make = std::function<std::shared_ptr<const Cost>(const Projector&, const List<View>&)>;
+using Make = std::function<std::shared_ptr<const Cost>(const RadiographProjector&, const List<View>&)>;
 
 /// Line integrals of two blobs, which move by a pixel a millimetre.
 inline double blobs(double u, double v) {
@@ -28,23 +29,19 @@ inline double blobs(double u, double v) {
   return 40 * blob(90, 80, 9) + 25 * blob(118, 96, 6);
 }
 
-class BlobProjector : public Projector {
+class BlobProjector : public pixelwise_projector::PixelwiseProjector {
  public:
-  std::vector<float> radiograph(const Camera&, const RigidTransform& pose, const PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column) {
-        const Eigen::Vector2d pixel = grid.pixel(column, row);
-        values.push_back(float(blobs(pixel.x() - pose.translation_mm.x(), pixel.y() - pose.translation_mm.y())));
-      }
-    return values;
-  }
   PixelGrid region(const Camera& camera, const RigidTransform& pose) const override {
     const double left = std::max(0.0, std::floor(50 + pose.translation_mm.x())),
                  top = std::max(0.0, std::floor(40 + pose.translation_mm.y()));
     const int columns = int(std::min(100.0, camera.width_px - left)),
               rows = int(std::min(90.0, camera.height_px - top));
     return columns > 0 && rows > 0 ? PixelGrid{left, top, 1, columns, rows} : PixelGrid{};
+  }
+
+ protected:
+  double integral(const Eigen::Vector2d& pixel, const RigidTransform& pose) const override {
+    return blobs(pixel.x() - pose.translation_mm.x(), pixel.y() - pose.translation_mm.y());
   }
 };
 

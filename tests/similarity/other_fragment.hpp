@@ -8,14 +8,15 @@
 #include <vector>
 
 #include "shipped.hpp"
+#include "similarity/pixelwise_projector.hpp"
 
 namespace other_fragment {
 
 using marrow::List;
 using marrow::Pose;
-using marrow::Projector;
 
 /// Lists of fragments: the one in question, and another at a place of its own.
+template <class Projector>
 struct Fragments {
   std::shared_ptr<const Projector> own, other;
   shipped::Inputs with(shipped::Inputs inputs) const {
@@ -31,34 +32,41 @@ struct Fragments {
   }
 };
 
+/// Another fragment, at a place of its own, that is known as a surface only.
+inline shipped::Inputs with_outline(shipped::Inputs inputs, std::shared_ptr<const marrow::OutlineProjector> other) {
+  List<marrow::OutlineProjector> outlines;
+  List<Pose> poses;
+  outlines.add_shared("other", std::move(other));
+  poses.add("other", Pose());
+  inputs["other_outlines"] = shipped::list(outlines, "fragment");
+  inputs["others"] = shipped::list(poses, "fragment");
+  return inputs;
+}
+
 /// A square of shadow, wherever the pose is.
-class SquareProjector : public Projector {
+class SquareProjector : public pixelwise_projector::PixelwiseProjector {
  public:
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column) {
-        const Eigen::Vector2d p = grid.pixel(column, row);
-        values.push_back(p.x() >= 100 && p.x() < 130 && p.y() >= 60 && p.y() < 90 ? 10.0f : 0.0f);
-      }
-    return values;
-  }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
     return {95, 55, 1, 40, 40};
   }
+
+ protected:
+  double integral(const Eigen::Vector2d& p, const marrow::RigidTransform&) const override {
+    return p.x() >= 100 && p.x() < 130 && p.y() >= 60 && p.y() < 90 ? 10 : 0;
+  }
 };
 
-/// The same square as an outline, open below.
-class SquareOutline : public Projector {
+/// The same square as an outline, open below, which moves by a pixel a millimetre.
+class SquareOutline : public marrow::OutlineProjector {
  public:
-  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&,
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
                                             double spacing_px) const override {
+    const double left = 100 + pose.translation_mm.x();
     std::vector<marrow::OutlinePoint> points;
     for (double at = 0; at < 30; at += spacing_px) {
-      points.push_back({100, float(60 + at), -1, 0});
-      points.push_back({129, float(60 + at), 1, 0});
-      points.push_back({float(100 + at), 60, 0, -1});
+      points.push_back({float(left), float(60 + at), -1, 0});
+      points.push_back({float(left + 29), float(60 + at), 1, 0});
+      points.push_back({float(left + at), 60, 0, -1});
     }
     return points;
   }

@@ -9,15 +9,18 @@
 namespace {
 
 using intensity_behaviour::at;
+using intensity_behaviour::BlobProjector;
 using marrow::Cost;
 using marrow::List;
-using marrow::Projector;
+using marrow::OutlineProjector;
+using marrow::RadiographProjector;
 using other_fragment::Fragments;
 using other_fragment::SquareOutline;
 using other_fragment::SquareProjector;
+using other_fragment::with_outline;
 
 /// An upright line at u = 60 + x, facing left.
-class LineProjector : public Projector {
+class LineProjector : public OutlineProjector {
  public:
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform& pose,
                                             double spacing_px) const override {
@@ -46,21 +49,65 @@ double value(const std::string& node, const shipped::Inputs& inputs, const marro
 
 TEST(Others, TheirShadowsDoNotCount) {
   const shipped::Options options{{"blur_px", 0.0}};
-  const auto own = std::make_shared<const intensity_behaviour::BlobProjector>();
-  for (const std::shared_ptr<const Projector>& other :
-       {std::shared_ptr<const Projector>(new SquareProjector), std::shared_ptr<const Projector>(new SquareOutline)}) {
-    const Fragments fragments{own, other};
+  const std::shared_ptr<const RadiographProjector> own = std::make_shared<const BlobProjector>();
+  const Fragments<RadiographProjector> fragments{own, std::make_shared<const SquareProjector>()};
+  for (const bool is_outline : {false, true}) {
     const auto with = [&](double grey) {
-      return fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}});
+      const shipped::Inputs inputs{{"projector", marrow::Value::of<RadiographProjector>(own)},
+                                   {"views", shipped::list(intensity_behaviour::views_of(view_with(grey)), "view")}};
+      return is_outline ? with_outline(inputs, std::make_shared<const SquareOutline>()) : fragments.with(inputs);
     };
     EXPECT_NEAR(value("similarity.normalised_cross_correlation", with(9000), at(2, 1), options),
                 value("similarity.normalised_cross_correlation", with(40000), at(2, 1), options), 1e-6);
     shipped::Inputs alone = with(9000);
     alone.erase("others");
-    alone.erase("other_projectors");
+    alone.erase(is_outline ? "other_outlines" : "other_projectors");
     EXPECT_GT(value("similarity.normalised_cross_correlation", alone, at(0, 0), options),
               value("similarity.normalised_cross_correlation", with(9000), at(0, 0), options) + 0.05);
   }
+}
+
+TEST(Others, TheirShadowsDoNotCountHoweverEachIsDrawn) {
+  const Fragments<RadiographProjector> fragments{std::make_shared<const BlobProjector>(),
+                                                 std::make_shared<const SquareProjector>()};
+  List<OutlineProjector> outlines;
+  outlines.add_shared("third", std::make_shared<const SquareOutline>());
+  marrow::Pose third;
+  third.world_from_model = at(-50, 0);
+  List<marrow::Pose> poses;
+  poses.add("other", marrow::Pose());
+  poses.add("third", third);
+  const auto with = [&](double grey) {
+    marrow::View view = view_with(grey);
+    view.image.pixels(cv::Rect(50, 60, 30, 30)).setTo(grey);
+    shipped::Inputs inputs = fragments.with({{"views", shipped::list(intensity_behaviour::views_of(view), "view")}});
+    inputs["other_outlines"] = shipped::list(outlines, "fragment");
+    inputs["others"] = shipped::list(poses, "fragment");
+    return value("similarity.normalised_cross_correlation", inputs, at(2, 1), {{"blur_px", 0.0}});
+  };
+  EXPECT_NEAR(with(9000), with(40000), 1e-6);
+}
+
+TEST(Others, OfOutlinesItIsSaidWhatIsMissing) {
+  const std::string node = "similarity.normalised_cross_correlation";
+  const shipped::Inputs inputs =
+      with_outline({{"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const BlobProjector>())},
+                    {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")}},
+                   std::make_shared<const SquareOutline>());
+  shipped::Inputs some = inputs;
+  some.erase("others");
+  EXPECT_EQ(shipped::refusal(node, some), "there are projectors of other fragments, but no poses; wire 'others'");
+  some = inputs;
+  some.erase("other_outlines");
+  EXPECT_EQ(shipped::refusal(node, some),
+            "there are poses of other fragments, but nothing draws them; wire 'other_projectors'");
+  some = inputs;
+  List<marrow::Pose> poses;
+  poses.add("third", marrow::Pose());
+  some["others"] = shipped::list(poses, "fragment");
+  EXPECT_EQ(shipped::refusal(node, some),
+            "other_outlines has the fragment 'other', but others has no pose of it; give the poses of the same "
+            "fragments");
 }
 
 TEST(Others, TheirEdgesDoNotCount) {
@@ -72,7 +119,8 @@ TEST(Others, TheirEdgesDoNotCount) {
   }
   List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
-  const Fragments fragments{std::make_shared<const LineProjector>(), std::make_shared<const SquareOutline>()};
+  const Fragments<OutlineProjector> fragments{std::make_shared<const LineProjector>(),
+                                              std::make_shared<const SquareOutline>()};
   shipped::Inputs inputs =
       fragments.with({{"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
                       {"edges", shipped::list(edges, "view")}});
@@ -97,7 +145,7 @@ TEST(Others, BothWaysAndWeights) {
   List<marrow::EdgeMap> edges;
   edges.add("frontal", map);
   shipped::Inputs inputs{
-      {"projector", marrow::Value::of<Projector>(std::make_shared<const LineProjector>())},
+      {"projector", marrow::Value::of<OutlineProjector>(std::make_shared<const LineProjector>())},
       {"views", shipped::list(intensity_behaviour::views_of(intensity_behaviour::view_of()), "view")},
       {"edges", shipped::list(edges, "view")}};
   shipped::Options options{{"reach_px", 6.0}, {"estimate_offset", false}, {"contour_spacing_px", 1.0}};

@@ -7,22 +7,19 @@
 namespace {
 
 using intensity_behaviour::at;
-using marrow::Projector;
+using marrow::RadiographProjector;
 
 /// A radiograph that is a formula of the pixel, wherever the model is.
-class FormulaProjector : public Projector {
+class FormulaProjector : public pixelwise_projector::PixelwiseProjector {
  public:
   explicit FormulaProjector(std::function<double(double, double)> formula) : formula_(std::move(formula)) {}
-  std::vector<float> radiograph(const marrow::Camera&, const marrow::RigidTransform&,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column)
-        values.push_back(float(formula_(grid.pixel(column, row).x(), grid.pixel(column, row).y())));
-    return values;
-  }
   marrow::PixelGrid region(const marrow::Camera&, const marrow::RigidTransform&) const override {
     return {0, 0, 1, 5, 5};
+  }
+
+ protected:
+  double integral(const Eigen::Vector2d& pixel, const marrow::RigidTransform&) const override {
+    return formula_(pixel.x(), pixel.y());
   }
 
  private:
@@ -44,7 +41,7 @@ marrow::View small_view(const std::function<double(double, double)>& formula) {
 
 double value(const std::function<double(double, double)>& rendered, const std::function<double(double, double)>& seen) {
   const shipped::Inputs inputs{
-      {"projector", marrow::Value::of<Projector>(std::make_shared<const FormulaProjector>(rendered))},
+      {"projector", marrow::Value::of<RadiographProjector>(std::make_shared<const FormulaProjector>(rendered))},
       {"views", shipped::list(intensity_behaviour::views_of(small_view(seen)), "view")}};
   const shipped::Options options{{"pixel_step", std::int64_t(1)},
                                  {"margin_px", std::int64_t(0)},
@@ -55,7 +52,8 @@ double value(const std::function<double(double, double)>& rendered, const std::f
 }
 
 shipped::Inputs blob_inputs(const marrow::View& view) {
-  return {{"projector", marrow::Value::of<Projector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
+  return {{"projector",
+           marrow::Value::of<RadiographProjector>(std::make_shared<const intensity_behaviour::BlobProjector>())},
           {"views", shipped::list(intensity_behaviour::views_of(view), "view")}};
 }
 

@@ -142,8 +142,8 @@ TEST(RayToSurface, LevelsUseFewerRays) {
 
 TEST(RayToSurface, AnotherFragmentsEdgesDoNotCount) {
   shipped::Inputs alone = inputs(), both = inputs();
-  const auto own = std::make_shared<const other_fragment::SquareProjector>();
-  const other_fragment::Fragments fragments{own, std::make_shared<const other_fragment::SquareOutline>()};
+  const other_fragment::Fragments<marrow::OutlineProjector> fragments{
+      std::make_shared<const other_fragment::SquareOutline>(), std::make_shared<const other_fragment::SquareOutline>()};
   const auto edges = both["edges"].as_list<marrow::EdgeMap>();
   marrow::List<marrow::EdgeMap> more;
   for (std::size_t i = 0; i < edges.size(); ++i) {

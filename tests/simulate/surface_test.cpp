@@ -7,6 +7,7 @@
 #include <fstream>
 
 #include "shapes.hpp"
+#include "shipped.hpp"
 
 namespace {
 
@@ -96,11 +97,10 @@ TEST(SimulateSurface, BadFilesAreExplained) {
             "simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends "
             "100.000000 x 10.000000 x "
             "10.000000 mm; turn it with rotation_deg");
-  SurfaceOptions options = reading(write_stl("good.stl", box, false));
-  options.fill_at = {0, 1};
-  options.fill_fraction = {0.1};
-  EXPECT_EQ(message(options),
-            "simulate.surface: fill_at has 2 positions, but fill_fraction has 1 values; give as many of each");
+}
+
+TEST(SimulateSurface, DeclaresAShareOfBoneForEachHeight) {
+  EXPECT_TRUE(shipped::declares("simulate.surface", same_length({"fill_at", "fill_fraction"})));
 }
 
 TEST(SimulateSurface, RealFemurIsAHollowBone) {

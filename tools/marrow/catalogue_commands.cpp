@@ -1,69 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-// list, inspect, doctor, describe: what can be used, from manifests alone.
+// inspect, doctor, describe: what can be used, from manifests alone.
+#include <algorithm>
 #include <cstdio>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <sstream>
 
+#include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "marrow/conformance.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/diagnostics.hpp"
-#include "marrow/runtime/kinds.hpp"
 #include "marrow/runtime/library.hpp"
 
 namespace marrow::cli {
 namespace {
 
 using nlohmann::json;
-
-const char* type_name(OptionType type) {
-  static constexpr const char* kNames[] = {"true/false", "integer",         "number",        "text",
-                                           "path",       "list of numbers", "list of texts", "list of paths"};
-  return kNames[int(type)];
-}
-
-std::string number_text(double value) {
-  std::ostringstream out;
-  out.precision(10);
-  out << value;
-  return out.str();
-}
-
-bool plain_scalar(const std::string& text) {
-  return !text.empty() && text.find_first_of(":#{}[]&*!|>'\"%@`,$ ") == std::string::npos && text != "true" &&
-         text != "false";
-}
-
-json option_json(const OptionInfo& option) {
-  json j = {{"name", option.name},
-            {"help", option.help},
-            {"unit", option.unit},
-            {"type", type_name(option.type)},
-            {"required", option.required}};
-  std::visit([&](const auto& value) { j["default"] = value; }, option.default_value);
-  if (option.minimum) j["minimum"] = *option.minimum;
-  if (option.maximum) j["maximum"] = *option.maximum;
-  if (!option.choices.empty()) j["choices"] = option.choices;
-  return j;
-}
-
-json node_json(const NodeInfo& node) {
-  json j = {{"name", node.name},       {"summary", node.summary},  {"random", node.random},
-            {"inputs", json::array()}, {"outputs", json::array()}, {"options", json::array()}};
-  for (const PortInfo& port : node.inputs)
-    j["inputs"].push_back({{"name", port.name},
-                           {"type", port.type.id},
-                           {"axis", port.axis},
-                           {"optional", port.optional},
-                           {"help", port.help}});
-  for (const PortInfo& port : node.outputs)
-    j["outputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"help", port.help}});
-  for (const OptionInfo& option : node.options) j["options"].push_back(option_json(option));
-  return j;
-}
 
 void print_ports(const char* title, const std::vector<PortInfo>& ports, bool inputs) {
   if (ports.empty()) return;
@@ -90,10 +43,28 @@ void print_snippet(const NodeInfo& node) {
                 printable(option.help).c_str(), printable(range_text(option)).c_str());
 }
 
-void print_node(const NodeInfo& node, const LibraryInfo& library) {
+void print_kind(const NodeInfo& node, const KindInfo* kind) {
+  if (!kind) return;
+  std::printf("\nKind\n  %s: %s\n", printable(kind->name).c_str(), printable(kind->summary).c_str());
+  for (const TraitInfo& trait : kind->traits)
+    if (std::find(node.traits.begin(), node.traits.end(), trait.name) != node.traits.end())
+      std::printf("  %s: %s\n", printable(trait.name).c_str(), printable(trait.help).c_str());
+}
+
+/// The figures that `marrow conformance` measures of a node, with their limits.
+void print_checks(const NodeInfo& node, const KindInfo* kind) {
+  if (!kind || kind->checks.empty()) return;
+  std::printf("\nConformance (marrow conformance %s)\n", printable(node.name).c_str());
+  for (const CheckInfo& check : kind->checks) {
+    const std::string limit =
+        check.unit.empty() ? "" : ": at most " + conformance::digits(check.limit) + " " + check.unit;
+    std::printf("  %-26s %s\n", printable(check.name).c_str(), printable(check.what + limit).c_str());
+  }
+}
+
+void print_node(const NodeInfo& node, const LibraryInfo& library, const KindInfo* kind) {
   std::printf("%s\n  %s\n", printable(node.name).c_str(), printable(node.summary).c_str());
-  if (const Kind* kind = find_kind(node.kind()))
-    std::printf("\nKind\n  %s: %s\n", kind->name.c_str(), kind->help.c_str());
+  print_kind(node, kind);
   print_ports("Inputs", node.inputs, true);
   print_ports("Outputs", node.outputs, false);
   if (!node.options.empty()) std::printf("\nOptions\n");
@@ -103,100 +74,9 @@ void print_node(const NodeInfo& node, const LibraryInfo& library) {
                 option.required ? "must be given" : printable("default " + yaml_text(option.default_value)).c_str());
   }
   if (node.random) std::printf("\nRandom: its result depends on the run's seed.\n");
-  print_limits(node);
+  print_checks(node, kind);
   std::printf("\nLibrary\n  %s\n  build id %s\n", printable(library.file.string()).c_str(),
               library.build_id.hex().c_str());
-}
-
-}  // namespace
-
-std::string port_text(const PortInfo& port) {
-  return port.axis.empty() ? port.type.id : "list of " + port.type.id + " over " + port.axis;
-}
-
-std::string yaml_text(const OptionValue& value) {
-  return std::visit(
-      [](const auto& v) -> std::string {
-        using T = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<T, bool>)
-          return v ? "true" : "false";
-        else if constexpr (std::is_same_v<T, std::int64_t>)
-          return std::to_string(v);
-        else if constexpr (std::is_same_v<T, double>)
-          return number_text(v);
-        else if constexpr (std::is_same_v<T, std::string>)
-          return plain_scalar(v) ? v : "\"" + v + "\"";
-        else {
-          std::string text;
-          for (const auto& item : v) text += (text.empty() ? "" : ", ") + yaml_text(OptionValue(item));
-          return "[" + text + "]";
-        }
-      },
-      value);
-}
-
-/// A bound of an option's range; none where it is only what an int can hold.
-std::optional<double> bound_told(const OptionInfo& option, std::optional<double> bound) {
-  using Limits = std::numeric_limits<int>;
-  const bool is_of_int = option.type == OptionType::integer && (bound == Limits::min() || bound == Limits::max());
-  return is_of_int ? std::nullopt : bound;
-}
-
-std::string range_text(const OptionInfo& option) {
-  if (!option.choices.empty()) {
-    std::string text;
-    for (const std::string& choice : option.choices) text += (text.empty() ? "one of: " : ", ") + choice;
-    return text;
-  }
-  std::string text = type_name(option.type);
-  if (option.length) text = std::to_string(option.length) + " numbers";
-  const std::optional<double> least = bound_told(option, option.minimum), most = bound_told(option, option.maximum);
-  if (least && most)
-    text += ", " + number_text(*least) + " to " + number_text(*most);
-  else if (least)
-    text += ", at least " + number_text(*least);
-  else if (most)
-    text += ", at most " + number_text(*most);
-  return option.unit.empty() ? text : text + " [" + option.unit + "]";
-}
-
-namespace {
-
-int list(const std::string& kind, bool as_json) {
-  const Catalogue catalogue;
-  json all = json::array();
-  std::string previous;
-  int shown = 0;
-  for (const std::string& name : catalogue.node_names()) {
-    const NodeInfo& node = *catalogue.find(name);
-    if (!kind.empty() && node.kind() != kind) continue;
-    ++shown;
-    if (as_json) {
-      all.push_back(node_json(node));
-      continue;
-    }
-    if (node.kind() != previous) {
-      const Kind* contract = find_kind(node.kind());
-      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", printable(node.kind()).c_str(), contract ? ": " : "",
-                  contract ? contract->help.c_str() : "");
-      previous = node.kind();
-    }
-    std::printf("  %-34s %s\n", printable(name).c_str(), printable(node.summary).c_str());
-  }
-  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
-  if (!kind.empty() && shown == 0) {
-    std::vector<std::string> kinds_known;
-    for (const Kind& one : kinds()) kinds_known.push_back(one.name);
-    std::fprintf(stderr, "marrow: error: no node of kind '%s'; %s\n", printable(kind).c_str(),
-                 printable(suggestion(kind, kinds_known)).c_str());
-    return 2;
-  }
-  if (!as_json)
-    for (const LibraryInfo& library : catalogue.libraries())
-      if (!library.refused.empty())
-        std::fprintf(stderr, "marrow: note: %s was refused (see 'marrow doctor')\n",
-                     printable(library.file.filename().string()).c_str());
-  return 0;
 }
 
 int inspect(const std::string& name, bool yaml, bool as_json) {
@@ -212,7 +92,7 @@ int inspect(const std::string& name, bool yaml, bool as_json) {
   else if (as_json)
     std::printf("%s\n", node_json(*node).dump(1, ' ', false, json::error_handler_t::replace).c_str());
   else
-    print_node(*node, *catalogue.library_of(name));
+    print_node(*node, *catalogue.library_of(name), catalogue.find_kind(node->kind()));
   return 0;
 }
 
@@ -229,8 +109,14 @@ int doctor(bool as_json) {
   if (!as_json) std::printf("\nLibraries:\n");
   for (const LibraryInfo& library : catalogue.libraries()) {
     refused += !library.refused.empty();
-    json nodes = json::array();
+    json kinds = json::array(), nodes = json::array();
     std::string text;
+    for (const KindInfo& kind : library.kinds) {
+      kinds.push_back(kind.name);
+      const bool hidden = catalogue.library_of_kind(kind.name) != &library;
+      text +=
+          (text.empty() ? "the kind " : ", the kind ") + kind.name + (hidden ? " (hidden by an earlier library)" : "");
+    }
     for (const NodeInfo& node : library.nodes) {
       nodes.push_back(node.name);
       const bool hidden = catalogue.library_of(node.name) != &library;
@@ -240,6 +126,7 @@ int doctor(bool as_json) {
     all["libraries"].push_back({{"file", library.file.string()},
                                 {"refused", library.refused},
                                 {"note", library.note},
+                                {"kinds", kinds},
                                 {"nodes", nodes},
                                 {"build_id", library.build_id.hex()}});
     if (as_json) continue;
@@ -275,16 +162,6 @@ int describe(const std::filesystem::path& file, bool write) {
 }
 
 }  // namespace
-
-void add_list(CLI::App& app, int& code) {
-  const auto kind = std::make_shared<std::string>();
-  const auto as_json = std::make_shared<bool>(false);
-  CLI::App* command = app.add_subcommand("list", "list the nodes that can be used");
-  command->add_option("kind", *kind, "only this kind");
-  command->add_flag("--json", *as_json, "as JSON");
-  command->callback([kind, as_json, &code] { code = list(*kind, *as_json); });
-  say_that_libraries_are_described(command);
-}
 
 void add_inspect(CLI::App& app, int& code) {
   struct Given {

@@ -61,9 +61,6 @@ void add_conformance(CLI::App& app, int& code);
 void add_check_worker(CLI::App& app, int& code);
 void add_describe(CLI::App& app, int& code);
 
-/// The checks that a node of this kind must pass, with their limits.
-void print_limits(const NodeInfo& node);
-
 /// Whether results can be kept. Says why not, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);
 /// Splits name=value texts. Throws Error for one without '='.
@@ -84,13 +81,6 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
 
 /// That the pipeline reads no folder to which the run writes; an empty one is below runs/. Throws Error.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
-
-/// "edge_map", "list of view over view".
-std::string port_text(const PortInfo& port);
-/// An option's default as it is written in YAML.
-std::string yaml_text(const OptionValue& value);
-/// "number, 0 to 100 px", "one of: a, b".
-std::string range_text(const OptionInfo& option);
 
 /// Prints what a person wants to see of results at once: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);

@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "catalogue_text.hpp"
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "runtime/text_file.hpp"
@@ -58,7 +59,7 @@ json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
   if (!required.empty()) with["required"] = required;
   const json reference = {{"type", "string"}};
   json in = {{"type", "object"}, {"additionalProperties", false}, {"properties", json::object()}};
-  for (const PortInfo& port : catalogue.ports_of_kind(node.kind()))
+  for (const KindPort& port : catalogue.ports_of_kind(node.kind()))
     in["properties"][port.name] = {{"description", port_text(port) + (port.help.empty() ? "" : ": " + port.help)},
                                    {"anyOf", {reference, {{"type", "array"}, {"items", reference}}}}};
   json wired = json::array();

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/match/nearest_outline.hpp"
@@ -37,23 +36,36 @@ void fill_outline(const std::vector<OutlinePoint>& outline, cv::Mat& mask) {
     fill_line(columns[std::size_t(u)], mask.rows, [&](int v) { mask.at<std::uint8_t>(v, u) = 1; });
 }
 
-/// The region of a fragment's radiograph; nothing for one that is drawn as an outline.
-std::optional<PixelGrid> region_of(const Other& other, const Camera& camera) {
-  try {
-    return other.projector->region(camera, other.world_from_model);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
+void add_shadow(const OutlineProjector& projector, const RigidTransform& world_from_model, const Camera& camera,
+                cv::Mat& mask) {
+  fill_outline(projector.outline(camera, world_from_model, 0.5), mask);
 }
 
+void add_shadow(const RadiographProjector& projector, const RigidTransform& world_from_model, const Camera& camera,
+                cv::Mat& mask) {
+  const PixelGrid region = projector.region(camera, world_from_model);
+  const std::vector<float> values = projector.radiograph(camera, world_from_model, region);
+  for (int row = 0; row < region.rows; ++row)
+    for (int column = 0; column < region.columns; ++column)
+      if (values[std::size_t(row) * std::size_t(region.columns) + std::size_t(column)] > 0)
+        mask.at<std::uint8_t>(int(region.v_px) + row, int(region.u_px) + column) = 1;
+}
+
+/// Marks where the other's shadow falls.
 void add_shadow(const Other& other, const Camera& camera, cv::Mat& mask) {
-  const std::optional<PixelGrid> region = region_of(other, camera);
-  if (!region) return fill_outline(other.projector->outline(camera, other.world_from_model, 0.5), mask);
-  const std::vector<float> values = other.projector->radiograph(camera, other.world_from_model, *region);
-  for (int row = 0; row < region->rows; ++row)
-    for (int column = 0; column < region->columns; ++column)
-      if (values[std::size_t(row) * std::size_t(region->columns) + std::size_t(column)] > 0)
-        mask.at<std::uint8_t>(int(region->v_px) + row, int(region->u_px) + column) = 1;
+  std::visit([&](const auto* projector) { add_shadow(*projector, other.world_from_model, camera, mask); },
+             other.projector);
+}
+
+constexpr const char* kNoPoses = "there are projectors of other fragments, but no poses; wire 'others'";
+
+/// The pose of a fragment in the list that the node's input `port` gives.
+const RigidTransform& pose_of(const std::string& fragment, const List<Pose>& poses, const std::string& port) {
+  const Pose* pose = poses.find(fragment);
+  if (!pose)
+    throw Error(port + " has the fragment '" + fragment +
+                "', but others has no pose of it; give the poses of the same fragments");
+  return pose->world_from_model;
 }
 
 }  // namespace
@@ -107,25 +119,35 @@ double weighted_mean(const std::vector<double>& of_view, const std::vector<doubl
   return sum / total;
 }
 
-std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors) {
-  std::vector<Other> others;
-  if (!projectors != !poses)
-    throw Error(std::string("there are ") +
-                (poses ? "poses of other fragments, but nothing draws them; wire 'other_projectors'"
-                       : "projectors of other fragments, but no poses; wire 'others'"));
+template <class Projector>
+std::vector<OtherDrawnBy<Projector>> others_of(const Projector* own, const List<Pose>* poses,
+                                               const List<Projector>* projectors, const std::string& own_port) {
+  std::vector<OtherDrawnBy<Projector>> others;
+  if (poses && !projectors)
+    throw Error("there are poses of other fragments, but nothing draws them; wire 'other_projectors'");
   if (!projectors) return others;
+  if (!poses) throw Error(kNoPoses);
   if (!own)
-    throw Error(
-        "there are other fragments, but it is not known which of them is this one; wire 'projector', the one that "
-        "draws this fragment");
-  for (std::size_t i = 0; i < projectors->size(); ++i) {
-    if (&(*projectors)[i] == own) continue;
-    const Pose* pose = poses->find(projectors->name(i));
-    if (!pose)
-      throw Error("other_projectors has the fragment '" + projectors->name(i) +
-                  "', but others has no pose of it; give the poses of the same fragments");
-    others.push_back({&(*projectors)[i], pose->world_from_model});
-  }
+    throw Error("there are other fragments, but it is not known which of them is this one; wire '" + own_port +
+                "', the one that draws this fragment");
+  for (std::size_t i = 0; i < projectors->size(); ++i)
+    if (&(*projectors)[i] != own)
+      others.push_back({&(*projectors)[i], pose_of(projectors->name(i), *poses, "other_projectors")});
+  return others;
+}
+template std::vector<OtherOutline> others_of(const OutlineProjector*, const List<Pose>*, const List<OutlineProjector>*,
+                                             const std::string&);
+template std::vector<Other> others_of(const RadiographProjector*, const List<Pose>*, const List<RadiographProjector>*,
+                                      const std::string&);
+
+std::vector<Other> shadows_of(const RadiographProjector* own, const List<Pose>* poses,
+                              const List<RadiographProjector>* projectors, const List<OutlineProjector>* outlines) {
+  if (!outlines) return others_of(own, poses, projectors);
+  if (!poses) throw Error(kNoPoses);
+  std::vector<Other> others;
+  if (projectors) others = others_of(own, poses, projectors);
+  for (std::size_t i = 0; i < outlines->size(); ++i)
+    others.push_back({&(*outlines)[i], pose_of(outlines->name(i), *poses, "other_outlines")});
   return others;
 }
 
@@ -144,14 +166,14 @@ List<View> without_shadows(const List<View>& views, const std::vector<Other>& ot
   return left;
 }
 
-List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others,
-                               double reach_px, double tolerance_deg) {
+List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges,
+                               const std::vector<OtherOutline>& others, double reach_px, double tolerance_deg) {
   if (others.empty()) return edges;
   List<EdgeMap> left;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const Camera& camera = views[i].camera;
     EdgeMap kept = edges[i];
-    for (const Other& other : others) {
+    for (const OtherOutline& other : others) {
       const std::vector<OutlinePoint> outline = other.projector->outline(camera, other.world_from_model, 1);
       const NearestOutline nearest(outline, camera.width_px, camera.height_px, reach_px);
       const float least_cosine = float(std::cos(radians(tolerance_deg)));

@@ -14,8 +14,8 @@ namespace {
 
 class IntensityCost : public Cost {
  public:
-  IntensityCost(const Projector& projector, const List<View>& views, const IntensityOptions& options, double worst,
-                MeasureOf measure_of)
+  IntensityCost(const RadiographProjector& projector, const List<View>& views, const IntensityOptions& options,
+                double worst, MeasureOf measure_of)
       : projector_(projector), views_(views), options_(options), worst_(worst), measure_of_(std::move(measure_of)) {
     for (const View& view : views) {
       images_.push_back(image_of(view));
@@ -83,7 +83,7 @@ class IntensityCost : public Cost {
     return measures_[index](patch);
   }
 
-  const Projector& projector_;
+  const RadiographProjector& projector_;
   const List<View> views_;
   const IntensityOptions options_;
   const double worst_;
@@ -94,19 +94,21 @@ class IntensityCost : public Cost {
 
 }  // namespace
 
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
+                                           const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of) {
   check_views(views);
   check_weights(options.weights, views.size());
-  const List<View> own = without_shadows(views, others_of(&projector, others, other_projectors));
+  const List<View> own = without_shadows(views, shadows_of(&projector, others, other_projectors, other_outlines));
   return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
 }
 
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
+                                           const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, Measure measure) {
-  return intensity_cost(projector, views, others, other_projectors, options, worst,
+  return intensity_cost(projector, views, others, other_projectors, other_outlines, options, worst,
                         [measure = std::move(measure)](const Patch&) { return measure; });
 }
 

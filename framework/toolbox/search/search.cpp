@@ -12,34 +12,27 @@
 
 namespace marrow::search {
 
-void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels,
-                      const std::string& like, const std::string& advice) {
-  if (values.empty() || values.size() != levels)
-    throw Error(name + " has " + std::to_string(values.size()) + " numbers, but " + like + " has " +
-                std::to_string(levels) + "; " + advice);
+void check_level_list(const std::vector<double>& values, const std::string& name) {
+  if (values.empty()) throw Error(name + ": there is no level; give a number for one at least");
   for (const double value : values)
     if (!(value > 0)) throw Error(name + ": each number must be positive");
 }
 
 void check_options(const SearchOptions& options) {
-  const auto check = [&](const std::vector<double>& values, const char* name) {
-    check_level_list(values, name, options.contour_spacing_px.size(), "contour_spacing_px",
-                     "give reach_px and the four options of steps as many, one for each level");
-  };
-  check(options.contour_spacing_px, "contour_spacing_px");
-  check(options.reach_px, "reach_px");
-  if (!options.pixel_step.empty()) check(options.pixel_step, "pixel_step");
-  check(options.step_deg, "step_deg");
-  check(options.step_axial_deg, "step_axial_deg");
-  check(options.step_mm, "step_mm");
-  check(options.step_tolerance, "step_tolerance");
+  check_level_list(options.contour_spacing_px, "contour_spacing_px");
+  check_level_list(options.reach_px, "reach_px");
+  if (!options.pixel_step.empty()) check_level_list(options.pixel_step, "pixel_step");
+  check_level_list(options.step_deg, "step_deg");
+  check_level_list(options.step_axial_deg, "step_axial_deg");
+  check_level_list(options.step_mm, "step_mm");
+  check_level_list(options.step_tolerance, "step_tolerance");
 }
 
 Levels levels_of(const Cost& cost, const SearchOptions& options) {
   Levels levels;
   for (std::size_t i = 0; i < options.contour_spacing_px.size(); ++i)
-    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px[i],
-                                    options.pixel_step.empty() ? 0 : int(options.pixel_step[i])}));
+    levels.push_back(cost.at_level({options.contour_spacing_px[i], options.reach_px.at(i),
+                                    options.pixel_step.empty() ? 0 : int(options.pixel_step.at(i))}));
   return levels;
 }
 
@@ -152,8 +145,8 @@ void Search::note(int evaluations, const RigidTransform& pose) {
 }
 
 Steps Search::steps_of(std::size_t level) const {
-  return {options_.step_deg[level], options_.step_axial_deg[level], options_.step_mm[level],
-          options_.step_tolerance[level]};
+  return {options_.step_deg.at(level), options_.step_axial_deg.at(level), options_.step_mm.at(level),
+          options_.step_tolerance.at(level)};
 }
 
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {

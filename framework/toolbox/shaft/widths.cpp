@@ -49,12 +49,9 @@ std::vector<Width> femur() {
 Widths::Widths(const std::vector<double>& mean_mm, const std::vector<double>& deviation_mm,
                double magnification_tolerance)
     : magnification_tolerance_(magnification_tolerance) {
-  if (mean_mm.size() != deviation_mm.size())
-    throw Error("width_mm has " + std::to_string(mean_mm.size()) + " numbers and width_deviation_mm " +
-                std::to_string(deviation_mm.size()) + "; give one deviation for each width");
   if (mean_mm.empty()) widths_ = femur();
   for (std::size_t i = 0; i < mean_mm.size(); ++i) {
-    if (!(mean_mm[i] > 0) || !(deviation_mm[i] > 0)) throw Error("width_mm and width_deviation_mm must be positive");
+    if (!(mean_mm[i] > 0) || !(deviation_mm.at(i) > 0)) throw Error("width_mm and width_deviation_mm must be positive");
     widths_.push_back({mean_mm[i], deviation_mm[i], -1});
   }
 }

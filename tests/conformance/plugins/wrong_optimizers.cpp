@@ -51,7 +51,7 @@ std::shared_ptr<const marrow::Optimizer> make() {
 
 MARROW_PLUGIN(plugin) {
   const auto add = [&](const char* name, auto* function) {
-    plugin.node(name, function).summary("For a test of the suite").out("optimizer", "minimiser");
+    plugin.node(name, function).summary("For a test of the suite").trait("needs_start").out("optimizer", "minimiser");
   };
   add("optimizer.plain", make<Fault::none>);
   add("optimizer.lazy", make<Fault::lazy>);

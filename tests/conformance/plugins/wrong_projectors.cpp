@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A plain projector, which adds a volume's attenuation at even steps and draws the edges of a mesh between what faces
-// the source and what does not, and others that are wrong in one way each: the suite must catch each of them.
+// Two plain projectors, one that adds a volume's attenuation at even steps and one that draws the edges of a mesh
+// between what faces the source and what does not, and others that are wrong in one way each: the suite must catch each
+// of them.
 #include <atomic>
 #include <cmath>
 #include <map>
@@ -11,15 +12,9 @@ namespace {
 enum class Fault { none, shifted, dense, narrow, behind, silent, coarse, everything, changing, inward, gaps, slanted };
 
 template <Fault fault>
-class Plain : public marrow::Projector {
+class PlainOutline : public marrow::OutlineProjector {
  public:
-  Plain(const marrow::Mesh& mesh, const marrow::Volume& volume, const marrow::SignedField* field)
-      : mesh_(mesh), volume_(volume), field_(fault == Fault::everything ? nullptr : field) {
-    marrow::check_mesh(mesh, "the mesh");
-    marrow::check_volume(volume, "the volume");
-    if (field && (field->grid.size != volume.grid.size || field->values_mm.size() != volume.values.size()))
-      throw marrow::Error("the field has another size than the volume");
-  }
+  explicit PlainOutline(const marrow::Mesh& mesh) : mesh_(mesh) { marrow::check_mesh(mesh, "the mesh"); }
 
   std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& pose,
                                             double spacing_px) const override {
@@ -49,27 +44,6 @@ class Plain : public marrow::Projector {
     return points;
   }
 
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
-                                const marrow::PixelGrid& grid) const override {
-    std::vector<float> values;
-    const double step = fault == Fault::coarse ? 1 : grid.step_px;
-    for (int row = 0; row < grid.rows; ++row)
-      for (int column = 0; column < grid.columns; ++column)
-        values.push_back(integral(camera, pose, grid.u_px + step * column, grid.v_px + step * row));
-    return values;
-  }
-  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
-                                const std::vector<Eigen::Vector2f>& pixels) const override {
-    std::vector<float> values;
-    for (const auto& p : pixels) values.push_back(integral(camera, pose, double(p.x()), double(p.y())));
-    return values;
-  }
-  marrow::PixelGrid region(const marrow::Camera& camera, const marrow::RigidTransform&) const override {
-    marrow::check_camera(camera, "the camera");
-    if (fault == Fault::narrow) return {60, 60, 1, 40, 40};
-    return {0, 0, 1, camera.width_px, camera.height_px};
-  }
-
  private:
   /// One point for each spacing_px of outline; gives the length of this piece.
   double add(const marrow::Camera& camera, const marrow::RigidTransform& pose,
@@ -94,6 +68,41 @@ class Plain : public marrow::Projector {
     return length;
   }
 
+  const marrow::Mesh& mesh_;
+};
+
+template <Fault fault>
+class PlainRadiograph : public marrow::RadiographProjector {
+ public:
+  PlainRadiograph(const marrow::Volume& volume, const marrow::SignedField* field)
+      : volume_(volume), field_(fault == Fault::everything ? nullptr : field) {
+    marrow::check_volume(volume, "the volume");
+    if (field && (field->grid.size != volume.grid.size || field->values_mm.size() != volume.values.size()))
+      throw marrow::Error("the field has another size than the volume");
+  }
+
+  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
+                                const marrow::PixelGrid& grid) const override {
+    std::vector<float> values;
+    const double step = fault == Fault::coarse ? 1 : grid.step_px;
+    for (int row = 0; row < grid.rows; ++row)
+      for (int column = 0; column < grid.columns; ++column)
+        values.push_back(integral(camera, pose, grid.u_px + step * column, grid.v_px + step * row));
+    return values;
+  }
+  std::vector<float> radiograph(const marrow::Camera& camera, const marrow::RigidTransform& pose,
+                                const std::vector<Eigen::Vector2f>& pixels) const override {
+    std::vector<float> values;
+    for (const auto& p : pixels) values.push_back(integral(camera, pose, double(p.x()), double(p.y())));
+    return values;
+  }
+  marrow::PixelGrid region(const marrow::Camera& camera, const marrow::RigidTransform&) const override {
+    marrow::check_camera(camera, "the camera");
+    if (fault == Fault::narrow) return {60, 60, 1, 40, 40};
+    return {0, 0, 1, camera.width_px, camera.height_px};
+  }
+
+ private:
   float integral(const marrow::Camera& camera, const marrow::RigidTransform& pose, double u, double v) const {
     static std::atomic<int> calls{0};
     constexpr double kStep_mm = 0.8, kReach_mm = 48;
@@ -120,38 +129,50 @@ class Plain : public marrow::Projector {
     return float(std::max(0.0, sum));
   }
 
-  const marrow::Mesh& mesh_;
   const marrow::Volume& volume_;
   const marrow::SignedField* field_;
 };
 
 template <Fault fault>
-std::shared_ptr<const marrow::Projector> make(const marrow::Mesh& mesh, const marrow::Volume& volume,
-                                              const marrow::SignedField* field) {
-  return std::make_shared<Plain<fault>>(mesh, volume, field);
+std::shared_ptr<const marrow::OutlineProjector> outline(const marrow::Mesh& mesh) {
+  return std::make_shared<PlainOutline<fault>>(mesh);
+}
+
+template <Fault fault>
+std::shared_ptr<const marrow::RadiographProjector> radiograph(const marrow::Volume& volume,
+                                                              const marrow::SignedField* field) {
+  return std::make_shared<PlainRadiograph<fault>>(volume, field);
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  const auto add = [&](const char* name, auto* function) {
+  const auto add_outline = [&](const char* name, auto* function) {
     plugin.node(name, function)
         .summary("For a test of the suite")
         .in("mesh", "surface")
+        .out("projector", "draws the outline");
+  };
+  add_outline("project.plain_outline", outline<Fault::none>);
+  add_outline("project.shifted_outline", outline<Fault::shifted>);
+  add_outline("project.silent", outline<Fault::silent>);
+  add_outline("project.inward", outline<Fault::inward>);
+  add_outline("project.gaps", outline<Fault::gaps>);
+  add_outline("project.slanted", outline<Fault::slanted>);
+
+  const auto add_radiograph = [&](const char* name, auto* function) {
+    plugin.node(name, function)
+        .summary("For a test of the suite")
         .in("volume", "CT")
         .in("field", "fragment")
-        .out("projector", "draws both");
+        .out("projector", "makes radiographs");
   };
-  add("project.plain", make<Fault::none>);
-  add("project.shifted", make<Fault::shifted>);
-  add("project.dense", make<Fault::dense>);
-  add("project.narrow", make<Fault::narrow>);
-  add("project.behind", make<Fault::behind>);
-  add("project.silent", make<Fault::silent>);
-  add("project.coarse", make<Fault::coarse>);
-  add("project.everything", make<Fault::everything>);
-  add("project.changing", make<Fault::changing>);
-  add("project.inward", make<Fault::inward>);
-  add("project.gaps", make<Fault::gaps>);
-  add("project.slanted", make<Fault::slanted>);
+  add_radiograph("project.plain_radiograph", radiograph<Fault::none>);
+  add_radiograph("project.shifted_radiograph", radiograph<Fault::shifted>);
+  add_radiograph("project.dense", radiograph<Fault::dense>);
+  add_radiograph("project.narrow", radiograph<Fault::narrow>);
+  add_radiograph("project.behind", radiograph<Fault::behind>);
+  add_radiograph("project.coarse", radiograph<Fault::coarse>);
+  add_radiograph("project.everything", radiograph<Fault::everything>);
+  add_radiograph("project.changing", radiograph<Fault::changing>);
 }

@@ -12,7 +12,7 @@ enum class Fault { none, shifted, careless, moved, changing, unordered, unmasked
 template <Fault fault>
 class Plain : public marrow::Cost {
  public:
-  Plain(const marrow::Projector& projector, const marrow::List<marrow::View>& views, int step)
+  Plain(const marrow::RadiographProjector& projector, const marrow::List<marrow::View>& views, int step)
       : projector_(projector), views_(views), step_(step) {}
 
   double value(const marrow::RigidTransform& world_from_model) const override {
@@ -73,22 +73,23 @@ class Plain : public marrow::Cost {
     return 1 - (ab - a * b / n) / std::sqrt(va * vb);
   }
 
-  const marrow::Projector& projector_;
+  const marrow::RadiographProjector& projector_;
   const marrow::List<marrow::View> views_;
   const int step_;
 };
 
 template <Fault fault>
-std::shared_ptr<const marrow::Cost> make(const marrow::Projector& projector, const marrow::List<marrow::View>& views,
+std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
+                                         const marrow::List<marrow::View>& views,
                                          const marrow::List<marrow::Pose>* others,
-                                         const marrow::List<marrow::Projector>* other_projectors) {
+                                         const marrow::List<marrow::RadiographProjector>* other_projectors) {
   if (views.size() == 0) throw marrow::Error("there is no view");
   marrow::List<marrow::View> own;
   for (marrow::View view : views) {
     check_view(view);
     check_camera(view.camera, "view '" + view.name + "'");
     for (std::size_t i = 0; other_projectors && others && i < other_projectors->size(); ++i) {
-      const marrow::Projector& other = (*other_projectors)[i];
+      const marrow::RadiographProjector& other = (*other_projectors)[i];
       if (&other == &projector && fault != Fault::alone) continue;
       const std::vector<float> shadow =
           other.radiograph(view.camera, (*others)[i].world_from_model,
@@ -110,11 +111,13 @@ MARROW_PLUGIN(plugin) {
   const auto add = [&](const char* name, auto* function) {
     plugin.node(name, function)
         .summary("For a test of the suite")
+        .trait("unmoved_by_gain")
+        .trait("derivatives")
         .in("projector", "makes radiographs")
         .in("views", "views", marrow::over("view"))
         .in("others", "poses", marrow::over("fragment"))
         .in("other_projectors", "projectors", marrow::over("fragment"))
-        .out("cost", "unmoved by gain and offset of the line integrals");
+        .out("cost", "how badly radiograph and image agree");
   };
   add("similarity.plain", make<Fault::none>);
   add("similarity.shifted", make<Fault::shifted>);

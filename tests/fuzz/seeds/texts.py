@@ -181,7 +181,7 @@ def pipeline_seeds():
         "name": SMALL + "name: ../../x\n",
         "quotes": SMALL.replace("one", '"o: \\x1b[31m\\n"'),
         "truth": (
-            "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  e: {uses: evaluate.test, in: {of: t, truth: t}}\n  s: {uses:"
+            "marrow: 1\nnodes:\n  t: {uses: test.truth}\n  e: {uses: judge.test, in: {of: t, truth: t}}\n  s: {uses:"
             " test.add, in: {a: t}}\noutputs: {e: e}\n"
         ),
     }

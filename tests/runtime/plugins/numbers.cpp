@@ -148,7 +148,8 @@ MARROW_PLUGIN(plugin) {
       .option("translation_mm", &DisplacedOptions::translation_mm, "translation")
       .option("distance_mm", &DisplacedOptions::distance_mm, "distance");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
-  plugin.node("evaluate.test", judge)
+  plugin.kind("judge").summary("may see the truth").sees_truth();
+  plugin.node("judge.test", judge)
       .summary("Sees the truth")
       .in("of", "number")
       .in("truth", "truth")

@@ -50,7 +50,8 @@ Metrics number(const Options& options, const Metrics* added, marrow::Context& co
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("read.test_number", number)
+  plugin.kind("parse").summary("reads files in a process of its own").runs_apart(marrow::Apart::parses);
+  plugin.node("parse.test_number", number)
       .summary("A number, or whatever the file asks for")
       .random()
       .in("added", "a number")

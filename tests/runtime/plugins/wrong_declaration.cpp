@@ -10,8 +10,10 @@ marrow::EdgeMap find(const marrow::View&, const Options&) { return {}; }
 
 MARROW_PLUGIN(plugin) {
   plugin.node("edges.wrong", find)
-      .summary("Wrong in three places")
-      .in("picture", "view")
+      .summary("Wrong in two places")
+      .trait("fast")
+      .trait("fast")
+      .in("view", "view")
       .out("edges", "edges")
       .option("low", &Options::low, "threshold", marrow::at_least(60));
 }

@@ -13,8 +13,8 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
-#include "conformance/camera_files.hpp"
-#include "conformance/suite.hpp"
+#include "marrow/domain/printable.hpp"
+#include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "process.hpp"
 
@@ -22,7 +22,6 @@ namespace marrow::cli {
 namespace {
 
 using conformance::Check;
-using conformance::Suite;
 using nlohmann::json;
 using OptionValues = std::map<std::string, OptionValue>;
 
@@ -44,10 +43,37 @@ struct Outcome {
   std::string text;
 };
 
+/// In the worker: the values that other nodes make for inputs that the kind does not have, port by port. Those nodes
+/// are called with the inputs of their own kind's suite, which `kept` keeps alive for what refers to them.
+conformance::Inputs further_inputs(const Catalogue& catalogue, const NodeDefinition& node, const json& makers,
+                                   std::vector<conformance::Inputs>& kept) {
+  conformance::Inputs further;
+  for (const auto& [name, maker] : makers.items()) {
+    const std::vector<PortInfo>& ports = node.info.inputs;
+    const auto port =
+        std::find_if(ports.begin(), ports.end(), [&, n = name](const PortInfo& p) { return p.name == n; });
+    const NodeInfo* made_by = catalogue.find(maker);
+    if (port == ports.end()) throw Error("it has no input '" + name + "'");
+    if (!made_by) throw Error("there is no node '" + maker.get<std::string>() + "'");
+    const KindInfo* kind = catalogue.find_kind(made_by->kind());
+    kept.push_back(kind && !kind->checks.empty() ? catalogue.load_kind(kind->name).suite.sample()
+                                                 : conformance::Inputs{});
+    const auto output = std::find_if(made_by->outputs.begin(), made_by->outputs.end(),
+                                     [&](const PortInfo& p) { return p.type == port->type; });
+    if (output == made_by->outputs.end())
+      throw Error(made_by->name + " gives no " + port->type.id + " for the input '" + name + "'");
+    further.set(name, conformance::Subject(catalogue.load(maker)).output(kept.back(), output->name));
+  }
+  return further;
+}
+
 /// In the worker: the verdict and the text after it.
-std::string measured(const NodeDefinition& node, const OptionValues& options, const Check& check) {
+std::string measured(const Catalogue& catalogue, const NodeDefinition& node, const json& makers,
+                     const OptionValues& options, const Check& check) {
   try {
-    const double figure = check.measure(conformance::Subject(node, options));
+    std::vector<conformance::Inputs> kept;
+    const conformance::Inputs further = further_inputs(catalogue, node, makers, kept);
+    const double figure = check.measure(conformance::Subject(node, options, further));
     if (check.unit.empty()) return "+";
     const std::string text =
         conformance::digits(figure) + " " + check.unit + ", limit " + conformance::digits(check.limit);
@@ -84,8 +110,8 @@ class FilesFolder {
 /// The checks of one node, one after the other in a worker.
 class Checks {
  public:
-  Checks(std::string node, const FilesFolder& files, const std::atomic<bool>& stopped)
-      : node_(std::move(node)), files_(files), stopped_(stopped) {}
+  Checks(std::string node, json makers, const FilesFolder& files, const std::atomic<bool>& stopped)
+      : node_(std::move(node)), makers_(std::move(makers)), files_(files), stopped_(stopped) {}
 
   Outcome run(std::size_t number) {
     const bool was_fresh = !worker_;
@@ -104,7 +130,7 @@ class Checks {
     if (!worker_)
       worker_ = std::make_unique<Worker>(
           WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker", files_.path()}});
-    worker_->ask({{"do", "check"}, {"node", node_}, {"check", number}});
+    worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"check", number}});
     const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
     if (stopped_.load()) throw Cancelled();  // a terminal's Ctrl-C ends the worker, too
     if (end.died) worker_.reset();
@@ -112,6 +138,7 @@ class Checks {
   }
 
   std::string node_;
+  json makers_;  ///< of inputs that the kind does not have: the names of nodes, by port
   const FilesFolder& files_;
   const std::atomic<bool>& stopped_;
   std::unique_ptr<Worker> worker_;
@@ -137,30 +164,16 @@ std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string&
   return names;
 }
 
-}  // namespace
-
-void print_limits(const NodeInfo& node) {
-  const Suite* suite = conformance::suite_of(node.kind());
-  if (!suite) return;
-  std::printf("\nConformance (marrow conformance %s)\n", node.name.c_str());
-  for (const Check& check : conformance::checks_of(*suite)) {
-    const std::string limit =
-        check.unit.empty() ? "" : ": at most " + conformance::digits(check.limit) + " " + check.unit;
-    std::printf("  %-26s %s%s\n", check.name.c_str(), check.what.c_str(), limit.c_str());
-  }
-}
-
-namespace {
-
 int check_worker(const std::filesystem::path& files_folder) {
-  conformance::write_files_to(files_folder);
+  conformance::set_files_folder(files_folder);
   const Catalogue catalogue;
   return serve_worker({{"check", [&](const json& request, WorkerReports&) {
                           const std::string name = request.at("node");
                           const NodeDefinition& node = catalogue.load(name);
-                          const Suite& suite = *conformance::suite_of(node.info.kind());
+                          const conformance::Suite& suite = catalogue.load_kind(node.info.kind()).suite;
                           const OptionValues options = suite.options ? suite.options() : OptionValues{};
-                          return json(measured(node, options, conformance::checks_of(suite).at(request.at("check"))));
+                          return json(measured(catalogue, node, request.at("in"), options,
+                                               conformance::checks_of(suite).at(request.at("check"))));
                         }}});
 }
 
@@ -177,22 +190,26 @@ void search_folders_of(const std::vector<std::string>& subjects) {
   }
 }
 
+/// Of the suite of a node's kind; none where there is no suite.
+std::vector<CheckInfo> checks_for(const std::string& node, const Catalogue& catalogue) {
+  const KindInfo* kind = catalogue.find_kind(catalogue.find(node)->kind());
+  return kind ? kind->checks : std::vector<CheckInfo>{};
+}
+
 /// Throws Error for a name that no node's suite has.
 void expect_known(const std::vector<std::string>& wanted, const Catalogue& catalogue,
                   const std::vector<std::string>& nodes) {
   std::vector<std::string> known;
   for (const std::string& node : nodes)
-    if (const Suite* suite = conformance::suite_of(catalogue.find(node)->kind()))
-      for (const Check& check : conformance::checks_of(*suite))
-        if (!is_in(known, check.name)) known.push_back(check.name);
+    for (const CheckInfo& check : checks_for(node, catalogue))
+      if (!is_in(known, check.name)) known.push_back(check.name);
   for (const std::string& name : wanted)
     if (!is_in(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
 }
 
 /// Runs the wanted checks of a node, or all where none are named, and counts their verdicts.
-void check_node(const std::string& node, const Suite& suite, const std::vector<std::string>& wanted, Checks& checks,
-                std::map<char, int>& count) {
-  const std::vector<Check> all = conformance::checks_of(suite);
+void check_node(const std::string& node, const std::vector<CheckInfo>& all, const std::vector<std::string>& wanted,
+                Checks& checks, std::map<char, int>& count) {
   std::printf("%s\n", node.c_str());
   for (std::size_t i = 0; i < all.size(); ++i) {
     if (!wanted.empty() && !is_in(wanted, all[i].name)) continue;
@@ -207,7 +224,24 @@ void check_node(const std::string& node, const Suite& suite, const std::vector<s
   }
 }
 
-int run_conformance(const std::vector<std::string>& subjects, const std::vector<std::string>& wanted) try {
+/// {"port": "kind.name"} of port=kind.name. Throws Error for another form.
+json makers_of(const std::vector<std::string>& texts) {
+  json makers = json::object();
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0) throw Error("'" + text + "' is not of the form port=kind.name");
+    makers[text.substr(0, equals)] = text.substr(equals + 1);
+  }
+  return makers;
+}
+
+struct ConformanceRequest {
+  std::vector<std::string> subjects, checks, inputs;
+};
+
+int run_conformance(const ConformanceRequest& request) try {
+  const std::vector<std::string>&subjects = request.subjects, &wanted = request.checks;
+  const json makers = makers_of(request.inputs);
   search_folders_of(subjects);
   const Catalogue catalogue;
   const std::atomic<bool>& stopped = stop_on_signals();
@@ -218,12 +252,17 @@ int run_conformance(const std::vector<std::string>& subjects, const std::vector<
   const FilesFolder files;
   std::map<char, int> count;
   for (const std::string& node : nodes) {
-    if (const Suite* suite = conformance::suite_of(catalogue.find(node)->kind())) {
-      Checks checks(node, files, stopped);
-      check_node(node, *suite, wanted, checks, count);
-    } else {
-      std::printf("%s: its kind has no suite\n", node.c_str());
+    if (const std::vector<CheckInfo> all = checks_for(node, catalogue); !all.empty()) {
+      Checks checks(node, makers, files, stopped);
+      check_node(node, all, wanted, checks, count);
+      continue;
     }
+    const std::string kind = catalogue.find(node)->kind();
+    ++count['-'];
+    std::printf("%s\n  FAIL nothing was checked: %s\n", printable(node).c_str(),
+                printable(catalogue.find_kind(kind) ? "the kind '" + kind + "' has no suite"
+                                                    : "no library brings the kind '" + kind + "'")
+                    .c_str());
   }
   std::printf("%d passed, %d do not apply, %d failed\n", count['+'], count['~'], count['-']);
   return count['-'] ? 1 : 0;
@@ -235,13 +274,19 @@ int run_conformance(const std::vector<std::string>& subjects, const std::vector<
 }  // namespace
 
 void add_conformance(CLI::App& app, int& code) {
-  const auto subjects = std::make_shared<std::vector<std::string>>(),
-             checks = std::make_shared<std::vector<std::string>>();
+  const auto request = std::make_shared<ConformanceRequest>();
   CLI::App* command = app.add_subcommand("conformance", "check that nodes do what every node of their kind must do");
-  command->add_option("subject", *subjects, "node, kind or library (.so file)")->required();
-  command->add_option("--check", *checks, "only this of the checks that marrow inspect NODE lists; may be given again")
+  command->add_option("subject", request->subjects, "node, kind or library (.so file)")->required();
+  command
+      ->add_option("--check", request->checks,
+                   "only this of the checks that marrow inspect NODE lists; may be given again")
       ->allow_extra_args(false);
-  command->callback([subjects, checks, &code] { code = run_conformance(*subjects, *checks); });
+  command
+      ->add_option(
+          "--in", request->inputs,
+          "port=kind.name: for an input that the kind does not have, the node that makes it; may be given again")
+      ->allow_extra_args(false);
+  command->callback([request, &code] { code = run_conformance(*request); });
   say_that_libraries_are_described(command);
 }
 

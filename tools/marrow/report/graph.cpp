@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <set>
 
+#include "catalogue_text.hpp"
 #include "commands.hpp"
 #include "report/report.hpp"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Functions that travel along the edges of a pipeline as values: a projector, a cost, an optimizer. All methods are
+// Functions that travel along the edges of a pipeline as values: projectors, costs, optimizers. All methods are
 // const and safe to call from several threads at once. A function may refer to the inputs of the node that made it: the
 // runtime keeps those alive as long as the function.
 #include <Eigen/Core>
@@ -32,24 +32,29 @@ struct PixelGrid {
   Eigen::Vector2d pixel(int column, int row) const { return {u_px + step_px * column, v_px + step_px * row}; }
 };
 
-/// Draws a model as a view would see it: its outline, where it is a surface; radiographs (DRR), where it is a volume.
-/// What a projector cannot draw, it refuses with an Error.
-class Projector {
+/// Draws the outline of a model as a view would see it.
+class OutlineProjector {
  public:
-  virtual ~Projector();
+  virtual ~OutlineProjector();
   /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a
   /// fixed order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
   virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
-                                            double spacing_px) const;
+                                            double spacing_px) const = 0;
+};
+
+/// Makes radiographs (DRR) of a model as a view would see it.
+class RadiographProjector {
+ public:
+  virtual ~RadiographProjector();
   /// Line integrals of the attenuation along the rays through these pixels, row by row, relative to water: millimetres
   /// of water that attenuate as much. 0 where a ray misses the model. Only what is asked for is computed.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
-                                        const PixelGrid& grid) const;
+                                        const PixelGrid& grid) const = 0;
   /// The same for single pixels (u, v), in their order.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
-                                        const std::vector<Eigen::Vector2f>& pixels) const;
+                                        const std::vector<Eigen::Vector2f>& pixels) const = 0;
   /// Whole pixels outside of which radiograph() is 0, cut to the image; empty where the model is out of view.
-  virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const;
+  virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const = 0;
 };
 
 /// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond
@@ -80,7 +85,8 @@ class Cost {
   /// The same cost at another resolution.
   virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
   /// The cost about a pose, for small motions of the fragment about this frame as Pose defines them; for optimizers
-  /// that use derivatives. As dear as one value(). Absent where the cost does not know its derivatives, as by default.
+  /// that use derivatives. It takes about as long as one value(). Absent where the cost does not know its derivatives,
+  /// as by default.
   virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
   /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then
   /// predicts the covariance of the minimum. Absent where the cost has no noise model.

@@ -11,11 +11,14 @@
 
 namespace marrow {
 
-/// All nodes that can be used, known from manifests; a library is loaded when a node of it is first called. Safe to use
-/// from several threads once made.
+struct KindDefinition;
+
+/// All kinds and nodes that can be used, known from manifests; a library is loaded when a node of it is first called.
+/// Safe to use from several threads once made.
 class Catalogue {
  public:
-  /// Looks into the folders in their order; the first library that offers a name has it.
+  /// Looks into the folders in their order; the first library that offers a name has it. A library with a node that
+  /// breaks the contract of its kind is refused, whichever library brings the kind.
   explicit Catalogue(std::vector<std::filesystem::path> folders = default_folders());
   ~Catalogue();
 
@@ -29,15 +32,26 @@ class Catalogue {
   /// nullptr when no library offers it.
   const NodeInfo* find(const std::string& name) const;
   const LibraryInfo* library_of(const std::string& name) const;
-  /// Ports that any node of the kind may be given: the kind's contract and what its known nodes take.
-  std::vector<PortInfo> ports_of_kind(const std::string& kind) const;
+  /// Sorted: the kinds that libraries bring, and those of nodes whose kind no library brings.
+  std::vector<std::string> kind_names() const;
+  /// nullptr when no library brings it.
+  const KindInfo* find_kind(const std::string& name) const;
+  const LibraryInfo* library_of_kind(const std::string& name) const;
+  /// Inputs that any node of the kind may be given: the kind's contract and what its known nodes take.
+  std::vector<KindPort> ports_of_kind(const std::string& kind) const;
   const WriterInfo* find_writer(const TypeInfo& type) const;
 
   /// Loads the node's library. Throws Error when that fails.
   const NodeDefinition& load(const std::string& name) const;
+  /// Loads the library that brings the kind. Throws Error when that fails.
+  const KindDefinition& load_kind(const std::string& name) const;
   const WriterDefinition& load_writer(const TypeInfo& type) const;
 
  private:
+  void find_libraries();
+  void enter_names();
+  /// Whether there were any; the names must then be entered again.
+  bool refuse_broken_contracts();
   const Plugin& load_plugin(std::size_t library) const;
 
   std::vector<std::filesystem::path> folders_;
@@ -46,6 +60,7 @@ class Catalogue {
     std::size_t library = 0, index = 0;
   };
   std::map<std::string, Entry> nodes_;
+  std::map<std::string, Entry> kinds_;
   std::map<std::string, Entry> writers_;
   mutable std::mutex mutex_;
   mutable std::map<std::size_t, std::unique_ptr<Plugin>> loaded_;

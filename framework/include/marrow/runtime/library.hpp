@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "marrow/runtime/hash.hpp"
+#include "marrow/runtime/kind.hpp"
 #include "marrow/runtime/node.hpp"
 
 namespace marrow {
@@ -26,13 +27,14 @@ struct LibraryInfo {
   Digest digest;        ///< of the file
   Digest build_id;      ///< of its own code, the framework's and the versions of the libraries that it links
   std::vector<LinkedLibrary> linked;
+  std::vector<KindInfo> kinds;
   std::vector<NodeInfo> nodes;
   std::vector<WriterInfo> writers;
 };
 
-/// Loads a plugin library into this process and registers its nodes. It is never unloaded. Throws Error with one
-/// sentence, also when the library is not the described one: each node and writer that it registers, and each library
-/// that it links, must be as described, so that nothing is called with the options of another.
+/// Loads a plugin library into this process and registers its kinds and nodes. It is never unloaded. Throws Error with
+/// one sentence, also when the library is not the described one: each kind, node and writer that it registers, and each
+/// library that it links, must be as described, so that nothing is called with the options of another.
 std::unique_ptr<Plugin> load_library(const LibraryInfo& described);
 
 /// Describes a library by loading it in a child process with a time limit, so that one that crashes or hangs does no

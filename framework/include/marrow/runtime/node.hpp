@@ -53,12 +53,21 @@ struct OptionInfo {
   std::size_t length = 0;  ///< of numbers: how many there must be; 0 = any
 };
 
+/// What options must be to each other.
+enum class RelationType { not_above, below, same_length, as_many_or_none, exactly_one };
+struct RelationInfo {
+  RelationType type = RelationType::not_above;
+  std::vector<std::string> names;  ///< of options; exactly_one may name inputs, too: "in.camera"
+};
+
 struct NodeInfo {
   std::string name;  ///< kind.name
   std::string summary;
   std::vector<PortInfo> inputs, outputs;
   std::vector<OptionInfo> options;
-  bool random = false;  ///< draws from Context::seed()
+  std::vector<RelationInfo> relations;
+  std::vector<std::string> traits;  ///< of those that its kind knows
+  bool random = false;              ///< draws from Context::seed()
 
   std::string kind() const { return name.substr(0, name.find('.')); }
 };

@@ -32,6 +32,7 @@ struct PipelineNode {
   std::string id;
   Place place;
   NodeInfo info;
+  Apart apart = Apart::no;           ///< as its kind says
   std::vector<OptionValue> options;  ///< in the order of info.options
   std::vector<Wire> wires;
   std::vector<std::string> mapped_axes;  ///< the node is called for each item along these, outermost first

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What costs are given: views, their edges and weights, and other fragments that the same images show.
+#include <string>
+#include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "marrow/plugin.hpp"
@@ -20,21 +23,34 @@ inline double weight_of(const std::vector<double>& weights, std::size_t view) {
   return weights.empty() ? 1 : weights[view];
 }
 
-/// Other fragments where they are known to be.
+/// Another fragment where it is known to be, drawn in one way or the other.
 struct Other {
-  const Projector* projector;
+  std::variant<const OutlineProjector*, const RadiographProjector*> projector;
   RigidTransform world_from_model;
 };
-/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment
-/// without a pose, and for others without `own`.
-std::vector<Other> others_of(const Projector* own, const List<Pose>* poses, const List<Projector>* projectors);
+/// The same, drawn as an outline.
+struct OtherOutline {
+  const OutlineProjector* projector;
+  RigidTransform world_from_model;
+};
+template <class Projector>
+using OtherDrawnBy = std::conditional_t<std::is_same_v<Projector, OutlineProjector>, OtherOutline, Other>;
 
-/// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines where
-/// they are drawn as outlines only.
+/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment
+/// without a pose, and for others without `own`, which is the node's input `own_port`.
+template <class Projector>
+std::vector<OtherDrawnBy<Projector>> others_of(const Projector* own, const List<Pose>* poses,
+                                               const List<Projector>* projectors,
+                                               const std::string& own_port = "projector");
+/// The same, and the fragments that `outlines` draw; none of these is this one.
+std::vector<Other> shadows_of(const RadiographProjector* own, const List<Pose>* poses,
+                              const List<RadiographProjector>* projectors, const List<OutlineProjector>* outlines);
+
+/// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines.
 List<View> without_shadows(const List<View>& views, const std::vector<Other>& others);
 constexpr double kOthersReach_px = 3;  ///< edges as near as this to another fragment's outline are its own
 /// The edges but for those within `reach_px` of another's outline that have its direction, up to the tolerance.
-List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges, const std::vector<Other>& others,
-                               double reach_px, double tolerance_deg);
+List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges,
+                               const std::vector<OtherOutline>& others, double reach_px, double tolerance_deg);
 
 }  // namespace marrow::match

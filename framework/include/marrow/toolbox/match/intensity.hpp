@@ -3,6 +3,7 @@
 // Costs that compare a radiograph of the model with the image, grey value by grey value: what they have in common.
 #include <functional>
 #include <memory>
+#include <type_traits>
 #include <vector>
 
 #include "marrow/plugin.hpp"
@@ -37,13 +38,31 @@ struct IntensityOptions {
 /// margin_px around it; a view that does not show the model counts as `worst`. At a level of pixel_step, every so many
 /// pixels are compared, of images smoothed with a Gaussian of blur_px times the step. Pixels that show other fragments
 /// do not count. Throws Error for views that are not valid.
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
+                                           const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
 /// The same, of a measure that asks of the image only what is compared.
-std::shared_ptr<const Cost> intensity_cost(const Projector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<Projector>* other_projectors,
+std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
+                                           const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, Measure measure);
+
+/// The function of a node: its cost is the mean of kMeasure over the views. kMeasure is called with a patch and gives
+/// the measure's value, or with the whole of an image and gives a Measure; in both cases also with the options, where
+/// it takes them. A view that does not show the model counts as kWorst.
+template <auto kMeasure, class Options = IntensityOptions, int kWorst = 2>
+std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector, const List<View>& views,
+                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
+                                           const List<OutlineProjector>* other_outlines, const Options& options) {
+  const auto measure = [options](const Patch& patch) {
+    if constexpr (std::is_invocable_v<decltype(kMeasure), const Patch&, const Options&>)
+      return kMeasure(patch, options);
+    else
+      return kMeasure(patch);
+  };
+  return intensity_cost(projector, views, others, other_projectors, other_outlines, options, kWorst, measure);
+}
 
 /// -log of the part of the brightest that is left, in arbitrary units: bright = air. Values of 0 or less count as one
 /// step of grey.
@@ -67,13 +86,15 @@ double correlation(const std::vector<float>& a, const std::vector<float>& b, con
 double deviation(const std::vector<float>& values, const std::vector<char>& counts);
 
 /// Declares the inputs, outputs and options that all of these nodes share.
-template <class Node, class Options>
+template <class Options, class Node>
 void declare(Node& node) {
   node.in("projector", "makes radiographs of the model")
       .in("views", "views with their cameras and masks", over("view"))
       .in("others", "where other fragments are, whose shadows are left out", over("fragment"))
       .in("other_projectors", "draw them, and maybe this one", over("fragment"))
-      .out("cost", "how badly radiograph and image agree; unmoved by gain and offset of the line integrals")
+      .in("other_outlines", "draw other bodies that are known as surfaces only; their shadows are left out",
+          over("fragment"))
+      .out("cost", "how badly radiograph and image agree")
       .option("pixel_step", &Options::pixel_step, "every how many pixels are compared", at_least(1), at_most(64))
       .option("margin_px", &Options::margin_px, "how far around the model the images are compared", at_least(0))
       .option("blur_px", &Options::blur_px, "smoothing, in steps: standard deviation of a Gaussian", at_least(0),

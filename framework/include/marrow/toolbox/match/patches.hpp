@@ -20,7 +20,7 @@ double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, c
 /// Declares inputs, output and options of both nodes.
 template <class Node>
 void declare_patches(Node& node) {
-  declare<Node, PatchOptions>(node);
+  declare<PatchOptions>(node);
   node.option("patch_pixels", &PatchOptions::patch_pixels, "side of the squares, in pixels that are compared",
               at_least(5), at_most(201));
 }

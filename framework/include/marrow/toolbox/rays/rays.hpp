@@ -29,7 +29,7 @@ Span span_in_box(const std::array<int, 3>& first, const std::array<int, 3>& last
                  const Eigen::Vector3d& direction, double margin);
 
 /// A projector that integrates ray by ray.
-class RayProjector : public Projector {
+class RayProjector : public RadiographProjector {
  public:
   explicit RayProjector(Attenuation attenuation) : attenuation_(std::move(attenuation)) {}
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;

@@ -32,12 +32,10 @@ struct SearchOptions {
   double warn_above_mm = 5;
 };
 
-/// Throws Error unless all options that say something per level say it for as many levels.
+/// Throws Error unless all options that say something per level say it in positive numbers.
 void check_options(const SearchOptions& options);
-/// Throws Error unless the list has as many numbers as there are levels, all positive. `like` names the list that says
-/// how many there are.
-void check_level_list(const std::vector<double>& values, const std::string& name, std::size_t levels,
-                      const std::string& like, const std::string& advice);
+/// Throws Error unless the list has a number, and all are positive.
+void check_level_list(const std::vector<double>& values, const std::string& name);
 
 using Levels = std::vector<std::shared_ptr<const Cost>>;
 Levels levels_of(const Cost& cost, const SearchOptions& options);
@@ -140,6 +138,9 @@ Node& declare(Node& node) {
               marrow::at_least(1))
       .option("step_tolerance", &Options::step_tolerance,
               "per level: it ends when steps fall below this part of its first step")
+      .relation(marrow::same_length(
+          {"contour_spacing_px", "reach_px", "step_deg", "step_axial_deg", "step_mm", "step_tolerance"}))
+      .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("warn_above_deg", &Options::warn_above_deg,
               "predicted standard deviation of a rotation that gives a warning", marrow::at_least(0))
       .option("warn_above_mm", &Options::warn_above_mm,

@@ -20,6 +20,7 @@ void declare_line_options(Builder&& node) {
   node.option("width_mm", &LineOptions::width_mm,
               "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, by level")
       .option("width_deviation_mm", &LineOptions::width_deviation_mm, "their standard deviations")
+      .relation(same_length({"width_mm", "width_deviation_mm"}))
       .option("magnification_tolerance", &LineOptions::magnification_tolerance,
               "standard deviation of the magnification, as a fraction: the shaft need not lie at the isocentre",
               at_least(0), at_most(1))

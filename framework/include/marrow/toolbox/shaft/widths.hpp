@@ -16,7 +16,7 @@ class Widths {
  public:
   /// Of femora, by level; or, where `mean_mm` is not empty, of another bone: a mean and a deviation for each direction
   /// from which it may be seen. The magnification at the shaft's depth is known to a deviation of so many parts of one.
-  /// Throws Error unless all are positive and as many.
+  /// Throws Error unless all are positive.
   Widths(const std::vector<double>& mean_mm, const std::vector<double>& deviation_mm, double magnification_tolerance);
 
   /// Log-likelihood of a pair of borders, relative to the likeliest one, for the level and direction that fit it best.

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Declares a kind: what Plugin::kind() returns.
+//
+//   plugin.kind("edges")
+//       .summary("edge pixels of an X-ray view")
+//       .in<marrow::View>("view", "X-ray view")
+//       .out<marrow::EdgeMap>("edges", "edge pixels")
+//       .suite(edges_suite());
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "marrow/conformance.hpp"
+#include "marrow/runtime/attributes.hpp"
+#include "marrow/runtime/kind.hpp"
+
+namespace marrow {
+
+/// A kind with its suite, as a loaded plugin registers it.
+struct KindDefinition {
+  KindInfo info;
+  std::vector<std::string> faults;  ///< what is wrong with the declaration itself
+  conformance::Suite suite;
+};
+
+namespace detail {
+/// Checks the declaration itself and fills `faults`.
+void check_declaration(KindDefinition& kind);
+}  // namespace detail
+
+class KindBuilder {
+ public:
+  explicit KindBuilder(KindDefinition& kind) : kind_(kind) {}
+  KindBuilder(const KindBuilder&) = delete;
+  KindBuilder& operator=(const KindBuilder&) = delete;
+  ~KindBuilder() { detail::check_declaration(kind_); }
+
+  KindBuilder& summary(std::string text) {
+    kind_.info.summary = std::move(text);
+    return *this;
+  }
+  /// An input that nodes of the kind may have. Where it is named with several types, a node takes one of them.
+  template <Registered... T>
+  KindBuilder& in(std::string name, std::string help, Over axis = {}) {
+    kind_.info.inputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
+    return *this;
+  }
+  /// An output that each node of the kind has, of one of the types.
+  template <Registered... T>
+  KindBuilder& out(std::string name, std::string help, Over axis = {}) {
+    kind_.info.outputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
+    return *this;
+  }
+  /// Something that nodes may declare of themselves with NodeBuilder::trait().
+  KindBuilder& trait(std::string name, std::string help) {
+    kind_.info.traits.push_back({std::move(name), std::move(help)});
+    return *this;
+  }
+  /// Its nodes judge or show results, so they may be given the truth.
+  KindBuilder& sees_truth() {
+    kind_.info.sees_truth = true;
+    return *this;
+  }
+  /// Its nodes are called in a process of their own where their options name files.
+  KindBuilder& runs_apart(Apart apart) {
+    kind_.info.apart = apart;
+    return *this;
+  }
+  /// What every node of the kind must do: `marrow conformance` checks it.
+  KindBuilder& suite(conformance::Suite suite) {
+    kind_.suite = std::move(suite);
+    for (const conformance::Check& check : conformance::checks_of(kind_.suite)) kind_.info.checks.push_back(check);
+    return *this;
+  }
+
+ private:
+  KindDefinition& kind_;
+};
+
+}  // namespace marrow

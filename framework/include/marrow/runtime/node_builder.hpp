@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Declares a node: what Plugin::node() returns.
+#include <array>
+#include <functional>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "marrow/runtime/attributes.hpp"
+#include "marrow/runtime/node.hpp"
+#include "marrow/runtime/option_values.hpp"
+#include "marrow/runtime/signature.hpp"
+
+namespace marrow {
+namespace detail {
+
+/// Unit by the suffix of a name: "sigma_mm" is in mm.
+std::string unit_of_name(const std::string& name);
+/// Checks the declaration itself (defaults within their range, names well formed, kind's contract) and fills `faults`.
+void check_declaration(NodeDefinition& node);
+
+}  // namespace detail
+
+template <class R, class... Args>
+class NodeBuilder {
+ public:
+  using Options = std::conditional_t<std::is_void_v<typename detail::OptionsOf<Args...>::type>, detail::NoOptions,
+                                     typename detail::OptionsOf<Args...>::type>;
+
+  NodeBuilder(NodeDefinition& node, R (*function)(Args...)) : node_(node) {
+    (add_port<Args>(), ...);
+    ports_ = node_.info.inputs.size();
+    node_.make_options = [] { return std::make_shared<Options>(); };
+    node_.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options,
+                                                Context& context) {
+      return call(function, *outputs, inputs, options, context, std::index_sequence_for<Args...>{});
+    };
+  }
+  NodeBuilder(const NodeBuilder&) = delete;
+  ~NodeBuilder() {
+    if (named_inputs_ != ports_)
+      node_.faults.push_back("the function takes " + std::to_string(ports_) + " inputs, but .in() names " +
+                             std::to_string(named_inputs_));
+    detail::check_declaration(node_);
+  }
+
+  NodeBuilder& summary(std::string text) {
+    node_.info.summary = std::move(text);
+    return *this;
+  }
+  /// The node does what its kind says of this trait.
+  NodeBuilder& trait(std::string name) {
+    node_.info.traits.push_back(std::move(name));
+    return *this;
+  }
+  /// What options must be to each other: not_above, below, same_length, as_many_or_none, exactly_one. A pipeline that
+  /// breaks it is refused with the option's line; the node need not test it.
+  NodeBuilder& relation(RelationInfo relation) {
+    node_.info.relations.push_back(std::move(relation));
+    return *this;
+  }
+  /// The node draws from Context::seed(); its results then depend on the run's seed.
+  NodeBuilder& random() {
+    node_.info.random = true;
+    return *this;
+  }
+
+  NodeBuilder& in(std::string name, std::string help, Over axis = {}) {
+    if (named_inputs_ < ports_) {
+      PortInfo& port = node_.info.inputs[named_inputs_];
+      if (axis.axis.empty() != port.axis.empty()) {
+        std::string fault = "input '" + name;
+        node_.faults.push_back(
+            fault.append(axis.axis.empty() ? "': a List needs over(\"axis\")" : "': over() is for List inputs"));
+      }
+      port.name = std::move(name);
+      port.help = std::move(help);
+      port.axis = std::move(axis.axis);
+    }
+    ++named_inputs_;
+    return *this;
+  }
+
+  /// The value returned, or the next item of a returned tuple.
+  NodeBuilder& out(std::string name, std::string help, Over axis = {}) {
+    const std::size_t index = outputs_->size();
+    if constexpr (detail::IsTuple<R>::value) {
+      add_tuple_output(index, std::move(name), std::move(help), std::move(axis),
+                       std::make_index_sequence<std::tuple_size_v<R>>{});
+    } else if constexpr (Registered<typename detail::Returned<R>::Item>) {
+      add_output<R>(std::move(name), std::move(help), axis, [axis = axis.axis](const std::shared_ptr<const R>& whole) {
+        return detail::Returned<R>::value(whole, *whole, axis);
+      });
+    } else {
+      node_.faults.push_back("output '" + name + "': the returned type is not registered with MARROW_VALUE_TYPE");
+    }
+    return *this;
+  }
+  /// A member of the struct returned.
+  template <class M, class S>
+  NodeBuilder& out(std::string name, M S::*member, std::string help, Over axis = {}) {
+    static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
+    return add_output<M>(std::move(name), std::move(help), axis,
+                         [member, axis = axis.axis](const std::shared_ptr<const R>& whole) {
+                           return detail::Returned<M>::value(whole, (*whole).*member, axis);
+                         });
+  }
+
+  /// An option, bound to a member of the options struct whose default-made value is the default. Attributes: at_least,
+  /// at_most, one_of, unit, required.
+  template <class M, class O, class... Attributes>
+  NodeBuilder& option(std::string name, M O::*member, std::string help, Attributes... attributes) {
+    static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");
+    OptionInfo info;
+    info.name = name;
+    info.help = std::move(help);
+    info.unit = detail::unit_of_name(name);
+    info.type = detail::option_type<M>();
+    info.length = detail::option_length<M>();
+    info.default_value = detail::to_option_value<M>(Options{}.*member);
+    (apply(info, attributes), ...);
+    detail::narrow_range<M>(info);
+    node_.info.options.push_back(std::move(info));
+    node_.set_option.push_back([member](void* options, const OptionValue& value) {
+      detail::from_option_value<M>(static_cast<Options*>(options)->*member, value);
+    });
+    return *this;
+  }
+
+ private:
+  using Output = std::function<Value(const std::shared_ptr<const R>&)>;
+
+  template <class A>
+  void add_port() {
+    using Argument = detail::Argument<A>;
+    if constexpr (Argument::kPort) {
+      PortInfo port;
+      constexpr detail::Role role = Argument::role();
+      port.optional = role == detail::Role::optional_input || role == detail::Role::optional_list;
+      if constexpr (role == detail::Role::list || role == detail::Role::optional_list) {
+        port.type = TypeInfo::of<typename Argument::Plain::value_type>();
+        port.axis.assign(1, '?');  // named by over()
+      } else {
+        port.type = TypeInfo::of<typename Argument::Plain>();
+      }
+      node_.info.inputs.push_back(std::move(port));
+    }
+  }
+
+  template <class M>
+  NodeBuilder& add_output(std::string name, std::string help, const Over& axis, Output output) {
+    using Returned = detail::Returned<M>;
+    if (axis.axis.empty() == Returned::kList)
+      node_.faults.push_back("output '" + name +
+                             "': " + (Returned::kList ? "a List needs over(\"axis\")" : "over() is for a List"));
+    node_.info.outputs.push_back({std::move(name), std::move(help), TypeInfo::of<typename Returned::Item>(),
+                                  Returned::kOptional || Returned::kList, axis.axis});
+    outputs_->push_back(std::move(output));
+    return *this;
+  }
+
+  template <std::size_t... I>
+  void add_tuple_output(std::size_t index, std::string name, std::string help, Over axis, std::index_sequence<I...>) {
+    const bool found = ((I == index && (add_output<std::tuple_element_t<I, R>>(
+                                            name, help, axis,
+                                            [axis = axis.axis](const std::shared_ptr<const R>& whole) {
+                                              return detail::Returned<std::tuple_element_t<I, R>>::value(
+                                                  whole, std::get<I>(*whole), axis);
+                                            }),
+                                        true)) ||
+                        ...);
+    if (!found) node_.faults.push_back("output '" + name + "': the returned tuple has fewer items");
+  }
+
+  static void apply(OptionInfo& info, const Minimum& minimum) { info.minimum = minimum.value; }
+  static void apply(OptionInfo& info, const Maximum& maximum) { info.maximum = maximum.value; }
+  static void apply(OptionInfo& info, const Unit& unit) { info.unit = unit.text; }
+  static void apply(OptionInfo& info, const Choices& choices) { info.choices = choices.names; }
+  static void apply(OptionInfo& info, const Required&) { info.required = true; }
+
+  /// Index of the port that argument `I` stands for.
+  template <std::size_t I>
+  static constexpr std::size_t port_index() {
+    constexpr std::array<bool, sizeof...(Args) + 1> is_port{detail::Argument<Args>::kPort..., false};
+    std::size_t count = 0;
+    for (std::size_t i = 0; i < I; ++i) count += is_port[i];
+    return count;
+  }
+
+  /// Keeps a list built from a value alive during the call.
+  template <class A>
+  struct Holder {
+    using Argument = detail::Argument<A>;
+    using Plain = typename Argument::Plain;
+    static constexpr detail::Role kRole = Argument::role();
+    Holder(const std::vector<Value>& inputs, std::size_t port, const void* options, Context& context)
+        : options_(options), context_(context) {
+      if constexpr (Argument::kPort) value_ = &inputs[port];
+      if constexpr (detail::IsList<Plain>::value) list_ = value_->template as_list<typename Plain::value_type>();
+    }
+    A get() {
+      if constexpr (kRole == detail::Role::context)
+        return context_;
+      else if constexpr (kRole == detail::Role::options)
+        return *static_cast<const Plain*>(options_);
+      else if constexpr (kRole == detail::Role::list)
+        return list_;
+      else if constexpr (kRole == detail::Role::optional_list)
+        return value_->is_absent() ? nullptr : &list_;
+      else if constexpr (kRole == detail::Role::optional_input)
+        return static_cast<const Plain*>(value_->data.get());
+      else
+        return *static_cast<const Plain*>(value_->data.get());
+    }
+    const void* options_;
+    Context& context_;
+    const Value* value_ = nullptr;
+    std::conditional_t<detail::IsList<Plain>::value, Plain, char> list_{};
+  };
+
+  template <std::size_t... I>
+  static std::vector<Value> call(R (*function)(Args...), const std::vector<Output>& outputs,
+                                 const std::vector<Value>& inputs, [[maybe_unused]] const void* options,
+                                 Context& context, std::index_sequence<I...>) {
+    std::tuple<Holder<Args>...> holders{Holder<Args>(inputs, port_index<I>(), options, context)...};
+    const auto whole = std::make_shared<const R>(function(std::get<I>(holders).get()...));
+    std::vector<Value> values;
+    for (const Output& output : outputs) values.push_back(output(whole));
+    return values;
+  }
+
+  NodeDefinition& node_;
+  std::shared_ptr<std::vector<Output>> outputs_ = std::make_shared<std::vector<Output>>();
+  std::size_t ports_ = 0, named_inputs_ = 0;
+};
+
+}  // namespace marrow

@@ -1,0 +1,105 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Members of an options struct as values of options, and back.
+#include <algorithm>
+#include <filesystem>
+#include <limits>
+#include <string>
+#include <tuple>
+#include <type_traits>
+#include <vector>
+
+#include "marrow/runtime/node.hpp"
+
+namespace marrow::detail {
+
+template <class M>
+OptionValue to_option_value(const M& member) {
+  if constexpr (std::is_same_v<M, bool>)
+    return member;
+  else if constexpr (std::is_integral_v<M>)
+    return std::int64_t(member);
+  else if constexpr (std::is_floating_point_v<M>)
+    return double(member);
+  else if constexpr (std::is_same_v<M, std::string>)
+    return member;
+  else if constexpr (std::is_same_v<M, std::filesystem::path>)
+    return member.string();
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    return member;
+  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
+    std::vector<std::string> texts;
+    for (const auto& path : member) texts.push_back(path.string());
+    return texts;
+  } else {  // a list of numbers: std::vector<double>, std::array<double, N>, Eigen::Vector3d
+    return std::vector<double>(member.begin(), member.end());
+  }
+}
+
+template <class M>
+void from_option_value(M& member, const OptionValue& value) {
+  if constexpr (std::is_same_v<M, bool>)
+    member = std::get<bool>(value);
+  else if constexpr (std::is_integral_v<M>)
+    member = M(std::get<std::int64_t>(value));
+  else if constexpr (std::is_floating_point_v<M>)
+    member = M(std::get<double>(value));
+  else if constexpr (std::is_same_v<M, std::string> || std::is_same_v<M, std::filesystem::path>)
+    member = std::get<std::string>(value);
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    member = std::get<std::vector<std::string>>(value);
+  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>) {
+    member.clear();
+    for (const auto& text : std::get<std::vector<std::string>>(value)) member.emplace_back(text);
+  } else {
+    const auto& numbers = std::get<std::vector<double>>(value);
+    if constexpr (std::is_same_v<M, std::vector<double>>)
+      member = numbers;
+    else
+      for (std::size_t i = 0; i < numbers.size(); ++i) member[i] = numbers[i];
+  }
+}
+
+template <class M>
+constexpr OptionType option_type() {
+  if constexpr (std::is_same_v<M, bool>)
+    return OptionType::boolean;
+  else if constexpr (std::is_integral_v<M>)
+    return OptionType::integer;
+  else if constexpr (std::is_floating_point_v<M>)
+    return OptionType::number;
+  else if constexpr (std::is_same_v<M, std::string>)
+    return OptionType::text;
+  else if constexpr (std::is_same_v<M, std::filesystem::path>)
+    return OptionType::path;
+  else if constexpr (std::is_same_v<M, std::vector<std::string>>)
+    return OptionType::texts;
+  else if constexpr (std::is_same_v<M, std::vector<std::filesystem::path>>)
+    return OptionType::paths;
+  else
+    return OptionType::numbers;
+}
+
+/// The number of numbers that a fixed-size list option takes; 0 for std::vector.
+template <class M>
+constexpr std::size_t option_length() {
+  if constexpr (requires { std::tuple_size<M>::value; })
+    return std::tuple_size<M>::value;
+  else if constexpr (requires { M::SizeAtCompileTime; })
+    return std::size_t(M::SizeAtCompileTime);
+  else
+    return 0;
+}
+
+/// A whole number that the member cannot hold is out of the option's range.
+template <class M>
+void narrow_range(OptionInfo& info) {
+  using Limits = std::numeric_limits<M>;
+  constexpr bool kWhole = std::is_integral_v<M> && !std::is_same_v<M, bool>;
+  if constexpr (kWhole && (sizeof(M) < sizeof(std::int64_t) || std::is_unsigned_v<M>))
+    info.minimum = std::max(info.minimum.value_or(double(Limits::min())), double(Limits::min()));
+  if constexpr (kWhole && sizeof(M) < sizeof(std::int64_t))
+    info.maximum = std::min(info.maximum.value_or(double(Limits::max())), double(Limits::max()));
+}
+
+}  // namespace marrow::detail

@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A body of ellipsoids that do not touch, known exactly as a volume, a field, a surface, an outline and a radiograph.
+#include <vector>
+
+#include "marrow/domain/functions.hpp"
+#include "marrow/domain/mesh.hpp"
+#include "marrow/domain/volume.hpp"
+
+namespace marrow::analytic {
+
+struct Ellipsoid {
+  Eigen::Vector3d centre_mm, radii_mm;
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+};
+using Body = std::vector<Ellipsoid>;
+
+/// Length of a ray inside, in front of its start. The direction is a unit vector.
+double chord_mm(const Body& body, const Eigen::Vector3d& start_mm, const Eigen::Vector3d& direction);
+/// Distance to the surface, negative inside, clamped to +-band.
+double signed_distance_mm(const Body& body, const Eigen::Vector3d& point_mm, double band_mm);
+
+/// A grid whose middle is the origin.
+Grid grid_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm,
+             const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity());
+/// `inside_hu` within, `outside_hu` around, in between by the part of a voxel that lies inside.
+Volume volume_of(const Body& body, const Grid& grid, double inside_hu, double outside_hu);
+/// The signed distance in each voxel.
+SignedField field_of(const Body& body, const Grid& grid, double band_mm);
+/// A closed surface per ellipsoid, its normals outward.
+Mesh mesh_of(const Body& body);
+
+/// A C-arm's view: 1000 mm from source to detector, 600 to the world's origin, turned about the patient's long axis.
+Camera c_arm(double angle_deg, int width_px, int height_px, double pixel_mm);
+RigidTransform moved_by(const Eigen::Vector3d& turn_rad, const Eigen::Vector3d& shift_mm);
+
+/// Draws the body exactly: the outer outline, and mm of its chords times a density.
+class BodyProjector : public OutlineProjector, public RadiographProjector {
+ public:
+  explicit BodyProjector(Body body, double density = 1) : body_(std::move(body)), density_(density) {}
+  std::vector<OutlinePoint> outline(const Camera&, const RigidTransform& world_from_model,
+                                    double spacing_px) const override;
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model, const PixelGrid&) const override;
+  std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
+                                const std::vector<Eigen::Vector2f>& pixels) const override;
+  PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+
+ private:
+  Body body_;
+  double density_;
+};
+
+}  // namespace marrow::analytic

@@ -1,0 +1,88 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "pipeline_axes.hpp"
+
+#include <algorithm>
+
+#include "marrow/domain/printable.hpp"
+#include "pipeline_order.hpp"
+
+namespace marrow {
+namespace {
+
+std::string joined(const std::vector<std::string>& names) {
+  std::string text;
+  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
+  return text;
+}
+
+bool contains(const std::vector<std::string>& list, const std::string& item) {
+  return std::find(list.begin(), list.end(), item) != list.end();
+}
+
+/// Sources before users, in the file's order otherwise.
+void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
+  std::vector<PipelineNode>& nodes = pipeline.nodes;
+  std::vector<std::size_t> stuck;
+  const std::vector<std::size_t> order = pipeline_order(nodes, stuck);
+  if (!stuck.empty()) {
+    std::vector<std::string> names;
+    for (const std::size_t i : stuck) names.push_back(nodes[i].id);
+    diagnostics.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names));
+    return;
+  }
+  std::vector<int> place_of(nodes.size());
+  std::vector<PipelineNode> sorted;
+  for (const std::size_t i : order) {
+    place_of[i] = int(sorted.size());
+    sorted.push_back(std::move(nodes[i]));
+  }
+  for (PipelineNode& node : sorted)
+    for (Wire& wire : node.wires)
+      for (Reference& source : wire.sources) source.node = place_of[std::size_t(source.node)];
+  for (PipelineOutput& output : pipeline.outputs) output.source.node = place_of[std::size_t(output.source.node)];
+  nodes = std::move(sorted);
+}
+
+void check_picks(const Pipeline& pipeline, const Reference& source, Diagnostics& diagnostics) {
+  const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
+  const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
+  if (source.items.size() > axes)
+    diagnostics.add(source.place,
+                    in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
+                        (axes ? "there are only " + std::to_string(axes) + " axes to pick along" : "it is no list"));
+}
+
+void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) {
+  PipelineNode& node = pipeline.nodes[index];
+  for (const Wire& wire : node.wires) {
+    const std::string& consumed = node.info.inputs[std::size_t(wire.port)].axis;
+    for (const Reference& source : wire.sources) {
+      check_picks(pipeline, source, diagnostics);
+      if (!diagnostics.empty()) return;
+      for (const std::string& axis : pipeline.axes_of(source)) {
+        if (axis == consumed && wire.is_list_literal)
+          diagnostics.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis),
+                          "pick one item of it");
+        else if (axis != consumed && !contains(node.mapped_axes, axis))
+          node.mapped_axes.push_back(axis);
+      }
+    }
+  }
+  for (const PortInfo& output : node.info.outputs)
+    if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
+      diagnostics.add(node.place,
+                      "node " + in_quotes(node.id) + " is called for each item along " + in_quotes(output.axis) +
+                          ", but its output '" + output.name + "' is itself a list over it",
+                      "pick one item of its input");
+}
+
+}  // namespace
+
+void order_and_find_axes(Pipeline& pipeline, Diagnostics& diagnostics) {
+  sort_nodes(pipeline, diagnostics);
+  for (std::size_t i = 0; i < pipeline.nodes.size() && diagnostics.empty(); ++i) find_axes(pipeline, i, diagnostics);
+  if (!diagnostics.empty()) return;
+  for (const PipelineOutput& output : pipeline.outputs) check_picks(pipeline, output.source, diagnostics);
+}
+
+}  // namespace marrow

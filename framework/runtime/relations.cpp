@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "relations.hpp"
+
+#include <cstdio>
+#include <vector>
+
+namespace marrow {
+namespace {
+
+double number_of(const OptionValue& value) {
+  const auto* whole = std::get_if<std::int64_t>(&value);
+  return whole ? double(*whole) : std::get<double>(value);
+}
+
+std::string number_text(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.10g", value);
+  return text;
+}
+
+std::size_t length_of(const OptionValue& value) {
+  if (const auto* numbers = std::get_if<std::vector<double>>(&value)) return numbers->size();
+  return std::get<std::vector<std::string>>(value).size();
+}
+
+bool is_empty(const OptionValue& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return text->empty();
+  return length_of(value) == 0;
+}
+
+std::string listed(const std::vector<std::string>& parts) {
+  std::string text;
+  for (std::size_t i = 0; i < parts.size(); ++i)
+    text += (i == 0 ? "" : i + 1 == parts.size() ? " and " : ", ") + parts[i];
+  return text;
+}
+
+std::string quoted(const std::string& name) { return "'" + name + "'"; }
+
+}  // namespace
+
+std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::string& node,
+                                     const std::function<const OptionValue*(const std::string&)>& value,
+                                     const std::function<bool(const std::string&)>& is_wired) {
+  const std::vector<std::string>& names = relation.names;
+  if (relation.type == RelationType::not_above || relation.type == RelationType::below) {
+    const double low = number_of(*value(names[0])), high = number_of(*value(names[1]));
+    const bool allows_equal = relation.type == RelationType::not_above;
+    if (low < high || (allows_equal && low == high)) return std::nullopt;
+    return BrokenRelation{"option " + quoted(names[0]) + " of " + node + " is " + number_text(low) +
+                              (allows_equal ? ", which is above" : ", which is not below") + " option " +
+                              quoted(names[1]) + " (" + number_text(high) + ")",
+                          ""};
+  }
+  if (relation.type == RelationType::as_many_or_none) {
+    const std::size_t count = length_of(*value(names[0])), like = length_of(*value(names[1]));
+    if (count == 0 || count == like) return std::nullopt;
+    return BrokenRelation{"option " + quoted(names[0]) + " of " + node + " has " + std::to_string(count) + " item" +
+                              (count == 1 ? "" : "s") + ", but " + quoted(names[1]) + " has " + std::to_string(like),
+                          "give one for each, or none"};
+  }
+  if (relation.type == RelationType::same_length) {
+    std::vector<std::string> parts;
+    bool is_same = true;
+    for (const std::string& name : names) {
+      parts.push_back(quoted(name) + " (" + std::to_string(length_of(*value(name))) + ")");
+      is_same = is_same && length_of(*value(name)) == length_of(*value(names[0]));
+    }
+    if (is_same) return std::nullopt;
+    return BrokenRelation{"options " + listed(parts) + " of " + node + " must have the same length", ""};
+  }
+  std::vector<std::string> all, given;
+  for (const std::string& name : names) {
+    all.push_back(quoted(name));
+    if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(*value(name))) given.push_back(quoted(name));
+  }
+  if (given.size() == 1) return std::nullopt;
+  const std::string got = given.empty() ? "none" : names.size() == 2 ? "both" : listed(given);
+  return BrokenRelation{node + " needs exactly one of " + listed(all) + ", got " + got, ""};
+}
+
+}  // namespace marrow

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: Apache-2.0
+// Nodes that find edges.
+#include <marrow/plugin.hpp>
+
+#include "suite.hpp"
+
+MARROW_PLUGIN(plugin) {
+  plugin.kind("edges")
+      .summary("edge pixels of an X-ray view")
+      .in<marrow::View>("view", "X-ray view")
+      .out<marrow::EdgeMap>("edges", "edge pixels at sub-pixel positions")
+      .suite(marrow::conformance::edges_suite());
+}

@@ -1,0 +1,202 @@
+// SPDX-License-Identifier: Apache-2.0
+// Optimizers, on functions of six numbers whose least value is known: a bowl, a long bowl, a bent valley, and for those
+// that need no start near the minimum one with many local minima. 1500 evaluations each, from ten starts.
+#include "suite.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+#include <thread>
+
+#include "marrow/domain/functions.hpp"
+
+namespace marrow::conformance {
+namespace {
+
+constexpr int kBudget = 1500, kStarts = 10;
+constexpr Eigen::Index kSize = 6;
+
+using Function = double (*)(const Eigen::VectorXd&);
+
+// The least value, 0, lies at the origin.
+double sphere(const Eigen::VectorXd& x) { return x.squaredNorm(); }
+double ellipsoid(const Eigen::VectorXd& x) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < x.size(); ++i) sum += std::pow(100.0, double(i) / double(x.size() - 1)) * x[i] * x[i];
+  return sum;
+}
+double rosenbrock(const Eigen::VectorXd& x) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i + 1 < x.size(); ++i)
+    sum += 10 * std::pow(x[i + 1] + 1 - (x[i] + 1) * (x[i] + 1), 2) + x[i] * x[i];
+  return sum;
+}
+double rastrigin(const Eigen::VectorXd& x) {
+  double sum = 0;
+  for (const double d : x) sum += d * d + 2 * (1 - std::cos(2 * kPi * d));
+  return sum;
+}
+
+const Optimizer& optimizer_of(const std::vector<Value>& outputs) {
+  expect(outputs.size() == 1 && outputs[0].data, "it gives no optimizer");
+  return *static_cast<const Optimizer*>(outputs[0].data.get());
+}
+
+/// The node's optimizer; the result keeps it alive.
+struct Made {
+  Result result;
+  const Optimizer& operator*() const { return optimizer_of(result.outputs); }
+};
+Made made(const Subject& subject) {
+  Made one{subject.call({})};
+  if (one.result.refusal) throw Failure("it refuses: " + *one.result.refusal);
+  return one;
+}
+
+MinimisationProblem problem_of(const std::function<double(const Eigen::VectorXd&)>& function, int start) {
+  std::mt19937 random(std::uint32_t(start) + 1);
+  MinimisationProblem problem;
+  problem.function = function;
+  problem.start.resize(kSize);
+  for (double& x : problem.start) x = 4 * (double(random()) / 4294967296.0 - 0.5);
+  problem.initial_step = Eigen::VectorXd::Constant(kSize, 0.7);
+  problem.max_evaluations = kBudget;
+  problem.step_tolerance = 1e-4;
+  return problem;
+}
+
+void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>& outputs) {
+  const MinimisationProblem problem = problem_of(sphere, 0);
+  const MinimisationResult result = optimizer_of(outputs).minimise(problem);
+  expect(result.x.size() == kSize && result.x.allFinite() && std::isfinite(result.value),
+         "its result is not finite, or of another size");
+  expect(std::abs(sphere(result.x) - result.value) <= 1e-12 * (1 + result.value),
+         "the value that it gives is not that of the point that it gives");
+  expect(!result.stopped_because.empty(), "it does not say why it stopped");
+}
+
+/// Of the start's value, what is left at the end, in %; the worst but two of the starts.
+double left_percent(const Subject& subject, Function function) {
+  const Made optimizer = made(subject);
+  std::vector<double> left;
+  for (int start = 0; start < kStarts; ++start) {
+    const MinimisationProblem problem = problem_of(function, start);
+    left.push_back(100 * function((*optimizer).minimise(problem).x) / function(problem.start));
+  }
+  std::sort(left.begin(), left.end());
+  return left[kStarts - 3];
+}
+
+double evaluations_over_budget(const Subject& subject) {
+  const Made optimizer = made(subject);
+  int worst = 0;
+  for (const int budget : {1, 7, 100}) {
+    int calls = 0;
+    MinimisationProblem problem = problem_of(
+        [&](const Eigen::VectorXd& x) {
+          ++calls;
+          return rosenbrock(x);
+        },
+        0);
+    problem.max_evaluations = budget;
+    const MinimisationResult result = (*optimizer).minimise(problem);
+    expect(result.evaluations == calls,
+           "it counts " + std::to_string(result.evaluations) + " evaluations of " + std::to_string(calls));
+    worst = std::max(worst, calls - budget);
+  }
+  return worst;
+}
+
+/// The least of the function lies beyond the bounds.
+double beyond_bounds(const Subject& subject) {
+  const Made optimizer = made(subject);
+  double beyond = 0;
+  MinimisationProblem problem = problem_of(
+      [&](const Eigen::VectorXd& x) {
+        beyond = std::max({beyond, (Eigen::VectorXd::Constant(kSize, 0.5) - x).maxCoeff(),
+                           (x - Eigen::VectorXd::Constant(kSize, 3)).maxCoeff()});
+        return sphere(x);
+      },
+      0);
+  problem.start = Eigen::VectorXd::Constant(kSize, 2);
+  problem.lower = Eigen::VectorXd::Constant(kSize, 0.5);
+  problem.upper = Eigen::VectorXd::Constant(kSize, 3);
+  const MinimisationResult result = (*optimizer).minimise(problem);
+  beyond = std::max(beyond, (problem.lower - result.x).maxCoeff());
+  return beyond <= 1e-9 ? 0 : beyond;
+}
+
+double noise_left(const Subject& subject) {
+  const Made optimizer = made(subject);
+  std::mt19937 random(9);
+  const MinimisationProblem problem =
+      problem_of([&](const Eigen::VectorXd& x) { return sphere(x) + 0.05 * double(random()) / 4294967296.0; }, 2);
+  return 100 * sphere((*optimizer).minimise(problem).x) / sphere(problem.start);
+}
+
+double nan_left(const Subject& subject) {
+  const Made optimizer = made(subject);
+  const MinimisationProblem problem =
+      problem_of([](const Eigen::VectorXd& x) { return x[0] > 1.95 || x[1] < -2.2 ? std::nan("") : sphere(x); }, 3);
+  const MinimisationResult result = (*optimizer).minimise(problem);
+  expect(result.x.allFinite() && std::isfinite(result.value), "it ends in what is not a number");
+  return 100 * sphere(result.x) / sphere(problem.start);
+}
+
+/// The same optimizer in four threads at once, and again.
+double differing_results(const Subject& subject) {
+  const Made optimizer = made(subject);
+  const Eigen::VectorXd expected = (*optimizer).minimise(problem_of(rosenbrock, 1)).x;
+  std::vector<Eigen::VectorXd> found(4);
+  std::vector<std::thread> threads;
+  for (Eigen::VectorXd& one : found)
+    threads.emplace_back([&] { one = (*optimizer).minimise(problem_of(rosenbrock, 1)).x; });
+  for (std::thread& thread : threads) thread.join();
+  return double(std::count_if(found.begin(), found.end(), [&](const Eigen::VectorXd& one) { return one != expected; }));
+}
+
+double lost_exceptions(const Subject& subject) {
+  const Made optimizer = made(subject);
+  int calls = 0;
+  const MinimisationProblem problem = problem_of(
+      [&](const Eigen::VectorXd& x) {
+        if (++calls == 5) throw Cancelled();
+        return sphere(x);
+      },
+      0);
+  try {
+    (*optimizer).minimise(problem);
+  } catch (const Cancelled&) {
+    return 0;
+  }
+  return 1;
+}
+
+}  // namespace
+
+Suite optimizer_suite() {
+  Suite suite{[] { return Inputs{}; }, validate, {}, {}};
+  const std::string six = " of six numbers, 1500 evaluations, eight of ten starts: what is left of the start's value";
+  const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
+                       const std::function<double(const Subject&)>& measure) {
+    suite.accuracy.push_back({{name, what, limit, unit}, measure});
+  };
+  add("sphere", "a bowl" + six, 10, "%", [](const Subject& subject) { return left_percent(subject, sphere); });
+  add("ellipsoid", "a bowl 10 times as long as wide" + six, 10, "%",
+      [](const Subject& subject) { return left_percent(subject, ellipsoid); });
+  add("rosenbrock", "a bent valley" + six, 20, "%",
+      [](const Subject& subject) { return left_percent(subject, rosenbrock); });
+  add("rastrigin", "many local minima" + six, 25, "%", [](const Subject& subject) {
+    if (subject.has_trait("needs_start")) throw NotApplicable("it finds the minimum near its start only");
+    return left_percent(subject, rastrigin);
+  });
+  add("budget", "evaluations more than allowed", 0, "evaluations", evaluations_over_budget);
+  add("bounds", "how far beyond its bounds it looks", 0, "units", beyond_bounds);
+  add("noise", "a bowl with noise: what is left of the start's value", 25, "%", noise_left);
+  add("not_a_number", "a bowl of which a part is not a number: what is left of the start's value", 10, "%", nan_left);
+  add("repeated", "results of four threads at once that differ from the first", 0, "results", differing_results);
+  add("exceptions", "exceptions of the function that it keeps to itself", 0, "exceptions", lost_exceptions);
+  return suite;
+}
+
+}  // namespace marrow::conformance

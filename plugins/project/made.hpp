@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The projectors that a node makes. What they draw is known from the types of its outputs.
+#include <cmath>
+#include <functional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "marrow/conformance.hpp"
+#include "marrow/runtime/types.hpp"
+
+namespace marrow::conformance {
+
+template <class Projector>
+bool is_of(const PortInfo& port) {
+  return port.type.id == TypeInfo::of<Projector>().id && port.axis.empty();
+}
+
+/// All projectors of a type among a node's outputs. Throws Failure where one is missing.
+template <class Projector>
+std::vector<const Projector*> projectors_in(const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
+  std::vector<const Projector*> found;
+  for (std::size_t i = 0; i < ports.size(); ++i) {
+    if (!is_of<Projector>(ports[i])) continue;
+    expect(outputs.at(i).data != nullptr, "it gives no " + ports[i].name);
+    found.push_back(&outputs[i].as<Projector>());
+  }
+  return found;
+}
+
+/// What a node makes of inputs, and these, which its projectors may refer to.
+class Made {
+ public:
+  /// Throws Failure where the node refuses.
+  Made(const Subject& subject, Inputs inputs) : ports_(subject.info().outputs), inputs_(std::move(inputs)) {
+    Result result = subject.call(inputs_);
+    if (result.refusal) throw Failure("it refuses: " + *result.refusal);
+    outputs_ = std::move(result.outputs);
+  }
+  template <class Projector>
+  std::vector<const Projector*> all() const {
+    return projectors_in<Projector>(ports_, outputs_);
+  }
+
+ private:
+  const std::vector<PortInfo>& ports_;
+  Inputs inputs_;
+  std::vector<Value> outputs_;
+};
+
+/// The largest figure of a node's projectors of a type. Throws NotApplicable with the reason where it makes none.
+template <class Projector>
+double largest_of(const Subject& subject, Inputs inputs, const std::string& reason,
+                  const std::function<double(const Projector&)>& figure) {
+  bool makes_some = false;
+  for (const PortInfo& port : subject.info().outputs) makes_some = makes_some || is_of<Projector>(port);
+  if (!makes_some) throw NotApplicable(reason);
+  const Made made(subject, std::move(inputs));
+  double most = 0;
+  for (const Projector* projector : made.all<Projector>()) {
+    const double one = figure(*projector);
+    if (std::isnan(one) || one > most) most = one;
+  }
+  return most;
+}
+
+}  // namespace marrow::conformance

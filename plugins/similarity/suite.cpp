@@ -1,0 +1,394 @@
+// SPDX-License-Identifier: Apache-2.0
+// Costs, on two simulated views of a body whose pose is known: three ellipsoids in soft tissue, blurred and with noise,
+// and the edges of these images. What a node asks for beside them (volume, field, surface, projector) is the same body.
+#include "suite.hpp"
+
+#include <oneapi/tbb/global_control.h>
+#include <oneapi/tbb/task_arena.h>
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "marrow/runtime/types.hpp"
+#include "marrow/toolbox/analytic/body.hpp"
+#include "marrow/toolbox/analytic/x_ray_view.hpp"
+
+namespace marrow::conformance {
+namespace {
+
+using namespace analytic;
+
+constexpr int kSize_px = 240;
+constexpr double kPixel_mm = 0.8;
+const Eigen::Vector3d kTurn_rad(0.2, -0.15, 0.3), kShift_mm(3, -2, 5);
+
+RigidTransform truth() { return moved_by(kTurn_rad, kShift_mm); }
+
+/// The body moved away from its true pose: turned by r [deg] about its middle and shifted by t [mm].
+RigidTransform off_truth(const Eigen::Vector3d& turn_deg, const Eigen::Vector3d& shift_mm) {
+  RigidTransform pose = truth();
+  pose.rotation = rotation_from_vector(turn_deg * radians(1)) * pose.rotation;
+  pose.translation_mm += shift_mm;
+  return pose;
+}
+RigidTransform off_truth(int axis, double by) {
+  const Eigen::Vector3d step = by * Eigen::Vector3d::Unit(axis % 3);
+  return axis < 3 ? off_truth(step, {0, 0, 0}) : off_truth({0, 0, 0}, step);
+}
+
+Body bone() {
+  const Eigen::Matrix3d tilt = rotation_from_vector({0.1, 0.05, 0.4});
+  return {{{0, 0, 8}, {9, 13, 32}, tilt}, {{20, -5, -22}, {8, 10, 9}, tilt}, {{-17, 7, -25}, {6, 9, 8}, tilt}};
+}
+Body other_bone() { return {{{24, 6, 26}, {7, 6, 15}}}; }
+
+/// The same one each time: a cost knows its own projector among those of all fragments.
+std::shared_ptr<const BodyProjector> bone_projector() {
+  static const auto kProjector = std::make_shared<const BodyProjector>(bone());
+  return kProjector;
+}
+
+/// What else the images show, and how.
+struct Scene {
+  bool with_other = false;
+  double gain = 1, offset = 0;  ///< of the line integrals
+  double noise = 1;
+};
+
+View view_of(int index, const Scene& scene) {
+  XRay x_ray{c_arm(index ? 80 : 0, kSize_px, kSize_px, kPixel_mm), scene.gain, scene.offset, scene.noise,
+             std::uint32_t(index)};
+  Body bodies = bone();
+  if (scene.with_other)
+    for (const Ellipsoid& one : other_bone()) bodies.push_back(one);
+  return x_ray_view(x_ray, index ? "lateral" : "frontal", BodyProjector(bodies), truth());
+}
+
+/// All inputs that the kind knows, but for other fragments. `change` may alter a view and its edges.
+Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>& change = nullptr) {
+  List<View> views;
+  List<EdgeMap> edges;
+  for (int i = 0; i < 2; ++i) {
+    View view = view_of(i, scene);
+    EdgeMap map = edges_of(view);
+    if (change) change(view, map);
+    const std::string name = view.name;
+    views.add(name, std::move(view));
+    edges.add(name, std::move(map));
+  }
+  const Grid grid = grid_of({68, 56, 100}, {1, 1, 1});
+  return {{"projector", Value::of<OutlineProjector>(bone_projector())},
+          {"projector", Value::of<RadiographProjector>(bone_projector())},
+          {"outline", Value::of<OutlineProjector>(bone_projector())},
+          {"mesh", item(mesh_of(bone()))},
+          {"volume", item(volume_of(bone(), grid, 700, 0))},
+          {"field", item(field_of(bone(), grid, 6))},
+          {"views", Value::of(views, "view")},
+          {"edges", Value::of(edges, "view")}};
+}
+
+/// The node's cost with what it refers to.
+class Made {
+ public:
+  Made(const Subject& subject, Inputs inputs) : inputs_(std::move(inputs)), value_(subject.output(inputs_, "cost")) {}
+  const Cost& operator*() const { return value_.as<Cost>(); }
+  const Cost* operator->() const { return &value_.as<Cost>(); }
+
+ private:
+  Inputs inputs_;
+  Value value_;
+};
+Made made(const Subject& subject, const Scene& scene = {}) { return Made(subject, inputs_of(scene)); }
+
+std::vector<RigidTransform> strange_poses() {
+  RigidTransform out = truth(), behind = truth(), far = truth(), around = truth();
+  out.translation_mm += Eigen::Vector3d(0, 0, 400);
+  behind.translation_mm += Eigen::Vector3d(0, -900, 0);
+  far.translation_mm += Eigen::Vector3d(1e7, 0, 1e7);
+  around.translation_mm += Eigen::Vector3d(0, -600, 0);  // about the frontal view's source
+  return {truth(), out, behind, far, around};
+}
+
+void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (ports[i].name != "cost") continue;
+    expect(outputs[i].data != nullptr, "it gives no cost");
+    const Cost& cost = outputs[i].as<Cost>();
+    const std::vector<RigidTransform> poses = strange_poses();
+    const std::vector<double> together = cost.values(poses);
+    expect(together.size() == poses.size(),
+           "of " + std::to_string(poses.size()) + " poses it gives " + std::to_string(together.size()) + " values");
+    for (std::size_t k = 0; k < poses.size(); ++k) {
+      const double value = cost.value(poses[k]);
+      expect(std::isfinite(value), std::string("its value is ") + (std::isnan(value) ? "not a number" : "infinite") +
+                                       " where the bone " +
+                                       (k == 0   ? "is"
+                                        : k == 1 ? "is out of view"
+                                        : k == 2 ? "is behind the source"
+                                        : k == 3 ? "is far away"
+                                                 : "is about the source"));
+      expect(value == together[k], "values() gives other values than value()");
+    }
+    expect(std::isfinite(cost.at_level({4, 10, 4})->value(truth())), "its value at another level is not finite");
+    const auto factor = cost.likelihood_factor(truth());
+    expect(!factor || (std::isfinite(*factor) && *factor > 0), "the factor of the likelihood is not above 0");
+  }
+}
+
+double better_than_truth_percent(const Subject& subject) {
+  constexpr int kPoses = 60;
+  const Made cost = made(subject);
+  const double best = cost->value(truth());
+  std::mt19937 random(4);
+  const auto uniform = [&] { return 2 * double(random()) / 4294967296.0 - 1; };
+  int better = 0;
+  for (int i = 0; i < kPoses; ++i) {
+    const Eigen::Vector3d turn(uniform(), uniform(), uniform()), shift(uniform(), uniform(), uniform());
+    better += cost->value(off_truth(turn.normalized() * (2 + 3 * std::abs(uniform())),
+                                    shift.normalized() * (2 + 3 * std::abs(uniform())))) <= best;
+  }
+  return 100.0 * better / kPoses;
+}
+
+/// Along each of the six axes, away from the truth to 6 degrees or 6 mm in steps of 1.5.
+double steps_down_percent(const Subject& subject) {
+  const Made cost = made(subject);
+  int down = 0, all = 0;
+  for (int axis = 0; axis < 6; ++axis)
+    for (const double side : {-1.0, 1.0}) {
+      double before = cost->value(off_truth(axis, side * 1.5));
+      for (const double by : {3.0, 4.5, 6.0}) {
+        const double value = cost->value(off_truth(axis, side * by));
+        down += value <= before;
+        ++all;
+        before = value;
+      }
+    }
+  return 100.0 * down / all;
+}
+
+Pose pose_of(const RigidTransform& world_from_model) {
+  Pose pose;
+  pose.world_from_model = world_from_model;
+  return pose;
+}
+
+/// How far from the truth the least value lies along an axis, sought at steps of 0.2 [deg or mm].
+double off_along(const Cost& cost, int axis) {
+  double least = cost.value(truth()), at = 0;
+  for (double by = -3; by < 3.1; by += 0.2)
+    if (const double value = cost.value(off_truth(axis, by)); value < least) least = value, at = by;
+  return std::abs(at);
+}
+double off_the_truth(const Made& cost) {
+  double sum = 0;
+  for (int axis = 0; axis < 6; ++axis) sum += off_along(*cost, axis) / 6;
+  return sum;
+}
+
+/// How far the values between truth and 6 mm off reach.
+double range_of(const Cost& cost) {
+  double most = 0;
+  for (int axis = 0; axis < 6; ++axis) most = std::max(most, cost.value(off_truth(axis, 6)) - cost.value(truth()));
+  expect(most > 0, "its value 6 mm or degrees off is not above that at the truth");
+  return most;
+}
+
+double gain_percent(const Subject& subject) {
+  if (!subject.has_trait("unmoved_by_gain")) throw NotApplicable("it does not say that it is unmoved by them");
+  const Made plain = made(subject, {false, 1, 0, 0}), changed = made(subject, {false, 1.6, 0.4, 0});
+  double most = 0;
+  for (int axis = 0; axis < 6; ++axis)
+    for (const double by : {0.0, 2.0, 5.0})
+      most = std::max(most, std::abs(plain->value(off_truth(axis, by)) - changed->value(off_truth(axis, by))));
+  return 100 * most / range_of(*plain);
+}
+
+/// What is masked out is changed: grey values and edges of one corner, where the body also lies.
+double mask_percent(const Subject& subject) {
+  const auto masked = [](bool change) {
+    return inputs_of({}, [change](View& view, EdgeMap& map) {
+      view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(255));
+      const cv::Rect corner(0, 0, kSize_px, kSize_px / 3);
+      view.mask(corner).setTo(0);
+      if (!change) return;
+      view.image.pixels = view.image.pixels.clone();
+      view.image.pixels(cv::Rect(0, 0, kSize_px, kSize_px / 3 - 12)).setTo(9000);  // blur reaches a few pixels
+      std::erase_if(map.pixels, [&](const EdgePixel& edge) { return edge.v_px < kSize_px / 3 - 12; });
+    });
+  };
+  const Made one(subject, masked(false)), other(subject, masked(true));
+  double most = 0;
+  for (const double by : {0.0, 2.0, 5.0})
+    most = std::max(most, std::abs(one->value(off_truth(3, by)) - other->value(off_truth(3, by))));
+  return 100 * most / range_of(*one);
+}
+
+double differing_values(const Subject& subject) {
+  const Made cost = made(subject);
+  const std::vector<RigidTransform> poses{truth(), off_truth(0, 2), off_truth(4, 3)};
+  const std::vector<double> expected = cost->values(poses);
+  int differing = 0;
+  for (const int threads : {1, 2, 7}) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, std::size_t(threads));
+    tbb::task_arena arena(threads);
+    arena.execute([&] {
+      for (std::size_t i = 0; i < poses.size(); ++i) differing += cost->value(poses[i]) != expected[i];
+    });
+  }
+  return differing;
+}
+
+double coarse_level_off(const Subject& subject) {
+  const Made cost = made(subject);
+  const std::shared_ptr<const Cost> coarse = cost->at_level({4, 12, 4});
+  double off = 0;
+  for (int axis = 0; axis < 6; ++axis)
+    for (const double side : {-1.0, 1.0}) off += coarse->value(off_truth(axis, 5 * side)) <= coarse->value(truth());
+  return 100 * off / 12;
+}
+
+double nothing_seen(const Subject& subject) {
+  const Made cost = made(subject);
+  const std::vector<RigidTransform> poses = strange_poses();
+  int better = 0;
+  for (std::size_t i = 1; i < poses.size(); ++i) better += cost->value(poses[i]) <= cost->value(off_truth(3, 1));
+  return better;
+}
+
+/// The derivatives that it tells against differences, in a pose where they are not small; in parts of their length.
+double slope_percent(const Subject& subject) {
+  const Made cost = made(subject);
+  const RigidTransform pose = off_truth({1, -0.7, 0.8}, {0.8, 0.6, -0.7});
+  const FragmentFrame frame{Eigen::Vector3d::Zero(), rotation_from_vector({0.3, 0.2, -0.1})};
+  const auto about = cost->expansion(pose, frame);
+  const bool is_declared = subject.has_trait("derivatives");
+  expect(!is_declared || about, "it declares the trait 'derivatives', but its cost tells none");
+  expect(is_declared || !about, "its cost tells derivatives, but it does not declare the trait 'derivatives'");
+  if (!about) throw NotApplicable("it tells no derivatives");
+  expect(std::abs(about->value - cost->value(pose)) <= 1e-9 * (1 + std::abs(about->value)),
+         "the value of its expansion is not that of the pose");
+  expect(about->curvature.allFinite() && (about->curvature - about->curvature.transpose()).cwiseAbs().maxCoeff() <
+                                             1e-9 * about->curvature.cwiseAbs().maxCoeff(),
+         "its curvature is not symmetric");
+  const Vector6d eigenvalues = about->curvature.selfadjointView<Eigen::Lower>().eigenvalues();
+  expect(eigenvalues.minCoeff() >= -1e-9 * eigenvalues.maxCoeff(), "its curvature has a negative eigenvalue");
+  Vector6d slope, scale;
+  for (int k = 0; k < 6; ++k) {
+    const double h = k < 3 ? 4e-3 : 0.1;
+    const Vector6d step = h * Vector6d::Unit(k);
+    scale[k] = k < 3 ? 0.03 : 1;  // rad to mm at the body's size
+    slope[k] = (cost->value(moved(pose, frame, step)) - cost->value(moved(pose, frame, -step))) / (2 * h);
+  }
+  return 100 * (slope - about->gradient).cwiseProduct(scale).norm() / slope.cwiseProduct(scale).norm();
+}
+
+/// Adds the fragments of the case: this one, and maybe another one.
+void add_fragments(Inputs& inputs, bool with_other) {
+  List<OutlineProjector> outlines;
+  List<RadiographProjector> radiographs;
+  List<Pose> poses;
+  const auto add = [&](const std::string& name, const std::shared_ptr<const BodyProjector>& projector) {
+    outlines.add_shared(name, projector);
+    radiographs.add_shared(name, projector);
+    poses.add(name, pose_of(truth()));
+  };
+  add("bone", bone_projector());
+  if (with_other) add("other", std::make_shared<const BodyProjector>(other_bone()));
+  inputs.set("other_projectors", Value::of(outlines, "fragment"));
+  inputs.set("other_projectors", Value::of(radiographs, "fragment"));
+  inputs.set("others", Value::of(poses, "fragment"));
+}
+
+/// Alone in a list of fragments nothing may change; beside another one in the images, the least value stays near the
+/// truth.
+double off_beside_another(const Subject& subject) {
+  bool knows = false;
+  for (const PortInfo& port : subject.info().inputs) knows = knows || port.name == "other_projectors";
+  if (!knows) throw NotApplicable("it has no input 'other_projectors'");
+  Inputs inputs = inputs_of({});
+  const Made alone(subject, inputs);
+  add_fragments(inputs, false);
+  const Made listed(subject, inputs);
+  for (int axis = 0; axis < 6; ++axis)
+    expect(alone->value(off_truth(axis, 2)) == listed->value(off_truth(axis, 2)),
+           "it leaves its own fragment out when that is in the list of all");
+  Inputs beside = inputs_of({true, 1, 0, 1});
+  add_fragments(beside, true);
+  return off_the_truth(Made(subject, beside));
+}
+
+Inputs spoilt(const std::function<void(View&, EdgeMap&)>& change) { return inputs_of({}, change); }
+
+std::vector<Trial> trials() {
+  const auto fill = [](double value) {
+    return spoilt([value](View& view, EdgeMap& map) {
+      view.image.pixels = cv::Mat(kSize_px, kSize_px, CV_16U, cv::Scalar(value));
+      map.pixels.clear();
+    });
+  };
+  return {{"constant_image", [fill] { return fill(30000); }},
+          {"black_image", [fill] { return fill(0); }},
+          {"no_edges", [] { return spoilt([](View&, EdgeMap& map) { map.pixels.clear(); }); }},
+          {"one_edge", [] { return spoilt([](View&, EdgeMap& map) { map.pixels.resize(1); }); }},
+          {"all_masked",
+           [] {
+             return spoilt([](View& view, EdgeMap&) { view.mask = cv::Mat(kSize_px, kSize_px, CV_8U, cv::Scalar(0)); });
+           }},
+          {"not_a_number",
+           [] {
+             return spoilt([](View& view, EdgeMap&) {
+               cv::Mat pixels;
+               view.image.pixels.convertTo(pixels, CV_32F);
+               pixels(cv::Rect(100, 90, 20, 30)).setTo(std::nan(""));
+               view.image.pixels = pixels;
+             });
+           }},
+          {"other_size", [] { return spoilt([](View& view, EdgeMap&) { view.camera.width_px = 50; }); }},
+          {"broken_camera",
+           [] { return spoilt([](View& view, EdgeMap&) { view.camera.intrinsics(0, 0) = std::nan(""); }); }},
+          {"no_views", [] {
+             Inputs inputs = inputs_of({});
+             for (const char* port : {"views", "edges"}) {
+               inputs.at(port).items.clear();
+               inputs.at(port).names.clear();
+             }
+             return inputs;
+           }}};
+}
+
+}  // namespace
+
+Suite similarity_suite() {
+  Suite suite;
+  suite.sample = [] { return inputs_of({}); };
+  suite.validate = validate;
+  suite.trials = trials();
+  const auto add = [&](const char* name, const std::string& what, double limit, const char* unit,
+                       std::function<double(const Subject&)> measure) {
+    suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
+  };
+  add("truth", "poses 2 to 5 mm and degrees off that cost no more than the true one", 0, "%",
+      better_than_truth_percent);
+  add("six_axes", "along each axis, away from the truth to 6 mm or degrees: steps at which the cost does not rise", 15,
+      "%", steps_down_percent);
+  add("minimum", "distance of the least value from the truth along each axis, mean", 0.5, "mm or degrees",
+      [](const Subject& subject) { return off_the_truth(made(subject)); });
+  add("gain", "change of the cost with gain and offset of the line integrals, of its range", 5, "%", gain_percent);
+  add("mask", "change of the cost with what is masked out, of its range", 2, "%", mask_percent);
+  add("any_threads", "values that differ with 1, 2 and 7 threads", 0, "values", differing_values);
+  add("coarse_level",
+      "at a coarse level: sides of the six axes on which 5 mm or degrees off cost no more than the truth", 10, "%",
+      coarse_level_off);
+  add("nothing_seen", "poses out of view or behind the source that cost less than 1 mm off the truth", 0, "poses",
+      nothing_seen);
+  add("slope", "its derivatives against differences", 10, "%", slope_percent);
+  add("beside_another", "distance of the least value from the truth where another fragment is in the images and known",
+      0.5, "mm or degrees", off_beside_another);
+  return suite;
+}
+
+}  // namespace marrow::conformance

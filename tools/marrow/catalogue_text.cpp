@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "catalogue_text.hpp"
+
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <sstream>
+
+namespace marrow::cli {
+namespace {
+
+using nlohmann::json;
+
+const char* type_name(OptionType type) {
+  static constexpr const char* kNames[] = {"true/false", "integer",         "number",        "text",
+                                           "path",       "list of numbers", "list of texts", "list of paths"};
+  return kNames[int(type)];
+}
+
+std::string number_text(double value) {
+  std::ostringstream out;
+  out.precision(10);
+  out << value;
+  return out.str();
+}
+
+bool plain_scalar(const std::string& text) {
+  return !text.empty() && text.find_first_of(":#{}[]&*!|>'\"%@`,$ ") == std::string::npos && text != "true" &&
+         text != "false";
+}
+
+json option_json(const OptionInfo& option) {
+  json j = {{"name", option.name},
+            {"help", option.help},
+            {"unit", option.unit},
+            {"type", type_name(option.type)},
+            {"required", option.required}};
+  std::visit([&](const auto& value) { j["default"] = value; }, option.default_value);
+  if (option.minimum) j["minimum"] = *option.minimum;
+  if (option.maximum) j["maximum"] = *option.maximum;
+  if (!option.choices.empty()) j["choices"] = option.choices;
+  return j;
+}
+
+}  // namespace
+
+json node_json(const NodeInfo& node) {
+  json j = {{"name", node.name},       {"summary", node.summary},  {"random", node.random},   {"traits", node.traits},
+            {"inputs", json::array()}, {"outputs", json::array()}, {"options", json::array()}};
+  for (const PortInfo& port : node.inputs)
+    j["inputs"].push_back({{"name", port.name},
+                           {"type", port.type.id},
+                           {"axis", port.axis},
+                           {"optional", port.optional},
+                           {"help", port.help}});
+  for (const PortInfo& port : node.outputs)
+    j["outputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"help", port.help}});
+  for (const OptionInfo& option : node.options) j["options"].push_back(option_json(option));
+  return j;
+}
+
+std::string port_text(const PortInfo& port) {
+  return port_text(KindPort{port.name, port.help, {port.type}, port.axis});
+}
+
+std::string port_text(const KindPort& port) {
+  std::string types;
+  for (const TypeInfo& type : port.types) types += (types.empty() ? "" : " or ") + type.id;
+  return port.axis.empty() ? types : "list of " + types + " over " + port.axis;
+}
+
+std::string yaml_text(const OptionValue& value) {
+  return std::visit(
+      [](const auto& v) -> std::string {
+        using T = std::decay_t<decltype(v)>;
+        if constexpr (std::is_same_v<T, bool>)
+          return v ? "true" : "false";
+        else if constexpr (std::is_same_v<T, std::int64_t>)
+          return std::to_string(v);
+        else if constexpr (std::is_same_v<T, double>)
+          return number_text(v);
+        else if constexpr (std::is_same_v<T, std::string>)
+          return plain_scalar(v) ? v : "\"" + v + "\"";
+        else {
+          std::string text;
+          for (const auto& item : v) text += (text.empty() ? "" : ", ") + yaml_text(OptionValue(item));
+          return "[" + text + "]";
+        }
+      },
+      value);
+}
+
+/// A bound of an option's range; none where it is only what an int can hold.
+std::optional<double> bound_told(const OptionInfo& option, std::optional<double> bound) {
+  using Limits = std::numeric_limits<int>;
+  const bool is_of_int = option.type == OptionType::integer && (bound == Limits::min() || bound == Limits::max());
+  return is_of_int ? std::nullopt : bound;
+}
+
+std::string range_text(const OptionInfo& option) {
+  if (!option.choices.empty()) {
+    std::string text;
+    for (const std::string& choice : option.choices) text += (text.empty() ? "one of: " : ", ") + choice;
+    return text;
+  }
+  std::string text = type_name(option.type);
+  if (option.length) text = std::to_string(option.length) + " numbers";
+  const std::optional<double> least = bound_told(option, option.minimum), most = bound_told(option, option.maximum);
+  if (least && most)
+    text += ", " + number_text(*least) + " to " + number_text(*most);
+  else if (least)
+    text += ", at least " + number_text(*least);
+  else if (most)
+    text += ", at most " + number_text(*most);
+  return option.unit.empty() ? text : text + " [" + option.unit + "]";
+}
+
+}  // namespace marrow::cli

@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+// list: the nodes that can be used, all or those that fit a place in a pipeline.
+#include <algorithm>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "catalogue_text.hpp"
+#include "command_options.hpp"
+#include "commands.hpp"
+#include "marrow/domain/printable.hpp"
+#include "marrow/runtime/fits.hpp"
+
+namespace marrow::cli {
+namespace {
+
+using nlohmann::json;
+
+struct ListRequest {
+  std::string kind;
+  std::vector<std::string> fits;  ///< FILE and NODE
+  std::vector<std::string> overrides;
+  bool as_json = false;
+};
+
+void note_refused(const Catalogue& catalogue) {
+  for (const LibraryInfo& library : catalogue.libraries())
+    if (!library.refused.empty())
+      std::fprintf(stderr, "marrow: note: %s was refused (see 'marrow doctor')\n",
+                   printable(library.file.filename().string()).c_str());
+}
+
+int list(const std::string& kind, bool as_json) {
+  const Catalogue catalogue;
+  json all = json::array();
+  std::string previous;
+  int shown = 0;
+  for (const std::string& name : catalogue.node_names()) {
+    const NodeInfo& node = *catalogue.find(name);
+    if (!kind.empty() && node.kind() != kind) continue;
+    ++shown;
+    if (as_json) {
+      all.push_back(node_json(node));
+      continue;
+    }
+    if (node.kind() != previous) {
+      const KindInfo* contract = catalogue.find_kind(node.kind());
+      std::printf("%s%s%s%s\n", previous.empty() ? "" : "\n", printable(node.kind()).c_str(), contract ? ": " : "",
+                  contract ? printable(contract->summary).c_str() : "");
+      previous = node.kind();
+    }
+    std::printf("  %-34s %s\n", printable(name).c_str(), printable(node.summary).c_str());
+  }
+  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+  if (!kind.empty() && shown == 0) {
+    const KindInfo* known = catalogue.find_kind(kind);
+    std::fprintf(stderr, "marrow: error: no node of kind '%s'%s\n", printable(kind).c_str(),
+                 known ? "" : printable("; " + suggestion(kind, catalogue.kind_names())).c_str());
+    return 2;
+  }
+  if (!as_json) note_refused(catalogue);
+  return 0;
+}
+
+void print_fits(const std::vector<Fit>& fits, const Catalogue& catalogue) {
+  const auto section = [&](const char* title, const auto& is_in, const std::vector<std::string> Fit::*lines) {
+    bool is_first = true;
+    for (const Fit& fit : fits) {
+      if (!is_in(fit)) continue;
+      if (is_first) std::printf("\n%s\n", title);
+      is_first = false;
+      std::printf("  %-34s %s\n", printable(fit.node).c_str(), printable(catalogue.find(fit.node)->summary).c_str());
+      for (const std::string& line : fit.*lines) std::printf("    %s\n", printable(line).c_str());
+    }
+  };
+  section(
+      "Fits", [](const Fit& fit) { return fit.faults.empty() && fit.missing.empty(); }, &Fit::missing);
+  section(
+      "Fits when more is given", [](const Fit& fit) { return fit.faults.empty() && !fit.missing.empty(); },
+      &Fit::missing);
+  section(
+      "Does not fit", [](const Fit& fit) { return !fit.faults.empty(); }, &Fit::faults);
+}
+
+int list_fits(const ListRequest& request) {
+  const Catalogue catalogue;
+  Diagnostics diagnostics;
+  const std::string &file = request.fits[0], &id = request.fits[1];
+  const std::vector<Fit> fits =
+      nodes_in_place_of(id, file, arguments_of({file, {}, request.overrides}), catalogue, diagnostics);
+  if (!diagnostics.empty()) {
+    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
+                 diagnostics.size() == 1 ? "" : "s");
+    return 2;
+  }
+  if (request.as_json) {
+    json all = json::array();
+    for (const Fit& fit : fits) {
+      const char* verdict = !fit.faults.empty() ? "no" : fit.missing.empty() ? "yes" : "with more";
+      all.push_back({{"node", fit.node}, {"fits", verdict}, {"missing", fit.missing}, {"faults", fit.faults}});
+    }
+    std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
+    return 0;
+  }
+  std::printf("In place of '%s' in %s\n", printable(id).c_str(), printable(file).c_str());
+  print_fits(fits, catalogue);
+  if (fits.empty()) std::printf("no other node of its kind is known, and none of another kind fits\n");
+  return 0;
+}
+
+}  // namespace
+
+void add_list(CLI::App& app, int& code) {
+  const auto request = std::make_shared<ListRequest>();
+  CLI::App* command = app.add_subcommand("list", "list the nodes that can be used");
+  command->add_option("kind", request->kind, "only this kind");
+  command
+      ->add_option("--fits", request->fits,
+                   "FILE NODE: the nodes that could stand in place of this one of a pipeline, and what they need")
+      ->type_name("FILE NODE")
+      ->expected(2);
+  command
+      ->add_option("--set", request->overrides,
+                   "node.option=value, node.uses=kind.name or node.in.port=reference in that pipeline")
+      ->allow_extra_args(false);
+  command->add_flag("--json", request->as_json, "as JSON");
+  command->callback(
+      [request, &code] { code = request->fits.empty() ? list(request->kind, request->as_json) : list_fits(*request); });
+  say_that_libraries_are_described(command);
+}
+
+}  // namespace marrow::cli
