@@ -6,7 +6,7 @@
 #include <cstdio>
 #include <numbers>
 
-#include "random.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::compare {
 namespace {

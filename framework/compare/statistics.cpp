@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "marrow/domain/error.hpp"
-#include "random.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::compare {
 namespace {

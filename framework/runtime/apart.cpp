@@ -15,6 +15,7 @@
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/abi.hpp"
+#include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "named_files.hpp"
 #include "no_process.hpp"
@@ -72,7 +73,8 @@ json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_i
 void pass_on(const json& report, const Context::Hooks& hooks) {
   const std::string what = report.value("say", ""), text = report.value("text", "");
   if (what == "progress" && hooks.progress) hooks.progress(report.value("fraction", 0.0), text);
-  if ((what == "info" || what == "warning") && hooks.log) hooks.log(text, what == "warning");
+  for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
+    if (what == level_name(level) && hooks.log) hooks.log(text, level);
 }
 
 /// What was being read: what the worker said last, else what the node's options name.

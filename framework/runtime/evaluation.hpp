@@ -51,7 +51,7 @@ class Evaluation {
   bool find(std::size_t node, Call& call);
 
   void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0,
-              double seconds = 0) const;
+              double seconds = 0, LogLevel level = LogLevel::info) const;
   std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
 
  private:
@@ -94,8 +94,5 @@ class Evaluation {
   mutable std::mutex observer_mutex_, warnings_mutex_;
   bool store_complained_ = false;
 };
-
-/// Of this process.
-double resident_memory_mb();
 
 }  // namespace marrow

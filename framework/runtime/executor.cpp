@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+// Runs a pipeline: starts each node when its sources have ended, on one pool of threads; and says what a run would do.
 #include "marrow/runtime/executor.hpp"
 
 #include <oneapi/tbb/global_control.h>
@@ -15,8 +16,9 @@
 #include <thread>
 
 #include "evaluation.hpp"
-#include "mapping.hpp"
 #include "no_process.hpp"
+#include "node_calls.hpp"
+#include "resident_memory.hpp"
 #include "stopped_nodes.hpp"
 #include "thread_supply.hpp"
 
@@ -90,10 +92,8 @@ class Executor {
   }
 
  private:
-  struct NodeState {
+  struct NodeState : NodeCalls {
     int waiting_for = 0;
-    std::vector<Call> calls;
-    std::vector<std::vector<std::string>> names;  ///< along each mapped axis
     std::size_t unfinished = 0;
     bool running = false;
   };
@@ -131,7 +131,7 @@ class Executor {
       return result;
     }
     NodeState& state = states_[index];
-    make_calls(index);
+    make_calls(pipeline_, result_, index, state);
     result.what = PlannedNode::What::cached;
     for (Call& call : state.calls) {
       if (!obstacle(node, call, call.result.status).empty()) continue;
@@ -224,7 +224,7 @@ class Executor {
     }
     try {
       if (cancelled()) throw Cancelled();
-      make_calls(index);
+      make_calls(pipeline_, result_, index, state);
     } catch (const std::exception& error) {
       state.names.assign(pipeline_.nodes[index].mapped_axes.size(), {""});
       state.calls.assign(1, {});
@@ -238,112 +238,6 @@ class Executor {
     const std::size_t count = state.calls.size();  // the last of them to end clears the calls
     state.unfinished = count;
     for (std::size_t c = 0; c < count; ++c) enqueue([this, index, c] { evaluate(index, c); });
-  }
-
-  /// Gathers the inputs and spreads them over the mapped axes.
-  void make_calls(std::size_t index) {
-    const PipelineNode& node = pipeline_.nodes[index];
-    NodeState& state = states_[index];
-    std::vector<Value> inputs(node.info.inputs.size());
-    for (const Wire& wire : node.wires)
-      inputs[std::size_t(wire.port)] = wired_value(wire, node.info.inputs[std::size_t(wire.port)]);
-    std::vector<std::string> names_text;
-    for (const std::string& axis : node.mapped_axes) {
-      std::vector<std::string> names;
-      std::string first;
-      for (std::size_t i = 0; i < inputs.size(); ++i) {
-        if (node.info.inputs[i].axis == axis) continue;  // consumed whole
-        const std::vector<std::string> along = names_along(inputs[i], axis);
-        if (along.empty()) continue;
-        if (names.empty()) {
-          names = along;
-          first = node.info.inputs[i].name;
-        } else if (names != along) {
-          throw Error("inputs '" + first + "' and '" + node.info.inputs[i].name + "' do not go in step along '" + axis +
-                      "': the first has " + list_text(names) + ", the second " + list_text(along));
-        }
-      }
-      if (names.empty()) names = {""};  // its list is absent as a whole
-      state.names.push_back(std::move(names));
-    }
-    spread(index, inputs, 0, "");
-  }
-
-  static std::string list_text(const std::vector<std::string>& names) {
-    std::string text;
-    for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-    return "(" + text + ")";
-  }
-
-  void spread(std::size_t index, const std::vector<Value>& inputs, std::size_t depth, const std::string& item) {
-    const PipelineNode& node = pipeline_.nodes[index];
-    NodeState& state = states_[index];
-    if (depth == node.mapped_axes.size()) {
-      state.calls.push_back({inputs, item, {}});
-      return;
-    }
-    for (std::size_t k = 0; k < state.names[depth].size(); ++k) {
-      std::vector<Value> slice = inputs;
-      for (std::size_t i = 0; i < slice.size(); ++i)
-        if (node.info.inputs[i].axis != node.mapped_axes[depth])
-          slice[i] = sliced(slice[i], node.mapped_axes[depth], k);
-      spread(index, slice, depth + 1, item.empty() ? state.names[depth][k] : item + "/" + state.names[depth][k]);
-    }
-  }
-
-  Value wired_value(const Wire& wire, const PortInfo& port) const {
-    if (!wire.is_list_literal) {
-      Value value = value_of(result_, wire.sources[0]);
-      const std::vector<std::string> axes = pipeline_.axes_of(wire.sources[0]);
-      const bool has_axis = std::find(axes.begin(), axes.end(), port.axis) != axes.end();
-      return port.axis.empty() || has_axis ? value : as_list_of_one(value, wire.sources[0], port.axis);
-    }
-    Value list;
-    list.axis = port.axis;
-    for (const Reference& source : wire.sources) {
-      list.items.push_back(value_of(result_, source));
-      list.type = list.items.back().type;
-      list.names.push_back(short_name(source));
-    }
-    return list;
-  }
-
-  std::string short_name(const Reference& source) const {
-    return source.items.empty() ? pipeline_.nodes[std::size_t(source.node)].id : source.items.back();
-  }
-
-  /// A list port may be given one item, which then is a list of one; inside other axes, at their ends.
-  Value as_list_of_one(const Value& value, const Reference& source, const std::string& axis) const {
-    Value result = value;
-    if (value.is_list()) {
-      for (Value& item : result.items) item = as_list_of_one(item, source, axis);
-      return result;
-    }
-    if (value.is_absent()) return value;
-    Value list;
-    list.type = value.type;
-    list.axis = axis;
-    list.names = {short_name(source)};
-    list.items = {value};
-    return list;
-  }
-
-  /// Why a call cannot be made, or an empty text. Sets `skipped` where an input simply is not there.
-  static std::string obstacle(const PipelineNode& node, const Call& call, Status& status) {
-    for (std::size_t i = 0; i < call.inputs.size(); ++i) {
-      const PortInfo& port = node.info.inputs[i];
-      std::vector<const Value*> leaves{&call.inputs[i]};
-      for (std::size_t k = 0; k < leaves.size(); ++k) {
-        const Value* value = leaves[k];
-        for (const Value& item : value->items) leaves.push_back(&item);
-        if (!value->is_absent()) continue;
-        status = Status::not_run;
-        if (!value->missing.empty()) return value->missing;  // the first cause, however far off
-        status = Status::skipped;
-        if (!port.optional) return "there is no '" + port.name + "'";
-      }
-    }
-    return "";
   }
 
   void evaluate(std::size_t index, std::size_t c) {
@@ -370,20 +264,7 @@ class Executor {
   /// Builds the node's outputs from its calls and starts what waited for it.
   void finish_node(std::size_t index) {
     NodeState& state = states_[index];
-    NodeRecord& record = result_.nodes[index];
-    // A node all of whose calls are deferred is not needed until something that runs asks for what it makes.
-    const bool deferred = !state.calls.empty() && std::all_of(state.calls.begin(), state.calls.end(),
-                                                              [](const Call& call) { return call.result.is_deferred; });
-    record.status = deferred ? Status::not_needed : Status::done;
-    for (const Call& call : state.calls) {
-      // The worst of its calls is the node's status; `failed` outranks what follows from other failures.
-      static constexpr Status kOrder[] = {Status::failed, Status::cancelled, Status::not_run, Status::skipped};
-      for (Status status : kOrder)
-        if (call.result.status == status && rank(status) > rank(record.status)) {
-          record.status = status;
-          record.reason = (call.item.empty() ? "" : call.item + ": ") + call.result.reason;
-        }
-    }
+    set_status(state.calls, result_.nodes[index]);
     assemble(index);
     std::vector<std::size_t> ready;
     {
@@ -399,25 +280,9 @@ class Executor {
   }
 
   void assemble(std::size_t index) {
-    for (std::size_t output = 0; output < pipeline_.nodes[index].info.outputs.size(); ++output) {
-      std::size_t next = 0;
-      result_.nodes[index].outputs.push_back(assembled(index, output, 0, next));
-    }
-  }
-
-  static int rank(Status status) {
-    switch (status) {
-      case Status::failed:
-        return 4;
-      case Status::cancelled:
-        return 3;
-      case Status::not_run:
-        return 2;
-      case Status::skipped:
-        return 1;
-      default:
-        return 0;
-    }
+    const PipelineNode& node = pipeline_.nodes[index];
+    for (std::size_t output = 0; output < node.info.outputs.size(); ++output)
+      result_.nodes[index].outputs.push_back(output_of(node, states_[index], output));
   }
 
   bool uses(std::size_t user, std::size_t index) const {
@@ -425,29 +290,6 @@ class Executor {
       for (const Reference& source : wire.sources)
         if (source.node == int(index)) return true;
     return false;
-  }
-
-  Value assembled(std::size_t index, std::size_t output, std::size_t depth, std::size_t& next) {
-    const PipelineNode& node = pipeline_.nodes[index];
-    const NodeState& state = states_[index];
-    if (depth < state.names.size() && !(state.names[depth].size() == 1 && state.names[depth][0].empty())) {
-      Value list;
-      list.type = node.info.outputs[output].type;
-      list.axis = node.mapped_axes[depth];
-      list.names = state.names[depth];
-      for (std::size_t k = 0; k < list.names.size(); ++k)
-        list.items.push_back(assembled(index, output, depth + 1, next));
-      return list;
-    }
-    const CallResult& result = state.calls[next++].result;
-    if (result.status == Status::done) return result.outputs[output];
-    Value absent;
-    absent.type = node.info.outputs[output].type;
-    if (result.status == Status::failed)
-      absent.missing = "node '" + node.id + "' failed";
-    else if (result.status != Status::skipped)
-      absent.missing = result.reason;
-    return absent;
   }
 
   const Pipeline& pipeline_;
@@ -468,28 +310,6 @@ class Executor {
 };
 
 }  // namespace
-
-const char* status_name(Status status) {
-  static constexpr const char* kNames[] = {"not needed", "done", "skipped", "failed", "not run", "cancelled"};
-  return kNames[int(status)];
-}
-
-bool RunResult::failed() const {
-  return std::any_of(nodes.begin(), nodes.end(), [](const NodeRecord& node) { return node.status == Status::failed; });
-}
-
-bool RunResult::cancelled() const {
-  return std::any_of(nodes.begin(), nodes.end(),
-                     [](const NodeRecord& node) { return node.status == Status::cancelled; });
-}
-
-Value value_of(const RunResult& result, const Reference& source) {
-  const NodeRecord& node = result.nodes[std::size_t(source.node)];
-  if (node.outputs.empty()) return {};
-  Value value = node.outputs[std::size_t(source.output)];
-  for (const std::string& item : source.items) value = picked(value, item, source.text);
-  return value;
-}
 
 std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue,
                                        const RunSettings& settings) {

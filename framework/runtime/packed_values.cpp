@@ -278,7 +278,7 @@ const Content* content_of_own(const TypeInfo& type) {
       TypeInfo::of<Seeds>(),   TypeInfo::of<Mesh>(),       TypeInfo::of<Camera>(),    TypeInfo::of<View>(),
       TypeInfo::of<EdgeMap>(), TypeInfo::of<ShaftLines>(), TypeInfo::of<Landmarks>(), TypeInfo::of<Pose>(),
       TypeInfo::of<Truth>(),   TypeInfo::of<Metrics>(),    TypeInfo::of<Scene>(),     TypeInfo::of<Landscape>(),
-      TypeInfo::of<Case>()};
+      TypeInfo::of<Case>(),    TypeInfo::of<Calibration>()};
   const auto found = std::find(kOwn.begin(), kOwn.end(), type);
   return found == kOwn.end() ? nullptr : found->content;
 }

@@ -6,7 +6,6 @@
 #include <map>
 #include <optional>
 #include <set>
-#include <sstream>
 
 #include "contract.hpp"
 #include "file_names.hpp"
@@ -14,39 +13,15 @@
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/types.hpp"
 #include "pipeline_axes.hpp"
+#include "pipeline_names.hpp"
+#include "pipeline_options.hpp"
+#include "pipeline_references.hpp"
 #include "pipeline_text.hpp"
-#include "plain_path.hpp"
-#include "relations.hpp"
 
 namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::vector<std::string> split(const std::string& text) {
-  std::vector<std::string> parts;
-  std::istringstream stream(text);
-  for (std::string part; std::getline(stream, part, '.');) parts.push_back(part);
-  if (parts.empty()) parts.emplace_back();
-  return parts;
-}
-
-template <class T>
-std::vector<std::string> names_of(const std::vector<T>& items) {
-  std::vector<std::string> names;
-  for (const T& item : items) names.push_back(item.name);
-  return names;
-}
-
-bool contains(const std::vector<std::string>& list, const std::string& item) {
-  return std::find(list.begin(), list.end(), item) != list.end();
-}
-
-std::string joined(const std::vector<std::string>& list, const char* separator) {
-  std::string text;
-  for (const std::string& item : list) text += (text.empty() ? "" : separator) + item;
-  return text;
-}
 
 std::string with_article(const std::string& noun) { return (noun.find_first_of("aeiou") == 0 ? "an " : "a ") + noun; }
 
@@ -66,8 +41,8 @@ class Resolver {
     pipeline_.file = written_.file;
     pipeline_.notes = written_.notes;
     for (const WrittenNode& node : written_.nodes) {
-      index_.emplace(node.id, ids_.size());
-      ids_.push_back(node.id);
+      ids_.index.emplace(node.id, ids_.all.size());
+      ids_.all.push_back(node.id);
       resolve_node(node);
     }
     for (std::size_t i = 0; i < written_.nodes.size(); ++i) resolve_wires(i);
@@ -85,14 +60,14 @@ class Resolver {
     if (const NodeInfo* info = catalogue_.find(written.uses)) {
       node.info = *info;
       if (const KindInfo* kind = catalogue_.find_kind(info->kind())) node.apart = kind->apart;
-      resolve_options(written, node);
+      resolve_options(written, node, input_texts_, unknown_values_, diagnostics_);
     } else if (!written.uses.empty()) {
       const std::vector<std::string>& names = node_names();
       const std::string kind = written.uses.substr(0, written.uses.find('.'));
       std::vector<std::string> siblings;
       for (const std::string& name : names)
         if (name.starts_with(kind + ".")) siblings.push_back(name);
-      std::string hint = suggested(written.uses, siblings.empty() ? names : siblings);
+      std::string hint = suggested(diagnostics_, written.uses, siblings.empty() ? names : siblings);
       for (const LibraryInfo& library : catalogue_.libraries())
         if (!library.refused.empty() &&
             library.file.stem().string().find(written.uses.substr(written.uses.find('.') + 1)) != std::string::npos)
@@ -112,85 +87,6 @@ class Resolver {
     return found != ports_.end() ? found->second : ports_.emplace(kind, catalogue_.ports_of_kind(kind)).first->second;
   }
 
-  /// A suggestion as long as faults are kept: thousands of unknown names among thousands of known ones take long.
-  std::string suggested(const std::string& wrong, const std::vector<std::string>& known) const {
-    return diagnostics_.is_full() ? "" : suggestion(wrong, known);
-  }
-
-  StrictYaml yaml_of(const WrittenValue& value) {
-    return value.is_override ? StrictYaml(value.place, diagnostics_) : StrictYaml(value.place.file, diagnostics_);
-  }
-
-  void resolve_options(const WrittenNode& written, PipelineNode& node) {
-    const std::vector<std::string> known = names_of(node.info.options);
-    for (const auto& [name, value] : written.options)
-      if (!contains(known, name))
-        diagnostics_.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
-                         suggested(name, known));
-    for (const OptionInfo& option : node.info.options) {
-      OptionValue result = option.default_value;
-      const auto given = std::find_if(written.options.begin(), written.options.end(),
-                                      [&](const auto& item) { return item.first == option.name; });
-      if (given != written.options.end()) {
-        const WrittenValue& value = given->second;
-        StrictYaml yaml = yaml_of(value);
-        const auto substitute = [&](const std::string& text, const Place& place) {
-          return input_texts_.put_into(text, place.line ? place : value.place);
-        };
-        auto converted = yaml.option(value.value, value.place, option,
-                                     "option " + in_quotes(option.name) + " of " + node.info.name, substitute);
-        if (converted)
-          result = in_folder(std::move(*converted), option.type, value.folder);
-        else
-          unknown_values_.insert({&written, option.name});
-      } else if (option.required) {
-        unknown_values_.insert({&written, option.name});
-        diagnostics_.add(written.place,
-                         "node " + in_quotes(node.id) + ": option " + in_quotes(option.name) + " of " + node.info.name +
-                             " must be given",
-                         option.help);
-      }
-      node.options.push_back(std::move(result));
-    }
-  }
-
-  /// Options against each other, where each of them could be read. The fault is shown at the last one that the file
-  /// gives.
-  void check_relations(const WrittenNode& written, const PipelineNode& node) {
-    const auto value = [&](const std::string& name) -> const OptionValue* {
-      for (std::size_t i = 0; i < node.options.size(); ++i)
-        if (node.info.options[i].name == name) return &node.options[i];
-      return nullptr;
-    };
-    const auto is_wired = [&](const std::string& name) { return is_written(written.wires, name); };
-    for (const RelationInfo& relation : node.info.relations) {
-      Place place = written.place;
-      bool is_known = true;
-      for (const std::string& name : relation.names) {
-        is_known = is_known && !unknown_values_.contains({&written, name});
-        const bool is_input = name.starts_with("in.");
-        for (const auto& [other, given] : is_input ? written.wires : written.options)
-          if (other == (is_input ? name.substr(3) : name)) place = given.place;
-      }
-      if (!is_known) continue;
-      if (const auto fault = broken(relation, node.info.name, value, is_wired))
-        diagnostics_.add(place, fault->message, fault->hint);
-    }
-  }
-
-  template <class Written>
-  static bool is_written(const Written& list, const std::string& name) {
-    return std::any_of(list.begin(), list.end(), [&](const auto& item) { return item.first == name; });
-  }
-
-  static OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
-    const auto full = [&](const std::string& text) { return text.empty() ? text : plain_path(folder / text).string(); };
-    if (type == OptionType::path) return full(std::get<std::string>(value));
-    if (type == OptionType::paths)
-      for (std::string& text : std::get<std::vector<std::string>>(value)) text = full(text);
-    return value;
-  }
-
   void resolve_wires(std::size_t index) {
     const WrittenNode& written = written_.nodes[index];
     PipelineNode& node = pipeline_.nodes[index];
@@ -204,7 +100,7 @@ class Resolver {
           std::find_if(of_kind.begin(), of_kind.end(), [&, n = name](const KindPort& p) { return p.name == n; });
       if (!own && sibling == of_kind.end()) {
         diagnostics_.add(value.place, in_quotes(node.info.name) + " has no input " + in_quotes(name),
-                         suggested(name, names_of(of_kind)));
+                         suggested(diagnostics_, name, names_of(of_kind)));
         continue;
       }
       // A port that only siblings use is checked like any other, and then left unwired.
@@ -221,7 +117,7 @@ class Resolver {
                              " is not wired",
                          "add  in: {" + port.name + ": ...}  with " + with_article(types_text({port.type}, port.axis)) +
                              " (" + port.help + ")" + or_another(index));
-    check_relations(written, node);
+    check_relations(written, node, unknown_values_, diagnostics_);
   }
 
   Wire resolve_wire(const WrittenValue& value, const KindPort& port, std::size_t index) {
@@ -232,7 +128,7 @@ class Resolver {
                          "write it as  " + port.name + ": node  or  node.output");
         return;
       }
-      Reference source = resolve_reference(text.Scalar(), place, &port.types);
+      Reference source = resolve_reference(text.Scalar(), place, &port.types, pipeline_.nodes, ids_, diagnostics_);
       check_type(source, port, index);
       wire.sources.push_back(std::move(source));
     };
@@ -246,66 +142,9 @@ class Resolver {
                                         " takes one " + types_text(port.types, "") + ", not a list");
       return wire;
     }
-    const StrictYaml yaml = yaml_of(value);
+    const StrictYaml yaml = yaml_of(value, diagnostics_);
     for (const YAML::Node& item : value.value) add(item, yaml.place(item));
     return wire;
-  }
-
-  Reference resolve_reference(const std::string& text, const Place& place, const std::vector<TypeInfo>* types) {
-    Reference source{text, place, -1, -1, {}};
-    const std::vector<std::string> parts = split(text);
-    const std::string id = parts.empty() ? text : parts[0];
-    const auto found = index_.find(id);
-    used_nodes_.insert(id);
-    if (found == index_.end()) {
-      unknown_nodes_.insert(id);
-      diagnostics_.add(place, "there is no node " + in_quotes(id), suggested(id, ids_));
-      return source;
-    }
-    const std::size_t index = found->second;
-    const std::vector<PortInfo>& outputs = pipeline_.nodes[index].info.outputs;
-    if (outputs.empty()) return source;  // its node is unknown, which has been said
-    std::size_t used = 1;
-    int output = -1;
-    for (std::size_t i = 0; i < outputs.size(); ++i)
-      if (parts.size() > 1 && outputs[i].name == parts[1]) output = int(i);
-    if (output >= 0) {
-      used = 2;
-    } else {
-      output = default_output(outputs, types, parts.size() > 1);
-    }
-    if (output < 0) {
-      if (parts.size() > 1)
-        diagnostics_.add(place, "node " + in_quotes(parts[0]) + " has no output " + in_quotes(parts[1]),
-                         suggested(parts[1], names_of(outputs)));
-      else
-        diagnostics_.add(place,
-                         "node " + in_quotes(parts[0]) + " has several outputs" +
-                             (types ? " and not just one " + types_text(*types, "") : ""),
-                         "say which: " + parts[0] + "." + joined(names_of(outputs), ", "));
-      return source;
-    }
-    source.node = int(index);
-    source.output = output;
-    source.items.assign(parts.begin() + std::ptrdiff_t(used), parts.end());
-    return source;
-  }
-
-  /// The output that a bare node's name means: its only one, or the only one of the wanted types.
-  static int default_output(const std::vector<PortInfo>& outputs, const std::vector<TypeInfo>* types, bool picks_item) {
-    if (outputs.size() == 1) return 0;
-    if (picks_item || !types) return -1;
-    int found = -1;
-    for (std::size_t i = 0; i < outputs.size(); ++i)
-      if (has_id(*types, outputs[i].type.id)) {
-        if (found >= 0) return -1;
-        found = int(i);
-      }
-    return found;
-  }
-
-  static bool has_id(const std::vector<TypeInfo>& types, const std::string& id) {
-    return std::any_of(types.begin(), types.end(), [&](const TypeInfo& type) { return type.id == id; });
   }
 
   void check_type(const Reference& source, const KindPort& port, std::size_t index) {
@@ -374,14 +213,15 @@ class Resolver {
       diagnostics_.add(value.place, "output " + in_quotes(name) + " must name a node or one of its outputs");
       return;
     }
-    pipeline_.outputs.push_back({name, resolve_reference(value.value.Scalar(), value.place, nullptr)});
+    pipeline_.outputs.push_back(
+        {name, resolve_reference(value.value.Scalar(), value.place, nullptr, pipeline_.nodes, ids_, diagnostics_)});
   }
 
   /// Where a name is unknown, the slip may be at its definition: the nearest name, which nothing uses.
   void point_at_renamed() {
     std::map<std::string, Place> nodes;
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
-    point_at_renamed("node", nodes, used_nodes_, unknown_nodes_);
+    point_at_renamed("node", nodes, ids_.used, ids_.unknown);
     point_at_renamed("input", written_.input_places, input_texts_.used, input_texts_.unknown);
   }
 
@@ -403,13 +243,12 @@ class Resolver {
   Diagnostics& diagnostics_;
   const bool tries_others_;  ///< not of a file that could not be read in full: its nodes may be half
   Pipeline pipeline_;
-  std::vector<std::string> ids_, node_names_;
-  std::map<std::string, std::size_t> index_;  ///< of nodes, by their ids
+  NodeIds ids_;
+  std::vector<std::string> node_names_;
   std::map<std::string, std::vector<KindPort>> ports_;
-  std::set<std::pair<const WrittenNode*, std::string>> unknown_values_;  ///< options whose values could not be read
-  std::map<std::size_t, std::vector<std::string>> fitting_;              ///< by node
+  UnknownValues unknown_values_;
+  std::map<std::size_t, std::vector<std::string>> fitting_;  ///< by node
   InputTexts input_texts_;
-  std::set<std::string> used_nodes_, unknown_nodes_;  ///< by references
 };
 
 }  // namespace

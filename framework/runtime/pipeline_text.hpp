@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+#include <algorithm>
 #include <filesystem>
 #include <map>
 #include <string>
@@ -39,6 +40,16 @@ struct WrittenPipeline {
   std::vector<std::pair<std::string, WrittenValue>> outputs;
   std::vector<std::string> notes;
 };
+
+/// Reads parts of a value, with faults at their places.
+inline StrictYaml yaml_of(const WrittenValue& value, Diagnostics& diagnostics) {
+  return value.is_override ? StrictYaml(value.place, diagnostics) : StrictYaml(value.place.file, diagnostics);
+}
+
+/// Whether a node's options or wires give that name.
+inline bool is_written(const std::vector<std::pair<std::string, WrittenValue>>& list, const std::string& name) {
+  return std::any_of(list.begin(), list.end(), [&](const auto& item) { return item.first == name; });
+}
 
 WrittenPipeline read_written_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                                       Diagnostics& diagnostics, bool inputs_required);

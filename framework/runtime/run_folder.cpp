@@ -231,6 +231,7 @@ bool RunFolder::take(const Pipeline& pipeline) {
   try {
     write_text_file(folder_ / "pipeline.yaml", resolved_yaml(pipeline));
     fs::create_directory(folder_ / "outputs");
+    log_ = std::make_unique<RunLog>(log);
     return true;
   } catch (const std::exception& fault) {
     for (const char* name : {"log.txt", "pipeline.yaml"})
@@ -252,16 +253,6 @@ std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipelin
     all.push_back(std::move(written));
   }
   return all;
-}
-
-void RunFolder::append_log(const std::string& line) {
-  errno = 0;
-  std::ofstream stream(folder_ / "log.txt", std::ios::app);
-  stream << printable_lines(line) << '\n';
-  stream.close();
-  if (!stream && log_fault_.empty())
-    log_fault_ = "lines are missing in " + (folder_ / "log.txt").string() +
-                 (errno ? std::string(": ") + std::strerror(errno) : "");
 }
 
 void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,

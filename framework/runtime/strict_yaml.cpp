@@ -4,26 +4,15 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
-#include <map>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "marrow/domain/yaml.hpp"
 #include "text_file.hpp"
 #include "unclosed.hpp"
-#include "yaml_survey.hpp"
 
 namespace marrow {
 namespace {
-
-std::string describe(const YAML::Node& node) {
-  if (!node.IsDefined() || node.IsNull()) return "nothing";
-  if (node.IsMap()) return "a map";
-  if (node.IsSequence()) return "a list";
-  return in_quotes(node.Scalar());
-}
-
-/// A quoted scalar is a text even when it looks like a number.
-bool is_plain(const YAML::Node& node) { return node.IsScalar() && node.Tag() != "!"; }
 
 /// Whole numbers with all their digits.
 std::string show(double value) {
@@ -37,8 +26,7 @@ std::string show(double value) {
 
 YAML::Node StrictYaml::parse(const std::string& text) {
   try {
-    survey_yaml(text);
-    return YAML::Load(text);
+    return parse_yaml(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
     // The parser notices where the text ends or goes on strangely; the slip is where something was left open.
@@ -50,84 +38,53 @@ YAML::Node StrictYaml::parse(const std::string& text) {
   return {};
 }
 
-Place StrictYaml::place(const YAML::Node& node) const {
-  if (only_) return *only_;
-  const YAML::Mark mark = node.Mark();
-  return {file_, mark.line + 1, mark.column + 1};
+Place StrictYaml::place_of(const YAML::Mark& mark) const {
+  return only_ ? *only_ : Place{file_, mark.line + 1, mark.column + 1};
 }
 
 std::vector<YamlEntry> StrictYaml::map(const YAML::Node& node, const Place& where, const std::string& what,
                                        const std::vector<std::string>* known) {
   std::vector<YamlEntry> entries;
   if (!node.IsMap()) {
-    fault(where, what + " must be a map, got " + describe(node), "write it as  key: value  lines");
+    fault(where, what + " must be a map, got " + yaml_described(node), "write it as  key: value  lines");
     return entries;
   }
-  std::map<std::string, int> lines;  ///< of the keys so far
-  for (const auto& item : node) {
-    const Place key_place = place(item.first);
-    if (!item.first.IsScalar()) {
-      fault(key_place, "a key in " + what + " must be a name, got " + describe(item.first));
-      continue;
-    }
-    const std::string& key = item.first.Scalar();
-    const auto [twin, is_new] = lines.try_emplace(key, key_place.line);
-    if (key == "<<") {
-      fault(key_place, "merge keys (<<) are not supported", "repeat the entries");
-    } else if (!is_new) {
-      fault(key_place, in_quotes(key) + " is given twice in " + what,
-            "the first is at line " + std::to_string(twin->second));
-    } else if (printable(key) != key) {
-      fault(key_place, "the key " + in_quotes(key) + " in " + what + " holds a control character", "write it without");
-    } else if (known && std::find(known->begin(), known->end(), key) == known->end()) {
-      fault(key_place, "unknown key " + in_quotes(key) + " in " + what, suggestion(key, *known));
-    } else {
-      entries.push_back({key, key_place, item.second});
-    }
+  std::vector<YamlFault> faults;
+  for (const YamlKey& key : yaml_keys(node, what, faults)) {
+    const Place key_place = place_of(key.mark);
+    if (known && std::find(known->begin(), known->end(), key.name) == known->end())
+      fault(key_place, "unknown key " + in_quotes(key.name) + " in " + what, suggestion(key.name, *known));
+    else
+      entries.push_back({key.name, key_place, key.value});
   }
+  for (const YamlFault& one : faults) fault(place_of(one.mark), one.text, one.hint);
   return entries;
 }
 
 std::optional<std::string> StrictYaml::text(const YAML::Node& node, const Place& where, const std::string& what) {
   if (node.IsScalar()) return node.Scalar();
-  fault(where, what + ": expected a text, got " + describe(node));
+  fault(where, what + ": expected a text, got " + yaml_described(node));
   return std::nullopt;
 }
 
 std::optional<bool> StrictYaml::boolean(const YAML::Node& node, const Place& where, const std::string& what) {
-  if (is_plain(node) && node.Scalar() == "true") return true;
-  if (is_plain(node) && node.Scalar() == "false") return false;
-  fault(where, what + ": expected true or false, got " + describe(node));
-  return std::nullopt;
+  const std::optional<bool> value = yaml_boolean(node);
+  if (!value) fault(where, what + ": expected true or false, got " + yaml_described(node));
+  return value;
 }
 
 std::optional<std::int64_t> StrictYaml::integer(const YAML::Node& node, const Place& where, const std::string& what) {
-  if (is_plain(node)) {
-    const std::string& text = node.Scalar();
-    std::int64_t value = 0;
-    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-    const std::size_t digits = text.starts_with("-") ? 1 : 0;
-    const bool leading_zero = text.size() > digits + 1 && text[digits] == '0';
-    if (error == std::errc() && end == text.data() + text.size() && !leading_zero) return value;
-    if (leading_zero) {
-      fault(where, what + ": expected an integer, got " + describe(node), "write it without leading zeros");
-      return std::nullopt;
-    }
-  }
-  fault(where, what + ": expected an integer, got " + describe(node));
-  return std::nullopt;
+  const std::optional<std::int64_t> value = yaml_integer(node);
+  if (!value)
+    fault(where, what + ": expected an integer, got " + yaml_described(node),
+          has_leading_zeros(node) ? "write it without leading zeros" : "");
+  return value;
 }
 
 std::optional<double> StrictYaml::number(const YAML::Node& node, const Place& where, const std::string& what) {
-  if (is_plain(node)) {
-    const std::string& text = node.Scalar();
-    double value = 0;
-    const char* begin = text.data() + (text.starts_with("+") ? 1 : 0);
-    const auto [end, error] = std::from_chars(begin, text.data() + text.size(), value);
-    if (error == std::errc() && end == text.data() + text.size() && std::isfinite(value)) return value;
-  }
-  fault(where, what + ": expected a number, got " + describe(node));
-  return std::nullopt;
+  const std::optional<double> value = yaml_number(node);
+  if (!value) fault(where, what + ": expected a number, got " + yaml_described(node));
+  return value;
 }
 
 bool StrictYaml::check_range(double value, const Place& where, const OptionInfo& info, const std::string& what) {
@@ -180,7 +137,7 @@ std::optional<OptionValue> StrictYaml::option(
       break;
   }
   if (!node.IsSequence()) {
-    fault(where, what + ": expected a list, got " + describe(node), "write it as [a, b, c]");
+    fault(where, what + ": expected a list, got " + yaml_described(node), "write it as [a, b, c]");
     return std::nullopt;
   }
   std::vector<double> numbers;

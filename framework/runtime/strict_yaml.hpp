@@ -21,8 +21,7 @@ struct YamlEntry {
   YAML::Node value;
 };
 
-/// The one way in which marrow's runtime reads YAML. yaml-cpp accepts duplicate keys, does not merge `<<`, reads 010 as
-/// 8 and yes as true; here each of these is a diagnostic at its place.
+/// Reads the YAML of files that people write: each fault (domain/yaml.hpp) is a diagnostic at its place.
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
@@ -31,7 +30,7 @@ class StrictYaml {
 
   /// Parses a text; a syntax error is a diagnostic and gives a null node.
   YAML::Node parse(const std::string& text);
-  Place place(const YAML::Node& node) const;
+  Place place(const YAML::Node& node) const { return place_of(node.Mark()); }
   /// The entries of a map in their order. `what` names the map in messages; with `known`, other keys are faults.
   std::vector<YamlEntry> map(const YAML::Node& node, const Place& where, const std::string& what,
                              const std::vector<std::string>* known = nullptr);
@@ -50,6 +49,7 @@ class StrictYaml {
   }
 
  private:
+  Place place_of(const YAML::Mark& mark) const;
   bool check_range(double value, const Place& where, const OptionInfo& info, const std::string& what);
 
   std::string file_;

@@ -14,6 +14,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/reading.hpp"
+#include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/worker.hpp"
 #include "packed_values.hpp"
 
@@ -95,9 +96,7 @@ Context::Hooks hooks_of(const json& request, WorkerReports& reports) {
   hooks.progress = [&](double fraction, std::string_view what) {
     reports.say({{"say", "progress"}, {"fraction", fraction}, {"text", what}});
   };
-  hooks.log = [&](std::string_view text, bool is_warning) {
-    reports.say({{"say", is_warning ? "warning" : "info"}, {"text", text}});
-  };
+  hooks.log = [&](std::string_view text, LogLevel level) { reports.say({{"say", level_name(level)}, {"text", text}}); };
   return hooks;
 }
 

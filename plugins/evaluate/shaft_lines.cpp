@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shaft's borders found in a view against those of the true outline: the model at its true pose is seen in the same
-// stretch of the same view, and its silhouette fitted by a straight line on each side.
+// The shaft's borders found in a view against those of the true outline: that of the model at its true pose, in the
+// same stretch of the same view.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/shaft/model_borders.hpp"
+#include "true_borders.hpp"
 
 namespace {
 
@@ -51,7 +51,7 @@ std::optional<Comparison> compare(const ShaftLines& lines, const View& view, con
     const Truth* truth = truths.find(models.name(i));
     if (!truth) continue;
     const auto borders =
-        marrow::shaft::model_borders(models[i], truth->world_from_model, view.camera, lines, tolerance_px);
+        true_borders::borders_beside(lines, models[i], truth->world_from_model, view.camera, tolerance_px);
     if (!borders) continue;
     const Comparison one{models.name(i), difference(lines.left, borders->left), difference(lines.right, borders->right),
                          difference(middle_of(lines.left, lines.right), middle_of(borders->left, borders->right)),

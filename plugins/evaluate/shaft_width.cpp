@@ -1,71 +1,150 @@
 // SPDX-License-Identifier: Apache-2.0
 // The shaft's outer diameter from two views or more. Planes through the X-ray sources and the borders touch the bone;
-// where its axis lies is known from the planes midway, so the diameter needs no guess of the magnification.
+// what touches all of them at once tells where it lies, so the diameter needs no guess of the magnification.
+#include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <marrow/plugin.hpp>
-
-#include "marrow/toolbox/shaft/axis.hpp"
-#include "marrow/toolbox/shaft/widths.hpp"
 
 namespace {
 
-using marrow::LineSegment, marrow::List, marrow::ShaftLines, marrow::View, marrow::shaft::Axis;
+using marrow::LineSegment, marrow::List, marrow::ShaftLines, marrow::View;
 
 struct Options {
   std::vector<double> width_mm, width_deviation_mm;
 };
 
-Eigen::Vector2d middle_of(const LineSegment& segment) { return 0.5 * (segment.from_px + segment.to_px); }
+/// Diameters that a shaft may have, from `least_mm` to `most_mm`; as many as the node's widths.
+struct Possible {
+  double least_mm, most_mm;
+};
 
-/// The point of the axis that is nearest to the ray through the middle of a pair.
-Eigen::Vector3d point_in_middle(const Axis& axis, const marrow::Camera& camera, const ShaftLines& lines) {
-  const Eigen::Vector3d ray = marrow::ray_direction(camera, 0.5 * (middle_of(lines.left) + middle_of(lines.right)));
-  const Eigen::Vector3d across = ray - axis.direction * axis.direction.dot(ray),
-                        from = marrow::source_position_mm(camera) - axis.point_mm;
-  const double along_ray = -across.dot(from) / across.squaredNorm();
-  return axis.nearest_to(marrow::source_position_mm(camera) + along_ray * ray);
+/// Without widths a femur's. Perimeters of 366 femora in the middle were 69 to 116 mm (J Clin Med Res 11, 2019, 740),
+/// which are diameters of 22 to 37 mm; a third less and half as much again is left for other people, sides and levels.
+std::vector<Possible> possible_diameters(const Options& options) {
+  std::vector<Possible> possible;
+  for (std::size_t i = 0; i < options.width_mm.size(); ++i) {
+    const double mean = options.width_mm[i], deviation = options.width_deviation_mm.at(i);
+    if (!(mean > 0) || !(deviation > 0)) throw marrow::Error("width_mm and width_deviation_mm must be positive");
+    possible.push_back({mean - 3 * deviation, mean + 3 * deviation});
+  }
+  return possible.empty() ? std::vector<Possible>{{15, 55}} : possible;
 }
 
-/// Twice the mean distance of the axis from the planes through the borders, where the pair's middle is.
-double diameter_mm(const Axis& axis, const marrow::Camera& camera, const ShaftLines& lines) {
-  const Eigen::Vector3d point = point_in_middle(axis, camera, lines);
-  double sum = 0;
-  for (const LineSegment* border : {&lines.left, &lines.right}) {
-    const marrow::Plane plane =
-        marrow::back_project_line(camera, border->from_px.homogeneous().cross(border->to_px.homogeneous()));
-    sum += std::abs(plane.normal.dot(point) - plane.offset_mm);
-  }
-  return sum;
+/// "15.0 to 55.0 mm"
+std::string range(const std::vector<Possible>& possible) {
+  double least = possible[0].least_mm, most = possible[0].most_mm;
+  for (const Possible& one : possible) least = std::min(least, one.least_mm), most = std::max(most, one.most_mm);
+  char text[80];
+  std::snprintf(text, sizeof text, "%.1f to %.1f mm", least, most);
+  return text;
+}
+
+/// One view's pair of borders, in world coordinates.
+struct Sight {
+  Eigen::Vector3d source_mm, ray;  ///< the ray runs through the middle of the pair
+  /// Unit normals, from the bone outwards, of the planes through the source that touch it.
+  Eigen::Vector3d left, right;
+};
+
+Sight sight_of(const View& view, const ShaftLines& lines) {
+  const auto middle = [](const LineSegment& border) { return Eigen::Vector2d(0.5 * (border.from_px + border.to_px)); };
+  Sight sight;
+  sight.source_mm = marrow::source_position_mm(view.camera);
+  sight.ray = marrow::ray_direction(view.camera, 0.5 * (middle(lines.left) + middle(lines.right)));
+  const auto outwards = [&](const LineSegment& border) {
+    const Eigen::Vector3d normal = marrow::ray_direction(view.camera, border.from_px)
+                                       .cross(marrow::ray_direction(view.camera, border.to_px))
+                                       .normalized();
+    return Eigen::Vector3d(normal.dot(sight.ray) > 0 ? -normal : normal);
+  };
+  sight.left = outwards(lines.left), sight.right = outwards(lines.right);
+  return sight;
+}
+
+/// A straight, evenly tapering bone. At `point_mm + t * direction` the planes of view v, through its borders, are
+/// `distance_mm[v] + slope[v] * t` away; a bone that is not round is wider in one view than in the other.
+struct Taper {
+  Eigen::Vector3d point_mm, direction;
+  Eigen::VectorXd distance_mm, slope;
+};
+
+/// Throws Error where the views see the bone from nearly the same side: there its depth is not known.
+void check_sides(const std::vector<Sight>& sights) {
+  double widest_deg = 0;
+  for (const Sight& a : sights)
+    for (const Sight& b : sights) {
+      const Eigen::Vector3d one = a.left - a.right, other = b.left - b.right;
+      widest_deg = std::max(widest_deg, marrow::degrees(std::atan2(one.cross(other).norm(), std::abs(one.dot(other)))));
+    }
+  char angle[40];
+  std::snprintf(angle, sizeof angle, "%.1f", widest_deg);
+  if (widest_deg < 10)
+    throw marrow::Error("the " + std::to_string(sights.size()) +
+                        " views see the shaft from nearly the same side: the planes of its axis meet at " + angle +
+                        " degrees, where 10 are needed; use views farther apart");
+}
+
+/// A plane {X : n . X = o} touches the bone for all t: n . (point + t direction) + distance_v + slope_v t = o. So
+/// (point, distance) solve one linear system in the sense of least squares, and (direction, slope) span its null space.
+Taper touching_all(const std::vector<Sight>& sights) {
+  check_sides(sights);
+  const Eigen::Index views = Eigen::Index(sights.size());
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(2 * views, 3 + views);
+  Eigen::VectorXd offsets_mm(2 * views);
+  for (Eigen::Index v = 0; v < views; ++v)
+    for (Eigen::Index side = 0; side < 2; ++side) {
+      const Sight& sight = sights[std::size_t(v)];
+      const Eigen::Vector3d& normal = side == 0 ? sight.left : sight.right;
+      rows.row(2 * v + side).head<3>() = normal.transpose();
+      rows(2 * v + side, 3 + v) = 1;
+      offsets_mm(2 * v + side) = normal.dot(sight.source_mm);
+    }
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(rows, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Index rank = 2 + views;
+  const Eigen::VectorXd at =
+      svd.matrixV().leftCols(rank) *
+      (svd.matrixU().leftCols(rank).transpose() * offsets_mm).cwiseQuotient(svd.singularValues().head(rank));
+  const Eigen::VectorXd along = svd.matrixV().col(rank) / svd.matrixV().col(rank).head<3>().norm();
+  return {at.head<3>(), along.head<3>(), at.tail(views), along.tail(views)};
+}
+
+/// The diameter across the axis, where that is nearest to the ray through the middle of a view's pair. A cone's surface
+/// is farther from its axis across it than its tangent planes are, by the cosine of half its opening angle.
+double diameter_mm(const Taper& bone, const Sight& sight, Eigen::Index view) {
+  const Eigen::Vector3d across = bone.direction.cross(sight.ray).cross(sight.ray);
+  const double t = across.dot(sight.source_mm - bone.point_mm) / across.dot(bone.direction), slope = bone.slope(view);
+  return 2 * (bone.distance_mm(view) + slope * t) / std::sqrt(1 - slope * slope);
 }
 
 std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const List<View>& views,
                                            const Options& options, marrow::Context& context) {
-  const marrow::shaft::Widths widths(options.width_mm, options.width_deviation_mm, 0);
-  std::vector<const View*> seen;
-  std::vector<marrow::Plane> planes;
+  const std::vector<Possible> possible = possible_diameters(options);
+  std::vector<Sight> sights;
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const View* view = views.find(lines.name(i));
     if (!view)
       throw marrow::Error("there are shaft lines of a view '" + lines.name(i) +
                           "', but no such view; wire the views that the lines were found in");
     marrow::check_camera(view->camera, "view '" + view->name + "'");
-    seen.push_back(view);
-    planes.push_back(marrow::shaft::bisecting_plane(view->camera, lines[i].left, lines[i].right));
+    sights.push_back(sight_of(*view, lines[i]));
   }
-  if (planes.size() < 2) {
+  if (sights.size() < 2) {
     context.warn(
         "there are shaft lines of one view alone: where the bone lies between source and detector, and so its "
         "diameter, is not known");
     return std::nullopt;
   }
-  const Axis axis = marrow::shaft::axis_of_planes(planes);
+  const Taper bone = touching_all(sights);
   marrow::Metrics metrics;
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const double width_mm = diameter_mm(axis, seen[i]->camera, lines[i]);
-    if (!widths.is_possible(width_mm))
+    const double width_mm = diameter_mm(bone, sights[i], Eigen::Index(i));
+    const auto holds = [&](const Possible& one) { return width_mm >= one.least_mm && width_mm <= one.most_mm; };
+    if (std::none_of(possible.begin(), possible.end(), holds))
       context.warn("view '" + lines.name(i) + "': the borders are " + std::to_string(int(std::lround(width_mm))) +
                    " mm apart at the depth where the views have the axis, which is no shaft's width (" +
-                   widths.range() + "); one view's pair is another thing than the other's");
+                   range(possible) + "); one view's pair is another thing than the other's");
     metrics.items.push_back({lines.name(i) + "_width_mm", width_mm, "mm"});
     metrics.items.push_back({lines.name(i) + "_magnification", lines[i].width_mm / width_mm, ""});
   }
@@ -84,8 +163,9 @@ MARROW_PLUGIN(plugin) {
       .out("metrics",
            "for each view the diameter in the middle of its borders, and the magnification there relative to the "
            "isocentre; a warning where it is no shaft's diameter")
-      .option("width_mm", &Options::width_mm,
-              "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, by level")
+      .option(
+          "width_mm", &Options::width_mm,
+          "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, 15 to 55 mm")
       .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations")
       .relation(marrow::same_length({"width_mm", "width_deviation_mm"}));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/names.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
@@ -15,7 +16,7 @@ struct Options {
 /// Notes a fault where a point that is seen or tracked is none of the CT's.
 void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
   if (places.has(name)) return;
-  const std::string near = map.file().is_full() ? "" : files::nearest(name, places.keys());
+  const std::string near = map.file().is_full() ? "" : nearest_name(name, places.keys());
   map.fault(name, "the points have no '" + name + "'; " +
                       (near.empty() ? "give its place in the CT under 'points'" : "did you mean '" + near + "'?"));
 }

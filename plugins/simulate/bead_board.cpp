@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/board_views.hpp"
-#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
@@ -28,7 +28,7 @@ Simulated bead_board(const Options& options, Context& context) {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     const std::string name = "view" + std::to_string(i + 1);
     simulated.images.add(name, phantom::expose_board(board, simulated.calibration, poses[i], options,
-                                                     phantom::Random(context.seed(), i)()));
+                                                     marrow::Random(context.seed(), i)()));
     simulated.cameras.add(name, {options.width_px, options.height_px, simulated.calibration.intrinsics, poses[i]});
     context.progress(double(i + 1) / double(poses.size()), "views");
   }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
@@ -255,7 +255,7 @@ Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) 
     const int first = slab * kSlabSlices, last = std::min(volume.grid.size[2], first + kSlabSlices);
     scanner.scan(first, last, volume.values);
     for (std::size_t i = std::size_t(first) * slice; i < std::size_t(last) * slice; ++i) {
-      phantom::Random random(context.seed(), i);
+      marrow::Random random(context.seed(), i);
       volume.values[i] = std::round(float(volume.values[i] + options.noise_hu * random.normal()));
     }
     context.progress(double(++done) / slabs, "slices");

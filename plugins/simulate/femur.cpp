@@ -4,10 +4,10 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/femur_shape.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "marrow/toolbox/phantom/polygonise.hpp"
-#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
@@ -37,7 +37,7 @@ struct FemurOptions {
 
 /// Draws each measure from a normal distribution with the spread found among people, within 2 standard deviations.
 phantom::FemurShape drawn(const FemurOptions& options) {
-  phantom::Random random(std::uint64_t(options.shape_seed), 1);
+  marrow::Random random(std::uint64_t(options.shape_seed), 1);
   const auto draw = [&](double mean, double spread) {
     return mean + options.variation * spread * std::clamp(random.normal(), -2.0, 2.0);
   };

@@ -10,7 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
@@ -183,7 +183,7 @@ cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& opti
 void add_quantum_noise(cv::Mat1d& expected, std::uint64_t seed) {
   tbb::parallel_for(0, expected.rows, [&](int row) {
     for (int column = 0; column < expected.cols; ++column) {
-      phantom::Random random(seed, std::uint64_t(row) << 32 | std::uint64_t(column));
+      marrow::Random random(seed, std::uint64_t(row) << 32 | std::uint64_t(column));
       double& photons = expected(row, column);
       if (photons > 0) photons = double(std::poisson_distribution<std::int64_t>(photons)(random));
     }
@@ -221,7 +221,7 @@ List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, cons
   phantom::check_phantom(phantom, "simulate.fluoroscopy");
   List<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
-    const std::uint64_t seed = phantom::Random(context.seed(), i)();
+    const std::uint64_t seed = marrow::Random(context.seed(), i)();
     views.add(cameras.name(i), expose(cameras.name(i), phantom, cameras[i], options, seed, context));
     context.progress(double(i + 1) / double(cameras.size()), "views");
   }

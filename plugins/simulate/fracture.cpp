@@ -5,8 +5,8 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/random.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
@@ -69,12 +69,13 @@ class Relief {
   Relief(const FractureOptions& options, const Eigen::Vector3d& centre) : centre_(centre) {
     const double slope = std::tan(radians(options.obliquity_deg)), direction = radians(options.direction_deg);
     slope_ = slope * Eigen::Vector2d(std::cos(direction), std::sin(direction));
-    phantom::Random random(std::uint64_t(options.fracture_seed), 3);
+    marrow::Random random(std::uint64_t(options.fracture_seed), 3);
     double power = 0;
     for (Wave& wave : waves_) {
-      const double length = 3 * std::pow(40.0 / 3, random.uniform()), angle = 2 * kPi * random.uniform();
+      const double length = 3 * std::pow(40.0 / 3, random.uniform_above_0()),
+                   angle = 2 * kPi * random.uniform_above_0();
       wave.number = 2 * kPi / length * Eigen::Vector2d(std::cos(angle), std::sin(angle));
-      wave.phase = 2 * kPi * random.uniform();
+      wave.phase = 2 * kPi * random.uniform_above_0();
       wave.amplitude = std::pow(length, 0.8);
       power += 0.5 * wave.amplitude * wave.amplitude;
     }

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
+#include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
-#include "marrow/toolbox/phantom/random.hpp"
 
 namespace {
 
@@ -66,7 +66,7 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
                    std::to_string(options.count) + " landmarks in all of them; it is left out");
       continue;
     }
-    phantom::Random random(context.seed(), f);
+    marrow::Random random(context.seed(), f);
     Landmarks found;
     for (const Eigen::Vector3d& point : points) {
       std::string name = "p";

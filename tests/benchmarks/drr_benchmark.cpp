@@ -71,7 +71,9 @@ std::shared_ptr<const RadiographProjector> projector(const Catalogue& catalogue,
                                           ? OptionValue(step_mm)
                                           : node.info.options[i].default_value);
   Context::Hooks hooks;
-  hooks.log = [](std::string_view message, bool) { std::printf("%.*s\n", int(message.size()), message.data()); };
+  hooks.log = [](std::string_view message, marrow::LogLevel) {
+    std::printf("%.*s\n", int(message.size()), message.data());
+  };
   Context context(std::move(hooks));
   return std::static_pointer_cast<const RadiographProjector>(node.call(inputs, options.get(), context).at(0).data);
 }

@@ -64,7 +64,9 @@ void measure(const char* what, const std::function<void()>& work) {
 
 Context logging() {
   Context::Hooks hooks;
-  hooks.log = [](std::string_view message, bool) { std::printf("    %.*s\n", int(message.size()), message.data()); };
+  hooks.log = [](std::string_view message, marrow::LogLevel) {
+    std::printf("    %.*s\n", int(message.size()), message.data());
+  };
   return Context(hooks);
 }
 

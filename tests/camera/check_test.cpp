@@ -192,7 +192,7 @@ struct Ran {
 Ran run(const List<View>& views, const Options& options, const Mesh* mesh = nullptr) {
   Ran ran;
   Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, bool) { ran.warnings.emplace_back(text); };
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { ran.warnings.emplace_back(text); };
   Context context(hooks);
   ran.checked = check(views, mesh, options, context);
   return ran;

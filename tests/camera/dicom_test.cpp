@@ -35,7 +35,7 @@ Read read(const Elements& elements, Options options = {}) {
   put(folder / "x.dcm", dicom_file(elements));
   Read result;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, bool) { result.warnings.emplace_back(text); };
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { result.warnings.emplace_back(text); };
   marrow::Context context(hooks);
   options.paths = {folder / "x.dcm"};
   result.camera = dicom(options, context)[0];

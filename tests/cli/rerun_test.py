@@ -3,7 +3,7 @@
 import json
 import struct
 
-from diff_test import CHAIN, Runs
+from diff_cases import CHAIN, Runs
 from marrow_cli import CACHE, IS_SANITIZED, TEST_PLUGINS, main
 
 

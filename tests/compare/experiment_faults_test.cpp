@@ -51,7 +51,7 @@ TEST_F(ExperimentFaults, NoYaml) {
   read("experiment: 1\npipeline: [p.yaml\ncases: {}\n");
   EXPECT_NE(diagnostics.text().find("e.yaml:2:11: error: this [ is not closed"), std::string::npos)
       << diagnostics.text();
-  expect_fault("- experiment\n", 1, "the experiment must be a map, got a list", kMapHint);
+  expect_fault("- experiment\n", 1, "the experiment must be a map, got a list of 1", kMapHint);
 }
 
 TEST_F(ExperimentFaults, WhatIsMissing) {
@@ -77,16 +77,16 @@ TEST_F(ExperimentFaults, HeadOfTheFile) {
                "experiment: expected an integer, got 'one'");
   expect_fault_of("name: my/edges", "an experiment's name becomes a file name: 'my/edges' cannot be one, it holds '/'",
                   marrow::kNameHint);
-  expect_fault_of("name: [edges]", "name: expected a text, got a list");
+  expect_fault_of("name: [edges]", "name: expected a text, got a list of 1");
   expect_fault_of("help: {}", "help: expected a text, got a map");
   expect_fault("experiment: 1\npipeline: q.yaml\n" + kGood.substr(kStart.find("cases")), 2, "there is no file 'q.yaml'",
                kStartsHere);
   expect_fault("experiment: 1\npipeline: [p.yaml]\n" + kGood.substr(kStart.find("cases")), 2,
-               "pipeline: expected a text, got a list");
+               "pipeline: expected a text, got a list of 1");
 }
 
 TEST_F(ExperimentFaults, Inputs) {
-  expect_fault_of("inputs: [1]", "'inputs' must be a map, got a list", kMapHint);
+  expect_fault_of("inputs: [1]", "'inputs' must be a map, got a list of 1", kMapHint);
   expect_fault_of("inputs: {x: [1]}", "'x' must be one value");
   expect_fault_of("inputs: {csae: 1}", "the pipeline has no input 'csae'", "did you mean 'case'?");
   scratch.write("p.yaml",
@@ -103,12 +103,12 @@ TEST_F(ExperimentFaults, Patches) {
   expect_fault(set("n.in.a: [c, d]"), 10, "input 'a' of test.add takes one metrics, not a list");
   expect_fault(set("n.in.a: d"), 10, "there is no node 'd'", "did you mean 'c'?");
   expect_fault(set("n: 1"), 10, "an override is node.option=value, node.uses=kind.name or node.in.port=reference");
-  expect_fault_of("set: [c.value]", "'set' must be a map, got a list", kMapHint);
+  expect_fault_of("set: [c.value]", "'set' must be a map, got a list of 1", kMapHint);
 }
 
 TEST_F(ExperimentFaults, Variants) {
   const auto variants = [](const std::string& lines) { return kStart + kMetrics + lines + "\n"; };
-  expect_fault(variants("variants: [one]"), 5, "'variants' must be a map, got a list", kMapHint);
+  expect_fault(variants("variants: [one]"), 5, "'variants' must be a map, got a list of 1", kMapHint);
   expect_fault(variants("variants:\n  a/b: {}"), 6,
                "a variant's name becomes a file name: 'a/b' cannot be one, it holds '/'", marrow::kNameHint);
   expect_fault(variants("variants:\n  one: {}\n  one: {}"), 7, "'one' is given twice in 'variants'",
@@ -121,7 +121,7 @@ TEST_F(ExperimentFaults, Variants) {
 
 TEST_F(ExperimentFaults, Matrix) {
   const auto matrix = [](const std::string& lines) { return kStart + kMetrics + lines + "\n"; };
-  expect_fault(matrix("matrix: [c.value]"), 5, "'matrix' must be a map, got a list", kMapHint);
+  expect_fault(matrix("matrix: [c.value]"), 5, "'matrix' must be a map, got a list of 1", kMapHint);
   expect_fault(matrix("matrix: {c.value: 1}"), 5, "'c.value' in the matrix must be a list of values",
                "write it as  c.value: [a, b]");
   expect_fault(matrix("matrix: {c.value: []}"), 5, "'c.value' in the matrix must be a list of values",
@@ -142,12 +142,12 @@ TEST_F(ExperimentFaults, FaultOfThePipelineIsSaidOnce) {
 TEST_F(ExperimentFaults, Cases) {
   const auto cases = [](const std::string& lines) { return kHead + ("cases: " + lines) + "\n" + kAfterCases; };
   const std::string no_cases = "name folders, as  folders: [data/*]  or a simulation";
-  expect_fault(cases("[cases/*]"), 3, "'cases' must be a map, got a list", kMapHint);
+  expect_fault(cases("[cases/*]"), 3, "'cases' must be a map, got a list of 1", kMapHint);
   expect_fault(cases("{folder: [cases/*]}"), 3, "unknown key 'folder' in 'cases'", "did you mean 'folders'?");
   expect_fault(cases("{input: case}"), 3, "there are no cases", no_cases);
   expect_fault(cases("{folders: []}"), 3, "there are no cases", no_cases);
   expect_fault(cases("{folders: cases/*}"), 3, "'folders' must be a list", "write it as  folders: [a, b]");
-  expect_fault(cases("\n  folders:\n  - [a]"), 5, "an item of 'folders': expected a text, got a list");
+  expect_fault(cases("\n  folders:\n  - [a]"), 5, "an item of 'folders': expected a text, got a list of 1");
   expect_fault(cases("\n  folders:\n  - nothing/*"), 5, "there is no folder at 'nothing/*'", kStartsHere);
   expect_fault(cases("{folders: [p.yaml]}"), 3, "there is no folder at 'p.yaml'", kStartsHere);
   std::filesystem::create_directories(scratch.path / "more" / "a");
@@ -157,7 +157,7 @@ TEST_F(ExperimentFaults, Cases) {
   expect_fault(
       cases("\n  folders:\n  - cases/*\n  - odd*/*"), 6, "two cases are named 'a'",
       "they are " + (scratch.path / "cases/a").string() + " and " + (scratch.path / "odd\\x0afolder/a").string());
-  expect_fault(cases("{input: [a], folders: [cases/*]}"), 3, "input: expected a text, got a list");
+  expect_fault(cases("{input: [a], folders: [cases/*]}"), 3, "input: expected a text, got a list of 1");
   read(cases("{input: caes, folders: [cases/*]}"));
   EXPECT_EQ(diagnostics.size(), 2u);
   EXPECT_NE(diagnostics.text().find("e.yaml:3:1: error: the pipeline has no input 'caes'"), std::string::npos)
@@ -176,10 +176,10 @@ TEST_F(ExperimentFaults, Simulation) {
   expect_simulation_fault("pipelin: s.yaml", "unknown key 'pipelin' in 'simulate'", "did you mean 'pipeline'?");
   expect_simulation_fault("pipeline: q.yaml", "there is no file 'q.yaml'", kStartsHere);
   expect_simulation_fault("output: csae", "the pipeline s has no output 'csae'", "did you mean 'case'?");
-  expect_simulation_fault("output: [case]", "output: expected a text, got a list");
+  expect_simulation_fault("output: [case]", "output: expected a text, got a list of 1");
   expect_simulation_fault("set: {c.wrod: two}", "'test.constant' has no option 'wrod'", "did you mean 'word'?");
   expect_simulation_fault("inputs: {y: 1}", "the pipeline has no input 'y'", "did you mean 'x'?");
-  expect_simulation_fault("draw: [x]", "'draw' must be a map, got a list", kMapHint);
+  expect_simulation_fault("draw: [x]", "'draw' must be a map, got a list of 1", kMapHint);
   expect_simulation_fault("draw: {y: [0, 1]}", "the pipeline has no input 'y'", "did you mean 'x'?");
   expect_simulation_fault("draw: {x: 1}", "'x' must be the two ends of a range", "write it as  x: [-10, 10]");
   expect_simulation_fault("draw: {x: [1, 2, 3]}", "'x' must be the two ends of a range", "write it as  x: [-10, 10]");
@@ -210,7 +210,7 @@ TEST_F(ExperimentFaults, Starts) {
   expect_fault_of("starts: {node: s, count: 3, rotation_deg: 200}", "'rotation_deg' must be 0 to 180, got 200");
   expect_fault_of("starts: {node: s, count: 3, translation_mm: -1}", "'translation_mm' must be 0 to 1000, got -1");
   expect_fault_of("starts: {node: s, count: 3, translation_mm: far}", "translation_mm: expected a number, got 'far'");
-  expect_fault_of("starts: {node: [s], count: 3}", "node: expected a text, got a list");
+  expect_fault_of("starts: {node: [s], count: 3}", "node: expected a text, got a list of 1");
   expect_fault_of("starts: {node: s, count: 3}", "the pipeline has no node 's'", "did you mean 'c'?");
 }
 TEST_F(ExperimentFaults, StartsOfANodeThatCannotBeDisplaced) {
@@ -227,7 +227,7 @@ TEST_F(ExperimentFaults, Metrics) {
   const std::string as_list = "write it as  metrics: [errors.distal.final.mtre_mm]";
   expect_fault(metrics("number.value"), 7, "'metrics' must be a list", as_list);
   expect_fault(metrics("[]"), 7, "'metrics' names no figure", as_list);
-  expect_fault(metrics("\n- [a]"), 8, "an item of 'metrics': expected a text, got a list");
+  expect_fault(metrics("\n- [a]"), 8, "an item of 'metrics': expected a text, got a list of 1");
   expect_fault(metrics("\n- number.value\n- number.value"), 9, "'number.value' is given twice in 'metrics'");
   expect_fault(metrics("\n- {label: Sum}"), 8, "a metric does not say which figure",
                "write it as  {figure: errors.distal.final.mtre_mm, label: mTRE}");
@@ -235,8 +235,8 @@ TEST_F(ExperimentFaults, Metrics) {
                "did you mean 'label'?");
   expect_fault(metrics("\n- {figure: number.value, better: highest}"), 8, "'highest' is no way to be better",
                "did you mean 'higher'?");
-  expect_fault(metrics("\n- {figure: number.value, label: [Sum]}"), 8, "label: expected a text, got a list");
-  expect_fault(metrics("\n- {figure: [number.value]}"), 8, "figure: expected a text, got a list");
+  expect_fault(metrics("\n- {figure: number.value, label: [Sum]}"), 8, "label: expected a text, got a list of 1");
+  expect_fault(metrics("\n- {figure: [number.value]}"), 8, "figure: expected a text, got a list of 1");
   expect_fault(metrics("[nubmer.value]"), 7, "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
   expect_fault(metrics("[truth.value]"), 7, "output 'truth' is truth, not figures of merit",
                "name an output of an evaluate node");
@@ -250,16 +250,16 @@ TEST_F(ExperimentFaults, SuccessBaselineAndPictures) {
   expect_fault_of("success: {number.valeu: 1}", "'number.valeu' is not among the metrics",
                   "did you mean 'number.value'?");
   expect_fault_of("baseline: tow", "there is no variant 'tow'", "did you mean 'two'?");
-  expect_fault_of("baseline: [two]", "baseline: expected a text, got a list");
+  expect_fault_of("baseline: [two]", "baseline: expected a text, got a list of 1");
   expect_fault_of("initial_error: nubmer.value", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
   expect_fault_of("initial_error: truth.value", "output 'truth' is truth, not figures of merit",
                   "name an output of an evaluate node");
   expect_fault_of("initial_error: number", "'number' does not say which figure",
                   "write it as  number.mtre_mm, with the items of its lists between");
-  expect_fault_of("initial_error: []", "initial_error: expected a text, got a list");
+  expect_fault_of("initial_error: []", "initial_error: expected a text, got a list of 0");
   expect_fault_of("pictures: number", "'pictures' must be a list", "write it as  pictures: [a, b]");
   expect_fault_of("pictures: [nubmer]", "the pipeline p has no output 'nubmer'", "did you mean 'number'?");
-  expect_fault_of("pictures: [[number]]", "an item of 'pictures': expected a text, got a list");
+  expect_fault_of("pictures: [[number]]", "an item of 'pictures': expected a text, got a list of 1");
   expect_fault_of("timed_cells: -1", "'timed_cells' must be 0 to 1000, got -1");
   expect_fault_of("timed_cells: all", "timed_cells: expected an integer, got 'all'");
 }

@@ -177,7 +177,9 @@ TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
   edges.add("narrow", narrow);
   std::string warning;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, bool is_warning) { warning += is_warning ? message : ""; };
+  hooks.log = [&](std::string_view message, marrow::LogLevel level) {
+    warning += level == marrow::LogLevel::warning ? message : "";
+  };
   marrow::Context context(hooks);
   EXPECT_EQ(outline_distance({}, LineProjector(), views, edges, {}, context).items.size(), 14u);
   EXPECT_EQ(warning, "view 'narrow': no part of the outline is inside the image at this pose; the view is left out");

@@ -11,9 +11,10 @@ namespace {
 /// Keeps what a node warns of.
 struct Listener {
   std::vector<std::string> warnings;
-  marrow::Context context{marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, bool warning) {
-                                                   if (warning) warnings.emplace_back(message);
-                                                 }}};
+  marrow::Context context{
+      marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, marrow::LogLevel level) {
+                               if (level == marrow::LogLevel::warning) warnings.emplace_back(message);
+                             }}};
 };
 
 constexpr double kRadius_mm = 14;
@@ -69,6 +70,12 @@ TEST(EvaluateShaftLines, NarrowerOnesLieInside) {
   EXPECT_NEAR(figure(lines, "border_offset_mm"), 0.5, 0.02);
   EXPECT_NEAR(figure(lines, "width_error_mm"), -1, 0.04);
   EXPECT_LT(figure(lines, "axis_offset_mm"), 0.01);
+}
+
+TEST(EvaluateShaftLines, APairThatIsOnePercentTooWideSaysSo) {
+  const ShaftLines lines = borders(frontal(), 1.01 * kRadius_mm);
+  EXPECT_NEAR(figure(lines, "width_error_mm"), 0.28, 0.01);
+  EXPECT_NEAR(figure(lines, "true_width_mm"), 28, 0.02);
 }
 
 TEST(EvaluateShaftLines, OneThatIsTurnedSaysByHowMuch) {

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "edges/radiograph.hpp"
+#include "evaluate/cone.hpp"
 #include "initial/tube.hpp"
 #include "shipped.hpp"
 
@@ -12,9 +15,10 @@ namespace {
 /// Keeps what a node warns of.
 struct Listener {
   std::vector<std::string> warnings;
-  marrow::Context context{marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, bool warning) {
-                                                   if (warning) warnings.emplace_back(message);
-                                                 }}};
+  marrow::Context context{
+      marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, marrow::LogLevel level) {
+                               if (level == marrow::LogLevel::warning) warnings.emplace_back(message);
+                             }}};
 };
 
 marrow::View view_at(const std::string& name, double angle_deg) {
@@ -67,6 +71,61 @@ TEST(ShaftWidth, IsExactWhereTheMagnificationIsNot) {
   EXPECT_TRUE(listener.warnings.empty());
 }
 
+TEST(ShaftWidth, IsThatOfAnyCylinderFromTwoAndThreeViews) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> unit(-1, 1);
+  for (const std::vector<double>& angles : {std::vector<double>{0, 90}, {-20, 35}, {0, 60, 120}})
+    for (int i = 0; i < 100; ++i) {
+      Scene scene;
+      const double radius_mm = 12 + 4 * unit(random);
+      const Eigen::Vector3d point(40 * unit(random), 40 * unit(random), 0),
+          direction(0.2 * unit(random), 0.2 * unit(random), 1);
+      for (const double angle : angles) {
+        const View view = view_at("at " + std::to_string(int(angle)), angle);
+        scene.lines.add(view.name, tube::borders(view.camera, point, direction, radius_mm, 100, 400));
+        scene.views.add(view.name, view);
+      }
+      Listener listener;
+      const auto metrics = shaft_width(scene.lines, scene.views, {}, listener.context);
+      ASSERT_TRUE(metrics);
+      for (const View& view : scene.views) EXPECT_NEAR(figure(*metrics, view.name + "_width_mm"), 2 * radius_mm, 1e-6);
+    }
+}
+
+/// The point of a line that is nearest to a ray, by least squares over both lengths.
+Eigen::Vector3d nearest(const Eigen::Vector3d& point, const Eigen::Vector3d& direction, const Eigen::Vector3d& source,
+                        const Eigen::Vector3d& ray) {
+  Eigen::Matrix<double, 3, 2> ways;
+  ways << direction, -ray;
+  const Eigen::Vector2d lengths = ways.colPivHouseholderQr().solve(source - point);
+  return point + lengths.x() * direction;
+}
+
+TEST(ShaftWidth, OfAConeIsThatInTheMiddleOfEachPair) {
+  for (const double half_angle_deg : {0.5, 2.0, 5.0}) {
+    const Eigen::Vector3d middle(20, -30, 5), direction = Eigen::Vector3d(0.1, -0.05, 1).normalized();
+    const double half_angle = marrow::radians(half_angle_deg);
+    const cone::Cone known{middle - 14 / std::tan(half_angle) * direction, direction, half_angle};
+    Scene scene;
+    for (const double angle : {0, 90}) {
+      const View view = view_at(angle == 0 ? "frontal" : "lateral", angle);
+      scene.lines.add(view.name, cone::borders(view.camera, known, angle == 0 ? 60 : 240, 380));
+      scene.views.add(view.name, view);
+    }
+    Listener listener;
+    const auto metrics = shaft_width(scene.lines, scene.views, {}, listener.context);
+    ASSERT_TRUE(metrics);
+    for (const View& view : scene.views) {
+      const ShaftLines& lines = *scene.lines.find(view.name);
+      const Eigen::Vector2d seen =
+          0.25 * (lines.left.from_px + lines.left.to_px + lines.right.from_px + lines.right.to_px);
+      const Eigen::Vector3d there =
+          nearest(middle, direction, marrow::source_position_mm(view.camera), marrow::ray_direction(view.camera, seen));
+      EXPECT_NEAR(figure(*metrics, view.name + "_width_mm"), 2 * known.radius_mm(there), 1e-6) << half_angle_deg;
+    }
+  }
+}
+
 TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
   const Scene scene = scene_of(40);
   Listener listener;
@@ -75,7 +134,39 @@ TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
   EXPECT_EQ(
       listener.warnings[0],
       "view 'frontal': the borders are 80 mm apart at the depth where the views have the axis, which is no shaft's "
-      "width (18.0 to 48.7 mm); one view's pair is another thing than the other's");
+      "width (15.0 to 55.0 mm); one view's pair is another thing than the other's");
+}
+
+TEST(ShaftWidth, IsHeldAgainstOtherBonesWhereTheseAreGiven) {
+  const Scene scene = scene_of(14);
+  Options tibia;
+  tibia.width_mm = {22, 27}, tibia.width_deviation_mm = {1, 2};
+  Listener listener;
+  shaft_width(scene.lines, scene.views, tibia, listener.context);
+  EXPECT_TRUE(listener.warnings.empty());
+  tibia.width_mm = {22, 37};
+  shaft_width(scene.lines, scene.views, tibia, listener.context);
+  ASSERT_EQ(listener.warnings.size(), 2u);
+  EXPECT_NE(listener.warnings[1].find("28 mm apart"), std::string::npos);
+  EXPECT_NE(listener.warnings[1].find("(19.0 to 43.0 mm)"), std::string::npos);
+}
+
+std::string refusal(const Scene& scene, const Options& options) {
+  Listener listener;
+  try {
+    shaft_width(scene.lines, scene.views, options, listener.context);
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+TEST(ShaftWidth, IsRefusedFromViewsOfTheSameSideAndWidthsThatAreNone) {
+  EXPECT_EQ(refusal(scene_of(14, {0, 4}), {}),
+            "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 3.7 degrees, where 10 "
+            "are needed; use views farther apart");
+  EXPECT_EQ(refusal(scene_of(14), {{30, 0}, {3, 3}}), "width_mm and width_deviation_mm must be positive");
+  EXPECT_EQ(refusal(scene_of(14), {{30, 30}, {3, -3}}), "width_mm and width_deviation_mm must be positive");
 }
 
 TEST(ShaftWidth, SaysWhatItNeeds) {

@@ -117,8 +117,8 @@ TEST(Landmarks, LeavesOutWhatOtherViewsShow) {
   landmarks.seen.push_back({landmarks.points[0].name, "axial", {3, 4}});
   std::vector<std::string> warnings;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, bool is_warning) {
-    if (is_warning) warnings.emplace_back(text);
+  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
+    if (level == marrow::LogLevel::warning) warnings.emplace_back(text);
   };
   const auto outputs = shipped::call(
       "initial.landmarks",

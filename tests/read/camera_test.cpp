@@ -110,7 +110,7 @@ TEST(ReadCamera, OwnYaml) {
   put(folder / "cam.yaml", kYaml + "radial_distortion: [0.5, 0, 0]\n");
   std::string warning;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, bool) { warning = text; };
+  hooks.log = [&](std::string_view text, marrow::LogLevel) { warning = text; };
   marrow::Context context(hooks);
   EXPECT_EQ(::camera({folder / "cam.yaml"}, context).width_px, 640);
   EXPECT_NE(warning.find("cam.yaml: the images of this camera are distorted"), std::string::npos);

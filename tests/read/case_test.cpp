@@ -130,7 +130,8 @@ TEST_F(ReadCase, StrictYaml) {
   expect_said("marrow-case: 1", "marrow-case: 2",
               "case.yaml:1:14: case: marrow-case: this program reads version 1, the file is of version 2");
   expect_said("marrow-case: 1\n", "", "key 'marrow-case' is missing");
-  expect_said("ct: ct.mha", "ct: ct.mha\nct: ct.mha", "case.yaml:3:1: case: key 'ct' is already given in line 2");
+  expect_said("ct: ct.mha", "ct: ct.mha\nct: ct.mha",
+              "case.yaml:3:1: 'ct' is given twice in case; the first is at line 2");
   expect_said("width_px: 6", "width_px: \"6\"", "width_px: expected a whole number, got the quoted text \"6\"");
   expect_said("width_px: 6", "width_px: 0x6", "width_px: expected a whole number, got '0x6'");
   expect_said("[1, 2, 3], [4", "[1, .inf, 3], [4", "expected a point [x, y, z] in mm");
@@ -139,7 +140,7 @@ TEST_F(ReadCase, StrictYaml) {
   expect_said("name: lateral", "name: frontal", "name: two views are named 'frontal'");
   expect_said("  - name: frontal", "  - name: [frontal]", "name: expected a text, got a list of 1");
   expect_said("ct: ct.mha", "ct: [ct.mha", "not YAML: ");
-  expect_said("marrow-case: 1", "marrow-case: 1\n<<: {a: 1}", "unknown key '<<'");
+  expect_said("marrow-case: 1", "marrow-case: 1\n<<: {a: 1}", "merge keys (<<) are not supported; repeat the entries");
 }
 
 TEST_F(ReadCase, TransformsSayTheirFramesAndAreRigid) {

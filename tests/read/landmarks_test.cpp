@@ -56,7 +56,7 @@ fragments:
   const std::string said = shipped::refusal("read.landmarks", {}, at(folder / "l.yaml"));
   for (const char* part :
        {"l.yaml:4:22: fragment 'distal', points: medial: expected 3 numbers [x, y, z], got a list of 2",
-        "l.yaml:4:51: fragment 'distal', points: key 'lateral' is already given in line 4",
+        "l.yaml:4:51: 'lateral' is given twice in fragment 'distal', points; the first is at line 4",
         "l.yaml:6:25: fragment 'distal', seen, view 'frontal': the points have no 'medail'; did you mean 'medial'?",
         "l.yaml:6:46: fragment 'distal', seen, view 'frontal': lateral: expected 2 numbers, got a list of 3",
         "l.yaml:7:5: fragment 'distal': unknown key 'traked'; did you mean 'tracked'?",

@@ -119,7 +119,7 @@ TEST(ReadMesh, WarnsOfASurfaceInMetres) {
   put(folder / "a.stl", stl_text());
   std::string warning;
   marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, bool) { warning = message; };
+  hooks.log = [&](std::string_view message, marrow::LogLevel) { warning = message; };
   marrow::Context context(hooks);
   mesh({folder / "a.stl", 0.4}, context);
   EXPECT_NE(warning.find("is it in metres? Then give scale: 1000"), std::string::npos) << warning;

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "marrow/toolbox/files/yaml_text.hpp"
 #include "read/files.hpp"
 
 namespace {
@@ -50,6 +51,31 @@ TEST(ReadPose, PlacementsOfTheWrist) {
   }
 }
 
+TEST(ReadPose, WhatASearchWroteIsReadBack) {
+  const TemporaryFolder folder;
+  marrow::Pose written;
+  written.world_from_model.translation_mm = {1, -2.5, 0.1};
+  written.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.2, 0.3});
+  written.frame.origin_mm = {10, 20, 30};
+  written.covariance = marrow::Matrix6d(marrow::Vector6d::LinSpaced(0.01, 0.06).asDiagonal());
+  written.warnings = {"mind: the gap"};
+  written.cost = 0.125;
+  written.evaluations = 20;
+  written.convergence = {{10, 2.5}, {20, 0.125}};
+  put(folder / "p.yaml", marrow::files::pose(written));
+  const marrow::Pose read = pose({folder / "p.yaml"});
+  EXPECT_EQ(read.world_from_model.translation_mm, written.world_from_model.translation_mm);
+  EXPECT_EQ(read.world_from_model.rotation, written.world_from_model.rotation);
+  EXPECT_EQ(read.frame.origin_mm, written.frame.origin_mm);
+  EXPECT_EQ(*read.covariance, *written.covariance);
+  EXPECT_EQ(read.warnings, written.warnings);
+  EXPECT_EQ(read.cost, written.cost);
+  EXPECT_EQ(read.evaluations, written.evaluations);
+  ASSERT_EQ(read.convergence.size(), 2u);
+  EXPECT_EQ(read.convergence[0].evaluations, 10);
+  EXPECT_EQ(read.convergence[1].cost, 0.125);
+}
+
 TEST(ReadPose, DiagnosesFaults) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {
@@ -62,9 +88,11 @@ TEST(ReadPose, DiagnosesFaults) {
   expect(with(kPose, "translation_mm", "translation"), "unknown key 'translation'; did you mean 'translation_mm'?");
   expect(with(kPose, "marrow-pose: 1\n", ""), "key 'marrow-pose' is missing");
   expect(kPose + "covariance: [[1]]\n", "covariance: expected 6 rows of 6 numbers");
+  expect(kPose + "convergence: 5\n", "convergence: expected a list, got '5'");
+  expect(kPose + "convergence:\n  - [1, 2]\n  - [1.5, 2]\n", "p.yaml:8:5: pose: convergence: expected a pair");
   expect("- a\n", "expected a YAML map of keys and values, got a list of 1");
   expect("", "expected a YAML map of keys and values, got nothing");
-  expect(kPose + "---\n" + kPose, "expected one YAML document, got more");
+  expect(kPose + "---\n" + kPose, "the file goes on after the end of its first document");
 }
 
 }  // namespace

@@ -45,7 +45,7 @@ TEST(ReadSeeds, DiagnosesFaults) {
          "s.yaml:2:25: fragment 'a': seeds: expected a point [x, y, z] in mm, got a list of 2");
   expect("fragments: {a: {seed: [[1, 2, 3]]}}\n", "unknown key 'seed'; did you mean 'seeds'?");
   expect("fragments: {a: {seeds: [[1, 2, 3]]}, a: {seeds: [[1, 2, 3]]}}\n",
-         "s.yaml:2:38: fragments: key 'a' is already given in line 2");
+         "s.yaml:2:38: 'a' is given twice in fragments; the first is at line 2");
 }
 
 }  // namespace

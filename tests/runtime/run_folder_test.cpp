@@ -7,6 +7,7 @@
 
 #include <atomic>
 #include <nlohmann/json.hpp>
+#include <regex>
 #include <set>
 #include <thread>
 
@@ -151,26 +152,33 @@ TEST_F(RunFolderTest, FullDiskLeavesNoHalfRecordAndTheLogSaysSo) {
   const marrow::Pipeline pipeline = pipeline_of("  c: {uses: test.constant}\n", "o: c");
   const marrow::RunResult result = marrow::run_pipeline(pipeline, test_catalogue(), {});
   RunFolder folder(scratch.path / "out", pipeline);
-  folder.append_log("first");
-  EXPECT_EQ(folder.log_fault(), "");
+  folder.log().show_from(marrow::LogLevel::error);
+  folder.log().write(marrow::LogLevel::info, "", "first");
+  EXPECT_EQ(folder.log().fault(), "");
   {
     const marrow::test::FullDisk full(20);
-    folder.append_log(std::string(100, 'x'));
+    folder.log().write(marrow::LogLevel::info, "", std::string(100, 'x'));
     EXPECT_NE(
         fault_of([&] { folder.write_record(pipeline, result, {}, test_catalogue(), {}, {}); }).find("cannot write"),
         std::string::npos);
   }
-  EXPECT_NE(folder.log_fault().find("lines are missing in " + (folder.path() / "log.txt").string()), std::string::npos)
-      << folder.log_fault();
+  EXPECT_NE(folder.log().fault().find("lines are missing in " + (folder.path() / "log.txt").string()),
+            std::string::npos)
+      << folder.log().fault();
   EXPECT_FALSE(fs::exists(folder.path() / "run.json"));
   EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), fs::directory_iterator()), 3);
 }
 
 TEST_F(RunFolderTest, LogTakesNoEscapeSequencesAndNoForgedLines) {
   RunFolder folder(scratch.path / "out", pipeline_of("  c: {uses: test.constant}\n", "o: c"));
-  folder.append_log("view \x1b[2J\nerror: forged");
-  folder.append_log("next");
-  EXPECT_EQ(text_of(folder.path() / "log.txt"), "view \\x1b[2J\n  error: forged\nnext\n");
+  folder.log().show_from(marrow::LogLevel::error);
+  folder.log().write(marrow::LogLevel::warning, "view \x1b[2J", "mind\n2026-01-01 00:00:00.000 [error] forged");
+  folder.log().write(marrow::LogLevel::debug, "", "next");
+  const std::string time = "[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}\\.[0-9]{3} ";
+  const std::regex expected(time +
+                            "\\[warning\\] view \\\\x1b\\[2J: mind\n  2026-01-01 00:00:00.000 \\[error\\] forged\n" +
+                            time + "\\[debug\\] next\n");
+  EXPECT_TRUE(std::regex_match(text_of(folder.path() / "log.txt"), expected)) << text_of(folder.path() / "log.txt");
 }
 
 TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {

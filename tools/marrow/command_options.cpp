@@ -20,6 +20,14 @@ void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& o
   add_amount(command, "--file-seconds", limits.seconds, "seconds", "seconds of processor time" + end);
 }
 
+void add_log_level(CLI::App* command, LogLevel& level) {
+  const std::map<std::string, LogLevel> levels{
+      {"debug", LogLevel::debug}, {"info", LogLevel::info}, {"warning", LogLevel::warning}, {"error", LogLevel::error}};
+  command->add_option("--log-level", level, "the least of what is shown: debug, info, warning or error (default: info)")
+      ->transform(CLI::CheckedTransformer(levels).description(""))
+      ->type_name("LEVEL");
+}
+
 void say_that_libraries_are_described(CLI::App* command) {
   command->footer(
       "A plugin library that is not known yet is loaded once, in a process of its own, to be described; where nobody "

@@ -10,6 +10,8 @@ namespace marrow::cli {
 void add_pipeline_arguments(CLI::App* command, PipelineRequest& request);
 /// --file-memory and --file-seconds.
 void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise = "by its size");
+/// --log-level.
+void add_log_level(CLI::App* command, LogLevel& level);
 /// Says below the help that the command may load libraries to describe them.
 void say_that_libraries_are_described(CLI::App* command);
 

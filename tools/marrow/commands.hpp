@@ -28,7 +28,8 @@ struct RunRequest {
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_cache = false;
-  bool quiet = false;
+  LogLevel log_level = LogLevel::info;  ///< the least that is shown
+  bool quiet = false;                   ///< only errors are shown
   bool json = false;
   FileLimits file_limits;
 };
@@ -36,6 +37,7 @@ struct RunRequest {
 struct RerunRequest {
   std::filesystem::path run;     ///< folder of the run that is repeated
   std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number where that is taken
+  LogLevel log_level = LogLevel::info;
   bool quiet = false;
   bool json = false;
   FileLimits file_limits;  ///< instead of those of the run

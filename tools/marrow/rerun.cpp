@@ -23,6 +23,7 @@ int rerun(const RerunRequest& request) {
   how.file_limits = before.file_limits;
   if (request.file_limits.memory_mb > 0) how.file_limits.memory_mb = request.file_limits.memory_mb;
   if (request.file_limits.seconds > 0) how.file_limits.seconds = request.file_limits.seconds;
+  how.log_level = request.log_level;
   how.quiet = request.quiet || request.json;
   // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the
   // first one.
@@ -49,6 +50,7 @@ void add_rerun(CLI::App& app, int& code) {
   command->add_option(
       "--out", request->folder,
       "folder to write; new or empty (default: runs/NAME-rerun, or runs/NAME-rerun-2 ... where that is there)");
+  add_log_level(command, request->log_level);
   command->add_flag("--quiet", request->quiet, "no progress");
   command->add_flag("--json", request->json, "print the differences as JSON");
   add_file_limits(command, request->file_limits, "as the run had it");

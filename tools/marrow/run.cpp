@@ -24,30 +24,32 @@ using Kind = RunEvent::Kind;
 class Progress {
  public:
   Progress(const RunRequest& request, RunFolder& folder)
-      : request_(request), folder_(folder), is_terminal_(isatty(STDERR_FILENO)) {}
+      : request_(request), log_(folder.log()), is_terminal_(isatty(STDERR_FILENO)) {
+    log_.show_from(silent() ? LogLevel::error : request.log_level);
+  }
 
   void operator()(const RunEvent& event) {
     const std::string where = printable(event.item.empty() ? event.node : event.node + " (" + event.item + ")");
     if (request_.json) print_json(event);
     switch (event.kind) {
       case Kind::finished:
-        line(where, seconds_text(event.seconds));
+        line(LogLevel::info, where, seconds_text(event.seconds));
         break;
       case Kind::skipped:
-        line(where, "skipped: " + event.text);
+        line(LogLevel::info, where, "skipped: " + event.text);
         break;
       case Kind::failed:
-        error_line("error: " + event.text);
+        line(LogLevel::error, "", event.text);
         break;
       case Kind::warning:
-        line(where, "warning: " + event.text);
+        line(LogLevel::warning, where, event.text);
         break;
       case Kind::waiting:
       case Kind::waited:
-        if (!event.text.empty()) line(where, event.text);
+        if (!event.text.empty()) line(LogLevel::info, where, event.text);
         break;
       case Kind::message:
-        folder_.append_log(where + ": " + event.text);
+        line(event.level, where, event.text);
         break;
       case Kind::progress:
         moving_line(where, event);
@@ -59,7 +61,7 @@ class Progress {
   }
 
   void clear() {
-    if (is_terminal_ && !silent()) std::fprintf(stderr, "\r\033[K");
+    if (is_terminal_) std::fprintf(stderr, "\r\033[K");
   }
 
  private:
@@ -71,23 +73,16 @@ class Progress {
     return text;
   }
 
-  void line(const std::string& where, const std::string& text) {
-    folder_.append_log(where + ": " + text);
-    if (silent()) return;
-    clear();
-    std::fprintf(stderr, "  %-32s %s\n", where.c_str(), printable_lines(text).c_str());
-  }
-
-  void error_line(const std::string& text) {
-    folder_.append_log(text);
-    clear();
-    std::fprintf(stderr, "marrow: %s\n", printable_lines(text).c_str());
+  void line(LogLevel level, const std::string& where, const std::string& text) {
+    if (log_.shows(level)) clear();
+    log_.write(level, where, text);
   }
 
   /// On a terminal at most ten times a second; in a log file every five seconds.
   void moving_line(const std::string& where, const RunEvent& event) {
     const auto now = std::chrono::steady_clock::now();
-    if (silent() || now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)))
+    if (!log_.shows(LogLevel::info) ||
+        now - last_ < (is_terminal_ ? std::chrono::milliseconds(100) : std::chrono::milliseconds(5000)))
       return;
     last_ = now;
     clear();
@@ -101,6 +96,7 @@ class Progress {
     json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
     if (!event.item.empty()) j["item"] = event.item;
     if (!event.text.empty()) j["text"] = event.text;
+    if (event.kind == Kind::message || event.kind == Kind::warning) j["level"] = level_name(event.level);
     if (event.kind == Kind::progress) j["fraction"] = event.fraction;
     if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
     std::printf("%s\n", j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
@@ -108,7 +104,7 @@ class Progress {
   }
 
   const RunRequest& request_;
-  RunFolder& folder_;
+  RunLog& log_;
   bool is_terminal_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
 };
@@ -170,7 +166,7 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   settings.cancelled = &stop_on_signals();
   settings.observer = [&](const RunEvent& event) { progress(event); };
   const auto note = [&](const std::string& text) {
-    folder.append_log("note: " + text);
+    folder.log().keep(LogLevel::info, "", "note: " + text);
     if (!request.quiet) std::fprintf(stderr, "marrow: note: %s\n", printable(text).c_str());
   };
   for (const std::string& text : pipeline.notes) note(text);
@@ -197,7 +193,8 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
   if (outcome.result.cancelled())
     std::fprintf(stderr, "marrow: %s; what was done is in %s\n", stopped_text().c_str(),
                  printable(folder.path().string()).c_str());
-  if (!folder.log_fault().empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(folder.log_fault()).c_str());
+  const std::string log_fault = folder.log().fault();
+  if (!log_fault.empty()) std::fprintf(stderr, "marrow: warning: %s\n", printable(log_fault).c_str());
   return outcome;
 }
 
@@ -244,6 +241,7 @@ void add_run(CLI::App& app, int& code) {
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
   command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
+  add_log_level(command, request->log_level);
   command->add_flag("--quiet", request->quiet, "print only errors");
   command->add_flag("--json", request->json, "print events as JSON, one a line");
   add_file_limits(command, request->file_limits);

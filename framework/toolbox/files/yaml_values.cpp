@@ -106,11 +106,36 @@ void check_version(const YamlMap& map, const std::string& key) {
     map.fault(key, key + ": this program reads version 1, the file is of version " + std::to_string(*version));
 }
 
+namespace {
+
+/// Pairs of evaluations and the least cost after them.
+std::vector<Pose::Progress> convergence_from(const YamlMap& map) {
+  std::vector<Pose::Progress> convergence;
+  const YAML::Node list = map.node("convergence");
+  if (!list.IsSequence()) {
+    map.fault("convergence", "convergence: expected a list, got " + yaml_described(list));
+    return convergence;
+  }
+  for (const YAML::Node& item : list) {
+    const bool is_pair = item.IsSequence() && item.size() == 2;
+    const std::optional<std::int64_t> evaluations = is_pair ? yaml_integer(item[0]) : std::nullopt;
+    const std::optional<double> cost = is_pair ? yaml_number(item[1]) : std::nullopt;
+    if (evaluations && cost && std::abs(*evaluations) <= 1'000'000'000)
+      convergence.push_back({int(*evaluations), *cost});
+    else
+      map.file().fault(item.Mark(),
+                       map.what() + ": convergence: expected a pair [evaluations, cost], got " + yaml_described(item));
+  }
+  return convergence;
+}
+
+}  // namespace
+
 Pose read_pose_file(const std::filesystem::path& path) {
   YamlFile file(path);
   std::vector<std::string> keys = transform_keys();
-  for (const char* key :
-       {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost", "evaluations"})
+  for (const char* key : {"marrow-pose", "fragment_frame", "predicted_deviation", "covariance", "warnings", "cost",
+                          "evaluations", "convergence"})
     keys.push_back(key);
   const YamlMap map(file, file.root(), "pose", keys);
   check_version(map, "marrow-pose");
@@ -124,6 +149,7 @@ Pose read_pose_file(const std::filesystem::path& path) {
   pose.warnings = map.texts_or_none("warnings");
   if (map.has("cost")) pose.cost = map.number("cost").value_or(0);
   if (map.has("evaluations")) pose.evaluations = map.integer("evaluations").value_or(0);
+  if (map.has("convergence")) pose.convergence = convergence_from(map);
   file.finish();
   return pose;
 }
@@ -135,7 +161,8 @@ List<Seeds> read_seeds_file(const std::filesystem::path& path) {
   List<Seeds> seeds;
   if (const auto fragments = map.required("fragments")) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
-    if (by_name.valid() && by_name.keys().empty()) map.fault("fragments", "fragments: expected fragments by name");
+    if (by_name.valid() && by_name.keys().empty() && !file.has_faults())
+      map.fault("fragments", "fragments: expected fragments by name");
     for (const std::string& name : by_name.keys())
       seeds.add(name,
                 seeds_from(YamlMap(file, by_name.node(name), "fragment '" + name + "'", {"seeds", "register"}), name));

@@ -10,7 +10,7 @@
 #include <random>
 
 #include "marrow/domain/error.hpp"
-#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::phantom {
 namespace {
@@ -72,15 +72,16 @@ std::vector<RigidTransform> draw_board_poses(const calibration::Board& board, co
   const Eigen::Vector3d middle = middle_of(board);
   std::vector<RigidTransform> all;
   Random random(seed, 0x626f617264);
-  const double first = 2 * kPi * random.uniform();
+  const double first = 2 * kPi * random.uniform_above_0();
   for (int i = 0; i < poses.views; ++i) {
     const double towards = first + 2 * kPi * i / poses.views;
-    const double tilt = radians(poses.tilt_deg) * (0.5 + 0.5 * random.uniform()), roll = 2 * kPi * random.uniform();
+    const double tilt = radians(poses.tilt_deg) * (0.5 + 0.5 * random.uniform_above_0()),
+                 roll = 2 * kPi * random.uniform_above_0();
     RigidTransform pose{"camera", "world"};
     pose.rotation = (Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(towards), std::sin(towards), 0)) *
                      Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()))
                         .toRotationMatrix();
-    const auto shift = [&] { return poses.shift_mm * (2 * random.uniform() - 1); };
+    const auto shift = [&] { return poses.shift_mm * (2 * random.uniform_above_0() - 1); };
     const double right = shift(), down = shift();
     pose.translation_mm = Eigen::Vector3d(right, down, poses.distance_mm) - pose.rotation * middle;
     all.push_back(pose);

@@ -6,7 +6,7 @@
 #include <span>
 #include <utility>
 
-#include "marrow/toolbox/phantom/random.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::phantom {
 namespace {
@@ -108,8 +108,8 @@ FemurField::FemurField(const FemurShape& shape) : shape_(shape), scale_(shape.bi
   Random random(shape.seed, 7);
   for (Wave& wave : waves_) {
     const Vector3d direction(random.normal(), random.normal(), random.normal());
-    wave = {direction.normalized() * 2 * 3.14159265358979323846 / (35 + 65 * random.uniform()),
-            2 * 3.14159265358979323846 * random.uniform()};
+    wave = {direction.normalized() * 2 * 3.14159265358979323846 / (35 + 65 * random.uniform_above_0()),
+            2 * 3.14159265358979323846 * random.uniform_above_0()};
   }
 }
 

@@ -86,6 +86,11 @@ Metrics warn(marrow::Context& context) {
   context.warn("mind the gap");
   return number(1);
 }
+Metrics say(marrow::Context& context) {
+  context.debug("a trifle");
+  context.info("a word");
+  return number(1);
+}
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
@@ -136,6 +141,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("test.adder", adder).summary("A function").in("amount", "what it adds").out("adder", "adds");
   plugin.node("test.failing_adder", failing_adder).summary("Fails").in("amount", "anything").out("adder", "none");
   plugin.node("test.warn", warn).summary("Warns").out("number", "1");
+  plugin.node("test.say", say).summary("Says something at two levels").out("number", "1");
   plugin.node("test.apply", apply)
       .summary("Calls a function")
       .in("adder", "function")

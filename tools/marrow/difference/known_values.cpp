@@ -1,15 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "difference/known_values.hpp"
 
-#include <yaml-cpp/yaml.h>
-
 #include <nlohmann/json.hpp>
 
+#include "marrow/domain/yaml.hpp"
 #include "marrow/runtime/types.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/text_file.hpp"
-#include "runtime/yaml_survey.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -60,9 +58,7 @@ std::optional<Value> value_of_file(const fs::path& file) {
       return Value::of(std::make_shared<const Metrics>(
           metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
     if (extension == ".yaml") {
-      const std::string text = read_text_file(file, kMostSourceBytes);
-      survey_yaml(text);
-      const YAML::Node yaml = YAML::Load(text);
+      const YAML::Node yaml = parse_yaml(read_text_file(file, kMostSourceBytes));
       if (yaml["marrow-pose"]) return Value::of(std::make_shared<const Pose>(pose_of(yaml)));
     }
     if (extension == ".png")

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <string>
+#include <vector>
 
 namespace marrow {
 
@@ -11,5 +12,12 @@ std::string fault_of_item_name(const std::string& name);
 
 /// Throws Error where the name of an item is not good; `what` says whose it is ("view").
 void check_item_name(const std::string& what, const std::string& name);
+
+/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string. Names of
+/// more than 100 bytes are near to none.
+std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known);
+
+/// "did you mean 'x'?" or, when nothing is near, "known: a, b, c".
+std::string suggestion(const std::string& wrong, const std::vector<std::string>& known);
 
 }  // namespace marrow

@@ -10,6 +10,9 @@
 
 namespace marrow {
 
+/// How much a line of the log matters. An error is what a node throws, so a node itself logs none.
+enum class LogLevel { debug, info, warning, error };
+
 /// What the runtime gives a node beside its inputs: take it as an argument `Context&`. Safe to use from several threads
 /// of the node. A default-made one (in tests) is never cancelled and keeps silent.
 class Context {
@@ -18,7 +21,7 @@ class Context {
     std::uint64_t seed = 0;
     const std::atomic<bool>* cancelled = nullptr;
     std::function<void(double fraction, std::string_view what)> progress;
-    std::function<void(std::string_view message, bool is_warning)> log;
+    std::function<void(std::string_view message, LogLevel level)> log;
   };
   Context() = default;
   explicit Context(std::uint64_t seed) { hooks_.seed = seed; }
@@ -35,12 +38,14 @@ class Context {
   void progress(double fraction, std::string_view what = {}) const {
     if (hooks_.progress) hooks_.progress(fraction, what);
   }
-  void info(std::string_view message) const {
-    if (hooks_.log) hooks_.log(message, false);
+  /// A line for the run's log. It names the node and the item; the text need not.
+  void log(LogLevel level, std::string_view message) const {
+    if (hooks_.log) hooks_.log(message, level);
   }
-  void warn(std::string_view message) const {
-    if (hooks_.log) hooks_.log(message, true);
-  }
+  void debug(std::string_view message) const { log(LogLevel::debug, message); }
+  void info(std::string_view message) const { log(LogLevel::info, message); }
+  /// What a person should know of the result; it is kept with the result and said again when that is read back.
+  void warn(std::string_view message) const { log(LogLevel::warning, message); }
 
  private:
   Hooks hooks_;

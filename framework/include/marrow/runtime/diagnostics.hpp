@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "marrow/domain/names.hpp"
+
 namespace marrow {
 
 /// A place in a file: 1-based line and column; line 0 where there is none (a command-line argument).
@@ -43,12 +45,5 @@ class Diagnostics {
   std::size_t not_kept_ = 0;
   std::map<std::string, std::string> sources_;
 };
-
-/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string. Names of
-/// more than 100 bytes are near to none.
-std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known);
-
-/// "did you mean 'x'?" or, when nothing is near, "known: a, b, c".
-std::string suggestion(const std::string& wrong, const std::vector<std::string>& known);
 
 }  // namespace marrow

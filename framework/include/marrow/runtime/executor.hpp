@@ -24,6 +24,7 @@ struct RunEvent {
   std::string node, item, text;
   double fraction = 0;
   double seconds = 0;
+  LogLevel level = LogLevel::info;  ///< of a message or a warning
 };
 
 /// What one call that reads a file may use, in its own process. 0 = by the file's size.

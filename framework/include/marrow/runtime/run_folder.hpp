@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "marrow/runtime/executor.hpp"
+#include "marrow/runtime/run_log.hpp"
 
 namespace marrow {
 
@@ -25,9 +27,7 @@ class RunFolder {
   };
   /// Writes the pipeline's outputs, as far as they were made.
   std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue);
-  void append_log(const std::string& line);
-  /// Why lines are missing in the log; empty where none are.
-  const std::string& log_fault() const { return log_fault_; }
+  RunLog& log() { return *log_; }
   void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,
                     const Catalogue& catalogue, const PipelineArguments& arguments,
                     const std::vector<Written>& written);
@@ -40,7 +40,7 @@ class RunFolder {
   bool take(const Pipeline& pipeline);
 
   std::filesystem::path folder_;
-  std::string log_fault_;
+  std::unique_ptr<RunLog> log_;
 };
 
 /// The widest instruction set that run-time dispatch finds on this machine.

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Strict reading of YAML files. yaml-cpp 0.7 takes duplicate keys, reads 010 as 8 and yes as true, and counts lines
-// from 0: so every map is read through YamlMap. All faults of a file are collected and thrown together.
-#include <yaml-cpp/yaml.h>
-
+// Strict reading of YAML files (domain/yaml.hpp): every map is read through YamlMap. All faults of a file are collected
+// and thrown together.
 #include <Eigen/Core>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <unordered_map>
 #include <vector>
+
+#include "marrow/domain/yaml.hpp"
 
 namespace marrow::files {
 
@@ -92,9 +92,5 @@ class YamlMap {
   std::vector<std::string> keys_;
   std::unordered_map<std::string, YAML::Node> values_;
 };
-
-/// The known word nearest to `word` by edit distance, or "" where none is near. Long words, and more than 1000 known
-/// ones, are not compared.
-std::string nearest(const std::string& word, const std::vector<std::string>& known);
 
 }  // namespace marrow::files

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Names in the messages about a pipeline.
+#include <string>
+#include <vector>
+
+#include "marrow/domain/names.hpp"
+#include "marrow/runtime/diagnostics.hpp"
+
+namespace marrow {
+
+template <class T>
+std::vector<std::string> names_of(const std::vector<T>& items) {
+  std::vector<std::string> names;
+  for (const T& item : items) names.push_back(item.name);
+  return names;
+}
+
+inline std::string joined(const std::vector<std::string>& list, const char* separator) {
+  std::string text;
+  for (const std::string& item : list) text += (text.empty() ? "" : separator) + item;
+  return text;
+}
+
+/// A suggestion as long as faults are kept: thousands of unknown names among thousands of known ones take long.
+inline std::string suggested(const Diagnostics& diagnostics, const std::string& wrong,
+                             const std::vector<std::string>& known) {
+  return diagnostics.is_full() ? "" : suggestion(wrong, known);
+}
+
+}  // namespace marrow

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a run's result can be asked.
+#include <algorithm>
+
+#include "mapping.hpp"
+#include "marrow/runtime/executor.hpp"
+
+namespace marrow {
+
+using Status = NodeRecord::Status;
+
+const char* status_name(Status status) {
+  static constexpr const char* kNames[] = {"not needed", "done", "skipped", "failed", "not run", "cancelled"};
+  return kNames[int(status)];
+}
+
+bool RunResult::failed() const {
+  return std::any_of(nodes.begin(), nodes.end(), [](const NodeRecord& node) { return node.status == Status::failed; });
+}
+
+bool RunResult::cancelled() const {
+  return std::any_of(nodes.begin(), nodes.end(),
+                     [](const NodeRecord& node) { return node.status == Status::cancelled; });
+}
+
+Value value_of(const RunResult& result, const Reference& source) {
+  const NodeRecord& node = result.nodes[std::size_t(source.node)];
+  if (node.outputs.empty()) return {};
+  Value value = node.outputs[std::size_t(source.output)];
+  for (const std::string& item : source.items) value = picked(value, item, source.text);
+  return value;
+}
+
+}  // namespace marrow

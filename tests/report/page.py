@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the report's page share: pages of made-up data in headless Chromium, and how they are used."""
+import pathlib
+import shutil
+import sys
+import tempfile
+import time
+import unittest
+
+HERE = pathlib.Path(__file__).resolve().parent
+sys.path[:0] = [str(HERE), str(HERE.parents[1] / "tools" / "report")]
+import assemble  # noqa: E402
+import browser  # noqa: E402
+import synthetic  # noqa: E402
+
+SECTIONS = [
+    "summary",
+    "distributions",
+    "paired",
+    "capture",
+    "by-case",
+    "pictures",
+    "scene",
+    "convergence",
+    "landscape",
+    "graph",
+    "cells",
+    "failures",
+    "repeat",
+]
+
+
+class PageTest(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow_report_"))
+        cls.browser = browser.Browser()
+        cls.comparison_data = synthetic.comparison()
+        cls.run_data = synthetic.run()
+        cls.comparison = cls.write("comparison", cls.comparison_data)
+        cls.run_page = cls.write("run", cls.run_data)
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.browser.close()
+        shutil.rmtree(cls.folder)
+
+    @classmethod
+    def write(cls, name, data):
+        path = cls.folder / (name + ".html")
+        path.write_text(assemble.assemble(data))
+        return path
+
+    def tearDown(self):
+        faults, asked = self.browser.logs()
+        self.assertEqual(faults, [], "the console reports faults")
+        self.assertEqual(
+            [url for url in asked if not url.startswith("file://%s/" % self.folder)], [], "the page asked the network"
+        )
+
+    def texts(self, selector):
+        return self.browser.js(
+            "return [...document.querySelectorAll(arguments[0])].map((item) => item.textContent)", selector
+        )
+
+    def press(self, text, within="body"):
+        found = self.browser.js(
+            (
+                "const b = [...document.querySelectorAll(arguments[1] + ' button')].find((b) => b.textContent.trim()"
+                " === arguments[0]); if (b) b.click(); return !!b"
+            ),
+            text,
+            within,
+        )
+        self.assertTrue(found, "no button '%s' in %s" % (text, within))
+
+    def choose(self, label, value, within="body"):
+        found = self.browser.js(
+            """const f = [...document.querySelectorAll(arguments[2] + ' label.field')].find(
+              (f) => f.firstChild.textContent === arguments[0]);
+            const s = f && f.querySelector('select, input');
+            if (!s) return false;
+            s.value = arguments[1];
+            s.dispatchEvent(new Event(s.matches('select') ? 'change' : 'input'));
+            return true""",
+            label,
+            value,
+            within,
+        )
+        self.assertTrue(found, "no control '%s' in %s" % (label, within))
+
+    def eventually(self, give, wanted):
+        """That give() comes to what is wanted: figures are drawn when the browser finds the time."""
+        end = time.monotonic() + 60
+        while give() != wanted and time.monotonic() < end:
+            time.sleep(0.05)
+        self.assertEqual(give(), wanted)
+
+
+def run_tests(arguments=()):
+    """The exit code of this file's tests: 77 where they are skipped, with the reason."""
+    reason = browser.missing()
+    if reason:
+        print("skipped: " + reason)
+        return 77
+    program = unittest.main(argv=sys.argv[:1] + list(arguments), exit=False, verbosity=2)
+    return 0 if program.result.wasSuccessful() else 1
