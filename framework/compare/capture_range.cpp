@@ -8,7 +8,7 @@
 namespace marrow::compare {
 namespace {
 
-constexpr std::size_t kMostBins = 100;  // the last one holds all that is farther
+constexpr std::size_t kMostBins = 100;  // the last one holds all starts that are farther
 
 }  // namespace
 

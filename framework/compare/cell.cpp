@@ -46,7 +46,7 @@ std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
   return "";
 }
 
-/// The figure that a path names. Throws Error where it is not there or is no number.
+/// The figure that a path names. Throws Error if it is missing or is not a finite number.
 Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
   const std::vector<std::string> parts = split(path);
   const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
@@ -87,21 +87,22 @@ int evaluations_in(const Value& value) {
   return sum;
 }
 
-/// Of a simulated case, by where its outputs lie.
+/// The folder of a simulated case, from the path of its outputs.
 fs::path case_folder_of(const fs::path& outputs) { return outputs.parent_path().parent_path(); }
 
-/// A case lies beside the hash of its content, which is written last: one that is not whole is made again.
+/// The hash of a case's content. A simulated case has it in the file content.txt, which is written last. A case that
+/// does not match its hash is not whole and is made again.
 std::string content_of_case(const fs::path& outputs) { return path_digest(outputs).hex(); }
 
 bool is_whole_case(const fs::path& folder, const fs::path& outputs) {
   try {
     return read_text_file(folder / "content.txt", kMostSourceBytes) == content_of_case(outputs) + "\n";
-  } catch (const std::exception&) {  // it cannot even be read
+  } catch (const std::exception&) {  // it cannot be read
     return false;
   }
 }
 
-/// False too for a file that is not there, or cannot be read.
+/// Whether a file has exactly this text. False also if the file is missing or cannot be read.
 bool has_text(const fs::path& file, const std::string& text) {
   try {
     return read_text_file(file, kMostSourceBytes) == text;
@@ -110,7 +111,7 @@ bool has_text(const fs::path& file, const std::string& text) {
   }
 }
 
-/// A folder that is removed unless it was given another name.
+/// A temporary folder. It is removed at the end, unless it was renamed before.
 struct TemporaryFolder {
   explicit TemporaryFolder(const fs::path& final) : path(new_folder_beside(final)) {}
   ~TemporaryFolder() {
@@ -122,14 +123,14 @@ struct TemporaryFolder {
   fs::path path;
 };
 
-/// The time that a cell took, where the store knows it.
+/// The time that a cell took, if the store has it.
 std::optional<double> kept_seconds(const Store& store, const Digest& key) {
   try {
     const auto kept = store.find(key);
     if (!kept) return std::nullopt;
     const Value& value = kept->outputs.at(0);
     if (value.source && !value.is_list()) return value.as<Metrics>().items.at(0).value;
-  } catch (const std::exception&) {  // not what was kept: it is measured again
+  } catch (const std::exception&) {  // the entry is not valid: the time is measured again
   }
   store.drop(key);
   return std::nullopt;
@@ -165,7 +166,7 @@ fs::path CellRunner::case_folder(std::size_t index) {
   if (!one.is_simulated) return one.folder;
   FoundCase& found = simulated_[index];
   const fs::path outputs = found.use ? found.outputs : case_place(index), folder = case_folder_of(outputs);
-  // Another process may tidy the store up until this one uses the folder.
+  // Until this process uses the folder, another one may remove it when it tidies the store up.
   for (int tries = 0; !found.use; ++tries) {
     std::shared_ptr<const void> use = use_folder(folder);
     if (use && is_whole_case(folder, outputs))
@@ -177,8 +178,8 @@ fs::path CellRunner::case_folder(std::size_t index) {
                   folder.parent_path().string() + " meanwhile");
   }
   std::error_code ignored;
-  fs::last_write_time(folder, fs::file_time_type::clock::now(),
-                      ignored);  // used just now: what a cell needs is removed last
+  // Mark the folder as just used, so that it is removed last.
+  fs::last_write_time(folder, fs::file_time_type::clock::now(), ignored);
   return outputs;
 }
 
@@ -236,7 +237,7 @@ std::optional<CellRow> CellRunner::finished(const CellIndex& cell, const std::st
     if (!row.failed.empty() || key.empty() || row.key != key) return std::nullopt;
     name_row(row, experiment_, cell);
     return row;
-  } catch (const std::exception&) {  // not there, or no row: the cell runs, and says what is wrong
+  } catch (const std::exception&) {  // there is no valid row: the cell runs again, and says what is wrong
     return std::nullopt;
   }
 }
@@ -282,7 +283,7 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   return row;
 }
 
-/// Throws Error for a figure that is not there.
+/// Throws Error if a figure is missing.
 void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) const {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& node = done.result.nodes[i];
@@ -348,8 +349,8 @@ double CellRunner::time(const CellIndex& cell) {
   hasher.add(std::string("seconds"));
   hasher.add(before.key);
   hasher.add(std::int64_t(threads_));
-  for (const std::string& id : settings.made_anew)
-    hasher.add(id);  // another experiment's variants may share more or less
+  // In another experiment, the variants may share more or fewer nodes.
+  for (const std::string& id : settings.made_anew) hasher.add(id);
   const Digest key = hasher.digest();
   if (const auto known = store_ ? kept_seconds(*store_, key) : std::nullopt) return *known;
 
@@ -371,7 +372,7 @@ void CellRunner::write(const CellIndex& cell, CellRow& row) const {
     if (error) throw Error("the folder " + folder.string() + " cannot be made: " + error.message());
     write_text_file(folder / "cell.json", to_json(row) + "\n");
   } catch (const Error& error) {
-    if (!row.failed.empty()) return;  // that is the better reason
+    if (!row.failed.empty()) return;  // the first reason is more useful
     const int tries = row.tries;
     row = failed_row(experiment_, cell, error.what(), tries);
   }

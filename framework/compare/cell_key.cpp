@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What cells and simulated cases depend on, by which kept ones are known again.
+// The keys of cells and simulated cases. They cover everything that these depend on, so that kept ones can be reused.
 #include "cell_key.hpp"
 
 #include <set>
@@ -14,7 +14,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What cannot be read ends nothing here: the node that needs it fails, and says why.
+/// The digest of what a path names. If it cannot be read, the error text is used instead, and the cell is not ended
+/// here: the node that needs the file fails and says why.
 std::string content_now(const std::string& path) {
   try {
     return path_digest(path).hex();
@@ -55,7 +56,7 @@ std::string CellRunner::content_of(const std::string& path, Look look) const {
   return kept[path] = content_now(path);
 }
 
-/// The case counts as a whole, whatever nodes name of it.
+/// The case counts as a whole, even if the nodes name only parts of it.
 void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs::path& case_folder, Look look) const {
   hasher.add(resolved_yaml(pipeline));
   std::set<Digest> build_ids;
@@ -97,7 +98,7 @@ std::string CellRunner::key_of(const CellIndex& cell, const Pipeline& pipeline) 
   hasher.add(seed_of(cell.case_index));
   for (const MetricChoice& metric : experiment_.metrics) {
     hasher.add(metric.path);
-    hasher.add(metric.better == MetricChoice::Better::nearest_zero);  // then the row holds its magnitude
+    hasher.add(metric.better == MetricChoice::Better::nearest_zero);  // the row then has the magnitude
   }
   hasher.add(experiment_.initial_error);
   return hasher.digest().hex();

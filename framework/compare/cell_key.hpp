@@ -5,8 +5,7 @@
 
 namespace marrow::compare {
 
-/// Of the states of all files that the pipeline's needed nodes name: another one where any was written to in the
-/// meantime.
+/// Digest of the states of all files that the pipeline's needed nodes name. It changes if any of them is written to.
 Digest states_of_files(const Pipeline& pipeline);
 
 }  // namespace marrow::compare

@@ -12,7 +12,7 @@ using nlohmann::json;
 
 json of(const std::optional<double>& value) { return value ? json(*value) : json(); }
 
-/// Nothing for null. Throws Error for what is no number.
+/// A number, or nothing for null. Throws Error for anything else, and for a number that is not finite.
 std::optional<double> number(const json& j, const std::string& what) {
   if (j.is_null()) return std::nullopt;
   if (!j.is_number() || !std::isfinite(j.get<double>())) throw Error(what + " is no number");

@@ -11,7 +11,7 @@
 namespace marrow::compare {
 namespace {
 
-/// Direction uniform on the sphere, length uniform in [0, most].
+/// A vector with a direction uniform on the sphere and a length uniform in [0, most].
 std::array<double, 3> draw_vector(Random& random, double most) {
   const double z = 2 * random.uniform() - 1, angle = 2 * std::numbers::pi * random.uniform(),
                length = most * random.uniform();

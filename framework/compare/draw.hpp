@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What an experiment draws at random, from its seeds alone: the same on any machine.
+// The random draws of an experiment. They depend only on its seeds and are the same on every machine.
 #include <string>
 #include <vector>
 
@@ -14,7 +14,7 @@ std::string number_text(double value);
 /// The values of the drawn inputs, in their order.
 std::vector<InputValue> draw_inputs(const std::vector<DrawnInput>& inputs, std::uint64_t seed);
 
-/// As many starts as the protocol says. The first ones do not depend on their number.
+/// As many starts as the protocol says. The first starts stay the same if the number changes.
 std::vector<Start> draw_starts(const StartProtocol& protocol);
 
 }  // namespace marrow::compare

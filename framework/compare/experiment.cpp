@@ -38,7 +38,7 @@ std::string cell_id(const Experiment& experiment, const CellIndex& cell) {
 }
 
 std::optional<CellIndex> cell_of(const Experiment& experiment, const std::string& id) {
-  const std::size_t first = id.find('/'), second = id.find('/', first + 1);  // no name has a slash
+  const std::size_t first = id.find('/'), second = id.find('/', first + 1);  // names have no slashes
   if (first == std::string::npos || second == std::string::npos) return std::nullopt;
   const auto variant = place_of_name(experiment.variants, id.substr(0, first));
   const auto one = place_of_name(experiment.cases, id.substr(first + 1, second - first - 1));

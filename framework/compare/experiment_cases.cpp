@@ -18,7 +18,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMostSeeds = 100000;
 
-/// "1..20", and nothing else.
+/// Reads a range such as "1..20". Returns false for any other text.
 bool read_range_of_seeds(const std::string& text, std::uint64_t& first, std::uint64_t& last) {
   const char* const end = text.data() + text.size();
   const auto begin = std::from_chars(text.data(), end, first);
@@ -51,7 +51,8 @@ class CaseReader {
   }
 
  private:
-  /// False, with a fault, for a case that cannot be added: its others are not worth looking at.
+  /// Returns false and reports a fault if the case cannot be added. The other cases of the same list are then not
+  /// looked at.
   bool add(ExperimentCase one, const Place& place) {
     if (!check_name(yaml_, one.name, place, "a case's name")) return false;
     const auto [known, is_new] = known_.emplace(in_small_letters(one.name), experiment_.cases.size());
@@ -80,8 +81,8 @@ class CaseReader {
     std::vector<fs::path> found;
     try {
       found = search_.matches(plain_path(folder_ / pattern));
-      std::transform(found.begin(), found.end(), found.begin(),
-                     plain_path);  // '..' after a '*' leads to one folder again and again
+      // With '..' after a '*', the same folder is found many times.
+      std::transform(found.begin(), found.end(), found.begin(), plain_path);
       std::sort(found.begin(), found.end());
       found.erase(std::unique(found.begin(), found.end()), found.end());
     } catch (const Error& error) {
@@ -96,7 +97,7 @@ class CaseReader {
         any = true;
         const std::string name = folder.filename().string();
         if (!add({fault_of_name(name).empty() ? name : file_name_of(name), folder}, place)) return;
-      } else if (fs::is_symlink(folder, error)) {  // not what else lies among the cases: it may have been one
+      } else if (fs::is_symlink(folder, error)) {  // a broken link may have been a case; other files are ignored
         if (fs::exists(folder, error)) continue;
         return yaml_.fault(place, "the link " + printable(folder.string()) + " leads nowhere",
                            "remove it, or put its target back");

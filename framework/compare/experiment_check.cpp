@@ -17,7 +17,7 @@ class Checker {
       Diagnostics faults;
       const Pipeline pipeline =
           read_pipeline(experiment_.pipeline, arguments_of(experiment_, {v, 0, 0}, "case"), catalogue_, faults, true);
-      diagnostics_.add_all(faults);  // what is wrong in every variant is said once
+      diagnostics_.add_all(faults);  // a fault of every variant is reported once
       if (!faults.empty()) continue;
       if (v == 0)
         check_names(pipeline);
@@ -35,7 +35,7 @@ class Checker {
                                               catalogue_, faults, true);
       diagnostics_.add_all(faults);
       if (faults.empty()) find_output(pipeline, experiment_.simulation.output, written_.simulation_place);
-      return;  // the others differ in numbers alone
+      return;  // the other cases differ only in numbers
     }
   }
 
@@ -48,7 +48,7 @@ class Checker {
       find_output(pipeline, experiment_.pictures[i], written_.picture_places[i]);
   }
 
-  /// A variant may use a node whose output is something else. The outputs' names are the same in all.
+  /// A variant may use a node whose output has another type. The names of the outputs are the same in all variants.
   void check_figures_of(const Variant& variant, const Pipeline& pipeline) {
     for (const PipelineOutput& output : pipeline.outputs)
       if (const PortInfo& port = port_of(pipeline, output); figures_.contains(output.name) && port.type.id != "metrics")

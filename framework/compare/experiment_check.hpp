@@ -4,8 +4,8 @@
 
 namespace marrow::compare {
 
-/// Reads the pipelines with the inputs that cells give them and each variant's changes, and looks for all that the
-/// experiment names in them.
+/// Reads the pipelines with the inputs of the cells and the changes of each variant. Checks that they have everything
+/// that the experiment names.
 void check_pipelines(const WrittenExperiment& written, const Catalogue& catalogue, Diagnostics& diagnostics);
 
 }  // namespace marrow::compare

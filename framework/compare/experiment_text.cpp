@@ -149,7 +149,7 @@ class Reader {
 
   void read_variants(const YamlEntry& section) {
     variants_place_ = section.place;
-    std::map<std::string, std::string> seen;  // by small letters
+    std::map<std::string, std::string> seen;  // by their names in small letters
     for (const YamlEntry& variant : yaml_.map(section.value, section.place, "'variants'")) {
       if (!check_name(yaml_, variant.key, variant.place, "a variant's name")) continue;
       const auto [other, is_new] = seen.emplace(in_small_letters(variant.key), variant.key);
@@ -177,7 +177,7 @@ class Reader {
     }
   }
 
-  /// Every variant in every combination of the matrix.
+  /// Combines every variant with every combination of the matrix.
   void apply_matrix() {
     if (matrix_.empty() || matrix_is_too_large()) return;
     std::vector<Variant> combined = experiment_.variants;
@@ -197,11 +197,13 @@ class Reader {
     }
     make_names_distinct(combined);
     for (const Variant& variant : combined)
-      if (!check_name(yaml_, variant.name, variant.place, "a variant's name")) break;  // the others are much the same
+      if (!check_name(yaml_, variant.name, variant.place, "a variant's name"))
+        break;  // the others have much the same fault
     experiment_.variants = std::move(combined);
   }
 
-  /// The number and the names of the combinations are those of the columns: known before any is made.
+  /// Checks the number of combinations and the length of their names before any combination is made. Both follow from
+  /// the columns of the matrix.
   bool matrix_is_too_large() {
     double count = double(std::max<std::size_t>(1, experiment_.variants.size()));
     std::size_t longest = 0;
@@ -229,7 +231,7 @@ class Reader {
     return true;
   }
 
-  /// Values may be written alike in a name: -2, -3 and so on tell them apart.
+  /// Different values may give the same name. The names then get -2, -3 and so on.
   static void make_names_distinct(std::vector<Variant>& variants) {
     std::set<std::string> taken;
     std::map<std::string, int> last;
@@ -243,7 +245,7 @@ class Reader {
     }
   }
 
-  /// The part of a value that names it best: of a node, what follows its kind.
+  /// A short name for a value. For a node, it is the part after the kind.
   static std::string short_value(std::string value) {
     const std::size_t dot = value.find('.');
     if (dot != std::string::npos && dot < kMostNameBytes && dot + 1 < value.size() &&
@@ -295,7 +297,7 @@ class Reader {
     }
   }
 
-  /// A path, or a path with a name for people.
+  /// Reads a metric, which is a path, or a path with a label.
   MetricChoice read_metric(const YAML::Node& item, const Place& place) {
     static const std::vector<std::string> kKeys{"figure", "label", "better"};
     MetricChoice metric;

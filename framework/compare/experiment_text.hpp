@@ -7,8 +7,8 @@
 
 namespace marrow::compare {
 
-/// An experiment with all that is drawn for it, and where in its file the names stand that only its pipelines can tell
-/// to be right.
+/// An experiment with everything that is drawn for it. The places in its file are those of names that can only be
+/// checked against the pipelines.
 struct WrittenExperiment {
   Experiment experiment;
   Place simulation_place, initial_error_place;
@@ -17,7 +17,7 @@ struct WrittenExperiment {
 
 WrittenExperiment read_written_experiment(const std::filesystem::path& file, Diagnostics& diagnostics);
 
-/// The section 'cases': folders, and simulations whose inputs are drawn.
+/// Reads the section 'cases': folders, seeds, and simulations whose inputs are drawn.
 void read_cases(StrictYaml& yaml, const YamlEntry& section, const std::filesystem::path& folder,
                 WrittenExperiment& written);
 

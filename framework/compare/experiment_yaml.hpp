@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The pieces that the sections of an experiment file are made of.
+// Readers for the parts of the sections of an experiment file.
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,28 +12,29 @@ namespace marrow::compare {
 
 using PlacedTexts = std::vector<std::pair<std::string, Place>>;
 
-/// A list of texts.
+/// Reads a list of texts.
 PlacedTexts texts_of(StrictYaml& yaml, const YamlEntry& entry);
-/// name: value of inputs.
+/// Reads values of inputs, written as name: value.
 std::vector<InputValue> inputs_of(StrictYaml& yaml, const YamlEntry& section);
-/// node.option: value and the like. `what` names the section in messages.
+/// Reads changes of a pipeline, written as node.option: value and so on. `what` names the section in messages.
 std::vector<Override> patches_of(StrictYaml& yaml, const YamlEntry& section, const std::string& what);
-/// A patch's value as it is written on the command line.
+/// The value of a change, as it is written on the command line.
 std::string patch_value(const YAML::Node& value);
-/// What a node uses goes first: it drops the options that were written for another one.
+/// Moves changes of `uses` to the front, because such a change drops the options that the file gives to the replaced
+/// node.
 void put_uses_first(std::vector<Override>& patches);
 
-/// An integer in a range; the least where it is none.
+/// Reads an integer in a range. Reports a fault and returns the least one for any other value.
 std::uint64_t count_of(StrictYaml& yaml, const YamlEntry& entry, std::int64_t least, std::int64_t most);
-/// A number from 0 to `most`; 0 where it is none.
+/// Reads a number from 0 to `most`. Reports a fault and returns 0 for any other value.
 double limit_of(StrictYaml& yaml, const YamlEntry& entry, double most);
 
 inline constexpr std::size_t kMostNameBytes = 100;
-/// Whether a name can be part of a cell's name and be a folder's; a fault where not.
+/// Whether a name can be a part of a cell's name and the name of a folder. Reports a fault if not.
 bool check_name(StrictYaml& yaml, const std::string& name, const Place& place, const std::string& what);
-/// The same for names that differ by the case of their letters alone: to some file systems they are one.
+/// The name in small letters. To some file systems, names that differ only in the case of their letters are the same.
 std::string in_small_letters(std::string name);
-/// The file that a key names, from the experiment's folder. Empty where there is none.
+/// The file that a key names, relative to `folder`. If there is none, reports a fault and returns an empty path.
 std::filesystem::path file_of(StrictYaml& yaml, const YamlEntry& entry, const std::filesystem::path& folder);
 
 }  // namespace marrow::compare

@@ -28,7 +28,7 @@ std::vector<fs::path> FolderSearch::matches(const fs::path& pattern) {
     throw Error("the path has " + std::to_string(pattern.native().size()) + " bytes, more than any path may have");
   std::vector<fs::path> found{pattern.root_path()};
   for (const fs::path& part : pattern.relative_path()) {
-    if (part.empty()) continue;  // after a slash at the end
+    if (part.empty()) continue;  // the part after a slash at the end
     std::vector<fs::path> next;
     for (const fs::path& folder : found) {
       if (is_pattern(part.string())) {

@@ -7,12 +7,13 @@
 
 namespace marrow::compare {
 
-/// Looks for what a pattern such as data/*/ct matches. Unlike glob(3) it says what it could not read, and it ends:
-/// links in a circle match without end.
+/// Finds the paths that match a pattern such as data/*/ct. Unlike glob(3), it says what it could not read, and it ends
+/// even if links form a circle.
 class FolderSearch {
  public:
-  /// What is there at `pattern`, sorted; a name that begins with a dot is matched by one only. Throws Error for a
-  /// folder that cannot be read, and when all calls together have looked at more than kMostLookedAt files and folders.
+  /// The existing paths that match `pattern`, sorted. A name that begins with a dot is matched only by a pattern that
+  /// begins with a dot. Throws Error if a folder cannot be read, if the pattern is longer than any path may be, or if
+  /// all calls together have looked at more than kMostLookedAt files and folders.
   std::vector<std::filesystem::path> matches(const std::filesystem::path& pattern);
 
   static constexpr std::size_t kMostLookedAt = 300000;

@@ -9,7 +9,7 @@
 namespace marrow::compare {
 namespace {
 
-/// With a point whatever the locale, and no minus before a zero.
+/// The number with a decimal point in every locale, and without a minus sign before zero.
 std::string fixed(double value, int decimals) {
   char text[400];  // the largest double has 309 digits before the point
   const auto end = std::to_chars(text, text + sizeof text, value, std::chars_format::fixed, decimals).ptr;
@@ -17,20 +17,20 @@ std::string fixed(double value, int decimals) {
   return result[0] == '-' && result.find_first_of("123456789") == std::string::npos ? result.substr(1) : result;
 }
 
-/// A whole number or a fraction in as few digits as it has: "95", "99.9", "0.05".
+/// A number with as few digits as it needs: "95", "99.9", "0.05".
 std::string plain(double value) {
   char text[40];
   return {text, std::to_chars(text, text + sizeof text, value, std::chars_format::general, 6).ptr};
 }
 
-/// Decimals with which one unit of the last place is at most `largest_unit`.
+/// The number of decimals with which one unit of the last place is at most `largest_unit`.
 int decimals_for(double largest_unit) {
   int decimals = 0;
   for (double unit = 1; decimals < 15 && unit > largest_unit * (1 + 1e-9); unit /= 10) ++decimals;
   return decimals;
 }
 
-/// Two digits, or more where rounding would move p across alpha; never 0.
+/// p with two digits, or with more if rounding would move it across alpha. It is never shown as 0.
 std::string p_text(double p, double alpha) {
   if (p < 0.001) return "p < 0.001";
   if (p >= 0.995) return "p = 1";
@@ -45,8 +45,8 @@ std::string p_text(double p, double alpha) {
   return "p = " + fixed(p, decimals);
 }
 
-/// The rounding follows the interval's width; where there is none, the difference. A bound beside 0 is not rounded to 0
-/// if two places more can help it, since that would read as no difference.
+/// The number of decimals follows from the interval's width; without an interval, from the difference. A bound near 0
+/// must not be rounded to 0, because this would read as no difference. Up to two more decimals are used to avoid it.
 int decimals_of(double difference, const Interval& interval, bool with_interval) {
   const double width = interval.upper - interval.lower;
   if (!with_interval || width <= 0) return difference == 0 ? 0 : decimals_for(std::abs(difference) / 10);
@@ -80,7 +80,7 @@ std::string sentence(const std::string& variant, const Metric& metric, const Com
   const bool shown = difference_shown(comparison, p_after_holm, alpha);
   const std::size_t fewest = fewest_cases(alpha);
   const bool enough = comparison.cases >= fewest;
-  // Everything in the direction that the sentence names.
+  // From here on, all numbers are in the direction that the sentence names.
   const double difference = comparison.median_difference;
   const double sign = difference < 0 ? -1 : 1;
   const bool worse = (sign > 0) != metric.larger_is_better;

@@ -28,10 +28,10 @@ void check_confidence(double confidence) {
     throw Error("the confidence is " + std::to_string(confidence) + "; give a fraction between 0 and 1, such as 0.95");
 }
 
-/// Chance that a standard normal deviate is larger than z.
+/// Probability that a standard normal variable is larger than z.
 double upper_tail(double z) { return 0.5 * std::erfc(z / std::sqrt(2.0)); }
 
-/// z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles.
+/// The z >= 0 with upper_tail(z) = tail, by bisection down to neighbouring doubles.
 double z_of_tail(double tail) {
   double below = 0, above = 40;
   for (;;) {
@@ -53,10 +53,10 @@ double median_of_sorted(const std::vector<double>& sorted) {
   return sorted.size() % 2 ? sorted[half] : 0.5 * (sorted[half - 1] + sorted[half]);
 }
 
-/// Magnitudes in rising order as ranks, doubled so that the mean rank of ties is an integer; zeros have rank 0 but
-/// count.
+/// Ranks of the magnitudes in rising order. They are doubled, so that the mean rank of ties is an integer. Zeros take
+/// the first ranks but are not listed.
 struct Ranks {
-  std::vector<std::size_t> doubled;  ///< of the differences that are not 0
+  std::vector<std::size_t> doubled;  ///< doubled ranks of the differences that are not 0
   std::size_t zeros = 0;
   std::size_t doubled_positive = 0;  ///< sum over the positive differences
   double tie_term = 0;               ///< sum of t^3 - t over groups of t equal magnitudes that are not 0
@@ -82,9 +82,10 @@ Ranks signed_ranks(std::vector<double> differences) {
   return ranks;
 }
 
-/// Two-sided p: twice the chance that, with fair signs, the positive ranks add up to `doubled_smaller` / 2 or less.
+/// Two-sided p: twice the probability that the positive ranks add up to `doubled_smaller` / 2 or less if each sign is
+/// equally likely.
 double exact_p(const std::vector<std::size_t>& doubled_ranks, std::size_t doubled_smaller) {
-  std::vector<double> chance(doubled_smaller + 1, 0.0);  // of each sum up to the one of interest
+  std::vector<double> chance(doubled_smaller + 1, 0.0);  // of each sum up to the observed one
   chance[0] = 1;
   for (const std::size_t rank : doubled_ranks)
     for (std::size_t sum = chance.size(); sum-- > 0;)
@@ -114,7 +115,8 @@ Interval wilson_interval(std::size_t successes, std::size_t trials, double confi
   const double z = z_of_tail((1 - confidence) / 2);
   const double centre = (rate + z * z / (2 * n)) / (1 + z * z / n);
   const double half = z / (1 + z * z / n) * std::sqrt(rate * (1 - rate) / n + z * z / (4 * n * n));
-  // At no and at all successes the bound is 0 or 1 exactly, which rounding would miss.
+  // With no successes the lower bound is exactly 0, and with all successes the upper bound is exactly 1. Rounding would
+  // miss this.
   return {successes == 0 ? 0.0 : centre - half, successes == trials ? 1.0 : centre + half, confidence};
 }
 

@@ -12,7 +12,7 @@
 namespace marrow {
 namespace {
 
-/// Distance, over the focal length, of the corner that lies farthest from the principal point, squared.
+/// Squared distance of the farthest image corner from the principal point, divided by the squared focal length.
 double largest_squared_radius(const Eigen::Matrix3d& inverse, int width_px, int height_px) {
   double largest = 0;
   for (const double u : {0.0, width_px - 1.0})
@@ -21,15 +21,15 @@ double largest_squared_radius(const Eigen::Matrix3d& inverse, int width_px, int 
   return largest;
 }
 
-/// Weights of the four samples about a place that lies `t` behind the second: Keys' cubic convolution with a = -1/2
-/// (IEEE Trans. ASSP 1981), which is exact for parabolas. OpenCV's has a = -3/4, which is not, and rounds places to
+/// Weights of four samples for a position `t` after the second one: Keys' cubic convolution with a = -1/2 (IEEE Trans.
+/// ASSP 1981), which is exact for parabolas. OpenCV uses a = -3/4, which is not exact for them, and rounds positions to
 /// 1/32 pixel.
 std::array<double, 4> cubic_weights(double t) {
   return {t * (-0.5 + t * (1 - 0.5 * t)), 1 + t * t * (-2.5 + 1.5 * t), t * (0.5 + t * (2 - 1.5 * t)),
           t * t * (-0.5 + 0.5 * t)};
 }
 
-/// Grey value between the pixels; the border's pixels go on outside.
+/// Grey value at a position between pixels. Outside the image, the border pixels are repeated.
 double sample_cubic(const cv::Mat1f& image, const Eigen::Vector2d& at) {
   const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
   const auto wu = cubic_weights(at.x() - u), wv = cubic_weights(at.y() - v);

@@ -8,7 +8,7 @@ namespace marrow {
 bool is_manifold(const Mesh& mesh) {
   if (!is_closed(mesh)) return false;
   struct Corner {
-    std::uint32_t vertex, next, last;  ///< of a triangle
+    std::uint32_t vertex, next, last;  ///< the vertices of a triangle, in its order
     bool operator<(const Corner& other) const {
       return vertex != other.vertex ? vertex < other.vertex : next < other.next;
     }
@@ -21,7 +21,7 @@ bool is_manifold(const Mesh& mesh) {
   for (auto begin = corners.begin(); begin != corners.end();) {
     const auto end =
         std::find_if(begin, corners.end(), [&](const Corner& corner) { return corner.vertex != begin->vertex; });
-    // From one triangle to the one on its other side, around the vertex: the mesh is closed, so this comes back.
+    // Walk from triangle to triangle around the vertex. The mesh is closed, so the walk returns to its start.
     auto at = begin;
     std::ptrdiff_t passed = 0;
     do {

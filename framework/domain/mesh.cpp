@@ -12,7 +12,7 @@
 namespace marrow {
 namespace {
 
-constexpr double kFarthest_mm = 1e6;  // beyond any room; sums of squares are exact enough up to here
+constexpr double kFarthest_mm = 1e6;  // larger than any room; up to here, sums of squares are exact enough
 
 std::string in_metres(double length_mm) {
   char text[32];
@@ -44,7 +44,7 @@ void check_mesh(const Mesh& mesh, const std::string& what) {
 }
 
 bool is_closed(const Mesh& mesh) {
-  std::vector<std::pair<std::uint64_t, int>> edges;  // undirected edge, +1 or -1 for its sense
+  std::vector<std::pair<std::uint64_t, int>> edges;  // undirected edge, and +1 or -1 for its direction
   edges.reserve(mesh.triangles.size() * 3);
   for (const auto& t : mesh.triangles)
     for (int k = 0; k < 3; ++k) {
@@ -78,7 +78,8 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
   double passed = 0;
   for (const auto& t : mesh.triangles) {
     const double area = 0.5 * area_vector(mesh, t).norm();
-    // A point wherever the running area passes a multiple of `step`; where in the triangle follows the golden ratio.
+    // Put a point wherever the running area passes (i + 1/2) * `step`. Its place in the triangle follows the golden
+    // ratio.
     for (double at = (double(points.size()) + 0.5) * step; at < passed + area && points.size() < count;
          at = (double(points.size()) + 0.5) * step) {
       const double r = (at - passed) / area, q = std::fmod(double(points.size()) * 0.6180339887498949, 1.0);

@@ -11,7 +11,7 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostInName = 100;  // bytes of a name that is looked for among others
+constexpr std::size_t kMostInName = 100;  // bytes; longer names are not compared
 
 /// Edit distance with neighbour swaps (optimal string alignment) of names of at most kMostInName bytes.
 std::size_t edit_distance(const std::string& a, const std::string& b) {

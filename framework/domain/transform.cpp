@@ -41,7 +41,7 @@ Eigen::Vector3d vector_from_rotation(const Eigen::Matrix3d& rotation) {
 }
 
 double geodesic_angle_rad(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
-  // |a - b| = 2 sqrt(2) sin(angle / 2) stays exact for small angles, where the arc cosine of the trace does not.
+  // |a - b| = 2 sqrt(2) sin(angle / 2) is exact for small angles; the arc cosine of the trace is not.
   const double half_sine = (a - b).norm() / std::sqrt(8.0);
   return 2 * std::asin(std::min(1.0, half_sine));
 }

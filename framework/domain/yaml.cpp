@@ -15,11 +15,11 @@ namespace marrow {
 namespace {
 
 constexpr std::size_t kMostLevels = 100;
-constexpr std::size_t kMostRepeated = 100'000;  // values, by aliases
+constexpr std::size_t kMostRepeated = 100'000;  // values that aliases may repeat
 
 [[noreturn]] void refuse(const YAML::Mark& mark, const std::string& why) { throw YAML::Exception(mark, why); }
 
-/// Counts values and levels as they would be with every alias written out, before a tree is made of them.
+/// Counts values and levels of nesting as if every alias were written out. It runs before a tree is built.
 class Survey : public YAML::EventHandler {
  public:
   explicit Survey(const YamlLimits& limits) : limits_(limits) {}
@@ -29,7 +29,7 @@ class Survey : public YAML::EventHandler {
   void OnDocumentEnd() override {}
   void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override { add(mark, anchor); }
   void OnScalar(const YAML::Mark& mark, const std::string&, YAML::anchor_t anchor, const std::string& text) override {
-    if (text.find('\0') != std::string::npos)  // names of files and sentences would end there
+    if (text.find('\0') != std::string::npos)  // file names and messages would end there
       refuse(mark, "a text holds the character NUL (\\0); take it out");
     add(mark, anchor);
   }
@@ -168,7 +168,7 @@ std::optional<bool> yaml_boolean(const YAML::Node& node) {
 
 std::vector<YamlKey> yaml_keys(const YAML::Node& map, const std::string& what, std::vector<YamlFault>& faults) {
   std::vector<YamlKey> keys;
-  std::map<std::string, int> lines;  ///< of the keys so far
+  std::map<std::string, int> lines;  ///< lines of the keys so far
   for (const auto& item : map) {
     const YAML::Mark mark = item.first.Mark();
     if (!item.first.IsScalar()) {
@@ -176,7 +176,7 @@ std::vector<YamlKey> yaml_keys(const YAML::Node& map, const std::string& what, s
       continue;
     }
     const std::string& name = item.first.Scalar();
-    const std::string shown = in_quotes(cut(printable(name), 100));
+    const std::string shown = in_quotes(cut(name, 100));
     const auto [twin, is_new] = lines.try_emplace(name, mark.line + 1);
     if (name == "<<")
       faults.push_back({mark, "merge keys (<<) are not supported", "repeat the entries"});

@@ -77,15 +77,15 @@ void pass_on(const json& report, const Context::Hooks& hooks) {
     if (what == level_name(level) && hooks.log) hooks.log(text, level);
 }
 
-/// What was being read: what the worker said last, else what the node's options name.
+/// The file that was being read: what the worker said last, else what the node's options name.
 std::string file_of(const PipelineNode& node, const Worker& worker) {
   if (!worker.at().empty()) return worker.at();
   const std::vector<std::string> paths = paths_of(node);
   return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
 }
 
-/// What the worker made. Large pieces are read from its memory, or where that is not allowed, from memory that both
-/// share.
+/// The values that the worker made. Large pieces are read from its memory. If this is not allowed, they are read from
+/// memory that both processes share.
 std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker,
                                const SharedMemory& made) {
   const auto content_of = [&](const TypeInfo& type) -> const Content* {
@@ -104,8 +104,9 @@ std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& n
   }
 }
 
-/// The processes that read files for this one. Where the system grants no further one, another of them must end first.
-/// One that has just ended, or a thread, may still be counted for a moment.
+/// The processes that read files for this one. If the system does not start another one, start() waits until one of
+/// them has ended. A process or thread that has just ended may still count for a moment, so start() tries several times
+/// even if no other process is running.
 class Readers {
  public:
   std::unique_ptr<Worker> start(const WorkerSettings& settings, const std::atomic<bool>* cancelled) {
@@ -148,7 +149,7 @@ class Readers {
   static constexpr int kMostTries = 25;
   std::mutex mutex_;
   std::condition_variable one_ended_;
-  int running_ = 0;  ///< or about to start
+  int running_ = 0;  ///< running, or about to start
   long ended_ = 0;
 };
 
@@ -175,7 +176,7 @@ std::string number_text(double value) {
   return text;
 }
 
-/// How a process ended, without where it was, which the sentence has said.
+/// How a process ended, without the place, because the sentence already names it.
 std::string without_place(std::string end, const std::string& place) {
   const std::string where = " in " + place, subject = "its process";
   if (const std::size_t found = end.find(where); found != end.npos) end.erase(found, where.size());
@@ -217,7 +218,7 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
   CallLimits limits;
   const double most_mb = std::max(kMostMemory_mb, 256 + 8 * megabytes);
   if (node.apart == Apart::parses) {
-    // No compression in use packs an image that is not empty to less than a thousandth.
+    // The usual compressions do not shrink an image with content to less than a thousandth.
     limits.memory_mb = std::min(most_mb, 192 + 1024 * megabytes);
     limits.processor_s = 1.5 + megabytes;
   } else {
@@ -229,7 +230,7 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
   if (settings.file_limits.seconds > 0) limits.processor_s = settings.file_limits.seconds;
   limits.memory_mb *= kSlower;
   limits.processor_s *= kSlower;
-  limits.seconds = 30 + 10 * limits.processor_s;  // by the clock, on a machine that has other work
+  limits.seconds = 30 + 10 * limits.processor_s;  // wall time, on a machine that has other work
   return limits;
 }
 

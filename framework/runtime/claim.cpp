@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Who makes a result: one byte of one file is locked for each key, so there is nothing to clean up, and the kernel
-// gives the lock back when its holder dies.
+// Claims: who makes a result. For each key, one byte of one file is locked. So there is nothing to clean up, and the
+// kernel gives the lock back if its holder dies.
 #include <fcntl.h>
 #include <sys/stat.h>
 #include <unistd.h>
@@ -17,10 +17,10 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr auto kAtOnce = std::chrono::milliseconds(100);  // not worth a word to anyone
-constexpr auto kLong = std::chrono::seconds(5);           // worth a word to people
+constexpr auto kAtOnce = std::chrono::milliseconds(100);  // shorter waits are not reported
+constexpr auto kLong = std::chrono::seconds(5);           // longer waits are shown to people
 
-/// Says that a wait begins, that it is long, and that it has ended.
+/// Reports that a wait has begun, that it is long, and that it has ended.
 class Waiting {
  public:
   explicit Waiting(const std::function<void(bool)>& on_wait) : on_wait_(on_wait) {}
@@ -53,10 +53,10 @@ struct flock one_byte(short type, off_t place) {
 
 Store::Claim::~Claim() {
   if (descriptor_ < 0) return;
-  // A child that was forked meanwhile shares the lock with its copy of the descriptor: closing ours would not give it
-  // back.
+  // A child that was forked in the meantime shares the lock through its copy of the descriptor. Closing only our
+  // descriptor would not release the lock.
   struct flock lock = one_byte(F_UNLCK, 0);
-  lock.l_len = 0;  // to the end
+  lock.l_len = 0;  // to the end of the file
   fcntl(descriptor_, F_OFD_SETLK, &lock);
   close(descriptor_);
 }
@@ -64,11 +64,11 @@ Store::Claim::~Claim() {
 Store::Claim Store::claim(const Digest& key, const std::atomic<bool>* cancelled,
                           const std::function<void(bool)>& on_wait) const {
   if (!prepare().empty()) return Claim();
-  // A description of the file of its own: two threads of one process exclude each other too.
+  // This opens the file anew, so that two threads of one process exclude each other too.
   const int descriptor =
       open((folder_ / "claims").c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0600);
   if (descriptor < 0) return Claim();
-  fchmod(descriptor, 0600);  // whatever the umask
+  fchmod(descriptor, 0600);  // with any umask
   Claim claim(descriptor);
   Waiting waiting(on_wait);
   struct flock lock = one_byte(F_WRLCK, off_t(key.low >> 2));

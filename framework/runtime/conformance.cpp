@@ -17,7 +17,7 @@ std::filesystem::path& known_files_folder() {
   return folder;
 }
 
-/// All values one after the other, as the store would keep them.
+/// The content hashes of all values, one after the other.
 std::string keys_of(std::vector<Value>& values) {
   std::string text;
   const std::function<void(Value&)> add = [&](Value& value) {

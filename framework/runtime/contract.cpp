@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes against the contracts of their kinds, which other libraries may bring.
+// Checks nodes against the contracts of their kinds, which other libraries may declare.
 #include "contract.hpp"
 
 #include <algorithm>
@@ -16,7 +16,7 @@ const Port* find_port(const std::vector<Port>& ports, const std::string& name) {
   return found == ports.end() ? nullptr : &*found;
 }
 
-/// That each port of a name that the kind knows is as the kind has it.
+/// Checks that each port whose name the kind knows has the type and the axis of the contract.
 void check_ports(const std::vector<PortInfo>& ports, const std::vector<KindPort>& contract, const std::string& what,
                  const std::string& kind, std::vector<std::string>& faults) {
   for (const PortInfo& port : ports) {

@@ -8,12 +8,12 @@
 
 namespace marrow {
 
-/// What is wrong with a node by the contract of its kind, a sentence each. `kind` is null where no library brings it:
-/// its nodes then choose their ports freely, but are not given the truth. A kind without outputs leaves the ports to
-/// its nodes, too. Inputs and outputs that the kind does not have are allowed.
+/// What breaks the contract of the node's kind, one sentence each. `kind` is null if no library declares the kind: its
+/// nodes may then have any ports, but are not given the truth. A kind without outputs leaves the outputs to its nodes.
+/// A node may have inputs and outputs that its kind does not have.
 std::vector<std::string> contract_faults(const NodeInfo& node, const KindInfo* kind);
 
-/// "view", "list of view over view", "outline_projector or radiograph_projector".
+/// Types as a text: "view", "list of view over view", "outline_projector or radiograph_projector".
 std::string types_text(const std::vector<TypeInfo>& types, const std::string& axis);
 
 }  // namespace marrow

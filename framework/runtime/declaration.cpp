@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Checks of the declaration of nodes and kinds when a plugin registers them: a wrong default or port is found without
+// Checks the declarations of nodes and kinds when a plugin registers them. So a wrong default or port is found without
 // running anything.
 #include <algorithm>
 #include <array>
@@ -48,7 +48,7 @@ std::vector<std::string> texts_of(const OptionValue& value) {
   return texts ? *texts : std::vector<std::string>{};
 }
 
-/// That range and default can be written down, and the default lies in the range.
+/// Checks that range and default are finite and that the default is within the range.
 void check_numbers(const OptionInfo& option, const std::string& name, std::vector<std::string>& faults) {
   constexpr double kLargest = std::numeric_limits<double>::max();
   const double least = option.minimum.value_or(-kLargest), most = option.maximum.value_or(kLargest);
@@ -91,7 +91,7 @@ const char* name_of(RelationType type) {
   return kNames[int(type)];
 }
 
-/// Of a name in a relation: what is wrong with it; empty where nothing is.
+/// What is wrong with a name in a relation; empty if nothing is.
 std::string fault_in_relation(const NodeInfo& node, RelationType type, const std::string& name) {
   if (type == RelationType::exactly_one && name.starts_with("in.")) {
     for (const PortInfo& port : node.inputs)
@@ -139,7 +139,7 @@ void check_kind_ports(const std::vector<KindPort>& ports, const char* what, std:
   }
 }
 
-/// Names that may not stand twice: of traits, of checks.
+/// Checks names of traits or checks: none may occur twice.
 void check_names(const std::vector<std::string>& names, const std::string& what, std::vector<std::string>& faults) {
   std::set<std::string> seen;
   for (const std::string& name : names) {

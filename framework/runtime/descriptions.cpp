@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known of libraries without loading them: manifests beside them, and a cache of descriptions in the user's own
-// folder.
+// Descriptions of libraries that are not loaded: the manifests next to them, and a cache of descriptions in the user's
+// own folder.
 #include "descriptions.hpp"
 
 #include <sys/stat.h>
@@ -23,20 +23,21 @@ namespace fs = std::filesystem;
 
 fs::path manifest_beside(const fs::path& library) { return fs::path(library).replace_extension(".json"); }
 
-/// Empty for a variable that is not set, is empty or is relative to wherever the program happens to run.
+/// The folder that an environment variable names. Empty if the variable is not set, is empty or is a relative path,
+/// which would depend on where the program happens to run.
 fs::path folder_of(const char* variable) {
   const char* text = std::getenv(variable);
   return text && text[0] == '/' ? fs::path(text) : fs::path();
 }
 
-/// Empty where there is none: without a home nothing is kept.
+/// Empty if there is none: without a home folder nothing is kept.
 fs::path cache_folder() {
   if (const fs::path cache = folder_of("XDG_CACHE_HOME"); !cache.empty()) return cache / "marrow" / "libraries";
   if (const fs::path home = folder_of("HOME"); !home.empty()) return home / ".cache" / "marrow" / "libraries";
   return {};
 }
 
-/// That a folder is the user's alone. One that an older version made readable for all is closed.
+/// Whether a folder belongs to the user alone. A folder that an older version made readable for all is made private.
 bool is_own(const fs::path& folder) {
   struct stat status {};
   if (stat(folder.c_str(), &status) != 0 || !S_ISDIR(status.st_mode) || status.st_uid != geteuid()) return false;
@@ -44,7 +45,7 @@ bool is_own(const fs::path& folder) {
   return changeable_by_others(folder).empty();
 }
 
-/// Makes the folder for the user alone. What is above it must already be nobody else's.
+/// Makes the folder for the user alone. Nobody else may be able to change the folders above it.
 bool make_own(const fs::path& folder) {
   std::error_code error;
   if (fs::exists(folder, error)) return is_own(folder);
@@ -54,8 +55,8 @@ bool make_own(const fs::path& folder) {
   return (mkdir(folder.c_str(), 0700) == 0 || errno == EEXIST) && is_own(folder);
 }
 
-/// Of the description of a library in the cache; a verdict depends on the framework too: what an older one refused, a
-/// newer one may accept. Empty where nothing can be kept.
+/// The file of a library's description in the cache. Its name depends on the framework too, because a newer framework
+/// may accept what an older one refused. Empty if nothing can be kept.
 fs::path cached_file(const Digest& library, const Digest& framework, bool make) {
   const fs::path folder = cache_folder();
   if (folder.empty() || !(make ? make_own(folder) : is_own(folder))) return {};
@@ -66,7 +67,8 @@ fs::path cached_file(const Digest& library, const Digest& framework, bool make) 
   return folder / (name.digest().hex() + ".json");
 }
 
-/// That the description belongs to this very library and to the libraries that are here now; else why not.
+/// Why a description does not belong to this very library and to the linked libraries that are here now; empty if it
+/// does.
 std::string stale(const LibraryInfo& info, const Digest& digest) {
   if (info.digest != digest) return "it belongs to another build of the library";
   for (const LinkedLibrary& library : info.linked) {
@@ -78,14 +80,15 @@ std::string stale(const LibraryInfo& info, const Digest& digest) {
   return "";
 }
 
-/// Throws Error, which begins with "it".
+/// The text of a manifest. Throws Error, with a text that begins with "it".
 std::string manifest_text_of(const fs::path& file) try {
   return read_text(RegularFile(trusted_path(file)), kMostManifest_bytes);
 } catch (const Error& error) {
   throw Error(std::string("it ") + error.what());
 }
 
-/// The description of a library from the manifest beside it; else nothing, and `note` says why.
+/// The description of a library from the manifest next to it. If the manifest cannot be used, returns nothing, and
+/// `note` says why.
 std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& digest, std::string& note) {
   const fs::path manifest = manifest_beside(library);
   std::error_code error;
@@ -104,7 +107,7 @@ std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& 
   return std::nullopt;
 }
 
-/// The description of a library from the cache; nothing where that has none that can be used.
+/// The description of a library from the cache; nothing if the cache has none that can be used.
 std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framework) {
   const fs::path file = cached_file(digest, framework, false);
   if (file.empty()) return std::nullopt;
@@ -114,19 +117,19 @@ std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framew
     LibraryInfo info = manifest_from_text(read_text(source, kMostManifest_bytes));
     if (stale(info, digest).empty()) return info;
   } catch (const Error&) {
-    // Only a cache: the library is described anew, and that is kept instead.
+    // This is only a cache: the library is described anew, and that description is kept instead.
   }
   return std::nullopt;
 }
 
 void keep(const LibraryInfo& info, const Digest& framework) {
-  // A reason that lies outside of the library, such as another one that it needs, may be gone next time.
+  // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
   if (info.refused.starts_with("cannot be")) return;
   try {
     if (const fs::path file = cached_file(info.digest, framework, true); !file.empty())
       write_text(file, manifest_text(info), 0600);
   } catch (const Error&) {
-    // Only a cache: without it the library is described again next time.
+    // This is only a cache: the library is described again next time.
   }
 }
 
@@ -137,7 +140,7 @@ LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Dige
   return info;
 }
 
-/// Whether marrow wrote the file, be it stale or of another version.
+/// Whether marrow wrote the file. It may be stale or of another version.
 bool is_manifest(const fs::path& file) {
   try {
     return parse_json(read_text_file(file, kMostManifest_bytes), file.string()).contains("marrow_manifest");

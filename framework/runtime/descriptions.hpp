@@ -4,10 +4,10 @@
 
 namespace marrow {
 
-/// Removes what is kept of a library that turned out to be another than described, so that it is described anew.
+/// Removes the kept description of a library that turned out to be different, so that the library is described anew.
 void forget_description(const LibraryInfo& library);
 
-/// What a person does about a description that is wrong.
+/// What a person can do about a wrong description.
 std::string cure_of_description(const std::filesystem::path& library);
 
 }  // namespace marrow

@@ -25,7 +25,8 @@ std::string line_of(const std::string& text, int line) {
   return content;
 }
 
-/// The line, and a caret below what is at the column, which counts bytes; of a long line what is around that.
+/// A source line, with a caret below the column, which counts bytes. Of a long line, only the part around the column is
+/// shown.
 std::string quoted_line(const std::string& line, int column) {
   const std::size_t at = std::min(std::size_t(std::max(0, column - 1)), line.size());
   const auto is_inside = [&](std::size_t i) {
@@ -63,7 +64,7 @@ void Diagnostics::add_all(const Diagnostics& other) {
     return std::tie(item.place.file, item.place.line, item.place.column, item.message);
   };
   const auto is_before = [&](const Diagnostic* a, const Diagnostic* b) { return key(*a) < key(*b); };
-  items_.reserve(items_.size() + other.items_.size());  // what is known points into it
+  items_.reserve(items_.size() + other.items_.size());  // `known` points into it
   std::set<const Diagnostic*, decltype(is_before)> known(is_before);
   for (const Diagnostic& item : items_) known.insert(&item);
   for (const Diagnostic& item : other.items_) {

@@ -17,7 +17,7 @@ constexpr int kMachine = EM_X86_64;
 #elif defined(__aarch64__)
 constexpr int kMachine = EM_AARCH64;
 #else
-constexpr int kMachine = EM_NONE;  // not known: the loader decides
+constexpr int kMachine = EM_NONE;  // not known: the dynamic loader decides
 #endif
 
 std::string machine_name(int machine) {
@@ -39,7 +39,8 @@ std::string machine_name(int machine) {
   }
 }
 
-/// That `bytes` from `offset` on lie in the file; sums are not formed, because they may wrap.
+/// Checks that `bytes` bytes from `offset` on are inside the file. The sum of both is not computed, because it may
+/// overflow.
 void expect_inside(const RegularFile& file, std::uint64_t offset, std::uint64_t bytes) {
   if (offset <= file.size() && bytes <= file.size() - offset) return;
   throw Error("is truncated: its ELF header speaks of " + std::to_string(bytes) + " bytes from byte " +

@@ -4,8 +4,8 @@
 
 namespace marrow {
 
-/// Throws Error, which begins with a verb, for a file that is no whole ELF library for this machine: such a file would
-/// make the dynamic loader fail obscurely or crash.
+/// Throws Error, with a text that begins with a verb, if the file is not a whole ELF library for this machine. With
+/// such a file, the dynamic loader would fail with an unclear message or crash.
 void check_elf(const RegularFile& file);
 
 }  // namespace marrow

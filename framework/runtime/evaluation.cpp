@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Finds the result of each call: once for each recipe within a run, from the store where it is there.
+// Finds the result of each call, once for each recipe within a run. Reads it from the store if it is there.
 #include "evaluation.hpp"
 
 #include <algorithm>
@@ -12,7 +12,7 @@ namespace marrow {
 
 using Status = NodeRecord::Status;
 
-/// The result of a recipe: in the making until `done`, then shared by all calls with the same key.
+/// The result of a recipe. It is being made until `done` is set. Then all calls with the same key share it.
 struct Evaluation::Memo {
   bool done = false;
   CallResult result;
@@ -44,7 +44,8 @@ Evaluation::Recipe Evaluation::recipe(std::size_t node, const Call& call, Conten
   return {recipe, result_key(recipe, catalogue_.library_of(info.name)->build_id, info.random, settings_.seed)};
 }
 
-/// The record of the run tells what its files held when they were read, whatever becomes of them later.
+/// Notes what the node's files hold. The run's record then tells what they held when they were read, whatever happens
+/// to them later.
 Evaluation::Recipe Evaluation::noted_recipe(std::size_t node, const Call& call) {
   const auto note = [&](const Contents& contents) {
     const std::scoped_lock lock(mutex_);
@@ -102,7 +103,7 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
     };
     const Store::Claim claim =
         settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
-    // Another process may have made it in the meantime.
+    // Another process may have made the result in the meantime.
     if (!read_back(node, call, key)) call.result = perform(node, call.inputs, call.item, key);
   }
   share(key.key, call.result);

@@ -19,35 +19,36 @@ struct CallResult {
   NodeRecord::Status status = NodeRecord::Status::done;
   std::string reason;
   std::vector<Value> outputs;
-  bool is_deferred = false;  ///< a function, which is made when a node that runs asks for it
+  bool is_deferred = false;  ///< the result is a function; it is made when a running node asks for it
   bool is_cached = false;    ///< read back from the store
 };
 
-/// One call of a node: its place along the mapped axes, what it is given, and what came of it.
+/// One call of a node: its inputs, its place along the mapped axes, and its result.
 struct Call {
   std::vector<Value> inputs;
   std::string item;
   CallResult result;
 };
 
-/// Finds the results of calls: each recipe once within a run, from the store where an earlier run left it there, else
-/// by calling the node. Functions are made only when something that runs needs them. Safe to use from several threads
-/// of the run's pool.
+/// Finds the results of calls. Each recipe is evaluated once within a run: its result is read from the store if an
+/// earlier run left it there, else the node is called. Functions are made only if a node that runs needs them. Safe to
+/// use from several threads of the run's pool.
 class Evaluation {
  public:
-  /// `finished(node, call)` is told of each call whose result is known. `records` is written under `mutex`.
+  /// finished(node, call) is called for each call as soon as its result is known. `records` is written under `mutex`.
   Evaluation(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings,
              std::vector<NodeRecord>& records, std::mutex& mutex,
              std::function<void(std::size_t node, Call& call)> finished);
   ~Evaluation();
 
   void evaluate(std::size_t node, Call& call);
-  /// Makes the data of a value that is wanted at the end of the run; what cannot be made becomes missing.
+  /// Makes the data of a value that is needed at the end of the run. What cannot be made becomes missing.
   static void make(Value& value, const std::function<const TypeInfo&()>& type);
-  /// Why the call has another key than when this node last ran; for plans.
+  /// Why the key of the call is not the one of the node's last run; for plans.
   std::string change_since_last(std::size_t node, const Call& call) const;
   double seconds_last_time(std::size_t node, const Call& call) const;
-  /// Whether the store has the result, or the node makes functions; then the call's result is set as evaluate() does.
+  /// Whether the store has the result or the node makes only functions. If so, sets the result of the call as
+  /// evaluate() does.
   bool find(std::size_t node, Call& call);
 
   void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0,

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Calls a node: makes its inputs, watches over what it leaves behind, and keeps what it returned.
+// Calls a node: makes its inputs, checks what it leaves behind, and keeps its result.
 #include <oneapi/tbb/task_arena.h>
 
 #include <algorithm>
@@ -20,7 +20,8 @@ using Status = NodeRecord::Status;
 
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
-/// Gives data its content hash; gives a function its recipe's key and keeps its inputs alive as long as it.
+/// Sets the key of a value: the content hash of data, or the key of a function, which is made from the recipe. A
+/// function also keeps the node's inputs alive.
 void finish_value(Value& value, const Digest& key, std::size_t output, const std::vector<Value>& inputs) {
   for (Value& item : value.items) finish_value(item, key, output, inputs);
   if (value.is_absent() || value.is_list()) return;
@@ -49,7 +50,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     if (settings_.cancelled && settings_.cancelled->load()) throw Cancelled();
     const Digest before = states_of_files(pipeline_.nodes[node]);
     write_back_files(pipeline_.nodes[node]);
-    // Isolated, so that a thread that waits inside this node does not take up another node's work and stretch its time.
+    // Isolated: a thread that waits inside this node must not take up work of another node, because that would add to
+    // the time of this node.
     result.outputs = tbb::this_task_arena::isolate([&] { return call_node(node, inputs, item, recipe, warnings); });
     if (const std::string elsewhere = working_folder_.go_back(); !elsewhere.empty())
       throw Error("the working folder was changed to " + elsewhere + " while it ran; a plugin must leave it as it is");
@@ -73,7 +75,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
     result.status = Status::failed;
     result.reason = error.what();
   }
-  working_folder_.go_back();  // also where it failed
+  working_folder_.go_back();  // also if the call failed
   if (result.status == Status::failed)
     report(RunEvent::Kind::failed, node, item, failure_text(node, item, result.reason));
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
@@ -89,8 +91,8 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   return result;
 }
 
-/// What was read must be what the key counts, or the store would keep it for another content for ever. A file that was
-/// changed and changed back has another state than before.
+/// What was read must be what the key covers. Otherwise the store would keep the result for another content, for ever.
+/// A file that was changed and changed back has another state than before.
 void Evaluation::check_unchanged(std::size_t node, const std::vector<Value>& inputs, const Recipe& recipe,
                                  const Digest& states) const {
   const std::vector<std::string> paths = paths_of(pipeline_.nodes[node]);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Results that are there before their data: calls made, and entries of the store read, when something needs them.
+// Results that exist before their data. A call is made, or an entry of the store is read, when something needs the
+// data.
 #include <algorithm>
 #include <optional>
 
@@ -12,8 +13,7 @@ namespace {
 
 using Status = NodeRecord::Status;
 
-/// Whether a stored value is one that the output gives: by its own account, it may come from another build or be
-/// damaged.
+/// Whether a stored value has the type and the axis of the output. The entry may come from another build or be damaged.
 bool is_of(const Value& value, const PortInfo& output) {
   if (value.type != output.type || (value.is_list() && value.axis != output.axis)) return false;
   if (!output.axis.empty() && !value.is_list()) return value.is_absent();
@@ -30,7 +30,7 @@ class Evaluation::Deferred {
       : evaluation_(evaluation), node_(node), inputs_(call.inputs), item_(call.item), recipe_(recipe) {}
 
   const CallResult& result() {
-    // A thread that holds the lock runs isolated, so it never comes back here for the same call.
+    // The thread that holds the lock runs isolated, so it never comes back here for the same call.
     const std::scoped_lock lock(mutex_);
     if (!result_) result_ = evaluation_.perform(node_, inputs_, item_, recipe_);
     return *result_;
@@ -48,7 +48,7 @@ class Evaluation::Deferred {
   std::optional<CallResult> result_;
 };
 
-/// One leaf of what a deferred call returns; read from the store where it is there and whole.
+/// One leaf of the result of a deferred call. It is read from the store if it is there and whole.
 class Evaluation::DeferredSource : public Source {
  public:
   DeferredSource(std::shared_ptr<Deferred> call, std::size_t leaf, std::shared_ptr<Source> stored = nullptr)
@@ -59,7 +59,7 @@ class Evaluation::DeferredSource : public Source {
       try {
         return stored_->data(type);
       } catch (const DamagedEntry&) {
-        call_->drop_stored();  // the recipe is known: it is made again
+        call_->drop_stored();  // the result can be made again from its recipe
       }
     }
     const CallResult& result = call_->result();

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Runs a pipeline: starts each node when its sources have ended, on one pool of threads; and says what a run would do.
+// Runs a pipeline: starts each node when its sources have ended, on one pool of threads. Also plans what a run would
+// do.
 #include "marrow/runtime/executor.hpp"
 
 #include <oneapi/tbb/global_control.h>
@@ -50,7 +51,7 @@ class Executor {
   }
 
   RunResult run() {
-    // The pool is the only source of threads: OpenCV's own loops stay on the thread of the node that calls them.
+    // The pool is the only source of threads. OpenCV's own loops stay on the thread of the node that calls them.
     cv::setNumThreads(1);
     const int wanted =
         settings_.threads > 0 ? settings_.threads : int(std::max(1u, std::thread::hardware_concurrency()));
@@ -97,14 +98,14 @@ class Executor {
     std::size_t unfinished = 0;
     bool running = false;
   };
-  /// Data made outside a run has no key yet; without one, all of it would pass for the same.
+  /// Data made outside of a run has no key yet. Without keys, all such data would count as the same.
   static void complete_key(Value& value) {
     for (Value& item : value.items) complete_key(item);
     if (value.data && value.type.content && value.key == Digest{})
       value.key = value.type.content->hash(value.data.get());
   }
 
-  /// What the pipeline is to give is made while the nodes can still be called.
+  /// Makes the data of the pipeline's outputs while the nodes can still be called.
   void make_outputs() {
     for (const PipelineOutput& output : pipeline_.outputs) {
       NodeRecord& record = result_.nodes[std::size_t(output.source.node)];
@@ -161,7 +162,7 @@ class Executor {
     return int(std::unique(sources.begin(), sources.end()) - sources.begin());
   }
 
-  /// Gives the pool some work. What a node throws is its own failure; anything else that goes wrong ends the run.
+  /// Gives work to the pool. If a node throws, only that node fails; any other exception ends the run.
   template <class Work>
   void enqueue(Work work) {
     const auto is_taken = std::make_shared<std::atomic<bool>>(false);
@@ -177,10 +178,10 @@ class Executor {
         const std::scoped_lock lock(mutex_);
         if (--at_work_ == 0) all_done_.notify_all();
       });
-    } catch (const std::bad_alloc&) {  // no memory for it: nobody will be at it
+    } catch (const std::bad_alloc&) {  // there is no memory: the work will not run
       withdraw(*is_taken);
       throw;
-    } catch (const std::exception& error) {  // no thread for it: in this process TBB waits for that thread from now on
+    } catch (const std::exception& error) {  // there is no thread: from now on TBB waits for it in this process
       withdraw(*is_taken);
       note_call_without_process();
       throw NoProcess(std::string("cannot start a thread (") + error.what() +
@@ -198,7 +199,7 @@ class Executor {
     is_broken_ = true;
   }
 
-  /// The main thread samples memory until all nodes have ended, and nothing of the run is at work any more.
+  /// The main thread samples memory until all nodes have ended and no work of the run is left.
   void watch() {
     std::unique_lock lock(mutex_);
     const auto is_over = [&] { return (unfinished_ == 0 || is_broken_) && at_work_ == 0; };
@@ -235,7 +236,7 @@ class Executor {
       finish_node(index);
       return;
     }
-    const std::size_t count = state.calls.size();  // the last of them to end clears the calls
+    const std::size_t count = state.calls.size();  // the last call that ends clears the calls
     state.unfinished = count;
     for (std::size_t c = 0; c < count; ++c) enqueue([this, index, c] { evaluate(index, c); });
   }
@@ -261,7 +262,7 @@ class Executor {
     if (last) finish_node(index);
   }
 
-  /// Builds the node's outputs from its calls and starts what waited for it.
+  /// Builds the node's outputs from its calls and starts the nodes that waited for it.
   void finish_node(std::size_t index) {
     NodeState& state = states_[index];
     set_status(state.calls, result_.nodes[index]);

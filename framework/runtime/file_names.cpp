@@ -12,9 +12,9 @@ namespace marrow {
 namespace {
 
 constexpr std::size_t kMostInName = 100;      // bytes
-constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix below the usual 255
+constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix it is below the usual 255
 
-/// As in addresses; `text` may be several bytes.
+/// As in URLs. `text` may have several bytes.
 std::string percent_encoded(std::string_view text) {
   std::string result;
   for (const unsigned char byte : text) {
@@ -46,7 +46,7 @@ void check_file_name(Diagnostics& diagnostics, const Place& place, const std::st
 }
 
 std::string file_name_of(const std::string& text) {
-  if (text.empty()) return "%";  // nothing else is written as a percent sign alone
+  if (text.empty()) return "%";  // no other text becomes a percent sign alone
   std::string result;
   for (std::size_t i = 0, next = 0; i < text.size(); i = next) {
     next = i + 1;

@@ -11,19 +11,19 @@ namespace marrow {
 inline constexpr const char* kNameHint =
     "use at most 100 letters, digits, '-', '_', '.' and spaces, and begin with neither a dot nor a space";
 
-/// Why a text cannot be the name of a file or folder on any machine, as "it holds '/'"; empty where it can: 1 to 100
-/// bytes of UTF-8 without '/', '\' and control characters, that begins neither with a dot nor with a space and ends
-/// with no space.
+/// Why a text cannot be the name of a file or folder on every machine, as "it holds '/'"; empty if it can. A good name
+/// has 1 to 100 bytes of UTF-8 without '/', '\' and control characters. It does not begin with a dot or a space and
+/// does not end with a space.
 std::string fault_of_name(const std::string& name);
 
-/// A fault at `place` for a text that cannot be the name of a file; `what` says whose it is ("a pipeline's name").
+/// Reports a fault at `place` if a text cannot be the name of a file. `what` says what is named ("a pipeline's name").
 void check_file_name(Diagnostics& diagnostics, const Place& place, const std::string& name, const std::string& what);
 
-/// Any text as the name of a file that no other text has: what a name may not hold, and '%' and '~', is written as %2F.
-/// More than 200 bytes end with a hash of the whole instead.
+/// A file name for any text. Different texts get different names. Characters that a name cannot have, and '%' and '~',
+/// are written as in %2F. A name of more than 200 bytes is cut and ends with a hash of the whole text.
 std::string file_name_of(const std::string& text);
 
-/// The names of a list's items, with (2), (3) ... behind those that were there before.
+/// The names of a list's items, made distinct: a name that was there before gets (2), (3) and so on.
 std::vector<std::string> distinct_names(const std::vector<std::string>& names);
 
 }  // namespace marrow

@@ -14,7 +14,7 @@ void FilesRead::note(const Contents& contents) {
     std::error_code error;
     const fs::path real = fs::weakly_canonical(fs::absolute(path, error), error);
     for (const auto& [file, digest] : content.files) note(file, digest, path);
-    // A folder may have lost a file, or have one more.
+    // A file may have been added to a folder, or removed from it.
     if (!content.is_there)
       note(real, Digest{}, path);
     else if (fs::is_directory(real, error))

@@ -6,13 +6,13 @@
 
 namespace marrow {
 
-/// What the nodes of a run found in the files that they read. All of them must find the same: a file that is edited
-/// between two nodes would give results that mix both contents. Safe to use from several threads.
+/// The contents that the nodes of a run found in their files. All nodes must find the same content: if a file is edited
+/// between two nodes, the results would mix both contents. Safe to use from several threads.
 class FilesRead {
  public:
-  /// Throws Error where something else was found before.
+  /// Adds contents. Throws Error if another content was found before.
   void note(const Contents& contents);
-  /// What was found in those paths of the node that were noted.
+  /// The noted contents of the node's paths.
   Contents of(const PipelineNode& node) const;
 
  private:
@@ -23,8 +23,8 @@ class FilesRead {
   Contents contents_;
 };
 
-/// By option of type path that names something: its content; zero where any of its paths is not among `contents` or not
-/// there.
+/// The content of each option of type path that names something. It is zero if any of the option's paths is missing on
+/// disk or in `contents`.
 std::map<std::string, Digest> contents_of_options(const PipelineNode& node, const Contents& contents);
 
 }  // namespace marrow

@@ -9,7 +9,8 @@
 namespace marrow {
 namespace {
 
-/// What the pipeline does not give the node. Options that the file gave another node there count for nothing.
+/// What the node needs and the pipeline does not give it. Options that the file gives to the replaced node do not
+/// count.
 std::vector<std::string> missing_for(const PipelineNode& node, const PipelineArguments& arguments) {
   std::vector<std::string> missing;
   for (std::size_t i = 0; i < node.info.inputs.size(); ++i) {
@@ -37,7 +38,7 @@ Fit fit_of(const std::string& name, const std::string& id, const std::filesystem
   Fit fit{name, {}, {}};
   for (const PipelineNode& node : pipeline.nodes)
     if (node.id == id) fit.missing = missing_for(node, arguments);
-  // What is missing is a fault, too. A pipeline that lacks nothing else can be completed.
+  // Each missing thing is a fault too. If there are no other faults, the pipeline can be completed.
   if (faults.size() > fit.missing.size())
     for (const Diagnostic& fault : faults.sorted()) fit.faults.push_back(fault.message);
   return fit;

@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// An open folder; what is locked through it is given back when it is closed.
+/// An open folder. Closing it releases its locks.
 struct OpenFolder {
   explicit OpenFolder(const fs::path& folder)
       : descriptor(open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC)) {}
@@ -38,7 +38,7 @@ bool is_still(const OpenFolder& open_folder, const fs::path& folder) {
 std::shared_ptr<const void> use_folder(const fs::path& folder) {
   auto held = std::make_shared<OpenFolder>(folder);
   if (held->descriptor < 0) return nullptr;
-  // Who removes a folder holds it alone while it is renamed, no longer.
+  // This wait is short: a process that removes a folder locks it only while it renames it.
   while (flock(held->descriptor, LOCK_SH) != 0 && errno == EINTR) continue;
   return is_still(*held, folder) ? held : nullptr;
 }

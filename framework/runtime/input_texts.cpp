@@ -9,7 +9,7 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostBytes = 256'000;  // a long value that is named often would fill memory, terminal and records
+constexpr std::size_t kMostBytes = 256'000;  // else a long value that is named often fills memory, terminal and records
 
 }  // namespace
 

@@ -8,23 +8,24 @@
 
 namespace marrow {
 
-/// Puts the values of a pipeline's inputs where texts name them, as $name; $$ is a dollar.
+/// Replaces $name in a text by the value of the pipeline's input of that name. $$ stands for a dollar.
 class InputTexts {
  public:
   InputTexts(const WrittenPipeline& pipeline, Diagnostics& diagnostics)
       : pipeline_(pipeline), diagnostics_(diagnostics) {}
 
-  /// Nothing where a name has no value: an unknown one is a fault, one that may still be given is none.
+  /// Returns nothing if a name has no value. A name that the pipeline does not declare is a fault. A declared input
+  /// without a value is not.
   std::optional<std::string> put_into(const std::string& text, const Place& place);
 
-  std::set<std::string> used, unknown;  ///< names so far
+  std::set<std::string> used, unknown;  ///< names found so far
 
  private:
   const std::string* value_of(const std::string& name, const Place& place);
 
   const WrittenPipeline& pipeline_;
   Diagnostics& diagnostics_;
-  std::size_t bytes_ = 0;  ///< put in so far
+  std::size_t bytes_ = 0;  ///< bytes of values put in so far
 };
 
 }  // namespace marrow

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kMostLevels = 64;
 
-/// How deep lists and objects are nested; brackets inside texts do not count.
+/// How deep lists and objects are nested. Brackets inside texts do not count.
 int levels_of(const std::string& text) {
   int level = 0, most = 0;
   bool in_text = false;
@@ -35,7 +35,7 @@ std::string place_in(const std::string& text, std::size_t byte) {
   return std::to_string(line) + ":" + std::to_string(before == std::string::npos ? at + 1 : at - before);
 }
 
-/// From the leaves up: an empty list or object ends without allocating.
+/// Clears the leaves first, because the destructor of an empty list or object does not allocate.
 void take_apart(nlohmann::json& value) {
   if (!value.is_structured()) return;
   for (nlohmann::json& item : value) take_apart(item);

@@ -23,8 +23,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What tells one state of a file from another: a write changes the time of its last change, which nobody can set.
-/// Where the file is mapped into memory, only the first write after write_back() does.
+/// What distinguishes two states of a file. A write changes the time of the file's last change, which no program can
+/// set. If the file is mapped into memory, only the first write after write_back() changes it.
 struct FileState {
   dev_t device = 0;
   ino_t number = 0;
@@ -45,18 +45,18 @@ std::optional<FileState> state_of(const fs::path& file) {
   return FileState{status.st_dev, status.st_ino, status.st_size, status.st_mtim, status.st_ctim};
 }
 
-/// Brings what was written through memory to the file, so that the next such write changes the file's time.
+/// Flushes what was written through memory maps to the file, so that the next such write changes the file's time.
 void write_back(const fs::path& file) {
   struct stat status {};
   if (stat(file.c_str(), &status) != 0 || !S_ISREG(status.st_mode)) return;
   const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
-  if (descriptor < 0) return;  // who reads it says why
+  if (descriptor < 0) return;  // whoever reads the file says why
   sync_file_range(descriptor, 0, 0, SYNC_FILE_RANGE_WAIT_BEFORE | SYNC_FILE_RANGE_WRITE | SYNC_FILE_RANGE_WAIT_AFTER);
   close(descriptor);
 }
 
-/// A file that was changed just now may change again within the resolution of its time; one that lies in memory alone
-/// may change without any other time.
+/// Whether each later change of the file will show in its state. A file that was changed just now may change again
+/// within the resolution of its time. A file that is in memory only may change without a new time.
 bool is_settled(const fs::path& file, const FileState& state) {
   struct statfs system {};
   if (statfs(file.c_str(), &system) != 0 || system.f_type == TMPFS_MAGIC || system.f_type == RAMFS_MAGIC) return false;
@@ -97,12 +97,12 @@ PathContent content_of(const std::string& path) {
   std::error_code error;
   const bool is_folder = !is_itself && fs::is_directory(path, error);
   content.is_there = is_itself || is_folder;
-  // The kind and the number keep a file apart from a folder that holds it alone, and what one path names from what the
-  // next does.
+  // The kind distinguishes a file from a folder that holds only this file. The number of files separates what one path
+  // names from what the next one names.
   hasher.add(std::string(is_itself ? "file" : is_folder ? "folder" : "absent"));
   hasher.add(std::uint64_t(files.size()));
   for (const NamedFile& file : files) {
-    // The name may decide what is made of the content: how it is read, or what an item is called.
+    // The name may decide what is made of the content: how it is read, or how an item is called.
     hasher.add(is_itself ? fs::path(path).filename().string() : file.name);
     const Digest digest = file.is_there ? digest_once(file.file) : Digest{};
     hasher.add(digest);

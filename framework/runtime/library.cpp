@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loading plugin libraries, and describing them without trusting them.
+// Loads plugin libraries, and describes them without trusting them.
 #include "marrow/runtime/library.hpp"
 
 #include <dlfcn.h>
@@ -28,7 +28,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr int kDescribeLimit_s = 20, kDescribeLimit_mb = 4096;
 
-/// What differs between the plugin's stamp and ours, in words with both values and the cure; empty when they agree.
+/// What differs between the plugin's stamp and ours, in words, with both values and what to do; empty if they agree.
 std::string stamp_mismatch(const AbiStamp& theirs) {
   constexpr AbiStamp ours = abi_stamp();
   const auto differs = [](const std::string& what, const std::string& got, const std::string& expected,
@@ -80,11 +80,11 @@ const PluginEntry& checked_entry(void* handle) {
   return *entry;
 }
 
-/// What an initialiser throws must not pass through the loader: that would keep its lock, and the next load would wait
-/// for ever.
+/// An exception of a library's initialiser must not pass through the loader. The loader would keep its lock, and the
+/// next load would wait for ever. So this function is noexcept: the process ends.
 void* load_without_throwing(const char* path, int mode) noexcept {
-  // dlopen is declared as a function that throws nothing. A compiler that knows this leaves out the end of the process
-  // here.
+  // dlopen is declared as a function that does not throw. A compiler that sees this omits the code that ends the
+  // process here, so dlopen is called through a volatile pointer.
   void* (*volatile load)(const char*, int) = dlopen;
   return load(path, mode);
 }
@@ -115,7 +115,7 @@ void add_registered(const Plugin& plugin, LibraryInfo& info) {
   for (const WriterDefinition& writer : plugin.writers) info.writers.push_back(writer.info);
 }
 
-/// Runs in a worker: what the library holds, or a refusal.
+/// Runs in a worker. Returns what the library holds, or a refusal.
 LibraryInfo describe_here(const fs::path& file) {
   LibraryInfo info;
   try {
@@ -123,7 +123,7 @@ LibraryInfo describe_here(const fs::path& file) {
     try {
       handle = open_library(file, RTLD_NOW);
     } catch (const Error&) {
-      // With lazy binding a library whose symbols do not fit can still say with what it was built, which is the better
+      // With lazy binding, a library whose symbols do not fit can still say what it was built with. That is the better
       // reason.
       checked_entry(open_library(file, RTLD_LAZY));
       throw;
@@ -140,7 +140,7 @@ LibraryInfo describe_here(const fs::path& file) {
   return info;
 }
 
-/// What a library said of itself is checked as strictly as any manifest.
+/// What a library says about itself is checked as strictly as a manifest.
 LibraryInfo described(const std::string& text) {
   LibraryInfo info;
   try {
@@ -151,7 +151,8 @@ LibraryInfo described(const std::string& text) {
   return info;
 }
 
-/// Loads a library in a worker; the answer may be a refusal. Throws Error where there is none.
+/// Loads a library in a worker and describes it. The description may be a refusal. Throws Error if no worker can be
+/// started.
 LibraryInfo describe_apart(const fs::path& file) {
   Worker worker({{worker_program().string()}});
   worker.ask({{"do", "describe"}, {"library", json_of_bytes(file.string())}});
@@ -174,7 +175,7 @@ LibraryInfo describe_apart(const fs::path& file) {
   return info;
 }
 
-/// What a loaded library registers, and the libraries that it found.
+/// What a loaded library registers, and the libraries that it links.
 LibraryInfo registered(const Plugin& plugin, void* handle) {
   LibraryInfo info;
   add_registered(plugin, info);
@@ -182,7 +183,7 @@ LibraryInfo registered(const Plugin& plugin, void* handle) {
   return info;
 }
 
-/// By name, size and what is in them.
+/// Libraries by name, size and identity.
 using Versions = std::set<std::tuple<std::string, std::uint64_t, Digest>>;
 
 Versions versions_of(const std::vector<LinkedLibrary>& libraries) {
@@ -192,8 +193,8 @@ Versions versions_of(const std::vector<LinkedLibrary>& libraries) {
   return result;
 }
 
-/// Everything before the load went by the description: options were checked and set, and keys were made. Where it is
-/// not what the library registers, nothing of the library may be called.
+/// Throws Error if a library does not register what its description says. Options were checked and set, and keys were
+/// made, from the description. So nothing of such a library may be called.
 void expect_described(const LibraryInfo& described, const LibraryInfo& registered) {
   std::string found = difference(described, registered);
   const Versions before = versions_of(described.linked), now = versions_of(registered.linked);

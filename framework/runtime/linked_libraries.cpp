@@ -21,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 constexpr std::size_t kMostNote_bytes = 1 << 16;
 
-/// What the loader knows of a library: its own name, and the names of those that it links.
+/// What the loader knows about a library: its own name, and the names of those that it links.
 struct Names {
   std::string own;
   std::vector<std::string> needed;
@@ -32,7 +32,7 @@ Names names_of(const link_map* library) {
   const char* texts = nullptr;
   for (const ElfW(Dyn)* d = library->l_ld; d && d->d_tag != DT_NULL; ++d)
     if (d->d_tag == DT_STRTAB) texts = reinterpret_cast<const char*>(d->d_un.d_ptr);
-  // The kernel's own library has a place from its beginning there, not an address.
+  // The kernel's own library has an offset from its beginning there, not an address.
   if (!texts || reinterpret_cast<std::uintptr_t>(texts) < library->l_addr) return names;
   for (const ElfW(Dyn)* d = library->l_ld; d->d_tag != DT_NULL; ++d) {
     if (d->d_tag == DT_SONAME) names.own = texts + d->d_un.d_val;
@@ -41,13 +41,13 @@ Names names_of(const link_map* library) {
   return names;
 }
 
-/// All libraries that are loaded, by the names under which others may need them, in the order of loading.
+/// All loaded libraries, in the order of loading, and by the names under which others may need them.
 class Loaded {
  public:
   explicit Loaded(const link_map* any) {
     while (any->l_prev) any = any->l_prev;
     for (const link_map* library = any; library; library = library->l_next) {
-      if (!library->l_name || !*library->l_name) continue;  // the program
+      if (!library->l_name || !*library->l_name) continue;  // the program itself
       order_.push_back(library);
       const Names names = names_of(library);
       for (const std::string& name : {fs::path(library->l_name).filename().string(), names.own})
@@ -60,7 +60,8 @@ class Loaded {
       if (const auto found = by_name_.find(name); found != by_name_.end()) needed.insert(found->second);
     return needed;
   }
-  /// Of a library and all that it needs; what is in `known` already is not followed.
+  /// Adds all libraries that a library needs, directly or indirectly. Does not go into libraries that are in `known`
+  /// already.
   void add_all(const link_map* library, std::set<const link_map*>& known) const {
     for (const link_map* one : needed_by(library))
       if (known.insert(one).second) add_all(one, known);
@@ -91,7 +92,7 @@ bool is_of_the_system(const std::string& library) {
   return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
 }
 
-/// The note that the linker leaves in each build, or an empty text.
+/// The build id that the linker writes into each build as a note, or an empty text.
 std::string build_note(const RegularFile& file) {
   Elf64_Ehdr header{};
   if (file.read(&header, sizeof header, 0) < sizeof header || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||

@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The libraries that a plugin needs, which change its results as much as its own code does.
+// The libraries that a plugin needs. They can change its results as much as its own code can.
 #include "marrow/runtime/library.hpp"
 
 namespace marrow {
 
-/// What a loaded library needs, with the files that were loaded: what it links itself, and what that needs in turn.
-/// Without the framework, and without what only the framework needs: framework_libraries() are those.
+/// The libraries that a loaded library needs, with the files that were loaded: those that it links itself, and those
+/// that they need in turn. The framework is left out. Libraries that the framework needs (framework_libraries()) are
+/// left out too, unless the library links them itself.
 std::vector<LinkedLibrary> linked_libraries(void* handle);
 
-/// What the framework needs in this process, directly or not.
+/// The libraries that the framework needs in this process, directly or indirectly.
 const std::vector<LinkedLibrary>& framework_libraries();
 
-/// Packages are told apart by the number that each build of a library gets (its GNU build id), where one has none by
-/// size and time. What people build themselves counts by its content. The file's name is part of it.
+/// The identity of a library. It includes the name of the file. For a library of the system, it also includes the size
+/// and the GNU build id, which each build gets; if there is no build id, the time of the file. For a library that
+/// people build themselves, it includes the content. Throws Error if the file cannot be read.
 Digest identity_of(const LinkedLibrary& library);
 
-/// Where LD_LIBRARY_PATH holds another file of the same name, up to the version; else empty. The loader may prefer
-/// that.
+/// Another file in LD_LIBRARY_PATH that has the same name up to the version; empty if there is none. The loader may
+/// prefer that file.
 std::string found_before(const LinkedLibrary& library);
 
-/// Of what the loader searches first: LD_LIBRARY_PATH, LD_PRELOAD and which libraries there are.
+/// Digest of what the loader searches first: LD_LIBRARY_PATH, LD_PRELOAD, and the names of the libraries in
+/// LD_LIBRARY_PATH.
 Digest search_digest();
 
 }  // namespace marrow

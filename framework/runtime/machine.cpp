@@ -13,7 +13,7 @@
 namespace marrow {
 namespace {
 
-/// What OpenCV and the C library choose their code by.
+/// The features of the processor by which OpenCV and the C library choose their code.
 std::string processor_features() {
   std::string features = cpu_level();
 #if defined(__x86_64__)
@@ -38,8 +38,9 @@ std::string processor_features() {
   return features;
 }
 
-/// OpenCV's switches for the processor's features, the choice of code of two libraries of linear algebra that OpenCV
-/// may call, and libraries that are put before all others.
+/// Whether an environment variable counts. Those that do are OpenCV's switches for the processor's features, the choice
+/// of code in two libraries of linear algebra that OpenCV may call, and the libraries that are loaded before all
+/// others.
 bool counts(std::string_view variable) {
   if (variable.starts_with("OPENCV_LOG")) return false;
   for (const char* beginning : {"OPENCV_", "OPENBLAS_CORETYPE=", "MKL_CBWR=", "LD_PRELOAD="})
@@ -47,8 +48,8 @@ bool counts(std::string_view variable) {
   return false;
 }
 
-/// The C library's switches for the processor's features, among others that change no result: worker processes set one
-/// of those.
+/// Adds the C library's switches for the processor's features. Its other switches do not change results; worker
+/// processes set one of those.
 void add_switches(std::string_view tunables, std::set<std::string>& variables) {
   std::istringstream stream{std::string(tunables)};
   for (std::string one; std::getline(stream, one, ':');)

@@ -4,8 +4,9 @@
 
 namespace marrow {
 
-/// Of all outside of marrow and its libraries that may change the last digits of a result: what the processor can do,
-/// since libraries choose their code by it, and the variables of the environment that make them choose other code.
+/// Digest of everything outside of marrow and its libraries that may change the last digits of a result. It covers the
+/// features of the processor, by which libraries choose their code, and the environment variables that change this
+/// choice.
 Digest machine_digest();
 
 }  // namespace marrow

@@ -71,7 +71,8 @@ json json_of(const WriterInfo& writer) {
 
 [[noreturn]] void damaged(const std::string& what) { throw Error("it is damaged: " + what); }
 
-/// An object of the manifest: each of its fields is there, has its type, and is read.
+/// Reads an object of the manifest. Checks that it has the expected number of fields, and that each field is there with
+/// the right type.
 class Fields {
  public:
   Fields(const json& object, std::string name, std::size_t count) : object_(object), name_(std::move(name)) {
@@ -158,7 +159,7 @@ OptionValue default_from(const Fields& fields, OptionType type) {
   }
 }
 
-/// The place of a text in a list of names.
+/// The index of a text in a list of names.
 template <std::size_t Count>
 int one_of(const char* const (&names)[Count], const std::string& text, const std::string& what) {
   const auto found = std::find(std::begin(names), std::end(names), text);
@@ -190,7 +191,7 @@ RelationInfo relation_from(const json& j) {
   return {RelationType(one_of(kRelationTypes, fields.text("type"), "relation")), fields.texts("names")};
 }
 
-/// Held to the same rules as when a library registers it.
+/// The node must obey the same rules as when a library registers it.
 NodeInfo node_from(const json& j) {
   const Fields fields(j, "a node", 8);
   NodeDefinition node;
@@ -214,7 +215,7 @@ KindPort kind_port_from(const json& j) {
   return port;
 }
 
-/// Held to the same rules as when a library registers it.
+/// The kind must obey the same rules as when a library registers it.
 KindInfo kind_from(const json& j) {
   const Fields fields(j, "a kind", 8);
   KindDefinition kind;
@@ -266,7 +267,7 @@ json parsed(const std::string& text) {
   }
 }
 
-/// Takes the checksum out of the document that it belongs to.
+/// Checks the version and the checksum. Removes the checksum from the document, because it does not cover itself.
 void check(json& j) {
   if (!j.is_object()) damaged("it is not an object");
   if (!j.contains("marrow_manifest") || j["marrow_manifest"] != kManifestVersion)
@@ -277,7 +278,7 @@ void check(json& j) {
   if (hash_of(j.dump()).hex() != checksum) throw Error("it was edited by hand");
 }
 
-/// Where two documents part; `path` names the place.
+/// The first difference between two documents. `path` names the place.
 std::string difference(const json& described, const json& registered, const std::string& path) {
   if (described == registered) return "";
   const bool lists = described.is_array() && registered.is_array() && described.size() == registered.size();

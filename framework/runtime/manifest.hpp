@@ -8,15 +8,15 @@ namespace marrow {
 
 nlohmann::json json_of(const OptionValue& value);
 nlohmann::json json_of(const NodeInfo& node);
-/// The whole description, with a checksum over the rest, so that an edited one is noticed.
+/// The text of a manifest: the whole description, with a checksum by which an edited manifest is noticed.
 std::string manifest_text(const LibraryInfo& info);
 constexpr std::size_t kMostManifest_bytes = 4 << 20;
-/// What it returns could have been registered by a library: every type, range and default is checked. Throws Error,
-/// which begins with "it", for any other text.
+/// Reads the text of a manifest. Every type, range and default is checked, so that a library could have registered what
+/// is returned. Throws Error, with a text that begins with "it", for any other text.
 LibraryInfo manifest_from_text(const std::string& text);
 
-/// The first thing in which what a library registers is not what its description says, with both values; empty when
-/// there is none. The files that it was described with do not count.
+/// The first difference between what a library registers and its description, with both values; empty if there is none.
+/// The files of the library, and of those that it links, are not compared.
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered);
 
 const char* option_type_name(OptionType type);

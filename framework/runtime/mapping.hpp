@@ -7,16 +7,17 @@
 
 namespace marrow {
 
-/// The item of that name along the value's outermost axis. Throws Error naming the ones there are.
+/// The item of that name along the value's outermost axis. Throws Error with the nearest known names if there is none.
 Value picked(const Value& value, const std::string& item, const std::string& reference);
 
-/// The names along an axis, wherever in the nest it is; empty where the value has no such axis.
+/// The names along an axis, at any level of nested lists; empty if the value has no such axis.
 std::vector<std::string> names_along(const Value& value, const std::string& axis);
 
-/// The value with one position taken along an axis; unchanged where it has no such axis.
+/// The value at one position along an axis; unchanged if the value has no such axis.
 Value sliced(const Value& value, const std::string& axis, std::size_t index);
 
-/// What identifies a value for the key of what uses it: its own key, or the keys and names of its items.
+/// The key of a value, as part of the keys of the nodes that use it. It is the value's own key. For a list, it is made
+/// from the axis and from the names and keys of the items.
 Digest key_of(const Value& value);
 
 }  // namespace marrow

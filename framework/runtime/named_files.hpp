@@ -8,21 +8,21 @@
 
 namespace marrow {
 
-/// A file below a path, with its name from there; ".": the path itself.
+/// A file below a path, with its name relative to the path. The name "." means the path itself.
 struct NamedFile {
   std::filesystem::path file;
   std::string name;
-  bool is_there = true;  ///< false for a link that leads nowhere
+  bool is_there = true;  ///< false if it is a link to nothing, or not a regular file
 };
 
-/// All regular files that a path names: itself, or all below it, sorted. Empty where there is nothing. A node may open
-/// these and no other, since they are what its key counts. Throws Error for what would be missed: a folder that cannot
-/// be read, and links inside a folder that lead out of it or to another folder.
+/// All regular files that a path names, sorted: the path itself, or all files below it. Empty if there is nothing. A
+/// node may open only these files, because only they count in its key. Throws Error if a folder cannot be read, and for
+/// links inside a folder that lead out of it or to another folder, because files would be missed.
 std::vector<NamedFile> files_named_by(const std::filesystem::path& path);
 
-/// The texts of one of a node's options; none where it is not of type path.
+/// The paths that one of a node's options names; none if it is not of type path.
 std::vector<std::string> paths_of(const PipelineNode& node, std::size_t option);
-/// The texts of a node's options of type path that name something.
+/// The paths that all options of a node name, without empty ones.
 std::vector<std::string> paths_of(const PipelineNode& node);
 
 }  // namespace marrow

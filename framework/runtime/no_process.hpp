@@ -4,14 +4,15 @@
 
 namespace marrow {
 
-/// The system grants no further process or thread, as at a limit: the fault of the surroundings, of no node.
+/// Thrown if the system does not start another process or thread, for example because of a limit. This is a fault of
+/// the environment and not of a node.
 class NoProcess : public Error {
  public:
   using Error::Error;
 };
 
-/// How often a call of a node, or a whole run, failed by that in this process. A comparison must not hold it against a
-/// method.
+/// How often a call of a node, or a whole run, failed for this reason in this process. A comparison must not count this
+/// as a failure of a method.
 long calls_without_process();
 void note_call_without_process();
 

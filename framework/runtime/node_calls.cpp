@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How a node's inputs become its calls, and what these came to its status and its outputs.
+// Makes a node's calls from its inputs, and its status and outputs from the results of the calls.
 #include "node_calls.hpp"
 
 #include <algorithm>
@@ -21,8 +21,8 @@ std::string short_name(const Pipeline& pipeline, const Reference& source) {
   return source.items.empty() ? pipeline.nodes[std::size_t(source.node)].id : source.items.back();
 }
 
-/// A list port may be given one item, which then is a list of one; inside other axes, at their ends. `name`: of the
-/// item.
+/// Makes a list of one from a single item, because a list port may be given one item. If the value has other axes, this
+/// is done for each innermost item. `name` is the name of the item.
 Value as_list_of_one(const Value& value, const std::string& name, const std::string& axis) {
   Value result = value;
   if (value.is_list()) {
@@ -118,7 +118,7 @@ void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t i
     std::vector<std::string> names;
     std::string first;
     for (std::size_t i = 0; i < inputs.size(); ++i) {
-      if (node.info.inputs[i].axis == axis) continue;  // consumed whole
+      if (node.info.inputs[i].axis == axis) continue;  // the node takes the whole list
       const std::vector<std::string> along = names_along(inputs[i], axis);
       if (along.empty()) continue;
       if (names.empty()) {
@@ -129,7 +129,7 @@ void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t i
                     "': the first has " + list_text(names) + ", the second " + list_text(along));
       }
     }
-    if (names.empty()) names = {""};  // its list is absent as a whole
+    if (names.empty()) names = {""};  // the whole list is absent
     made.names.push_back(std::move(names));
   }
   spread(node, inputs, 0, "", made);
@@ -144,7 +144,7 @@ std::string obstacle(const PipelineNode& node, const Call& call, Status& status)
       for (const Value& item : value->items) leaves.push_back(&item);
       if (!value->is_absent()) continue;
       status = Status::not_run;
-      if (!value->missing.empty()) return value->missing;  // the first cause, however far off
+      if (!value->missing.empty()) return value->missing;  // the first cause, however many nodes back
       status = Status::skipped;
       if (!port.optional) return "there is no '" + port.name + "'";
     }
@@ -153,12 +153,12 @@ std::string obstacle(const PipelineNode& node, const Call& call, Status& status)
 }
 
 void set_status(const std::vector<Call>& calls, NodeRecord& record) {
-  // A node all of whose calls are deferred is not needed until something that runs asks for what it makes.
+  // If all calls of a node are deferred, the node is not needed until a node that runs asks for what it makes.
   const bool deferred = !calls.empty() && std::all_of(calls.begin(), calls.end(),
                                                       [](const Call& call) { return call.result.is_deferred; });
   record.status = deferred ? Status::not_needed : Status::done;
   for (const Call& call : calls) {
-    // The worst of its calls is the node's status; `failed` outranks what follows from other failures.
+    // The node gets the status of its worst call. `failed` is worse than what follows from failures of other nodes.
     static constexpr Status kOrder[] = {Status::failed, Status::cancelled, Status::not_run, Status::skipped};
     for (Status status : kOrder)
       if (call.result.status == status && rank(status) > rank(record.status)) {

@@ -13,16 +13,18 @@ struct NodeCalls {
   std::vector<std::vector<std::string>> names;  ///< along each mapped axis
 };
 
-/// Gathers the node's inputs and spreads them over the mapped axes. Throws Error where lists do not go in step.
+/// Collects the node's inputs and makes a call for each item along the mapped axes. Throws Error if two lists have
+/// different names along an axis.
 void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t index, NodeCalls& made);
 
-/// Why a call cannot be made, or an empty text. Sets `skipped` where an input simply is not there.
+/// Why a call cannot be made, or an empty text. If it cannot be made, `status` is set: skipped if an input simply does
+/// not exist, not_run if it could not be made.
 std::string obstacle(const PipelineNode& node, const Call& call, NodeRecord::Status& status);
 
-/// What the calls came to: the node's status, with the reason of anything but done.
+/// Sets the status of the node from its calls, with the reason if it is not done.
 void set_status(const std::vector<Call>& calls, NodeRecord& record);
 
-/// One output of the node, a nest of lists along the mapped axes.
+/// One output of the node: nested lists along the mapped axes.
 Value output_of(const PipelineNode& node, const NodeCalls& made, std::size_t output);
 
 }  // namespace marrow

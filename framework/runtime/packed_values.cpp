@@ -20,7 +20,7 @@ constexpr int kMostAxes = 8;
 
 constexpr std::size_t kLarge = std::size_t(1) << 20;
 
-/// At the end of the file: where the description is.
+/// The end of the file. It says where the description is.
 struct Trailer {
   std::uint64_t magic = 0x32766f7272616d00;
   std::uint64_t begin = 0, size = 0;
@@ -28,12 +28,12 @@ struct Trailer {
 
 /// A large piece of a value, in the memory of the process that made it.
 struct Piece {
-  std::uint64_t place = 0;  ///< in the value's packed data
+  std::uint64_t place = 0;  ///< offset in the value's packed data
   std::uint64_t address = 0, size = 0;
   static constexpr auto fields() { return std::make_tuple(&Piece::place, &Piece::address, &Piece::size); }
 };
 
-/// Gathers small pieces; larger ones go straight to the file, or are noted by their address.
+/// Gathers small pieces. Larger ones are written to the file directly, or only their addresses are noted.
 class FilePacker : public Archive {
  public:
   FilePacker(int descriptor, bool in_place) : descriptor_(descriptor), in_place_(in_place) {
@@ -57,9 +57,9 @@ class FilePacker : public Archive {
     put(gathered_.data(), gathered_.size());
     gathered_.clear();
   }
-  /// Bytes in the file.
+  /// Bytes for the file so far, including gathered ones.
   std::uint64_t written() const { return written_; }
-  /// Bytes of the value since begin(), and those of them that stayed in place.
+  /// Begins a value. After that, packed() is the number of its bytes, and pieces() are those that stayed in place.
   void begin() {
     packed_ = 0;
     pieces_.clear();
@@ -87,7 +87,7 @@ class FilePacker : public Archive {
   std::vector<Piece> pieces_;
 };
 
-/// Reads the packed data of one value: what lies in the file, and pieces from the other process.
+/// Reads the packed data of one value, from the file and from pieces in the memory of the other process.
 class PieceUnpacker : public Unpacker {
  public:
   PieceUnpacker(std::string_view in_file, std::vector<Piece> pieces, std::uint64_t size, pid_t process)
@@ -211,7 +211,7 @@ class Reader {
     return value;
   }
 
-  /// That the pieces lie one behind the other and, with what is in the file, are the whole.
+  /// Checks that the pieces follow each other, and that together with the bytes in the file they are the whole value.
   static void check_pieces(const std::vector<Piece>& pieces, std::uint64_t in_file, std::uint64_t size) {
     std::uint64_t end = 0, left = size;
     for (const Piece& piece : pieces) {
@@ -227,7 +227,7 @@ class Reader {
   const ContentOf& content_of_;
 };
 
-/// The whole file in memory of our own: the other process may still write to it.
+/// Copies the whole file to our own memory, because the other process may still write to the file.
 std::string contents_of(int descriptor) {
   std::string bytes(std::size_t(bytes_in(descriptor)), '\0');
   for (std::size_t done = 0; done < bytes.size();) {

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Values handed from one process to another: the packed data of one after the other, then their description, then where
-// it is. Small pieces lie in memory that both share. Large ones are copied once, from one process's memory into the
-// other's.
+// Hands values from one process to another. A file has the packed data of the values one after the other, then their
+// description, then the place of the description. Small pieces are in memory that both processes share. Large pieces
+// are copied once, from the memory of one process to that of the other.
 #include <sys/types.h>
 
 #include <functional>
@@ -14,7 +14,7 @@
 
 namespace marrow {
 
-/// Memory without a name, as an open file. Throws Error.
+/// Memory without a name, as an open file. Throws Error if it cannot be made.
 class SharedMemory {
  public:
   SharedMemory();
@@ -27,27 +27,28 @@ class SharedMemory {
   int descriptor_;
 };
 
-/// Writes values into an open file. Large pieces stay where they are when `in_place`: only their addresses are written,
-/// and the values must stay until they were read. Throws Error for functions, and where the file cannot take them.
+/// Writes values to an open file. With `in_place`, large pieces stay where they are and only their addresses are
+/// written; the values must then stay until they are read. Throws Error for functions, and if the file cannot be
+/// written.
 void write_values(int descriptor, const std::vector<Value>& values, bool in_place);
 
 /// How many bytes the file holds.
 std::uint64_t bytes_in(int descriptor);
 
-/// Knows how data of a type are unpacked; nullptr for a type that is not known.
+/// Returns the Content that unpacks data of a type; nullptr for a type that is not known.
 using ContentOf = std::function<const Content*(const TypeInfo&)>;
 
-/// Thrown where the memory of the other process cannot be read: the system does not allow it, or it is gone.
+/// Thrown if the memory of the other process cannot be read: the system does not allow it, or the process is gone.
 class NoAccess : public Error {
  public:
   using Error::Error;
 };
 
-/// Reads values back; pieces that stayed in place are read from the memory of `process`. Throws Error for bytes that
-/// write_values() did not write, whatever they are.
+/// Reads values back. Pieces that stayed in place are read from the memory of `process`. Throws Error for any bytes
+/// that write_values() did not write, and NoAccess if that memory cannot be read.
 std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& content_of);
 
-/// The content of marrow's own types; nullptr for others.
+/// The Content of marrow's own types; nullptr for other types.
 const Content* content_of_own(const TypeInfo& type);
 
 }  // namespace marrow

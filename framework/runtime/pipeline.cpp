@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// From a written pipeline to a checked graph: names looked up, options converted, wires typed, axes found.
+// Makes a checked graph from a written pipeline: looks up names, converts options, checks the types of wires, finds
+// axes.
 #include "marrow/runtime/pipeline.hpp"
 
 #include <algorithm>
@@ -27,7 +28,7 @@ std::string with_article(const std::string& noun) { return (noun.find_first_of("
 
 class Resolver {
  public:
-  /// `is_trial`: whether the result is only asked for its faults.
+  /// `is_trial`: only the faults of the result are of interest.
   Resolver(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics, bool is_trial = false)
       : written_(written),
         catalogue_(catalogue),
@@ -103,7 +104,7 @@ class Resolver {
                          suggested(diagnostics_, name, names_of(of_kind)));
         continue;
       }
-      // A port that only siblings use is checked like any other, and then left unwired.
+      // A port that only other nodes of the kind have is checked like any other, and then left unwired.
       Wire wire =
           resolve_wire(value, own ? KindPort{port->name, port->help, {port->type}, port->axis} : *sibling, index);
       if (!own) continue;
@@ -168,8 +169,8 @@ class Resolver {
     }
   }
 
-  /// Nodes with which the pipeline would have no fault, of the kinds of these two: "kind.one fits in place of
-  /// kind.other". Empty where there are none.
+  /// Nodes of the kind of `source`, or else of the kind of `user`, with which the pipeline would have no fault:
+  /// "kind.one fits in place of kind.other". Empty if there are none.
   std::string fitting(std::size_t source, std::size_t user) {
     for (const std::size_t index : {source, user}) {
       const std::vector<std::string>& names = names_that_fit(index);
@@ -185,8 +186,8 @@ class Resolver {
     return names.empty() ? "" : ", or use " + joined(names, ", ");
   }
 
-  /// Nodes of the same kind with which the whole pipeline would be good. Each is tried, so of few nodes only, and not
-  /// in very long pipelines.
+  /// Nodes of the same kind with which the whole pipeline would have no fault. All of them are tried, so this is done
+  /// only for a few nodes and not in very long pipelines.
   const std::vector<std::string>& names_that_fit(std::size_t index) {
     constexpr std::size_t kMostNodes = 300, kMostTried = 4;
     static const std::vector<std::string> kNone;
@@ -217,7 +218,8 @@ class Resolver {
         {name, resolve_reference(value.value.Scalar(), value.place, nullptr, pipeline_.nodes, ids_, diagnostics_)});
   }
 
-  /// Where a name is unknown, the slip may be at its definition: the nearest name, which nothing uses.
+  /// If a name is unknown, the typing error may be at its definition. So this points at the nearest defined name, if
+  /// nothing uses it.
   void point_at_renamed() {
     std::map<std::string, Place> nodes;
     for (const WrittenNode& node : written_.nodes) nodes.emplace(node.id, node.place);
@@ -241,13 +243,13 @@ class Resolver {
   const WrittenPipeline& written_;
   const Catalogue& catalogue_;
   Diagnostics& diagnostics_;
-  const bool tries_others_;  ///< not of a file that could not be read in full: its nodes may be half
+  const bool tries_others_;  ///< not if the file has faults: its nodes may be incomplete
   Pipeline pipeline_;
   NodeIds ids_;
   std::vector<std::string> node_names_;
   std::map<std::string, std::vector<KindPort>> ports_;
   UnknownValues unknown_values_;
-  std::map<std::size_t, std::vector<std::string>> fitting_;  ///< by node
+  std::map<std::size_t, std::vector<std::string>> fitting_;  ///< by the index of the node
   InputTexts input_texts_;
 };
 

@@ -19,7 +19,7 @@ bool contains(const std::vector<std::string>& list, const std::string& item) {
   return std::find(list.begin(), list.end(), item) != list.end();
 }
 
-/// Sources before users, in the file's order otherwise.
+/// Sorts sources before users, and otherwise keeps the order of the file.
 void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
   std::vector<PipelineNode>& nodes = pipeline.nodes;
   std::vector<std::size_t> stuck;

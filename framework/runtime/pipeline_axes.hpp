@@ -5,8 +5,8 @@
 
 namespace marrow {
 
-/// Sorts the nodes so that sources come before users, in the file's order otherwise, and finds the axes along which
-/// each is called. Needs a pipeline whose references are all resolved.
+/// Sorts the nodes so that sources come before users, and otherwise in the order of the file. Then finds the axes along
+/// which each node is called. All references of the pipeline must be resolved.
 void order_and_find_axes(Pipeline& pipeline, Diagnostics& diagnostics);
 
 }  // namespace marrow

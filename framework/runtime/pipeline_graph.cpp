@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a checked pipeline can tell of itself.
+// Queries about a checked pipeline, and its YAML.
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
@@ -9,7 +9,7 @@
 namespace marrow {
 namespace {
 
-/// An item of an option as it is written: a dollar in a text is doubled, so that it is not taken for the name of an
+/// An item of an option, as written in YAML. A dollar in a text is doubled, so that it does not begin the name of an
 /// input.
 template <class T>
 T written(const T& item) {

@@ -22,7 +22,8 @@ inline std::string joined(const std::vector<std::string>& list, const char* sepa
   return text;
 }
 
-/// A suggestion as long as faults are kept: thousands of unknown names among thousands of known ones take long.
+/// A suggestion, as long as faults are kept; then an empty text. Thousands of unknown names among thousands of known
+/// ones would take long.
 inline std::string suggested(const Diagnostics& diagnostics, const std::string& wrong,
                              const std::vector<std::string>& known) {
   return diagnostics.is_full() ? "" : suggestion(wrong, known);

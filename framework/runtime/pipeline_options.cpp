@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The values of a node's options, and what they must be to each other.
+// The values of a node's options, and the relations between them.
 #include "pipeline_options.hpp"
 
 #include <algorithm>

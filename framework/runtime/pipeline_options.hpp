@@ -8,15 +8,15 @@
 
 namespace marrow {
 
-/// Options whose values could not be read, by the nodes that they were written at.
+/// Options whose values could not be read, each with the node for which it was written.
 using UnknownValues = std::set<std::pair<const WrittenNode*, std::string>>;
 
-/// Gives `node` the values of its options: as written, converted and checked, or by default.
+/// Sets the options of `node`: to the values that are written, converted and checked, or to the defaults.
 void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts& input_texts, UnknownValues& unknown,
                      Diagnostics& diagnostics);
 
-/// Options against each other, where each of them could be read. The fault is shown at the last one that the file
-/// gives.
+/// Checks the relations between options. A relation is checked only if each of its options could be read. A fault is
+/// shown at the last of these options that the file gives.
 void check_relations(const WrittenNode& written, const PipelineNode& node, const UnknownValues& unknown,
                      Diagnostics& diagnostics);
 

@@ -6,8 +6,8 @@
 namespace marrow {
 
 std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, std::vector<std::size_t>& stuck) {
-  // As if one went through the file again and again, each time taking what has all its sources: a node is taken in the
-  // round of its latest source, or in the one after where that stands below it.
+  // The order is as if one went through the file in rounds, and in each round took the nodes that have all their
+  // sources. So a node is taken in the round of its latest source, or in the next round if that source stands below it.
   std::vector<std::vector<std::size_t>> users(nodes.size());
   std::vector<std::size_t> waiting_for(nodes.size()), round(nodes.size()), order;
   for (std::size_t i = 0; i < nodes.size(); ++i)

@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// The nodes with sources before users, in their own order otherwise. `stuck` gets those that wait for each other, or
-/// for such.
+/// The order of the nodes in which sources come before users, and which otherwise keeps the given order. `stuck`
+/// receives the nodes that wait for each other, and the nodes that wait for these.
 std::vector<std::size_t> pipeline_order(const std::vector<PipelineNode>& nodes, std::vector<std::size_t>& stuck);
 
 }  // namespace marrow

@@ -21,7 +21,8 @@ std::vector<std::string> split(const std::string& text) {
   return parts;
 }
 
-/// The output that a bare node's name means: its only one, or the only one of the wanted types.
+/// The output that a node's name alone means: its only output, or the only one of the wanted types. -1 if there is
+/// none.
 int default_output(const std::vector<PortInfo>& outputs, const std::vector<TypeInfo>* types, bool picks_item) {
   if (outputs.size() == 1) return 0;
   if (picks_item || !types) return -1;
@@ -54,7 +55,7 @@ Reference resolve_reference(const std::string& text, const Place& place, const s
   }
   const std::size_t index = found->second;
   const std::vector<PortInfo>& outputs = nodes[index].info.outputs;
-  if (outputs.empty()) return source;  // its node is unknown, which has been said
+  if (outputs.empty()) return source;  // its node is unknown; this was already reported
   std::size_t used = 1;
   int output = -1;
   for (std::size_t i = 0; i < outputs.size(); ++i)

@@ -204,8 +204,8 @@ class Reader {
       return;
     }
     if (what == "uses") {
-      // `with` was written for the node that is replaced: its options mean nothing to another one. Overrides are for
-      // this run, in any order.
+      // The options under `with` were written for the node that is replaced, so they mean nothing to another node.
+      // Overrides are meant for this run, so they are kept, in any order.
       const auto of_file = [](const auto& option) { return !option.second.is_override; };
       if (text != node->uses && std::erase_if(node->options, of_file) > 0)
         pipeline_.notes.push_back("node " + in_quotes(node->id) + ": the options written for " + node->uses +

@@ -11,13 +11,12 @@
 
 namespace marrow {
 
-/// A value as written, with the place it was written at and the folder that relative paths in it start from.
+/// A value as written, with its place and with the folder at which relative paths in it start.
 struct WrittenValue {
   Place place;
   YAML::Node value;
   std::filesystem::path folder;
-  bool is_override =
-      false;  ///< its text was cut out of where it was written, so that parts of it have no place of their own
+  bool is_override = false;  ///< from an override: the parts of its text have no places of their own
 };
 
 struct WrittenNode {
@@ -29,19 +28,19 @@ struct WrittenNode {
   std::vector<std::pair<std::string, WrittenValue>> wires;
 };
 
-/// A pipeline file as written, with the command line's overrides applied and before any name in it was looked up.
+/// A pipeline file as written, with the overrides applied. No name in it has been looked up yet.
 struct WrittenPipeline {
   std::string name, help;
   std::filesystem::path file;
   std::map<std::string, std::string> inputs;  ///< values, as texts
-  std::vector<std::string> missing_inputs;    ///< declared, with neither a value nor a default
+  std::vector<std::string> missing_inputs;    ///< inputs that are declared but have neither a value nor a default
   std::map<std::string, Place> input_places;  ///< where each is declared
   std::vector<WrittenNode> nodes;
   std::vector<std::pair<std::string, WrittenValue>> outputs;
   std::vector<std::string> notes;
 };
 
-/// Reads parts of a value, with faults at their places.
+/// A reader for the parts of a value. It reports faults at their places.
 inline StrictYaml yaml_of(const WrittenValue& value, Diagnostics& diagnostics) {
   return value.is_override ? StrictYaml(value.place, diagnostics) : StrictYaml(value.place.file, diagnostics);
 }

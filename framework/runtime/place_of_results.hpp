@@ -9,12 +9,12 @@
 
 namespace marrow {
 
-/// That `place`, to which a run writes, lies in no folder that a node of it reads: all files of that folder count, so
-/// that they would never be the same before and after. `what` and `advice` are for the sentence. Throws Error.
+/// Throws Error if `place`, to which a run writes, is in a folder that a node of the run reads. All files of that
+/// folder count, so its content would not be the same before and after. `what` and `advice` are parts of the message.
 void expect_nothing_reads(const Pipeline& pipeline, const std::filesystem::path& place, const std::string& what,
                           const std::string& advice);
 
-/// The first of the folders in which `place` lies, with all links followed; nothing where it lies in none.
+/// The first of the folders that contains `place`, with all links followed; nothing if none does.
 std::optional<std::filesystem::path> folder_that_holds(const std::vector<std::filesystem::path>& folders,
                                                        const std::filesystem::path& place);
 

@@ -12,7 +12,7 @@ fs::path plain_path(const fs::path& path) {
   fs::path plain = path.root_path();
   for (const fs::path& part : path.relative_path()) {
     const bool is_up = part == "..", is_root = plain.has_root_directory() && !plain.has_relative_path();
-    if (part.empty() || part == "." || (is_up && is_root)) continue;  // above the root is the root
+    if (part.empty() || part == "." || (is_up && is_root)) continue;  // the parent of the root is the root
     std::error_code error;
     const bool goes_with_it = is_up && plain.filename() != ".." && fs::is_directory(fs::symlink_status(plain, error));
     if (goes_with_it)

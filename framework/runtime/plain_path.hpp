@@ -4,8 +4,9 @@
 
 namespace marrow {
 
-/// The path without '.' and, where that leaves its meaning alone, without '..': a folder that is there and is no link
-/// goes together with the '..' after it. After a link, '..' stays, for the system goes up from where the link leads.
+/// The path without '.', and without '..' if this does not change its meaning. A '..' is removed together with the
+/// folder before it, if that folder exists and is not a link. After a link, '..' stays, because the system goes up from
+/// the target of the link.
 std::filesystem::path plain_path(const std::filesystem::path& path);
 
 }  // namespace marrow

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Small enough to stay in a core's own cache between being copied and being hashed.
+/// Small enough to stay in the cache of a core between reading and hashing.
 constexpr std::size_t kBlock_bytes = 256 << 10;
 
 void expect_regular(const struct stat& status) {
@@ -46,11 +46,11 @@ bool write_all(int descriptor, const std::string& text) {
   return true;
 }
 
-/// A new file beside the one that it will replace; -1 with errno when there is none.
+/// Makes a new file next to the one that it will replace. Returns -1 with errno if it cannot be made.
 int make_temporary(const fs::path& file, mode_t mode, fs::path& temporary) {
   static std::atomic<unsigned> count{0};
   int descriptor = -1;
-  // A name may have been left by a killed process that had the same number.
+  // A killed process with the same number may have left a file of that name.
   for (int attempt = 0; attempt < 100 && descriptor < 0; ++attempt) {
     temporary = file.string() + "." + std::to_string(getpid()) + "-" + std::to_string(count++) + ".tmp";
     descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
@@ -62,8 +62,8 @@ int make_temporary(const fs::path& file, mode_t mode, fs::path& temporary) {
 }  // namespace
 
 RegularFile::RegularFile(const fs::path& file) {
-  // Looked at before it is opened, because opening a device may already do something, and again after, because it may
-  // have been replaced in between.
+  // The kind of the file is checked before it is opened, because opening a device may have an effect. It is checked
+  // again afterwards, because the file may have been replaced in between.
   if (stat(file.c_str(), &status_) != 0) throw unreadable();
   expect_regular(status_);
   descriptor_ = open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY);
@@ -97,7 +97,7 @@ void RegularFile::expect_unchanged() const {
   if (now.st_size != status_.st_size || !same(now.st_mtim, status_.st_mtim)) throw changed();
 }
 
-// Not mapped into memory: reading a mapped file that another program makes shorter ends the process.
+// The file is not mapped into memory. If another program makes a mapped file shorter, reading it ends the process.
 Digest digest_of(const RegularFile& file) {
   const auto block = std::make_unique_for_overwrite<char[]>(kBlock_bytes);
   Hasher hasher;
@@ -105,7 +105,7 @@ Digest digest_of(const RegularFile& file) {
   while (const std::size_t count = file.read(block.get(), kBlock_bytes, at)) {
     hasher.bytes(block.get(), count);
     at += count;
-    if (at > file.size()) break;  // it grows, perhaps for ever
+    if (at > file.size()) break;  // the file grows, perhaps for ever
   }
   if (at != file.size()) throw changed();
   file.expect_unchanged();

@@ -14,7 +14,8 @@ struct BrokenRelation {
   std::string hint;  ///< may be empty
 };
 
-/// Nothing where the relation holds. `value` gives an option's value; `is_wired` tells of an input.
+/// Checks a relation. Returns nothing if it holds. `value` returns the value of an option; `is_wired` says whether an
+/// input is wired.
 std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::string& node,
                                      const std::function<const OptionValue*(const std::string&)>& value,
                                      const std::function<bool(const std::string&)>& is_wired);

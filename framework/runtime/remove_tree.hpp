@@ -5,12 +5,12 @@
 
 namespace marrow {
 
-/// Where another file system, or a folder from elsewhere, is mounted on a path or below it: what that holds is somebody
-/// else's. Nothing where nothing is, or where the kernel does not tell.
+/// The place where another file system, or a folder from elsewhere, is mounted on a path or below it. What is there
+/// belongs to somebody else. Returns nothing if nothing is mounted, or if the kernel does not tell.
 std::optional<std::filesystem::path> mount_at_or_below(const std::filesystem::path& path);
 
-/// Removes a folder, or a file, with all that is below it; nothing where there is none. Throws Error where that fails,
-/// and, with nothing removed, where something is mounted there.
+/// Removes a folder or a file with everything below it. Does nothing if it does not exist. Throws Error if that fails.
+/// If something is mounted there, throws Error and removes nothing.
 void remove_tree(const std::filesystem::path& path);
 
 }  // namespace marrow

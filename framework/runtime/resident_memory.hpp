@@ -3,7 +3,8 @@
 
 namespace marrow {
 
-/// Memory that this process has now. Asks for none, for it is called where none may be left.
+/// Resident memory of this process, in units of 1e6 bytes. Allocates no memory, because it is called when there may be
+/// none left.
 double resident_memory_mb();
 
 }  // namespace marrow

@@ -59,13 +59,13 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
     return;
   }
   try {
-    fs::create_directories(file.parent_path());  // a list without any item that was made leaves no folder
+    fs::create_directories(file.parent_path());  // so a list of which no item was made has no folder
     catalogue.load_writer(value.type).write(value.data.get(), file.string());
     written.files.push_back(file.lexically_relative(root).string());
   } catch (const std::exception& error) {
     written.fault = error.what();
     std::error_code ignored;
-    fs::remove_all(file, ignored);  // half of it is worse than nothing
+    fs::remove_all(file, ignored);  // half a file is worse than none
   }
 }
 
@@ -79,7 +79,7 @@ std::string utc_now() {
 }
 
 /// The keys of the single items of a list, each with its place along the axes, in the order in which files are written.
-/// The place is written as the file's path is, so that no two items have the same.
+/// The place is written like the path of the file, so that no two items have the same place.
 void add_items(const Value& value, const std::string& place, json& items) {
   if (!value.is_list()) {
     items.push_back({place, value.key.hex()});
@@ -96,30 +96,29 @@ json items_of(const Value& value) {
   return items;
 }
 
-/// The keys of what the node's inputs were wired to.
+/// The keys of the values that the node's inputs were wired to.
 json inputs_of(const PipelineNode& node, const RunResult& result) {
   json inputs = json::object();
   for (const Wire& wire : node.wires) {
     Hasher hasher;
     try {
       for (const Reference& source : wire.sources) hasher.add(key_of(value_of(result, source)));
-    } catch (const Error&) {  // an item that the list does not have: the node failed by it
+    } catch (const Error&) {  // the list does not have this item: the node failed
     }
     inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
   }
   return inputs;
 }
 
-/// The contents that the node's options of type path named when it read them; null for what was not there or not to be
-/// read.
+/// The digests of what the node's options of type path named when the node read it; null if it was missing or
+/// unreadable.
 json files_of(const NodeRecord& record) {
   json files = json::object();
   for (const auto& [option, content] : record.files) files[option] = content == Digest{} ? json() : json(content.hex());
   return files;
 }
 
-/// The contents of files that were written, so that it can be told when one is damaged later; null for what cannot be
-/// read.
+/// The digests of the files that were written, by which later damage can be found; null for what cannot be read.
 json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
   json digests = json::array();
   for (const std::string& file : files) try {
@@ -131,8 +130,8 @@ json digests_of(const fs::path& folder, const std::vector<std::string>& files) {
 }
 
 bool took_part(const NodeRecord& record) {
-  return record.status != NodeRecord::Status::not_needed ||
-         !record.outputs.empty();  // a function that nothing called has a key all the same
+  // A function has outputs with keys even if nothing called it.
+  return record.status != NodeRecord::Status::not_needed || !record.outputs.empty();
 }
 
 json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue& catalogue) {
@@ -216,8 +215,8 @@ RunFolder RunFolder::with_free_name(const fs::path& base, const Pipeline& pipeli
 
 bool RunFolder::take(const Pipeline& pipeline) {
   const fs::path log = folder_ / "log.txt";
-  const int file =
-      ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);  // succeeds for one process alone
+  // O_EXCL: this succeeds for one process only.
+  const int file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (file < 0 && errno == EEXIST) return false;
   if (file < 0)
     throw Error("cannot write to the output folder " + folder_.string() + ": " + std::strerror(errno) + kAdvice);
@@ -281,7 +280,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i], catalogue));
     record["nodes"].back()["inputs"] = inputs_of(pipeline.nodes[i], result);
   }
-  // What a file may use decides whether it is read at all.
+  // These limits decide whether a file is read at all.
   if (settings.file_limits.memory_mb > 0) record["file_memory_mb"] = settings.file_limits.memory_mb;
   if (settings.file_limits.seconds > 0) record["file_seconds"] = settings.file_limits.seconds;
   for (std::size_t i = 0; i < written.size(); ++i) {
@@ -290,7 +289,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     if (!written[i].fault.empty()) output["fault"] = written[i].fault;
     try {
       output["items"] = items_of(value_of(result, pipeline.outputs.at(i).source));
-    } catch (const Error&) {  // an item that its list does not have: that is its fault
+    } catch (const Error&) {  // the list does not have this item: `fault` says so
     }
     record["outputs"].push_back(std::move(output));
   }

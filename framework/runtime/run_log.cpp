@@ -26,7 +26,8 @@ spdlog::sink_ptr file_sink(const std::filesystem::path& file) try {
   throw Error("cannot write to " + file.string() + ": " + error.what());
 }
 
-/// As people read it beside the moving line of a run: the node in a column, the level where it is more than info.
+/// A line as it is shown on the terminal, together with the moving line of a run. The node is in a column; the level is
+/// shown if it is above info.
 std::string shown_line(LogLevel level, const std::string& where, const std::string& text) {
   const std::string named = level >= LogLevel::warning ? std::string(level_name(level)) + ": " : "";
   if (where.empty()) return "marrow: " + named + printable_lines(text);
@@ -55,7 +56,7 @@ struct RunLog::Loggers {
     });
     terminal.set_pattern("%^%v%$");
     terminal.set_level(spdlog::level::info);
-    terminal.set_error_handler([](const std::string&) {});  // nobody is left who could be told
+    terminal.set_error_handler([](const std::string&) {});  // there is nobody left to tell
   }
   mutable std::mutex mutex;
   std::string fault;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a run's result can be asked.
+// Queries about the result of a run.
 #include <algorithm>
 
 #include "mapping.hpp"

@@ -4,8 +4,8 @@
 
 namespace marrow {
 
-/// Sets `stopped` of each node that failed or was cancelled: how many nodes behind it were not called at all. A node
-/// behind several of them counts for each.
+/// Sets `stopped` of each node that failed or was cancelled: how many of the nodes that depend on it were not called at
+/// all. A node that depends on several of them counts for each.
 void count_stopped_nodes(const Pipeline& pipeline, std::vector<NodeRecord>& records);
 
 }  // namespace marrow

@@ -18,7 +18,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// What `last` holds for a place; with the place, so that a file that was given another's name is not believed.
+/// What a file in `last` holds. It includes the place, so that a file that was renamed to another place's name is
+/// noticed.
 struct Remembered {
   std::string place;
   Store::Last last;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the store holds, and how it stays within its size.
+// Lists what the store holds, and keeps it within its size.
 #include <signal.h>
 
 #include <algorithm>
@@ -37,22 +37,24 @@ std::uint64_t bytes_of(const fs::path& path) {
   return sum;
 }
 
-/// Whether the process that writes a temporary file has ended. Another may have been given its number since.
+/// Whether the process that writes a temporary file has ended. Its number may belong to another process by now, so a
+/// file that was not changed for a day counts as abandoned too.
 bool is_abandoned(const StoreItem& item) {
   std::error_code error;
   const auto changed = fs::last_write_time(item.path, error);
   return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && Clock::now() - changed > kDay);
 }
 
-/// Whether something is mounted on what holds it, on it or below it: that is another's.
+/// Whether something is mounted on the folder that holds the item, on the item, or below it. What is there belongs to
+/// somebody else.
 bool is_mounted(const StoreItem& item) {
   std::error_code error;
   const fs::path parent = fs::canonical(item.path.parent_path(), error);
   return mount_at_or_below(parent) == parent || mount_at_or_below(item.path);
 }
 
-/// Returns false with the reason where something of it is left. A folder gets another name first, so that no one takes
-/// half of it for the whole; one in use is left.
+/// Returns false, with the reason in `error`, if some of the item is left. A simulated case is renamed first, so that
+/// no process takes half of it for the whole. A case that is in use is left.
 bool remove_item(const StoreItem& item, std::error_code& error) {
   error.clear();
   fs::path path = item.path;
@@ -64,8 +66,8 @@ bool remove_item(const StoreItem& item, std::error_code& error) {
   return !error;
 }
 
-/// Of what nodes last came to. It is written when a call begins, which may take long: only where it is much older than
-/// all results that are kept, its own is gone.
+/// Removes old records of what nodes last made. A record is written when a call begins, and the call may take long. So
+/// its own result is surely gone only if the record is much older than all results that are kept.
 void remove_older(const std::vector<StoreItem>& remembered, fs::file_time_type oldest) {
   std::error_code error;
   for (const StoreItem& item : remembered)
@@ -94,7 +96,7 @@ std::vector<Store::Entry> Store::entries() const {
       ReadEntry read = read_entry(file, item.key);
       entry.provenance = std::move(read.description.provenance);
       list_keys(read.description.leaves, entry.outputs);
-    } catch (const Error&) {  // listed all the same, so that it can be collected
+    } catch (const Error&) {  // listed nevertheless, so that it can be collected
     }
     entries.push_back(std::move(entry));
   }

@@ -12,8 +12,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// In front of each file: what it is, how long the description is that follows, and its hash. The last digit is raised
-/// with every change of the layout.
+/// The beginning of each file: what it is, and the length and the hash of the description that follows. The last digit
+/// of `magic` is raised with every change of the layout.
 struct Preamble {
   std::array<char, 8> magic{'m', 'a', 'r', 'r', 'o', 'w', 'r', '2'};
   std::uint64_t size = 0;
@@ -32,7 +32,7 @@ class Counter : public Archive {
   std::uint64_t count = 0;
 };
 
-/// Hands on what it is given, and counts it.
+/// Passes the bytes on and counts them.
 class CountingArchive : public Archive {
  public:
   explicit CountingArchive(Archive& out) : out_(out) {}
@@ -100,7 +100,7 @@ class StoredSource : public Source {
       if (unpacker.remaining() == 0 && unpacker.digest() == key_) return data;
     } catch (const std::bad_alloc&) {
       throw;
-    } catch (const std::exception&) {  // its bytes are no such value
+    } catch (const std::exception&) {  // the bytes are not a value of this type
     }
     throw DamagedEntry(name + " is damaged");
   }
@@ -113,7 +113,7 @@ class StoredSource : public Source {
   std::shared_ptr<const void> data_;
 };
 
-/// The value that begins with leaf number `next`, which goes on to the one after it.
+/// The value that begins at leaf `next`. Moves `next` to the first leaf after it.
 Value value_at(const ReadEntry& entry, const fs::path& file, std::size_t& next, int depth) {
   if (next >= entry.description.leaves.size() || depth > kMostAxes) throw Error(kDamaged);
   const Leaf& leaf = entry.description.leaves[next++];

@@ -18,7 +18,7 @@ struct Leaf {
   std::uint64_t type_size = 0;
   bool present = false;
   Digest key;
-  std::uint64_t offset = 0, size = 0;  // of the packed value, after the description
+  std::uint64_t offset = 0, size = 0;  // of the packed value; the offset starts after the description
   std::string axis;
   std::vector<std::string> names;
   static constexpr auto fields() {
@@ -28,7 +28,7 @@ struct Leaf {
 };
 
 struct EntryDescription {
-  Digest key;  ///< under which it was kept: a file that was given another's name is not that result
+  Digest key;  ///< the key of the entry; it does not fit if the file was renamed to another entry's name
   Provenance provenance;
   std::vector<Leaf> leaves;
   std::uint64_t payload = 0;  ///< bytes of all packed values
@@ -38,18 +38,18 @@ struct EntryDescription {
   }
 };
 
-/// Throws Error for what cannot be stored.
+/// Throws Error if an output cannot be stored.
 EntryDescription describe_entry(const Digest& key, const std::vector<Value>& outputs, const Provenance& provenance);
 void write_entry(Archive& out, const EntryDescription& description, const std::vector<Value>& outputs);
 
 struct ReadEntry {
   EntryDescription description;
-  std::uint64_t begin = 0;  ///< of the payload
+  std::uint64_t begin = 0;  ///< where the payload begins in the file
 };
-/// Throws Error for a file that is not the whole entry of that key.
+/// Throws Error if the file is not the whole entry of that key.
 ReadEntry read_entry(const StoreFile& file, const Digest& key);
-/// The outputs, whose data are read from the file when they are first needed. Throws Error where the description is no
-/// description of outputs.
+/// The outputs. Their data are read from the file when they are first needed. Throws Error if the description is not
+/// one of outputs.
 std::vector<Value> outputs_of(const ReadEntry& entry, const std::filesystem::path& file);
 
 }  // namespace marrow

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr std::size_t kBuffer = 64 * 1024;
 constexpr std::size_t kPiece = 256 * 1024;  // read and hashed while it is in the processor's cache
 
-/// Writes to a file, small pieces together. Keeps the first fault.
+/// Writes to a file. Small pieces are gathered and written together. Remembers the first fault.
 class FileWriter : public Archive {
  public:
   explicit FileWriter(int descriptor) : descriptor_(descriptor) {}
@@ -31,7 +31,7 @@ class FileWriter : public Archive {
     else
       buffer_.append(static_cast<const char*>(data), size);
   }
-  /// 0, or the number of what went wrong.
+  /// Returns 0, or the errno of the first fault.
   int flush() {
     write_all(buffer_.data(), buffer_.size());
     buffer_.clear();
@@ -55,7 +55,7 @@ class FileWriter : public Archive {
   std::string buffer_;
 };
 
-/// A new file beside `file`; its name goes to `temporary`. -1 with errno where it cannot be made.
+/// Makes a new file next to `file` and puts its name into `temporary`. Returns -1 with errno if it cannot be made.
 int open_temporary(const fs::path& file, fs::path& temporary) {
   constexpr int kMode = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC | O_NOFOLLOW;
   int descriptor = -1;
@@ -65,7 +65,7 @@ int open_temporary(const fs::path& file, fs::path& temporary) {
     if (descriptor < 0 && errno == ENOENT && make_private_folder(file.parent_path()).empty())
       descriptor = open(temporary.c_str(), kMode, 0600);
   } while (descriptor < 0 && (errno == EEXIST || errno == EINTR));
-  if (descriptor >= 0) fchmod(descriptor, 0600);  // whatever the umask
+  if (descriptor >= 0) fchmod(descriptor, 0600);  // with any umask
   return descriptor;
 }
 
@@ -149,7 +149,7 @@ std::string write_whole(const fs::path& file, const std::function<void(Archive&)
     fault = error.what();
   }
   if (fault.empty() && is_durable && fsync(descriptor)) fault = fault_of(errno);
-  // Some file systems tell only now that there is no space. After EINTR it is closed all the same.
+  // Some file systems report only now that there is no space. After EINTR, the file is closed nevertheless.
   if (close(descriptor) && errno != EINTR && fault.empty()) fault = fault_of(errno);
   if (fault.empty() && std::rename(temporary.c_str(), file.c_str())) fault = fault_of(errno);
   if (!fault.empty()) unlink(temporary.c_str());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Files of the store: written whole or not at all, read without ever trusting their size.
+// Files of the store. They are written whole or not at all. Readers never trust their size.
 #include <cstdint>
 #include <filesystem>
 #include <functional>
@@ -11,7 +11,7 @@
 
 namespace marrow {
 
-/// A regular file, open for reading; not one that is reached by a link.
+/// A regular file that is open for reading. A link is not opened.
 class StoreFile {
  public:
   explicit StoreFile(const std::filesystem::path& path);
@@ -20,8 +20,8 @@ class StoreFile {
   StoreFile& operator=(const StoreFile&) = delete;
 
   bool is_open() const { return descriptor_ >= 0; }
-  std::uint64_t size() const { return size_; }  ///< when it was opened
-  /// False where the file has become shorter or cannot be read.
+  std::uint64_t size() const { return size_; }  ///< the size when it was opened
+  /// Returns false if the file has become shorter or cannot be read.
   bool read(void* data, std::size_t size, std::uint64_t offset) const;
   void mark_as_used() const;
 
@@ -30,12 +30,12 @@ class StoreFile {
   std::uint64_t size_ = 0;
 };
 
-/// Reads a part of a file and hashes it on the way. Not by a map of the file: one that is truncated meanwhile would end
-/// the process.
+/// Unpacks a part of a file and hashes it at the same time. The file is not mapped into memory: if a mapped file is
+/// truncated, reading it ends the process.
 class FileUnpacker : public Unpacker {
  public:
   FileUnpacker(const StoreFile& file, std::uint64_t offset, std::uint64_t size);
-  /// Of all that was read so far; of the whole part when nothing remains.
+  /// Digest of everything that was read so far. If nothing remains, it is the digest of the whole part.
   Digest digest() const { return hasher_.digest(); }
 
  protected:
@@ -47,12 +47,13 @@ class FileUnpacker : public Unpacker {
   const StoreFile& file_;
   std::uint64_t offset_, unread_;
   std::vector<char> buffer_;
-  std::size_t next_ = 0, end_ = 0;  ///< of what the buffer holds
+  std::size_t next_ = 0, end_ = 0;  ///< the part of the buffer that was not taken yet
   Hasher hasher_;
 };
 
-/// Writes what `fill` gives to a temporary file, for its owner's eyes only, and renames it; its folder is made where
-/// that is missing. Returns why that failed, and leaves nothing then. `is_durable`: waits until it is on the disk.
+/// Writes what `fill` adds to a temporary file that only its owner can read, and renames it. Makes the folder if it is
+/// missing. Returns why this failed, or an empty text; after a failure, nothing is left behind. With `is_durable`,
+/// waits until the file is on the disk.
 std::string write_whole(const std::filesystem::path& file, const std::function<void(Archive&)>& fill,
                         bool is_durable = false);
 

@@ -55,8 +55,8 @@ std::optional<TemporaryName> temporary_of_name(const std::string& name) {
   return found;
 }
 
-/// Calls visit(name, path, is_folder) for each regular file and folder in a folder; links and all else are left out.
-/// `fault` says which folder could not be read, unless it already says something.
+/// Calls visit(name, path, is_folder) for each regular file and folder in a folder. Links and everything else are left
+/// out. If the folder cannot be read, `fault` says so, unless it already has a text.
 template <class Visit>
 void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit) {
   std::error_code error;
@@ -70,7 +70,7 @@ void for_each_in(const fs::path& folder, std::string& fault, const Visit& visit)
     fault = "cannot look into the folder " + folder.string() + ": " + error.message();
 }
 
-/// Whether a folder holds nothing but markers that were being written. Not where it cannot be read.
+/// Whether a folder is empty, apart from markers that are being written. False if it cannot be read.
 bool holds_nothing(const fs::path& folder) {
   std::error_code error;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error)) {
@@ -94,7 +94,7 @@ Mark mark_of(const fs::path& folder) {
 
 const std::string kChooseAnother = "; set MARROW_CACHE to a new or empty folder of your own";
 
-/// The same for a folder that is there and belongs to this user.
+/// examine_store() for a folder that exists and belongs to this user.
 FolderState examine_own(const fs::path& folder, mode_t mode) {
   Mark mark = mark_of(folder);
   const bool is_new = mark == Mark::none && holds_nothing(folder);
@@ -103,7 +103,8 @@ FolderState examine_own(const fs::path& folder, mode_t mode) {
   if (mark == Mark::other_layout) return {false, name + " is a store of another version of marrow" + kChooseAnother};
   if (mark != Mark::ours && !is_new)
     return {false, name + " holds other things and is no store of marrow" + kChooseAnother};
-  // An empty folder becomes private when it becomes a store; but one that all users share is not to be taken from them.
+  // An empty folder becomes private when it becomes a store. But a folder that all users share must not be taken from
+  // them.
   if ((mode & (S_IWGRP | S_IWOTH)) && (!is_new || (mode & S_ISVTX)))
     return {false,
             "other users may write to " + folder.string() + "; take that from them (chmod go-w), or set MARROW_CACHE"};
@@ -138,7 +139,7 @@ std::string make_store(const fs::path& folder) {
   state = examine_store(folder);  // another user may have been quicker
   if (state.is_store || !state.fault.empty()) return state.fault;
   chmod(folder.c_str(), 0700);
-  // Durable, for a folder with entries and without a marker would never be used again.
+  // Durable, because a folder with entries but without a marker would never be used again.
   const std::string fault = write_whole(
       folder / kStoreMarker,
       [](Archive& out) {

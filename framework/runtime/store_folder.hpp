@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // What a store's folder looks like, and who may use it:
-//   marrow-store            says that it is a store, and of which layout
-//   01/01...HEX             entries, below the first two digits of their keys
+//   marrow-store            says that this is a store, and which layout it has
+//   01/01...HEX             entries, in folders named by the first two digits of their keys
 //   cases/HEX/              simulated cases
-//   last/HEX                what nodes last came to
-//   claims, tidied          locks; when it was last tidied up
-//   NAME.tmp-PROCESS-NUMBER any of these while it is written
+//   last/HEX                the last results of nodes
+//   claims, tidied          locks; the time when the store was last tidied up
+//   NAME.tmp-PROCESS-NUMBER any of these while it is being written
 #include <filesystem>
 #include <string>
 #include <string_view>
@@ -20,19 +20,19 @@ inline constexpr std::string_view kStoreMarker = "marrow-store";
 
 struct FolderState {
   bool is_store = false;
-  std::string fault;  ///< why it is not used; empty for a store, and for a folder that is absent or empty
+  std::string fault;  ///< why it cannot be used; empty for a store, and for a folder that is absent or empty
 };
 FolderState examine_store(const std::filesystem::path& folder);
-/// Makes an absent or empty folder a store. Returns why the folder cannot be used as one.
+/// Makes a store of an absent or empty folder. Returns why the folder cannot be used, or an empty text.
 std::string make_store(const std::filesystem::path& folder);
 
-/// Makes a folder that only its owner can look into, whatever the umask, and likewise the folders above it that are
-/// missing. Returns why that failed; a folder that is there already is left as it is.
+/// Makes a folder that only its owner can look into, with any umask. Also makes the missing folders above it in this
+/// way. A folder that exists is left as it is. Returns why this failed, or an empty text.
 std::string make_private_folder(const std::filesystem::path& folder);
 
-/// A name for a file or folder that is renamed to `final` when it is complete. Each call gives another one.
+/// A temporary name for a file or folder that is renamed to `final` when it is complete. Each call returns a new name.
 std::filesystem::path temporary_beside(const std::filesystem::path& final);
-/// Makes a new private folder with such a name. Throws Error where it cannot.
+/// Makes a new private folder with a temporary name. Throws Error if it cannot.
 std::filesystem::path new_folder_beside(const std::filesystem::path& final);
 
 /// Something in a store that can be removed.
@@ -40,11 +40,12 @@ struct StoreItem {
   enum class Kind { entry, simulated_case, remembered, temporary };
   Kind kind = Kind::entry;
   std::filesystem::path path;
-  Digest key;       ///< of an entry or a simulated case; what names a place in last/
-  int process = 0;  ///< that writes a temporary
+  Digest key;       ///< key of an entry or a simulated case, or hash of the place in last/
+  int process = 0;  ///< the process that writes a temporary
 };
-/// Only what bears a name that the store gives and is of the right sort: no links, nothing that others put there.
-/// `fault`: why there may be more, where a folder of the store could not be read.
+/// The items of a store: only files and folders of the right type with names that the store gives. Links, and files
+/// that others put there, are not listed. If a folder of the store could not be read, `fault` says why, and there may
+/// be more items.
 std::vector<StoreItem> items_of_store(const std::filesystem::path& folder, std::string& fault);
 
 }  // namespace marrow

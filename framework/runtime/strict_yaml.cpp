@@ -14,7 +14,7 @@
 namespace marrow {
 namespace {
 
-/// Whole numbers with all their digits.
+/// A number as a text. Whole numbers below 1e15 have all their digits.
 std::string show(double value) {
   char text[32];
   const bool is_whole = value == std::trunc(value) && std::abs(value) < 1e15;
@@ -29,7 +29,8 @@ YAML::Node StrictYaml::parse(const std::string& text) {
     return parse_yaml(text);
   } catch (const YAML::ParserException& error) {
     fault({file_, error.mark.line + 1, error.mark.column + 1}, "not valid YAML: " + error.msg);
-    // The parser notices where the text ends or goes on strangely; the slip is where something was left open.
+    // The parser reports the place where the text ends or goes on strangely. The typing error is where something was
+    // left open.
     if (const auto opened = last_unclosed(text))
       fault({file_, opened->line, opened->column}, std::string("this ") + opened->mark + " is not closed");
   } catch (const YAML::Exception& error) {
@@ -173,7 +174,7 @@ std::optional<std::string> read_source(const std::filesystem::path& file, const 
     diagnostics.remember(file.string(), text);
     return text;
   } catch (const Error& error) {
-    const std::string fault = error.what();  // begins with the file's name, which the place says
+    const std::string fault = error.what();  // begins with the file's name, which the place has already
     const auto says = [&](const char* part) { return fault.find(part, file.string().size()) != std::string::npos; };
     const char* hint = says(" is longer than ")  ? ""
                        : says("no regular file") ? "write the text to a file and give that"

@@ -21,17 +21,17 @@ struct YamlEntry {
   YAML::Node value;
 };
 
-/// Reads the YAML of files that people write: each fault (domain/yaml.hpp) is a diagnostic at its place.
+/// Reads YAML files that people write. Each fault (domain/yaml.hpp) becomes a diagnostic at its place.
 class StrictYaml {
  public:
   StrictYaml(std::string file, Diagnostics& diagnostics) : file_(std::move(file)), diagnostics_(diagnostics) {}
-  /// For a text that was cut out of a file: all of it counts as written at one place.
+  /// For a text that was taken out of a file. All of it counts as written at one place.
   StrictYaml(const Place& only, Diagnostics& diagnostics) : file_(only.file), diagnostics_(diagnostics), only_(only) {}
 
-  /// Parses a text; a syntax error is a diagnostic and gives a null node.
+  /// Parses a text. A syntax error becomes a diagnostic and gives a null node.
   YAML::Node parse(const std::string& text);
   Place place(const YAML::Node& node) const { return place_of(node.Mark()); }
-  /// The entries of a map in their order. `what` names the map in messages; with `known`, other keys are faults.
+  /// The entries of a map in their order. `what` names the map in messages. If `known` is given, other keys are faults.
   std::vector<YamlEntry> map(const YAML::Node& node, const Place& where, const std::string& what,
                              const std::vector<std::string>* known = nullptr);
   std::optional<std::string> text(const YAML::Node& node, const Place& where, const std::string& what);
@@ -39,7 +39,7 @@ class StrictYaml {
   std::optional<std::int64_t> integer(const YAML::Node& node, const Place& where, const std::string& what);
   std::optional<double> number(const YAML::Node& node, const Place& where, const std::string& what);
   /// A value for an option, converted and checked against its range, choices and length. `substitute` replaces $names
-  /// in texts before they are read; where it gives nothing, neither does this.
+  /// in texts before they are read. If it returns nothing, so does option().
   std::optional<OptionValue> option(
       const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
       const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute);
@@ -57,8 +57,8 @@ class StrictYaml {
   std::optional<Place> only_;
 };
 
-/// The text of a file that people write, kept for showing its lines; `what` names it in the fault ("the pipeline file")
-/// where it cannot be read or is longer than 4 MB, and nothing is given.
+/// The text of a file that people write. It is remembered so that its lines can be shown. If the file cannot be read or
+/// is longer than 4 MB, reports a fault and returns nothing. `what` names the file in the fault ("the pipeline file").
 std::optional<std::string> read_source(const std::filesystem::path& file, const std::string& what,
                                        Diagnostics& diagnostics);
 

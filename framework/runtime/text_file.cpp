@@ -27,7 +27,7 @@ class Descriptor {
   Descriptor(const Descriptor&) = delete;
   Descriptor& operator=(const Descriptor&) = delete;
   operator int() const { return number_; }
-  /// Some file systems say only now that there was no room.
+  /// Returns false if the file cannot be closed: some file systems report only now that there is no space.
   bool close() { return ::close(std::exchange(number_, -1)) == 0; }
 
  private:
@@ -46,7 +46,7 @@ bool write_all(int descriptor, const std::string& text) {
   return true;
 }
 
-/// A name beside the file that no other thread or process writes to, as long as none on another machine has this
+/// A name next to the file that no other thread or process writes to, unless a process on another machine has the same
 /// number.
 fs::path free_temporary(const fs::path& file) {
   static std::atomic<int> count{0};
@@ -68,7 +68,7 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
     if (S_ISDIR(info.st_mode)) throw unreadable("it is a folder");
     if (!S_ISREG(info.st_mode)) throw unreadable("it is no regular file");
   };
-  // Before it is opened, too, because opening a device may already do something.
+  // The kind is also checked before the file is opened, because opening a device may have an effect.
   if (::stat(file.c_str(), &info) != 0) throw unreadable(reason());
   check_kind();
   Descriptor descriptor(file, O_RDONLY | O_NONBLOCK | O_NOCTTY);
@@ -89,7 +89,7 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
 void write_text_file(const fs::path& file, const std::string& text, Kinds kinds) {
   const auto unwritten = [&](const std::string& why) { return Error("cannot write " + file.string() + ": " + why); };
   struct stat info {};
-  // Through links, as /dev/stdout is one.
+  // stat() follows links, because /dev/stdout is a link.
   if (kinds == Kinds::files_and_pipes && ::stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) &&
       !S_ISDIR(info.st_mode)) {
     Descriptor device(file, O_WRONLY);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loading a library runs its code as the user, so one that another user could have put there is not loaded.
+// Loading a library runs its code with the rights of the user. So a library that another user could have put there is
+// not loaded.
 #include "trust.hpp"
 
 #include <grp.h>
@@ -24,7 +25,7 @@ namespace {
 
 namespace fs = std::filesystem;
 constexpr const char* kTrustAll = "MARROW_TRUST_ALL_PLUGINS";
-constexpr std::size_t kMostNames_bytes = 1 << 20;  // of a group's members
+constexpr std::size_t kMostNames_bytes = 1 << 20;  // for the names of a group's members
 
 struct User {
   std::string name;
@@ -43,7 +44,8 @@ std::string name_of(uid_t id) {
   return user ? user->name : "user " + std::to_string(id);
 }
 
-/// A group of the owner's own, as most systems make one for each user: programs of developers let it write (umask 002).
+/// Whether a group is the owner's private group. Most systems make one for each user, and programs of developers let it
+/// write (umask 002).
 bool is_private(gid_t id, uid_t owner) {
   const std::optional<User> user = user_of(owner);
   if (!user) return id == owner || (owner == geteuid() && id == getegid());
@@ -72,12 +74,12 @@ std::string mode_text(mode_t mode) {
   return text;
 }
 
-/// An access list lets other users write as far as the mode lets the group; the group itself may have nothing to do
-/// with it.
+/// Whether a file has an access list. The list lets other users write as far as the mode lets the group write, and the
+/// group itself may have nothing to do with it.
 bool has_access_list(const fs::path& path) { return getxattr(path.c_str(), "system.posix_acl_access", nullptr, 0) > 0; }
 
-/// What lets others change a file or the entries of a folder. Of a folder further above, a sticky bit keeps them from
-/// replacing what is not theirs.
+/// What lets others change a file or the entries of a folder; empty if nothing does. In a folder further above, a
+/// sticky bit keeps others from replacing what is not theirs.
 std::string fault_of(const fs::path& path, bool is_above) {
   struct stat status {};
   if (stat(path.c_str(), &status) != 0) return "cannot be read: " + std::string(std::strerror(errno));
@@ -89,20 +91,21 @@ std::string fault_of(const fs::path& path, bool is_above) {
   const bool has_list = (status.st_mode & S_IWGRP) && has_access_list(path);
   const bool group = has_list || ((status.st_mode & S_IWGRP) && !is_private(status.st_gid, status.st_uid));
   if (!group && !(status.st_mode & S_IWOTH)) return "";
-  // A sticky folder is there for all, as /tmp is.
+  // A folder with a sticky bit is for all users, as /tmp is.
   const bool is_for_all = S_ISDIR(status.st_mode) && (status.st_mode & S_ISVTX);
   return "is not trusted, because others may write to " + quoted + " (owner " + name_of(status.st_uid) + ", mode " +
          mode_text(status.st_mode) + (has_list ? " and an access list" : "") + "); " +
          (is_for_all ? "move the library into a folder of your own" : "chmod go-w " + quoted);
 }
 
-/// Whoever can write here can replace marrow itself, so that trusting no plugin below would gain nothing.
+/// Whether a folder contains marrow itself. Whoever can write there can replace marrow, so it would not help to
+/// distrust the plugins below.
 bool holds_framework(const fs::path& folder) {
   static const fs::path framework = framework_file();
   return std::mismatch(folder.begin(), folder.end(), framework.begin(), framework.end()).first == folder.end();
 }
 
-/// Of a path without links: the file, its folder and those above, or a folder and those above.
+/// Checks a path without links: a file or folder, and all folders above it.
 std::string fault_of_chain(const fs::path& real) {
   std::string fault = fault_of(real, false);
   bool is_above = fs::is_directory(real);
@@ -113,7 +116,7 @@ std::string fault_of_chain(const fs::path& real) {
   return fault;
 }
 
-/// Of a path that may lead over links; `real` is the one without.
+/// Checks a path that may contain links. Sets `real` to the path without links.
 std::string fault_of_both_ends(const fs::path& file, fs::path& real) {
   std::error_code error;
   real = fs::canonical(file, error);

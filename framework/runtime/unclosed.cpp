@@ -7,7 +7,7 @@
 namespace marrow {
 namespace {
 
-/// Whether a bracket or quote after this character begins something; inside a word, as in "bone's", it is text.
+/// Whether a bracket or quote after this character begins something. Inside a word, as in "bone's", it is text.
 bool begins_after(char before) {
   return std::isspace(static_cast<unsigned char>(before)) || before == '{' || before == '[' || before == ',';
 }
@@ -30,7 +30,7 @@ std::optional<Unclosed> last_unclosed(const std::string& text) {
     const bool quoted = !open.empty() && (open.back().mark == '"' || open.back().mark == '\'');
     if (in_comment) continue;
     if (quoted) {
-      // What is escaped ends no quote; a line break is counted all the same.
+      // An escaped character does not end a quote. An escaped line break still counts as a line.
       if (c == '\\' && open.back().mark == '"' && text.compare(i + 1, 1, "\n") != 0)
         ++i, ++column;
       else if (c == open.back().mark)

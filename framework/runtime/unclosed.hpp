@@ -11,7 +11,8 @@ struct Unclosed {
   int column;
 };
 
-/// The innermost bracket or quote of a YAML text that is opened but not closed, or closed by another kind.
+/// The innermost bracket or quote of a YAML text that is opened but not closed, or that is closed by another kind of
+/// bracket.
 std::optional<Unclosed> last_unclosed(const std::string& text);
 
 }  // namespace marrow

@@ -17,7 +17,7 @@ fs::path absolute_path_in(const char* variable) {
   return text && fs::path(text).is_absolute() ? fs::path(text) : fs::path();
 }
 
-/// Calls use(entry) with what the system knows of a user, where it knows them.
+/// Calls use(entry) with what the system knows about a user, if it knows the user.
 template <class Use>
 void look_up(uid_t user, const Use& use) {
   std::vector<char> text(16384);

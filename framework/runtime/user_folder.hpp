@@ -5,12 +5,12 @@
 
 namespace marrow {
 
-/// The folder for what a program can make again: XDG_CACHE_HOME, or .cache in HOME or in the home that the system knows
-/// of the user. A variable that is empty or names no absolute path counts as not set. Empty where there is none; never
-/// a folder that all users share.
+/// The folder for files that a program can make again: XDG_CACHE_HOME, or .cache in HOME, or .cache in the home folder
+/// that the system knows for the user. A variable that is empty or not an absolute path counts as not set. Empty if
+/// there is none of these. It is never a folder that all users share.
 std::filesystem::path user_cache_folder();
 
-/// "alice", or "user 1001" for one without a name.
+/// The name of a user, "alice"; or "user 1001" if the system knows no name.
 std::string user_name(unsigned user);
 
 }  // namespace marrow

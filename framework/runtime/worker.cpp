@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The side of a worker that gives the work.
+// The parent's side of a worker, which gives the work.
 #include "marrow/runtime/worker.hpp"
 
 #include <fcntl.h>
@@ -30,9 +30,9 @@ using Clock = std::chrono::steady_clock;
 using nlohmann::json;
 
 constexpr std::size_t kLongestLine = std::size_t(64) << 20;
-/// Time between two looks counts as no more than this: where it was longer, this process was suspended itself.
+/// The time between two checks counts as this at most. If it was longer, this process was suspended.
 constexpr double kLongestLook_s = 1;
-constexpr int kFirstFreeDescriptor = 64;  // above those that the worker is given
+constexpr int kFirstFreeDescriptor = 64;  // above the descriptors that the worker is given
 constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
 
 [[noreturn]] void cannot_start(int code) {
@@ -45,7 +45,7 @@ constexpr rlim_t kMostFiles = kFirstFreeDescriptor + 16, kEnoughFiles = 1024;
                   (code == EAGAIN ? "; the limit of processes is reached (ulimit -u)" : ""));
 }
 
-/// An open file that closes itself, with a number that no descriptor of the worker has.
+/// An open file that closes itself. Its number is different from all descriptors of the worker.
 class Descriptor {
  public:
   explicit Descriptor(int original) : number_(fcntl(original, F_DUPFD_CLOEXEC, kFirstFreeDescriptor)) {
@@ -77,7 +77,8 @@ std::pair<Descriptor, Descriptor> make_pipe() {
   return {std::move(read_end), Descriptor(ends[1])};
 }
 
-/// The environment with the number of this process: a worker that finds another parent was left behind.
+/// The environment, with the number of this process added. A worker that has another parent knows that it was left
+/// behind.
 std::vector<std::string> environment_of_worker(bool has_large_pages) {
   std::vector<std::string> texts;
   for (char** one = environ; one && *one; ++one)
@@ -94,7 +95,7 @@ std::vector<char*> pointers_to(const std::vector<std::string>& texts) {
   return pointers;
 }
 
-/// Starts the program with default signals, in a group of its own so that Ctrl-C reaches only us.
+/// Starts the program with default signals, in its own process group, so that Ctrl-C reaches only this process.
 pid_t start(const WorkerSettings& settings, int input, int output) {
   std::vector<Descriptor> shared;
   for (const int original : settings.shared) shared.emplace_back(original);
@@ -128,8 +129,8 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   return process;
 }
 
-/// With what it has started itself, which is in its group unless it has left it. To be called before the process is
-/// waited for: until then the group's number is no other's.
+/// Kills the process and everything that it started, which is in its group unless it left it. Must be called before the
+/// process is waited for: until then, no other group has this number.
 void kill_group(pid_t process) {
   kill(process, SIGKILL);
   kill(-process, SIGKILL);
@@ -175,7 +176,7 @@ void Worker::ask(json request) {
   const std::string line = request.dump() + "\n";
   for (std::size_t done = 0; to_ >= 0 && done < line.size();) {
     const ssize_t count = write(to_, line.data() + done, line.size() - done);
-    if (count < 0 && errno != EINTR) ::close(std::exchange(to_, -1));  // it has ended, which the next take() shows
+    if (count < 0 && errno != EINTR) ::close(std::exchange(to_, -1));  // it has ended; the next take() reports it
     if (count > 0) done += std::size_t(count);
   }
 }
@@ -228,7 +229,7 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
 WorkerEnd Worker::died() {
   int status = 0;
   siginfo_t gone{};
-  // Its answers have ended; where the process itself has not, it is of no use.
+  // Its output has ended. If the process itself has not ended after a second, it is of no use and is killed.
   for (int i = 0; i < 100 && waitid(P_PID, id_t(process_), &gone, WEXITED | WNOHANG | WNOWAIT) == 0 && gone.si_pid == 0;
        ++i)
     usleep(10'000);

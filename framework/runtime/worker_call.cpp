@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The worker's side of a call that runs apart.
+// The worker's side of a call that runs in its own process.
 #include <oneapi/tbb/global_control.h>
 #include <sys/resource.h>
 #include <unistd.h>
@@ -25,13 +25,13 @@ using nlohmann::json;
 
 constexpr int kGivenDescriptor = 3, kMadeDescriptor = 4;
 
-/// Of the one call that this process is there for.
+/// The reports of the one call for which this process exists.
 std::atomic<WorkerReports*> current_reports{nullptr};
-/// What it made; kept until the process ends, since it is read from where it lies.
+/// What the call made. It is kept until the process ends, because the parent reads it from this memory.
 std::vector<Value> made;
 
-/// Beyond it, memory cannot be had and the process is ended. A library's own use up to here is not counted as the
-/// call's time.
+/// Sets the limits of this process. Beyond the memory limit, allocations fail; beyond the time limit, the process is
+/// ended. Processor time that was used up to here, for example to load the library, does not count.
 void set_limits(double memory_mb, double processor_s) {
   const auto set = [](auto what, double most) {
     rlimit limit{};

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The side of a worker that does the work.
+// The worker's side, which does the work.
 #include <signal.h>
 #include <sys/prctl.h>
 #include <unistd.h>
@@ -19,7 +19,7 @@ namespace {
 
 using nlohmann::json;
 
-/// Reads lines from the standard input, unbuffered by anything that a library could share.
+/// Reads lines from the standard input. It does not use a buffer that a library could share.
 class Requests {
  public:
   std::optional<std::string> next() {
@@ -40,7 +40,8 @@ class Requests {
   std::string text_;
 };
 
-/// Answers go to the standard output as it was at the start: what a library prints there must not pass for an answer.
+/// Sends answers to the standard output as it was at the start. What a library prints there must not be taken for an
+/// answer.
 class Answers : public WorkerReports {
  public:
   Answers() : descriptor_(dup(STDOUT_FILENO)) { dup2(STDERR_FILENO, STDOUT_FILENO); }
@@ -53,7 +54,7 @@ class Answers : public WorkerReports {
     const std::scoped_lock lock(mutex_);
     for (std::size_t done = 0; done < line.size();) {
       const ssize_t count = write(descriptor_, line.data() + done, line.size() - done);
-      if (count < 0 && errno != EINTR) _exit(1);  // nobody listens any more
+      if (count < 0 && errno != EINTR) _exit(1);  // nobody reads the answers any more
       if (count > 0) done += std::size_t(count);
     }
   }

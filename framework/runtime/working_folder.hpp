@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// The folder that this process works in, from which all relative paths count. A library of a plugin may go elsewhere:
-/// then inputs would be read and results be written where nobody asked for it. Safe to use from several threads.
+/// The working folder of this process, at which all relative paths start. A plugin's library may change it. Then inputs
+/// would be read and results written in the wrong place. Safe to use from several threads.
 class WorkingFolder {
  public:
   WorkingFolder();
@@ -15,7 +15,8 @@ class WorkingFolder {
   WorkingFolder(const WorkingFolder&) = delete;
   WorkingFolder& operator=(const WorkingFolder&) = delete;
 
-  /// Goes back to where the process was when this was made. Returns where it had gone; empty where it had not.
+  /// Goes back to the folder in which the process was when this object was made. Returns the folder in which it was;
+  /// empty if it had not changed.
   std::string go_back() const;
 
  private:

@@ -6,8 +6,8 @@
 
 namespace marrow {
 
-/// Of the content of a file, or of all files below a folder with their names from there: by it a file that a run wrote
-/// is known again, wherever its folder was moved to. Throws Error for what cannot be read.
+/// Digest of the content of a file, or of all files below a folder with their relative names. It identifies what a run
+/// wrote, even if the folder was moved. Throws Error if something cannot be read.
 Digest content_of(const std::filesystem::path& path);
 
 }  // namespace marrow

@@ -40,14 +40,15 @@ struct Outliers {
   std::vector<std::vector<Eigen::Vector2d>> pixels;  ///< per view
 };
 
-/// Takes out the beads that lie too many deviations of the others off. True when there were any.
+/// Removes beads whose residual exceeds `deviations` standard deviations. The deviation is estimated from the median of
+/// all residuals. Returns true if a bead was removed.
 bool take_outliers(std::vector<ViewPoints>& views, const CalibrationResult& fit, double deviations,
                    Outliers& outliers) {
   std::vector<double> sizes;
   for (const auto& view : fit.views)
     for (const auto& residual : view.residuals_px) sizes.push_back(residual.norm());
   std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
-  // The median length of a normal residual in two directions is 1.177 deviations.
+  // For a normal distribution in two directions, the median length is 1.177 standard deviations.
   const double limit = deviations * std::max(sizes[sizes.size() / 2] / 1.17741, 1e-6);
   bool any = false;
   for (std::size_t n = 0; n < views.size(); ++n) {
@@ -125,7 +126,7 @@ Metrics pose_report(const calibration::CalibratedView& view) {
   return report;
 }
 
-/// The image with what was taken for beads, how far each is off, and what was left out.
+/// The image with the beads found, their residuals, and the beads left out.
 Picture picture_of(const Image& image, const ViewPoints& points, const calibration::CalibratedView& view,
                    const std::vector<Eigen::Vector2d>& outliers, const BeadBoardOptions& options) {
   using namespace draw;
@@ -206,27 +207,32 @@ MARROW_PLUGIN(plugin) {
       .summary(
           "Calibration from images of a board with beads on both sides (Tsai 1987), with radial distortion and "
           "uncertainties")
-      .in("images", "images of the board as taken, in at least 3 poses", over("view"))
+      .in("images", "images of the board in at least 3 poses, not corrected for distortion", over("view"))
       .out("camera", &BeadBoardResult::cameras,
-           "geometry of each view without distortion; the board's frame is the world", over("view"))
-      .out("calibration", &BeadBoardResult::calibration, "camera matrix and distortion of the device, with deviations")
+           "camera of each view, without distortion; the world frame is the board's frame", over("view"))
+      .out("calibration", &BeadBoardResult::calibration,
+           "camera matrix and distortion of the device, with standard deviations")
       .out("report", &BeadBoardResult::report,
-           "camera matrix and distortion with standard deviations, and the residuals")
+           "the same as figures, with the residuals and the numbers of beads and outliers")
       .out("poses", &BeadBoardResult::poses,
-           "per view: beads, residual, and standard deviations of the camera's pose, in its own axes", over("view"))
-      .out("picture", &BeadBoardResult::pictures, "the beads that were found and how far each is off", over("view"))
-      .option("board", &BeadBoardOptions::board, "the board's beads (YAML, docs/case.md)", required())
-      .option("radial_terms", &BeadBoardOptions::radial_terms, "terms of the radial distortion: r^2, r^4, r^6",
-              at_least(0), at_most(3))
-      .option("square_pixels", &BeadBoardOptions::square_pixels, "one focal length for both directions")
+           "per view: number of beads, residual, and standard deviations of the camera's pose along and about its own "
+           "axes",
+           over("view"))
+      .out("picture", &BeadBoardResult::pictures, "each image with the beads found and their residuals", over("view"))
+      .option("board", &BeadBoardOptions::board, "file with the positions of the board's beads (YAML, docs/case.md)",
+              required())
+      .option("radial_terms", &BeadBoardOptions::radial_terms,
+              "number of terms of the radial distortion (r^2, r^4, r^6)", at_least(0), at_most(3))
+      .option("square_pixels", &BeadBoardOptions::square_pixels, "use one focal length for both directions")
       .option("largest_bead_px", &BeadBoardOptions::largest_bead_px,
-              "diameter of the largest bead in the images; 0: a sixteenth of their width", at_least(0))
+              "diameter of the largest bead in the images; 0: a sixteenth of the image width", at_least(0))
       .option("least_contrast", &BeadBoardOptions::least_contrast,
-              "darkness of the faintest bead, as a fraction of the darkest", at_least(0.01), at_most(1), unit("1"))
+              "smallest contrast of a bead, as a fraction of the contrast of the darkest bead", at_least(0.01),
+              at_most(1), unit("1"))
       .option("outlier_deviations", &BeadBoardOptions::outlier_deviations,
-              "beads farther off than this many standard deviations are left out", at_least(3), unit("1"))
-      .option("residual_scale", &BeadBoardOptions::residual_scale, "how many times longer residuals are drawn",
+              "beads with a residual of more than this many standard deviations are left out", at_least(3), unit("1"))
+      .option("residual_scale", &BeadBoardOptions::residual_scale, "residuals are drawn this many times longer",
               at_least(1), unit("1"))
       .option("size_px", &BeadBoardOptions::size_px, "longer side of the pictures", at_least(100), at_most(4096));
-  plugin.writer<Calibration>(".yaml", write_calibration, "camera matrix and distortion with their deviations");
+  plugin.writer<Calibration>(".yaml", write_calibration, "camera matrix and distortion with their standard deviations");
 }

@@ -22,7 +22,7 @@ std::string little(std::uint32_t value, int width) {
   return bytes;
 }
 
-/// An element in explicit little endian.
+/// A DICOM element in the transfer syntax Explicit VR Little Endian.
 std::string element(std::uint32_t tag, const std::string& kind, std::string value) {
   if (value.size() % 2) value += kind == "UI" ? '\0' : ' ';
   const bool is_long = kind == "OW" || kind == "OB";

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Views of an isocentric C-arm from its two angles: the chapter's Eq 4 in corrected form. As printed, equal poses of
-// the gantry do not give the identity; what is meant is the absolute pose W_i = R_beta R_alpha R_0 of each view, from
-// which the relative motion follows as R_21 = W_2^T W_1.
+// Cameras of an isocentric C-arm from its two angles: the chapter's Eq 4 in corrected form. As printed, Eq 4 does not
+// give the identity for two equal positions of the arm. The corrected form is the absolute pose W_i = R_beta R_alpha
+// R_0 of each view. The relative motion of two views is R_21 = W_2^T W_1.
 #include <marrow/plugin.hpp>
 #include <set>
 
@@ -53,19 +53,22 @@ marrow::List<marrow::Camera> carm(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.carm", carm)
-      .summary("Views of an isocentric C-arm from its angles (Eq 4, corrected; signs of DICOM's positioner angles)")
-      .out("camera", "geometry of each view", marrow::over("view"))
+      .summary(
+          "Cameras of an isocentric C-arm from its angles (Eq 4, corrected); the angles have the signs of DICOM's "
+          "positioner angles")
+      .out("camera", "camera of each view", marrow::over("view"))
       .option("names", &Options::names, "one name per view")
       .option("alpha_deg", &Options::alpha_deg,
-              "cranio-caudal angle per view, positive with the detector towards the head", marrow::at_least(-90),
+              "cranio-caudal angle of each view, positive if the detector is towards the head", marrow::at_least(-90),
               marrow::at_most(90))
       .option("beta_deg", &Options::beta_deg,
-              "right/left anterior angle per view, positive with the detector towards the patient's left",
+              "right/left anterior angle of each view, positive if the detector is towards the patient's left",
               marrow::at_least(-180), marrow::at_most(180))
       .relation(marrow::same_length({"names", "alpha_deg", "beta_deg"}))
-      .option("source_to_detector_mm", &Options::source_to_detector_mm, "source to detector", marrow::at_least(1))
-      .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm, "source to the centre of rotation",
+      .option("source_to_detector_mm", &Options::source_to_detector_mm, "distance from the source to the detector",
               marrow::at_least(1))
+      .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm,
+              "distance from the source to the centre of rotation", marrow::at_least(1))
       .relation(marrow::below("source_to_isocentre_mm", "source_to_detector_mm"))
       .option("width_px", &Options::width_px, "image width", marrow::at_least(1), marrow::at_most(16384))
       .option("height_px", &Options::height_px, "image height", marrow::at_least(1), marrow::at_most(16384))

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Are the cameras right? A known object is drawn into the images, and where its points are seen is compared with where
-// they should be.
+// Checks whether the cameras are right. A known object is drawn into the images. The positions where its points are
+// seen are compared with their projections.
 #include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
@@ -32,7 +32,8 @@ struct Checked {
   List<Picture> pictures;
 };
 
-/// A point by all views that show it: the place that the rays come nearest to.
+/// Triangulates a point from all views that show it: the position with the least sum of squared distances from the
+/// rays. Nothing if fewer than two views show it, or if their rays are nearly parallel.
 std::optional<Eigen::Vector3d> triangulated(const KnownPoint& point, const List<View>& views) {
   Eigen::Matrix3d normal = Eigen::Matrix3d::Zero();
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
@@ -61,7 +62,8 @@ void check_names(const std::vector<KnownPoint>& points, const List<View>& views)
       }
 }
 
-/// Where the points should be, known or triangulated, and where this view shows them.
+/// The points that a view shows, with their pixels. `known`: only points with a given position. `all`: triangulated
+/// points too.
 struct InView {
   SeenPoints known, all;
 };
@@ -85,8 +87,8 @@ InView points_in(const View& view, const std::vector<KnownPoint>& points, const 
 /// Edges between triangles that face the source and triangles that do not, and the edges of holes.
 std::vector<std::pair<Eigen::Vector3d, Eigen::Vector3d>> outline_edges(const Mesh& mesh, const Camera& camera) {
   const Eigen::Vector3d source = source_position_mm(camera);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int>
-      sides;  // 1: seen from the front, 2: from behind, 4: more than once
+  // Bits of an edge: 1 = it has a triangle seen from the front, 2 = seen from behind, 4 = two or more triangles.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
   for (const auto& triangle : mesh.triangles) {
     const Eigen::Vector3d &a = mesh.vertices_mm[triangle[0]], &b = mesh.vertices_mm[triangle[1]],
                           &c = mesh.vertices_mm[triangle[2]];
@@ -142,7 +144,7 @@ std::string text(double value) {
   return characters;
 }
 
-/// What is to be said of one view, the likeliest first.
+/// The warnings about one view, the most probable first.
 std::vector<std::string> warnings_of(const View& view, const InView& points, const Mesh* mesh, const Options& options,
                                      double error) {
   std::vector<Eigen::Vector3d> object = points.known.world_mm;
@@ -187,7 +189,7 @@ void add_metrics(const View& view, const InView& points, double error, Metrics& 
     metrics.items.push_back({name + "error_with_free_pose", refit->error_px, "px"});
 }
 
-/// Two views in nearly one direction cannot tell how far a point is.
+/// Two views along nearly the same direction do not determine the depth of a point.
 void check_directions(const List<View>& views, Context& context, int& warnings) {
   for (std::size_t i = 0; i < views.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) {
@@ -236,21 +238,23 @@ Checked check(const List<View>& views, const Mesh* mesh, const Options& options,
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.check", check)
       .summary(
-          "Draws a known object into the images, measures the reprojection error and says in words what is wrong with "
-          "a camera")
+          "Draws a known object into the images, measures the reprojection error and explains in words what is wrong "
+          "with a camera")
       .in("views", "images with the cameras to check", over("view"))
-      .in("mesh", "surface of a known object in world coordinates, to draw")
+      .in("mesh", "surface of a known object in world coordinates; it is drawn into the images")
       .out("metrics", &Checked::metrics, "reprojection errors, and the number of warnings")
-      .out("picture", &Checked::pictures, "the image with what is seen and what is expected", over("view"))
-      .option("points", &Options::points, "points of a known object and where they are seen (YAML, docs/case.md)")
-      .option("warn_above_px", &Options::warn_above_px, "reprojection error that is warned of", at_least(0))
-      .option("source_to_detector_mm", &Options::source_to_detector_mm, "of the device, to compare with; 0 = not known",
+      .out("picture", &Checked::pictures, "each image with the seen and the expected positions of the points",
+           over("view"))
+      .option("points", &Options::points,
+              "file with points of a known object and the pixels where they are seen (YAML, docs/case.md)")
+      .option("warn_above_px", &Options::warn_above_px, "a larger reprojection error gives a warning", at_least(0))
+      .option("source_to_detector_mm", &Options::source_to_detector_mm,
+              "known distance from source to detector, to compare with; 0: not known", at_least(0))
+      .option("pixel_mm", &Options::pixel_mm, "known size of a pixel on the detector, to compare with; 0: not known",
               at_least(0))
-      .option("pixel_mm", &Options::pixel_mm, "size of a pixel on the detector, to compare with; 0 = not known",
+      .option("detector_mm", &Options::detector_mm, "known longer side of the detector, to compare with; 0: not known",
               at_least(0))
-      .option("detector_mm", &Options::detector_mm, "longer side of the detector, to compare with; 0 = not known",
-              at_least(0))
-      .option("residual_scale", &Options::residual_scale, "how many times longer differences are drawn", at_least(1),
+      .option("residual_scale", &Options::residual_scale, "differences are drawn this many times longer", at_least(1),
               unit("1"))
       .option("size_px", &Options::size_px, "longer side of the pictures", at_least(100), at_most(4096));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras from the headers of X-ray images: what a C-arm writes of its angles and distances.
+// Cameras from the angles and distances that a C-arm writes to the headers of X-ray images.
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
@@ -37,20 +37,21 @@ marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& cont
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.dicom", dicom)
       .summary("Cameras of X-ray images (XA, RF) from the angles and distances in their DICOM headers")
-      .out("camera", "geometry of each view; the isocentre is the world's origin, its axes are the patient's",
+      .out("camera", "camera of each view; the world's origin is the isocentre, its axes are the patient's",
            marrow::over("view"))
-      .option("paths", &Options::paths, "DICOM files, the same that read.views takes as images", marrow::required())
-      .option("names", &Options::names, "one name per view; without names, the files' names without extension")
+      .option("paths", &Options::paths, "DICOM files, the same files that read.views reads as images",
+              marrow::required())
+      .option("names", &Options::names, "one name per view; if empty, the file names without extension")
       .relation(marrow::as_many_or_none("names", "paths"))
       .option("frame", &Options::frame,
-              "frame of a multi-frame file, from 1, the one that read.views takes; 0 = there is only one, or all were "
-              "taken alike",
+              "frame of a multi-frame file, counted from 1, the same frame that read.views reads; 0: the file has one "
+              "frame, or all frames have the same geometry",
               marrow::at_least(0))
       .option("source_to_detector_mm", &Options::source_to_detector_mm,
-              "instead of DistanceSourceToDetector; 0 = as the header says", marrow::at_least(0))
+              "distance used instead of DistanceSourceToDetector; 0: use the header's value", marrow::at_least(0))
       .option("source_to_isocentre_mm", &Options::source_to_isocentre_mm,
-              "instead of DistanceSourceToPatient; 0 = as the header says", marrow::at_least(0))
+              "distance used instead of DistanceSourceToPatient; 0: use the header's value", marrow::at_least(0))
       .option("pixel_mm", &Options::pixel_mm,
-              "size of a pixel on the detector, instead of ImagerPixelSpacing; 0 = as the header says",
+              "size of a pixel on the detector, used instead of ImagerPixelSpacing; 0: use the header's value",
               marrow::at_least(0));
 }

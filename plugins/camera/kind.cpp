@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that find, read or check cameras. They choose their ports freely.
+// The kind of nodes that compute, read or check cameras. These nodes choose their ports freely.
 #include <marrow/plugin.hpp>
 
 #include "suite.hpp"
 
 MARROW_PLUGIN(plugin) {
   plugin.kind("camera")
-      .summary("geometry of a view")
+      .summary("cameras: the geometry of X-ray views")
       .runs_apart(marrow::Apart::computes)
       .suite(marrow::conformance::camera_suite());
 }

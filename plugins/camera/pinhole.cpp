@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A camera given by its matrices: Eq 1-3 of the chapter with v = (f / z) y, K 3x3 and [R|t] 3x4 (as printed, Eq 1
-// repeats x for v, and K's size does not fit [R|t]).
+// A camera from its matrices: Eq 1-3 of the chapter, with v = (f / z) y, K 3x3 and [R|t] 3x4. As printed, Eq 1 has x
+// also in the formula for v, and the size of K does not fit [R|t].
 #include <marrow/plugin.hpp>
 
 namespace {
@@ -31,11 +31,13 @@ marrow::Camera pinhole(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("camera.pinhole", pinhole)
       .summary(
-          "Pinhole camera from its matrices (Eq 1-3): pixel = K (R x_world + t), +z to the detector, u right, v down")
-      .out("camera", "geometry of the view")
+          "Pinhole camera from its matrices (Eq 1-3): pixel = K (R x_world + t); z points to the detector, u to the "
+          "right, v down")
+      .out("camera", "the camera")
       .option("width_px", &Options::width_px, "image width", marrow::at_least(1), marrow::at_most(16384))
       .option("height_px", &Options::height_px, "image height", marrow::at_least(1), marrow::at_most(16384))
-      .option("intrinsics", &Options::intrinsics, "camera matrix K, row by row", marrow::unit("px"))
-      .option("rotation", &Options::rotation, "R of camera_from_world, row by row", marrow::unit("1"))
-      .option("translation_mm", &Options::translation_mm, "t of camera_from_world");
+      .option("intrinsics", &Options::intrinsics, "camera matrix K, 9 numbers row by row", marrow::unit("px"))
+      .option("rotation", &Options::rotation, "rotation R of camera_from_world, 9 numbers row by row",
+              marrow::unit("1"))
+      .option("translation_mm", &Options::translation_mm, "translation t of camera_from_world");
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Cameras: found from images of a board with beads whose places are known, from the headers of X-ray files, or checked
-// against points that they should show. A node takes part in what it has the inputs and options for.
+// Checks for nodes of the kind camera. A node may compute cameras from images of a bead board, read them from the
+// headers of X-ray files, or compare them with known points. Each check runs only for nodes with its inputs and
+// options.
 #include "suite.hpp"
 
 #include <Eigen/Geometry>
@@ -19,7 +20,8 @@ constexpr double kFocal_px = 2133, kPrincipal_u_px = 323.4, kPrincipal_v_px = 31
                  kPincushion = 3;  // 7 % at the middle of an edge
 constexpr double kNoise = 250, kBright = 50000;
 
-/// The device that the images are made with, its distortion aside, tilted to one of 8 sides.
+/// The exact camera of image `number`, without distortion. The board is tilted towards another side in each of 8
+/// images.
 Camera device(int number) {
   Camera camera{kSize_px, kSize_px, {}, {"camera", "world"}};
   camera.intrinsics << kFocal_px, 0, kPrincipal_u_px, 0, kFocal_px, kPrincipal_v_px, 0, 0, 1;
@@ -34,14 +36,14 @@ Camera device(int number) {
   return camera;
 }
 
-/// Where the distorted image shows a point.
+/// Pixel of a point in the distorted image.
 Eigen::Vector2d seen_px(const Camera& camera, const Eigen::Vector3d& point) {
   const Eigen::Vector2d principal(kPrincipal_u_px, kPrincipal_v_px),
       ideal = (project(camera, point) - principal) / kFocal_px;
   return principal + kFocal_px * (1 + kPincushion * ideal.squaredNorm()) * ideal;
 }
 
-/// Dark balls in front of an even background, 3 x 3 samples a pixel, with noise.
+/// Dark balls on a constant background, with 3 x 3 samples per pixel and noise.
 cv::Mat board_image(int number) {
   const Camera camera = device(number);
   cv::Mat pixels(kSize_px, kSize_px, CV_16U, cv::Scalar(kBright));
@@ -91,7 +93,7 @@ Value views_of(const Camera& a, const Camera& b) {
   return Value::of<View>(list, "view");
 }
 
-/// Two views of the board, 50 degrees apart.
+/// A second view of the board: device(3) turned by 50 degrees about the middle of the board.
 Camera second() {
   Camera camera = device(3);
   const Eigen::Matrix3d turn = Eigen::AngleAxisd(radians(50), Eigen::Vector3d::UnitY()).toRotationMatrix();
@@ -172,8 +174,8 @@ double board_error(const Subject& subject) {
   return std::sqrt(sum / double(8 * board_beads().size()));
 }
 
-/// In the DICOM standard's axes (left, back, head) the detector lies at (sin p cos s, -cos p cos s, sin s), seen from
-/// the isocentre.
+/// In the DICOM standard's axes (left, back, head), the direction from the isocentre to the detector is (sin p cos s,
+/// -cos p cos s, sin s), with the primary angle p and the secondary angle s.
 double arm_direction(const Subject& subject) {
   const List<Camera> cameras = cameras_of(subject, "paths");
   expect(cameras.size() == 2, "it gives " + std::to_string(cameras.size()) + " cameras for 2 files");
@@ -208,10 +210,10 @@ double warnings(const Subject& subject, const Camera& a, const Camera& b) {
 
 double right_cameras(const Subject& subject) { return warnings(subject, device(0), second()); }
 
-/// 1 where a wrong camera is passed over in silence.
+/// The check gives 1 if there is no warning about a wrong camera.
 Check wrong_camera(const std::string& name, const std::string& what,
                    const std::function<double(const Subject&)>& warnings_of) {
-  return {{name, what + ": views passed without a warning", 0, "views"}, [warnings_of](const Subject& subject) {
+  return {{name, what + ": wrong cameras without a warning", 0, "views"}, [warnings_of](const Subject& subject) {
             if (!has_option(subject, "points")) throw NotApplicable("it has no option 'points'");
             return warnings_of(subject) > 0 ? 0.0 : 1.0;
           }};
@@ -269,18 +271,28 @@ std::vector<Trial> trials() {
 
 Suite camera_suite() {
   Suite suite{sample, validate, trials(), {}, options};
-  const std::string board = "8 images of a board, 7 % of pincushion: ", arm = "headers of two X-ray files: ",
-                    check = "points of a board in two views, ";
-  suite.accuracy.push_back({{"focal_length", board + "largest error", 0.15, "%"}, focal_length});
-  suite.accuracy.push_back({{"principal_point", board + "distance", 0.5, "px"}, principal_point});
-  suite.accuracy.push_back({{"board", board + "root mean square error of the beads", 0.3, "px"}, board_error});
+  const std::string board = "8 images of a bead board with 7 % pincushion distortion: ",
+                    arm = "cameras from the headers of two X-ray files: ",
+                    check = "points of a board seen in two views, ";
+  suite.accuracy.push_back({{"focal_length", board + "largest error of the focal length", 0.15, "%"}, focal_length});
   suite.accuracy.push_back(
-      {{"arm_direction", arm + "source and direction, at the isocentre", 0.01, "mm"}, arm_direction});
-  suite.accuracy.push_back({{"arm_pixels", arm + "focal length and principal point", 0.01, "px"}, arm_pixels});
-  suite.accuracy.push_back({{"right_cameras", check + "right cameras: warnings", 0, "warnings"}, right_cameras});
-  suite.accuracy.push_back(wrong_camera("mirrored", check + "mirrored", [](const Subject& subject) {
-    return warnings(subject.with("points", points_file(device(0), second(), true).string()), device(0), second());
-  }));
+      {{"principal_point", board + "largest distance of the principal point from the true one", 0.5, "px"},
+       principal_point});
+  suite.accuracy.push_back(
+      {{"board", board + "root mean square reprojection error of the beads", 0.3, "px"}, board_error});
+  suite.accuracy.push_back(
+      {{"arm_direction",
+        arm + "largest error of the source's position and of the beam's direction, measured at the isocentre", 0.01,
+        "mm"},
+       arm_direction});
+  suite.accuracy.push_back(
+      {{"arm_pixels", arm + "largest error of focal length and principal point", 0.01, "px"}, arm_pixels});
+  suite.accuracy.push_back(
+      {{"right_cameras", check + "cameras are right: number of warnings", 0, "warnings"}, right_cameras});
+  suite.accuracy.push_back(
+      wrong_camera("mirrored", check + "seen positions mirrored left to right", [](const Subject& subject) {
+        return warnings(subject.with("points", points_file(device(0), second(), true).string()), device(0), second());
+      }));
   const auto changed = [&](const std::string& name, const std::string& what, void (*change)(Camera&)) {
     suite.accuracy.push_back(wrong_camera(name, check + what, [change](const Subject& subject) {
       Camera camera = device(0);
@@ -288,13 +300,13 @@ Suite camera_suite() {
       return warnings(subject, camera, second());
     }));
   };
-  changed("wrong_unit", "one camera placed in metres",
+  changed("wrong_unit", "position of one camera in metres",
           [](Camera& camera) { camera.camera_from_world.translation_mm /= 1000; });
-  changed("flipped_axis", "one camera with v upwards", [](Camera& camera) {
+  changed("flipped_axis", "v axis of one camera points up", [](Camera& camera) {
     camera.camera_from_world.rotation.bottomRows<2>() *= -1;
     camera.camera_from_world.translation_mm.tail<2>() *= -1;
   });
-  changed("other_size", "the camera matrix of an image twice as large",
+  changed("other_size", "one camera matrix belongs to an image of twice the size",
           [](Camera& camera) { camera.intrinsics.topRows<2>() *= 2; });
   return suite;
 }

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What cameras must do.
+/// The checks that every node of the kind camera must pass.
 Suite camera_suite();
 
 }  // namespace marrow::conformance

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's edge extraction (3.2): hysteresis thresholds at the 50th and 75th percentile of the gradient's
-// magnitude in a local window, recursive relaxation of the pixels between them, removal of small components. In every
-// flat window a quarter of all pixels lies above the 75th percentile, so both thresholds have a floor: the window's
-// median plus a multiple of the measured noise. (The median, because noise makes ridges on the smooth slope of a round
-// thigh as well as on flat ground.)
+// The chapter's edge extraction (3.2) in three steps: hysteresis thresholds at the 50th and 75th percentile of the
+// gradient's magnitude in a local window, recursive relaxation of the pixels between them, removal of small components.
+// Even in a flat window, a quarter of all pixels lies above the 75th percentile. So both thresholds have a lower limit:
+// the window's median plus a multiple of the measured noise. The median is added because noise makes ridges also on the
+// smooth slope of a round thigh, where the gradient is not 0.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ struct Options {
   int min_pixels = 20;
 };
 
-/// Thresholds at the centres of the blocks, CV_32F.
+/// Thresholds at the centres of the blocks (CV_32F).
 struct Thresholds {
   cv::Mat low, high;
 };
@@ -64,7 +64,7 @@ cv::Mat classified(const Prepared& image, const Gradient& gradient, const Thresh
   return labels;
 }
 
-/// Calls function(u, v) for the eight neighbours; labels are never set on the image's border, so all of them exist.
+/// Calls function(u, v) for the eight neighbours. Labels are never set on the image's border, so all neighbours exist.
 template <class Function>
 void for_neighbours(const cv::Point& pixel, Function function) {
   for (int v = pixel.y - 1; v <= pixel.y + 1; ++v)
@@ -72,7 +72,7 @@ void for_neighbours(const cv::Point& pixel, Function function) {
       if (u != pixel.x || v != pixel.y) function(u, v);
 }
 
-/// Calls function(u, v) for the pixels labelled as edges, also where it changes labels further on.
+/// Calls function(u, v) for the pixels labelled as edges, row by row. The function may change labels of later pixels.
 template <class Function>
 void for_edges(const cv::Mat& labels, Function function) {
   for (int v = 0; v < labels.rows; ++v) {
@@ -85,8 +85,8 @@ void for_edges(const cv::Mat& labels, Function function) {
   }
 }
 
-/// Recursive relabelling of intermediate pixels beside an edge pixel of similar magnitude and direction. What is
-/// reached does not depend on the order.
+/// Makes an intermediate pixel an edge pixel if a neighbouring edge pixel has similar magnitude and direction, again
+/// and again. The result does not depend on the order.
 void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
   const float cosine = float(std::cos(marrow::radians(options.direction_tolerance_deg)));
   std::vector<cv::Point> edge;
@@ -108,7 +108,8 @@ void relax(const Gradient& gradient, const Options& options, cv::Mat& labels) {
   }
 }
 
-/// Marks (255) the edge pixels whose 8-connected component has at least `min_pixels`; empties `labels`.
+/// Marks the edge pixels of 8-connected components of at least `min_pixels` pixels with 255. Removes all edges from
+/// `labels`.
 cv::Mat large_components(cv::Mat& labels, int min_pixels) {
   cv::Mat kept(labels.size(), CV_8U, cv::Scalar(0));
   std::vector<cv::Point> component;
@@ -142,30 +143,34 @@ marrow::EdgeMap adaptive_relaxation(const marrow::View& view, const Options& opt
 
 MARROW_PLUGIN(plugin) {
   plugin.node("edges.adaptive_relaxation", adaptive_relaxation)
-      .summary("Edges by local percentile thresholds, relaxation and removal of small components (the chapter's 3.2)")
+      .summary(
+          "Edges by local percentile thresholds, relaxation and removal of small components (section 3.2 of the "
+          "chapter)")
       .in("view", "X-ray view")
       .out("edges", "edge pixels at sub-pixel positions")
-      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7),
+      .option("sigma_px", &Options::sigma_px, "standard deviation of the Gaussian derivative", marrow::at_least(0.7),
               marrow::at_most(10))
-      .option("logarithm", &Options::logarithm, "seek edges of the attenuation (logarithm of the grey value)")
+      .option("logarithm", &Options::logarithm,
+              "find edges of the attenuation (logarithm of the grey value) instead of the grey value")
       .option("low", &Options::low, "lower threshold: percentile of the gradient's magnitude in the window",
               marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
       .option("high", &Options::high, "upper threshold: percentile of the gradient's magnitude in the window",
               marrow::unit("%"), marrow::at_least(0), marrow::at_most(100))
       .relation(marrow::not_above("low", "high"))
-      .option("window_px", &Options::window_px, "side of the local window, in effect an odd multiple of 16",
+      .option("window_px", &Options::window_px, "side of the local window, rounded down to an odd multiple of 16",
               marrow::at_least(16))
       .option("noise_low", &Options::noise_low,
-              "floor of the lower threshold above the window's median, in standard deviations of the noise",
+              "least value of the lower threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
       .option("noise_high", &Options::noise_high,
-              "floor of the upper threshold above the window's median, in standard deviations of the noise",
+              "least value of the upper threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
-      .option("thin", &Options::thin, "keep only the ridge of the gradient's magnitude")
+      .option("thin", &Options::thin, "keep only pixels on the ridge of the gradient's magnitude")
       .option("magnitude_tolerance", &Options::magnitude_tolerance,
-              "relaxation: largest difference of magnitudes, as a fraction of the larger", marrow::at_least(0),
+              "relaxation: largest difference of two magnitudes, as a fraction of the larger one", marrow::at_least(0),
               marrow::at_most(1))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "relaxation: largest difference of directions", marrow::at_least(0), marrow::at_most(180))
-      .option("min_pixels", &Options::min_pixels, "smaller connected components are removed", marrow::at_least(1));
+              "relaxation: largest angle between two gradients", marrow::at_least(0), marrow::at_most(180))
+      .option("min_pixels", &Options::min_pixels, "connected components with fewer pixels are removed",
+              marrow::at_least(1));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Canny's detector (IEEE TPAMI 1986) as OpenCV has it, on a Gaussian gradient. Its magnitude is counted above the
-// median of a window and in multiples of the noise, so that the same thresholds serve an 8 bit and a 16 bit image, its
-// bright and its dark parts, and the smooth slope of a round thigh, on which noise makes ridges.
+// OpenCV's version of Canny's detector (IEEE TPAMI 1986) on a Gaussian gradient. The median of a window is subtracted
+// from the gradient's magnitude, and the rest is divided by the noise. So the same thresholds fit 8 bit and 16 bit
+// images, bright and dark parts, and the smooth slope of a round thigh, where noise makes ridges.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -23,7 +23,7 @@ struct Options {
   double low = 2, high = 5;
 };
 
-constexpr float kUnit = 64;  // of the 16 bit gradient that OpenCV wants, per standard deviation of the noise
+constexpr float kUnit = 64;  // one standard deviation of the noise in the 16 bit gradient that OpenCV needs
 
 marrow::EdgeMap canny(const marrow::View& view, const Options& options) {
   const Prepared image = prepare(view, options.sigma_px, options.logarithm);
@@ -59,16 +59,17 @@ MARROW_PLUGIN(plugin) {
       .summary("Canny's edge detector (IEEE TPAMI 1986), thresholds in multiples of the image's noise")
       .in("view", "X-ray view")
       .out("edges", "edge pixels at sub-pixel positions")
-      .option("sigma_px", &Options::sigma_px, "width of the Gaussian derivative", marrow::at_least(0.7),
+      .option("sigma_px", &Options::sigma_px, "standard deviation of the Gaussian derivative", marrow::at_least(0.7),
               marrow::at_most(10))
-      .option("logarithm", &Options::logarithm, "seek edges of the attenuation (logarithm of the grey value)")
-      .option("window_px", &Options::window_px, "side of the window of the median, in effect an odd multiple of 16",
-              marrow::at_least(16))
+      .option("logarithm", &Options::logarithm,
+              "find edges of the attenuation (logarithm of the grey value) instead of the grey value")
+      .option("window_px", &Options::window_px,
+              "side of the window for the median, rounded down to an odd multiple of 16", marrow::at_least(16))
       .option("low", &Options::low,
-              "lower hysteresis threshold above the window's median, in standard deviations of the noise",
+              "lower hysteresis threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
       .option("high", &Options::high,
-              "upper hysteresis threshold above the window's median, in standard deviations of the noise",
+              "upper hysteresis threshold: the window's median plus this many standard deviations of the noise",
               marrow::at_least(0))
       .relation(marrow::not_above("low", "high"));
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that find edges.
 #include <marrow/plugin.hpp>
 
 #include "suite.hpp"

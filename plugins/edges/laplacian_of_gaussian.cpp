@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth, Proc. R. Soc. Lond. B 1980), at sub-pixel
-// positions. Noise makes zero crossings everywhere, so only those count where the slope of the image is significant.
-// The Laplacian must fall along the gradient: where it rises, the gradient is least, not greatest (Clark, IEEE TPAMI
-// 1989).
+// positions. Noise makes zero crossings everywhere, so a zero crossing counts only if the gradient there is
+// significant. The Laplacian must fall along the gradient. Where it rises, the gradient has a minimum, not a maximum
+// (Clark, IEEE TPAMI 1989).
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
@@ -12,10 +12,10 @@ namespace {
 
 using namespace marrow::image;
 
-constexpr double kReach =
-    5;  // sigma at which kernels end: what is cut off sooner makes zero crossings beside a steep edge
+// Radius of the kernels in sigma. Shorter kernels give false zero crossings beside a steep edge.
+constexpr double kReach = 5;
 
-/// Weights of the second derivative of a Gaussian: nothing of a constant or a ramp, 2 of a parabola x^2.
+/// Weights of the second derivative of a Gaussian. They give 0 for a constant or a ramp and 2 for the parabola x^2.
 std::vector<float> second_derivative(double sigma_px, int radius) {
   const auto weight = [&](int i) {
     return std::exp(-0.5 * i * i / (sigma_px * sigma_px)) * (i * i - sigma_px * sigma_px);
@@ -40,7 +40,8 @@ cv::Mat laplacian(const cv::Mat& values, double sigma_px) {
   return across + along;
 }
 
-/// The way along the gradient to where the Laplacian falls through zero, within a pixel.
+/// Distance along the gradient to the place where the Laplacian falls through zero. Nothing if it is more than a pixel
+/// away.
 std::optional<float> way_to_zero(const cv::Mat& laplacian, const Gradient& gradient, int u, int v) {
   const float du = gradient.du.at<float>(v, u), dv = gradient.dv.at<float>(v, u), length = std::hypot(du, dv);
   if (!(length > 0)) return std::nullopt;
@@ -60,11 +61,11 @@ marrow::EdgeMap laplacian_of_gaussian(const marrow::View& view, const ThresholdO
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_threshold_options(plugin.node("edges.laplacian_of_gaussian", laplacian_of_gaussian)
-                                .summary("Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth 1980) where "
-                                         "the image's slope is significant")
-                                .in("view", "X-ray view")
-                                .out("edges", "edge pixels at sub-pixel positions")
-                                .option("sigma_px", &ThresholdOptions::sigma_px, "width of the Gaussian",
-                                        marrow::at_least(1), marrow::at_most(10)));
+  declare_threshold_options(
+      plugin.node("edges.laplacian_of_gaussian", laplacian_of_gaussian)
+          .summary("Zero crossings of the Laplacian of a Gaussian (Marr and Hildreth 1980) with a significant gradient")
+          .in("view", "X-ray view")
+          .out("edges", "edge pixels at sub-pixel positions")
+          .option("sigma_px", &ThresholdOptions::sigma_px, "standard deviation of the Gaussian", marrow::at_least(1),
+                  marrow::at_most(10)));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Prewitt's mask (in: Picture Processing and Psychopictorics, 1970): differences of 3 x 3 pixels, the mean across them.
+// Prewitt's mask (in: Picture Processing and Psychopictorics, 1970): central differences over 3 x 3 pixels, averaged
+// across their direction.
 #include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
@@ -16,10 +17,11 @@ marrow::EdgeMap prewitt(const marrow::View& view, const ThresholdOptions& option
 MARROW_PLUGIN(plugin) {
   declare_threshold_options(
       plugin.node("edges.prewitt", prewitt)
-          .summary("Prewitt's mask of 3 x 3 pixels (1970), thinned, one threshold in multiples of the image's noise")
+          .summary("Prewitt's mask of 3 x 3 pixels (1970) with thinning and one threshold, in multiples of the image's "
+                   "noise")
           .in("view", "X-ray view")
           .out("edges", "edge pixels at sub-pixel positions")
           .option("sigma_px", &ThresholdOptions::sigma_px,
-                  "width of the Gaussian that smooths the image before; 0: none", marrow::at_least(0),
-                  marrow::at_most(10)));
+                  "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
+                  marrow::at_least(0), marrow::at_most(10)));
 }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Roberts' cross (in: Optical and Electro-Optical Information Processing, 1965). The differences along the two
-// diagonals of 2 x 2 pixels, turned by 45 degrees, are the differences of the means of its sides.
+// Roberts' cross (in: Optical and Electro-Optical Information Processing, 1965). Roberts takes the differences along
+// the two diagonals of 2 x 2 pixels. Rotated by 45 degrees, these are the differences between the means of opposite
+// sides.
 #include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
@@ -17,10 +18,11 @@ marrow::EdgeMap roberts(const marrow::View& view, const ThresholdOptions& option
 MARROW_PLUGIN(plugin) {
   declare_threshold_options(
       plugin.node("edges.roberts", roberts)
-          .summary("Roberts' mask of 2 x 2 pixels (1965), thinned, one threshold in multiples of the image's noise")
+          .summary(
+              "Roberts' mask of 2 x 2 pixels (1965) with thinning and one threshold, in multiples of the image's noise")
           .in("view", "X-ray view")
           .out("edges", "edge pixels at sub-pixel positions")
           .option("sigma_px", &ThresholdOptions::sigma_px,
-                  "width of the Gaussian that smooths the image before; 0: none", marrow::at_least(0),
-                  marrow::at_most(10)));
+                  "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
+                  marrow::at_least(0), marrow::at_most(10)));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Sobel's mask (Stanford Artificial Intelligence Project, 1968): differences of 3 x 3 pixels, the middle row counted
-// twice.
+// Sobel's mask (Stanford Artificial Intelligence Project, 1968): central differences over 3 x 3 pixels, averaged across
+// their direction with double weight in the middle.
 #include "marrow/toolbox/image/threshold.hpp"
 
 namespace {
@@ -17,10 +17,11 @@ marrow::EdgeMap sobel(const marrow::View& view, const ThresholdOptions& options)
 MARROW_PLUGIN(plugin) {
   declare_threshold_options(
       plugin.node("edges.sobel", sobel)
-          .summary("Sobel's mask of 3 x 3 pixels (1968), thinned, one threshold in multiples of the image's noise")
+          .summary(
+              "Sobel's mask of 3 x 3 pixels (1968) with thinning and one threshold, in multiples of the image's noise")
           .in("view", "X-ray view")
           .out("edges", "edge pixels at sub-pixel positions")
           .option("sigma_px", &ThresholdOptions::sigma_px,
-                  "width of the Gaussian that smooths the image before; 0: none", marrow::at_least(0),
-                  marrow::at_most(10)));
+                  "standard deviation of the Gaussian that smooths the image first; 0: no smoothing",
+                  marrow::at_least(0), marrow::at_most(10)));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edge extractors, on images whose edges are known exactly: a disc and a bar, dark as bone is, blurred by a Gaussian,
-// with noise.
+// Checks for edge extractors on images whose edges are known exactly: a disc and a bar, dark like bone, blurred by a
+// Gaussian, with noise.
 #include "suite.hpp"
 
 #include <algorithm>
@@ -13,11 +13,10 @@ namespace marrow::conformance {
 namespace {
 
 constexpr int kWidth = 240, kHeight = 200;
-constexpr double kBlur_px = 1.2, kBright = 40000, kDark = 32000,
-                 kNoise =
-                     160;  // faint enough that linear and logarithmic grey values have their edge at the same place
+// The contrast is so low that grey values and their logarithms have their edges at the same place.
+constexpr double kBlur_px = 1.2, kBright = 40000, kDark = 32000, kNoise = 160;
 
-/// The signed distance in px from a pixel to the edge, positive on the bright side, and the direction towards it.
+/// The signed distance in px from the edge, positive on the bright side, and the unit normal towards the bright side.
 struct Shape {
   std::function<double(double u, double v)> distance_px;
   std::function<Eigen::Vector2d(double u, double v)> outward;
@@ -53,7 +52,7 @@ cv::Mat picture(const Shape& shape, int type = CV_16U, double noise = kNoise) {
   cv::Mat pixels(kHeight, kWidth, type);
   for (int v = 0; v < kHeight; ++v)
     for (int u = 0; u < kWidth; ++u) {
-      double sum = 0;  // a normal number: the sum of twelve uniform ones
+      double sum = 0;  // nearly normal: the sum of twelve uniform numbers
       for (int i = 0; i < 12; ++i) sum += double(random()) / 4294967296.0;
       const double value =
           kDark + (kBright - kDark) * 0.5 * (1 + std::erf(shape.distance_px(u, v) / (kBlur_px * std::sqrt(2.0)))) +
@@ -91,7 +90,7 @@ void validate(const Inputs& inputs, const std::vector<PortInfo>&, const std::vec
   }
 }
 
-/// The edge pixels near the edge, as signed distances; those further than `kNear_px` are false.
+/// An edge pixel farther than this from the true edge is false.
 constexpr double kNear_px = 3;
 
 EdgeMap edges_of(const Subject& subject, const Shape& shape) {
@@ -131,7 +130,7 @@ double false_percent(const Subject& subject, const Shape& shape) {
   return 100.0 * double(count) / double(map.pixels.size());
 }
 
-/// Of the edge, the parts without an edge pixel within 2 px. The edge is walked through the pixels that it crosses.
+/// Percentage of the true edge without an edge pixel within 2 px. The true edge is sampled at pixels that it crosses.
 double missed_percent(const Subject& subject, const Shape& shape) {
   const EdgeMap map = edges_of(subject, shape);
   int all = 0, missed = 0;
@@ -198,17 +197,17 @@ std::vector<Trial> trials() {
 Suite edges_suite() {
   Suite suite{[] { return inputs_of(picture(disc())); }, validate, trials(), {}};
   for (const auto& [name, shape] : {std::pair<std::string, Shape>{"disc", disc()}, {"bar", bar()}}) {
-    const std::string of = "edge of a " + name + ", blurred by 1.2 px, noise 2 %";
+    const std::string of = "edge of a " + name + ", blurred by 1.2 px, with noise of 2 % of its contrast";
     const auto add = [&, shape = shape](const std::string& what, const std::string& help, double limit,
                                         const std::string& unit, double (*measure)(const Subject&, const Shape&)) {
       suite.accuracy.push_back({{name + "_" + what, of + ": " + help, limit, unit},
                                 [measure, shape](const Subject& subject) { return measure(subject, shape); }});
     };
-    add("bias", "median distance", 0.2, "px", bias);
-    add("spread", "half the width of the middle 95 % of distances", 0.6, "px", spread);
-    add("direction", "90th percentile of the angle to its normal", 10, "deg", direction_error);
-    add("missed", "part without an edge pixel within 2 px", 3, "%", missed_percent);
-    add("false", "edge pixels further than 3 px away", 40, "%", false_percent);
+    add("bias", "absolute value of the median signed distance", 0.2, "px", bias);
+    add("spread", "half the width of the middle 95 % of the signed distances", 0.6, "px", spread);
+    add("direction", "90th percentile of the angle between gradient and normal", 10, "deg", direction_error);
+    add("missed", "part of the edge without an edge pixel within 2 px", 3, "%", missed_percent);
+    add("false", "share of the edge pixels that are more than 3 px away from it", 40, "%", false_percent);
   }
   return suite;
 }

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What edge extractors must do.
+/// The checks that every edge extractor must pass.
 Suite edges_suite();
 
 }  // namespace marrow::conformance

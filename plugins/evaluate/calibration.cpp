@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a calibration is from the exact one of a simulated device.
+// Errors of a calibration, compared with the exact one of a simulated device.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -18,8 +18,9 @@ marrow::Metrics calibration_error(const Calibration& found, const Calibration& t
     return 100 * std::abs(found.intrinsics(i, i) - truth.intrinsics(i, i)) / truth.intrinsics(i, i);
   };
   const auto principal_error = [&](int i) { return std::abs(found.intrinsics(i, 2) - truth.intrinsics(i, 2)); };
-  // What counts for a measurement is where the two put the same ray. A shift of the principal point is nearly a turn of
-  // the whole device, which the poses of the views take up, so the mean shift over the image is taken out.
+  // What counts for a measurement is where both calibrations see the same ray. A shift of the principal point is nearly
+  // a rotation of the whole device, and the poses of the views compensate for it. So the mean shift over the image is
+  // subtracted.
   std::vector<Eigen::Vector2d> shifts;
   Eigen::Vector2d mean = Eigen::Vector2d::Zero();
   constexpr int kGrid = 20;
@@ -46,8 +47,10 @@ marrow::Metrics calibration_error(const Calibration& found, const Calibration& t
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.calibration", calibration_error)
-      .summary("How far a calibration is from the exact one of a simulated device")
+      .summary("Errors of a calibration, compared with the exact one of a simulated device")
       .in("calibration", "camera matrix and distortion that were found")
-      .in("truth", "the exact ones")
-      .out("metrics", "errors of focal length, principal point and of the distortion over the image");
+      .in("truth", "exact camera matrix and distortion")
+      .out("metrics",
+           "errors of focal length and principal point, root mean square error of the distortion over the image, and "
+           "the residual");
 }

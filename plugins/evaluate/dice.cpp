@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Overlap of two segmentations (Dice, Ecology 1945). They may be on different grids: the reference is looked up at the
-// voxels of the field.
+// Overlap of two segmentations (Dice, Ecology 1945). They may have different grids: the reference is interpolated at
+// the voxels of the field.
 #include <marrow/plugin.hpp>
 
 namespace {
@@ -20,7 +20,7 @@ bool covers(const Grid& grid, const Eigen::Vector3d& index) {
   return true;
 }
 
-/// Calls visit(index of the sample, whether it is inside, its place in the other grid) for each sample.
+/// Calls visit(whether the sample is inside, its index in the other grid) for each sample.
 template <class Visit>
 void for_samples(const SignedField& field, const Grid& other, const Visit& visit) {
   for (int z = 0; z < field.grid.size[2]; ++z)
@@ -68,8 +68,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.dice", dice)
       .summary("Overlap of two segmentations: Dice's and Jaccard's coefficients")
       .in("field", "segmentation, negative inside")
-      .in("reference", "the one to compare with; it is looked up at the voxels of the first")
+      .in("reference", "segmentation to compare with; it is interpolated at the voxels of the field")
       .out("metrics",
-           "2 |A and B| / (|A| + |B|), |A and B| / |A or B|, and both volumes; parts of the reference beyond the "
-           "field's grid count as missed");
+           "Dice = 2 |A and B| / (|A| + |B|), Jaccard = |A and B| / |A or B|, and both volumes; parts of the reference "
+           "beyond the field's grid count as missed");
 }

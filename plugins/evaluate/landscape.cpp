@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b): how wide the valley is,
-// where its floor lies, and which direction is poorly determined.
+// Profiles of the cost around a pose, along each of the six axes of the fragment (Fig. 7b of the chapter). They show
+// how wide the minimum is, where it lies, and which direction is poorly determined.
 #include <array>
 #include <marrow/plugin.hpp>
 
@@ -49,14 +49,15 @@ marrow::Landscape landscape(const marrow::Cost& cost, const marrow::Pose& pose, 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.landscape", landscape)
-      .summary("The cost about a pose along each of the six axes of the fragment")
-      .in("cost", "cost to look at")
+      .summary("Profiles of the cost around a pose, along each of the six axes of the fragment")
+      .in("cost", "cost to evaluate")
       .in("pose", "pose in the middle; its frame gives the axes")
-      .in("truth", "exact pose; its part about or along each axis is noted")
-      .out("landscape", "six profiles; offsets in degrees or mm from the pose")
-      .option("range_deg", &Options::range_deg, "rotations to either side", marrow::at_least(1e-3),
+      .in("truth", "exact pose; its offset from the pose is noted in each profile")
+      .out("landscape", "six profiles: costs at offsets from the pose, in degrees or mm")
+      .option("range_deg", &Options::range_deg, "largest rotation to either side", marrow::at_least(1e-3),
               marrow::at_most(180))
-      .option("range_mm", &Options::range_mm, "translations to either side", marrow::at_least(1e-3),
+      .option("range_mm", &Options::range_mm, "largest translation to either side", marrow::at_least(1e-3),
               marrow::at_most(1000))
-      .option("samples", &Options::samples, "points of a profile", marrow::at_least(3), marrow::at_most(2001));
+      .option("samples", &Options::samples, "number of points of a profile", marrow::at_least(3),
+              marrow::at_most(2001));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Target registration error: how far a pose takes points of the fragment from where the truth does.
+// Target registration error: the distance between the positions of a target under the found and under the true pose.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -34,8 +34,8 @@ MARROW_PLUGIN(plugin) {
           "Target registration error over the fragment's surface or its landmarks: mean, root mean square, maximum")
       .in("pose", "pose found")
       .in("truth", "exact pose")
-      .in("model", "the fragment's surface: the targets are spread over it")
-      .in("landmarks", "their points are the targets instead")
-      .out("metrics", "mTRE (van de Kraats et al., IEEE TMI 2005), root mean square and largest error")
-      .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6));
+      .in("model", "surface of the fragment; the targets are spread over it")
+      .in("landmarks", "landmarks to use as targets instead")
+      .out("metrics", "mTRE (mean; van de Kraats et al., IEEE TMI 2005), root mean square and largest error")
+      .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far the model's outline lies from the edges of the images at a pose. It needs no truth, so it can be used on real
-// data.
+// Distance between the model's outline at a pose and the edges of the images. It needs no truth, so it can be used on
+// real data.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,8 +13,8 @@ namespace {
 
 using marrow::geometry::quantile;
 
-/// Finds the nearest edge pixel whose gradient has nearly a given direction. Edge pixels are sorted into square cells;
-/// cells are visited in growing square rings about the point.
+/// Finds the nearest edge pixel with a gradient of similar direction. Edge pixels are sorted into square cells. The
+/// cells are visited in growing square rings around the point.
 class EdgeSearch {
  public:
   explicit EdgeSearch(const marrow::EdgeMap& edges)
@@ -24,14 +24,14 @@ class EdgeSearch {
     for (const marrow::EdgePixel& edge : edges.pixels) cells_[index(column(edge.u_px), row(edge.v_px))].push_back(edge);
   }
 
-  /// The nearest edge within `reach_px` whose direction makes an angle with (normal_u, normal_v) of at most
-  /// acos(least_cosine); nullptr where there is none. The normal has unit length.
+  /// The nearest edge within `reach_px` whose direction makes an angle of at most acos(least_cosine) with the unit
+  /// vector (normal_u, normal_v). nullptr if there is none.
   const marrow::EdgePixel* nearest(double u, double v, double normal_u, double normal_v, double reach_px,
                                    double least_cosine) const {
     double best = reach_px;
     const marrow::EdgePixel* found = nullptr;
     const int centre_column = column(u), centre_row = row(v);
-    // The point lies anywhere in its cell, so ring k holds nothing nearer than (k - 1) cells.
+    // The point may lie anywhere in its cell, so no edge in ring k is nearer than (k - 1) cells.
     for (int ring = 0; (ring - 1) * kCell <= best && ring <= std::max(columns_, rows_); ++ring)
       for (int y = centre_row - ring; y <= centre_row + ring; ++y) {
         const bool whole_row = y == centre_row - ring || y == centre_row + ring;
@@ -65,11 +65,11 @@ struct Options {
   double angle_deg = 30;
 };
 
-/// The distances of a view's outline points; a point with no edge in reach counts with the reach itself, so that parts
-/// that match nothing make the figures worse, not better.
+/// The distances of a view's outline points. A point without an edge in reach counts with the reach itself. So parts of
+/// the outline without a match make the figures worse, not better.
 struct Distances {
   std::vector<double> px, mm;
-  std::vector<double> across_px;  ///< of matched points: along the outline's normal, positive where the edge is outside
+  std::vector<double> across_px;  ///< of matched points: along the outline's normal, positive if the edge is outside
 };
 
 void check_edges(const marrow::View& view, const marrow::EdgeMap* edges) {
@@ -168,19 +168,20 @@ marrow::Metrics outline_distance(const marrow::Pose& pose, const marrow::Outline
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.outline_distance", outline_distance)
       .summary(
-          "Distance of the model's outline at a pose to the nearest image edges of the same direction; needs no truth")
-      .in("pose", "pose to judge")
-      .in("projector", "draws the outline")
+          "Distance of the model's outline at a pose to the nearest image edges of similar direction; needs no truth")
+      .in("pose", "pose to evaluate")
+      .in("projector", "projector that gives the outline")
       .in("views", "X-ray views", marrow::over("view"))
-      .in("edges", "their edges", marrow::over("view"))
+      .in("edges", "edges of the views", marrow::over("view"))
       .out("metrics",
-           "median and 90th percentile in pixels and in mm at the object, and the share of the outline with an edge in "
-           "reach; then the offset that most of the edges have from the outline (positive: outside), which blur and a "
-           "fat "
-           "or thin model make, and the median distance from that offset: of all views together, then of each")
-      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1),
+           "median and 90th percentile of the distance, in pixels and in mm at the object; the share of the outline "
+           "with an edge in reach; the median offset of the edges along the outline's normal (positive: outside), "
+           "caused by blur or by a model that is too thick or too thin; the median deviation from this offset. First "
+           "for all views together, then for each view")
+      .option("spacing_px", &Options::spacing_px, "distance between two outline points", marrow::at_least(0.1),
               marrow::at_most(100))
-      .option("reach_px", &Options::reach_px, "how far an edge may be; points with none count with this distance",
+      .option("reach_px", &Options::reach_px,
+              "largest distance of an edge; outline points without an edge count with this distance",
               marrow::at_least(1), marrow::at_most(10000))
       .option("angle_deg", &Options::angle_deg, "largest angle between the outline's normal and an edge's gradient",
               marrow::at_least(0), marrow::at_most(180));

@@ -28,13 +28,14 @@ marrow::Metrics pose_difference(const marrow::Pose& pose, const marrow::Pose& re
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.pose_difference", pose_difference)
       .summary(
-          "How far two poses of one fragment are apart, where no truth is known: of two methods, or of a result and a "
-          "placement by hand")
+          "Difference between two poses of one fragment if no truth is known, for example poses of two methods, or a "
+          "result and a placement by hand")
       .in("pose", "pose found")
-      .in("reference", "the other pose")
-      .in("model", "the fragment's surface: gives its axes, its centroid and the points")
+      .in("reference", "pose to compare with")
+      .in("model", "surface of the fragment; it gives the axes, the centroid and the points")
       .out("metrics",
-           "geodesic angle; signed rotation about the long axis; displacement of the centroid; mean distance between "
-           "the surface's points in both")
-      .option("points", &Options::points, "points spread over the surface", marrow::at_least(1), marrow::at_most(1e6));
+           "rotation angle (geodesic); signed rotation about the long axis; displacement of the centroid; mean "
+           "distance between the positions of the surface's points in both poses")
+      .option("points", &Options::points, "number of points spread over the surface", marrow::at_least(1),
+              marrow::at_most(1e6));
 }

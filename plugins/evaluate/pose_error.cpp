@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far a pose is from the truth, in the figures that every table of marrow uses. All of them belong to the small
-// motion that leads from the true pose to the found one, about the fragment's centroid and along its own axes.
+// Errors of a pose against the truth. Every table of marrow uses these figures. They describe the small motion from the
+// true pose to the found one, about the fragment's centroid and along its own axes.
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
@@ -16,8 +16,8 @@ struct Options {
   int points = 500;
 };
 
-/// The covariance of the same small motion about another point and along other axes: r and t of frame `from` become
-/// to^T (from r) and to^T (from t + (from r) x (to's origin - from's origin)).
+/// Converts the covariance of a small motion (r, t) to another origin and other axes: r becomes to^T (from r), and t
+/// becomes to^T (from t + (from r) x (to's origin - from's origin)).
 marrow::Matrix6d in_frame(const marrow::Matrix6d& covariance, const marrow::FragmentFrame& from,
                           const marrow::FragmentFrame& to) {
   const Eigen::Vector3d arm = to.origin_mm - from.origin_mm;
@@ -30,13 +30,13 @@ marrow::Matrix6d in_frame(const marrow::Matrix6d& covariance, const marrow::Frag
   return change * covariance * change.transpose();
 }
 
-/// Standard deviation in the direction that is determined worst.
+/// Standard deviation in the worst direction.
 double largest_deviation(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]));
 }
 
 void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& frame, marrow::Metrics& metrics) {
-  // A direction that the images do not determine at all has no finite deviation: then there is nothing to print.
+  // If the images do not determine a direction at all, its deviation is infinite. Then no prediction is given.
   if (!pose.covariance || !pose.covariance->allFinite()) return;
   const marrow::Matrix6d covariance = in_frame(*pose.covariance, pose.frame, frame);
   const auto deviation = [&](int i) { return std::sqrt(std::max(0.0, covariance(i, i))); };
@@ -84,18 +84,16 @@ marrow::Metrics pose_error(const marrow::Pose& pose, const marrow::Truth& truth,
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.pose_error", pose_error)
       .summary(
-          "Rotation, translation and target registration error of a pose against the truth, with the predicted "
-          "deviation")
+          "Rotation error, translation error and target registration error of a pose, with the predicted standard "
+          "deviations")
       .in("pose", "pose found")
       .in("truth", "exact pose")
-      .in("model", "the fragment's surface: gives its axes, its centroid and the targets")
+      .in("model", "surface of the fragment; it gives the axes, the centroid and the targets")
       .out("metrics",
-           "geodesic angle; signed angles about the frontal, lateral and long axes; displacement of the centroid, "
-           "signed along "
-           "the long, frontal and lateral axes, and across the long one; mTRE; means of the absolute angles and "
-           "translations; predicted standard "
-           "deviations "
-           "where the pose has a covariance")
-      .option("points", &Options::points, "points spread over the surface for the mTRE", marrow::at_least(1),
+           "rotation angle (geodesic); signed angles about the frontal, lateral and long axes; displacement of the "
+           "centroid: its length, its signed parts along the long, frontal and lateral axes, and its length across the "
+           "long axis; mTRE; means of the three absolute angles and of the three absolute translations; predicted "
+           "standard deviations if the pose has a covariance")
+      .option("points", &Options::points, "number of targets spread over the surface for the mTRE", marrow::at_least(1),
               marrow::at_most(1e6));
 }

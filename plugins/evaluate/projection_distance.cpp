@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// mPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how far
-// apart the images of the targets lie at the found and at the true pose. What a pose is wrong along the beam hardly
-// counts.
+// mPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: the
+// mean distance between the projections of the targets at the found and at the true pose. An error along the beam
+// hardly counts.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -20,7 +20,7 @@ struct Distances {
   std::vector<double> px, mm, detector_mm;
 };
 
-/// The detector's distance of a view; 0 where it is not known. A camera matrix knows it in pixels alone.
+/// Distance in mm from the source to the detector of a view; 0 if not known. A camera matrix gives it only in pixels.
 double source_to_detector_mm(const Options& options, std::size_t view, std::size_t views) {
   const std::vector<double>& given = options.source_to_detector_mm;
   if (given.empty()) return 0;
@@ -84,17 +84,17 @@ Metrics projection_distance(const Pose& pose, const Truth& truth, const Mesh* mo
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.projection_distance", projection_distance)
-      .summary("Mean projection distance (mPD) between the images of the targets at the found and the true pose")
+      .summary(
+          "Mean projection distance (mPD) between the projections of the targets at the found and at the true pose")
       .in("pose", "pose found")
       .in("truth", "exact pose")
-      .in("model", "the fragment's surface: the targets are spread over it")
-      .in("landmarks", "their points are the targets instead")
-      .in("views", "X-ray views, for their cameras", over("view"))
+      .in("model", "surface of the fragment; the targets are spread over it")
+      .in("landmarks", "landmarks to use as targets instead")
+      .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("metrics",
-           "over all views and for each: mPD in pixels, in mm at the target's depth (divided by the magnification) "
-           "and, where the detector's "
-           "distance is known, in mm on the detector")
-      .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6))
+           "for all views together and for each view: mPD in pixels, in mm at the target's depth (divided by the "
+           "magnification) and, if source_to_detector_mm is given, in mm on the detector")
+      .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6))
       .option("source_to_detector_mm", &Options::source_to_detector_mm,
-              "distance of the detector from the source, one for all views or one for each; none: not known");
+              "distance from the source to the detector, one for all views or one for each view; empty: not known");
 }

@@ -11,7 +11,7 @@ struct Options : marrow::geometry::FragmentPair {
   double border_mm = 3;
 };
 
-/// The item of that name; an Error that names those that there are.
+/// The item of that name. If there is none, throws an Error that lists the existing names.
 template <class T>
 const T& named(const marrow::List<T>& items, const std::string& name, const std::string& what) {
   if (const T* item = items.find(name)) return *item;
@@ -21,7 +21,8 @@ const T& named(const marrow::List<T>& items, const std::string& name, const std:
                       "; name both fragments with moved and reference");
 }
 
-/// Of the moved fragment's surface, the points that lie by the other fragment in the CT: the fracture.
+/// Points on the fracture: points of the moved fragment's surface that lie within `border_mm` of the other fragment in
+/// the CT.
 std::vector<Eigen::Vector3d> fracture_points(const marrow::Mesh& moved, const marrow::Mesh& reference,
                                              double border_mm) {
   constexpr std::size_t kPoints = 20000;
@@ -35,7 +36,7 @@ std::vector<Eigen::Vector3d> fracture_points(const marrow::Mesh& moved, const ma
   return near;
 }
 
-/// The reduction that the found poses ask for is done to the fragment where it truly is.
+/// Computes the reduction from the found poses and applies it to the fragment at its true pose.
 marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const marrow::List<marrow::Truth>& truths,
                               const marrow::List<marrow::Mesh>& models, const Options& options) {
   const marrow::Pose &moved = named(poses, options.moved, "poses"),
@@ -68,17 +69,19 @@ marrow::Metrics reduction_gap(const marrow::List<marrow::Pose>& poses, const mar
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.reduction_gap", reduction_gap)
       .summary(
-          "How far a fracture stays open after the reduction that the found poses ask for: done to the fragment where "
-          "it truly is")
+          "Remaining gap of a fracture after a reduction that is computed from the found poses and applied to the "
+          "fragment at its true pose")
       .in("poses", "poses found", marrow::over("fragment"))
       .in("truths", "exact poses", marrow::over("fragment"))
       .in("models", "surfaces of both fragments", marrow::over("fragment"))
       .out("metrics",
-           "over the points of the fracture: mean distance from where they belong, before and after, the largest "
-           "after; the rotation left, and the shift of the fragment's centroid: the misalignment is wrong by as much")
+           "for points on the fracture: mean distance from their place in the restored bone before and after the "
+           "reduction, and the largest distance after it; the remaining rotation and the remaining shift of the "
+           "centroid, which are the errors of the misalignment")
       .option("moved", &Options::moved, "fragment that is moved")
       .option("reference", &Options::reference, "fragment that stays")
       .option("border_mm", &Options::border_mm,
-              "points of the moved surface that lie so near to the other one in the CT are the fracture's",
+              "points of the moved surface belong to the fracture if they are closer than this to the other surface in "
+              "the CT",
               marrow::at_least(0.1));
 }

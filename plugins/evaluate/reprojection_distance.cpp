@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// mRPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: how
-// far, at the patient, the ray through a target's image at the found pose passes the target's true place.
+// mRPD of van de Kraats et al., Standardized evaluation methodology for 2-D-3-D registration, IEEE TMI 24, 2005: a
+// target is projected at the found pose; its error is the distance in the patient between the ray through this pixel
+// and the target's true position.
 #include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -56,12 +57,13 @@ Metrics reprojection_distance(const Pose& pose, const Truth& truth, const Mesh* 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.reprojection_distance", reprojection_distance)
       .summary(
-          "Mean reprojection distance (mRPD) of the true targets from the rays through their images at the found pose")
+          "Mean reprojection distance (mRPD) between the true targets and the rays through their projections at the "
+          "found pose")
       .in("pose", "pose found")
       .in("truth", "exact pose")
-      .in("model", "the fragment's surface: the targets are spread over it")
-      .in("landmarks", "their points are the targets instead")
-      .in("views", "X-ray views, for their cameras", over("view"))
-      .out("metrics", "mRPD over all views and for each; what a pose is wrong along a view's beam does not count in it")
-      .option("points", &Options::points, "points spread over the surface", at_least(1), at_most(1e6));
+      .in("model", "surface of the fragment; the targets are spread over it")
+      .in("landmarks", "landmarks to use as targets instead")
+      .in("views", "X-ray views; only their cameras are used", over("view"))
+      .out("metrics", "mRPD for all views together and for each view; an error along the beam of a view does not count")
+      .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shaft's borders found in a view against those of the true outline: that of the model at its true pose, in the
-// same stretch of the same view.
+// Compares the borders of the shaft found in a view with those of the true outline. The true outline is that of the
+// model at its true pose, along the same part of the shaft in the same view.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -15,10 +15,10 @@ struct Options {
   double tolerance_mm = 1.0;
 };
 
-/// How two segments of equal length and sense differ.
+/// Difference of two segments with the same length and direction.
 struct Difference {
   double angle_deg = 0;               ///< signed
-  double middle_px = 0, ends_px = 0;  ///< distances from the true line, signed in the middle, the largest at the ends
+  double middle_px = 0, ends_px = 0;  ///< distances from the true line: signed in the middle, largest at the ends
 };
 
 Difference difference(const LineSegment& found, const LineSegment& truth) {
@@ -35,7 +35,7 @@ Difference difference(const LineSegment& found, const LineSegment& truth) {
 struct Comparison {
   std::string fragment;
   Difference left, right, middle;
-  double width_px = 0;  ///< of the true outline
+  double width_px = 0;  ///< width of the true outline
   double worst_px() const { return std::max(left.ends_px, right.ends_px); }
 };
 
@@ -43,7 +43,7 @@ LineSegment middle_of(const LineSegment& one, const LineSegment& other) {
   return {0.5 * (one.from_px + other.from_px), 0.5 * (one.to_px + other.to_px)};
 }
 
-/// Against the fragment whose outline is nearest; nothing where no fragment lies in the pair's stretch.
+/// Compares with the fragment whose outline is nearest. Nothing if no fragment lies along the pair of borders.
 std::optional<Comparison> compare(const ShaftLines& lines, const View& view, const List<Mesh>& models,
                                   const List<Truth>& truths, double tolerance_px) {
   std::optional<Comparison> best;
@@ -95,19 +95,20 @@ std::optional<marrow::Metrics> shaft_lines(const ShaftLines& lines, const View& 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.shaft_lines", shaft_lines)
-      .summary("The shaft's borders of a view against the fit to the true outline in the same stretch")
+      .summary(
+          "Errors of the shaft's borders in a view, against lines fitted to the true outline along the same part of "
+          "the shaft")
       .in("lines", "borders found in the view")
-      .in("view", "X-ray view, for its camera")
+      .in("view", "X-ray view; only its camera is used")
       .in("models", "surface of each fragment", marrow::over("fragment"))
-      .in("truths", "exact pose of the fragments", marrow::over("fragment"))
-      .out("metrics",
-           "at the isocentre's depth, of the two borders the larger angle to the true one and the larger distance from "
-           "it in the middle of the "
-           "stretch; the largest distance at its ends (beyond a few mm it is another pair); the same for the line "
-           "midway; the pair's width "
-           "less the true one, which is negative where edges lie inside the outline; true width, length; the "
-           "log-likelihood that the shaft node gives")
+      .in("truths", "exact pose of each fragment", marrow::over("fragment"))
+      .out(
+          "metrics",
+          "all lengths in mm at the isocentre's depth; of the two borders, the larger angle to the true border and the "
+          "larger distance from it in the middle; the largest distance at an end (more than a few mm means a wrong "
+          "pair); angle and distance of the axis, the line midway between the borders; found width minus true width "
+          "(negative if the edges lie inside the outline); true width; length; log-likelihood from the shaft node")
       .option("tolerance_mm", &Options::tolerance_mm,
-              "largest distance, at the isocentre, of a silhouette point from the outline's line",
+              "largest distance, in mm at the isocentre, of a silhouette point from the line fitted to the outline",
               marrow::at_least(0.01));
 }

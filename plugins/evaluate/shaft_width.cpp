@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The shaft's outer diameter from two views or more. Planes through the X-ray sources and the borders touch the bone;
-// what touches all of them at once tells where it lies, so the diameter needs no guess of the magnification.
+// The shaft's outer diameter from two views or more. Each border and its X-ray source span a plane that touches the
+// bone. A tapering bone that touches all planes has a known depth, so the magnification need not be assumed.
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
@@ -15,13 +15,14 @@ struct Options {
   std::vector<double> width_mm, width_deviation_mm;
 };
 
-/// Diameters that a shaft may have, from `least_mm` to `most_mm`; as many as the node's widths.
+/// A range of diameters that a shaft may have.
 struct Possible {
   double least_mm, most_mm;
 };
 
-/// Without widths a femur's. Perimeters of 366 femora in the middle were 69 to 116 mm (J Clin Med Res 11, 2019, 740),
-/// which are diameters of 22 to 37 mm; a third less and half as much again is left for other people, sides and levels.
+/// One range for each given width. Without widths, one range for a femur: 366 femora had perimeters of 69 to 116 mm at
+/// mid-shaft (J Clin Med Res 11, 2019, 740), which means diameters of 22 to 37 mm. The range goes from a third less to
+/// half as much again, for other people, directions and levels.
 std::vector<Possible> possible_diameters(const Options& options) {
   std::vector<Possible> possible;
   for (std::size_t i = 0; i < options.width_mm.size(); ++i) {
@@ -41,10 +42,10 @@ std::string range(const std::vector<Possible>& possible) {
   return text;
 }
 
-/// One view's pair of borders, in world coordinates.
+/// The pair of borders of one view, in world coordinates.
 struct Sight {
   Eigen::Vector3d source_mm, ray;  ///< the ray runs through the middle of the pair
-  /// Unit normals, from the bone outwards, of the planes through the source that touch it.
+  /// Unit normals of the planes through the source that touch the bone. They point away from the bone.
   Eigen::Vector3d left, right;
 };
 
@@ -63,14 +64,15 @@ Sight sight_of(const View& view, const ShaftLines& lines) {
   return sight;
 }
 
-/// A straight, evenly tapering bone. At `point_mm + t * direction` the planes of view v, through its borders, are
-/// `distance_mm[v] + slope[v] * t` away; a bone that is not round is wider in one view than in the other.
+/// A straight, evenly tapering bone. The planes through the borders of view v have the distance `distance_mm[v] +
+/// slope[v] * t` from the axis point `point_mm + t * direction`. Each view has its own distance, because a bone need
+/// not be round.
 struct Taper {
   Eigen::Vector3d point_mm, direction;
   Eigen::VectorXd distance_mm, slope;
 };
 
-/// Throws Error where the views see the bone from nearly the same side: there its depth is not known.
+/// Throws Error if all views see the bone from nearly the same side, because then its depth is not determined.
 void check_sides(const std::vector<Sight>& sights) {
   double widest_deg = 0;
   for (const Sight& a : sights)
@@ -86,8 +88,8 @@ void check_sides(const std::vector<Sight>& sights) {
                         " degrees, where 10 are needed; use views farther apart");
 }
 
-/// A plane {X : n . X = o} touches the bone for all t: n . (point + t direction) + distance_v + slope_v t = o. So
-/// (point, distance) solve one linear system in the sense of least squares, and (direction, slope) span its null space.
+/// A plane {X : n . X = o} touches the bone if n . (point + t direction) + distance_v + slope_v t = o for all t. So
+/// (point, distance) is the least-squares solution of a linear system, and (direction, slope) spans its null space.
 Taper touching_all(const std::vector<Sight>& sights) {
   check_sides(sights);
   const Eigen::Index views = Eigen::Index(sights.size());
@@ -110,8 +112,9 @@ Taper touching_all(const std::vector<Sight>& sights) {
   return {at.head<3>(), along.head<3>(), at.tail(views), along.tail(views)};
 }
 
-/// The diameter across the axis, where that is nearest to the ray through the middle of a view's pair. A cone's surface
-/// is farther from its axis across it than its tangent planes are, by the cosine of half its opening angle.
+/// The diameter at the point of the axis that is nearest to the ray through the middle of a view's pair. It is measured
+/// across the axis. The radius of a cone across its axis is the distance of its tangent planes, divided by the cosine
+/// of half the opening angle.
 double diameter_mm(const Taper& bone, const Sight& sight, Eigen::Index view) {
   const Eigen::Vector3d across = bone.direction.cross(sight.ray).cross(sight.ray);
   const double t = across.dot(sight.source_mm - bone.point_mm) / across.dot(bone.direction), slope = bone.slope(view);
@@ -156,16 +159,16 @@ std::optional<marrow::Metrics> shaft_width(const List<ShaftLines>& lines, const 
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.shaft_width", shaft_width)
       .summary(
-          "Outer diameter of the shaft by the planes that touch it in two views or more, without a guess of the "
+          "Outer diameter of the shaft from the planes through its borders in two views or more, without an assumed "
           "magnification")
       .in("lines", "borders of the shaft in each view", marrow::over("view"))
-      .in("views", "X-ray views, for their cameras", marrow::over("view"))
+      .in("views", "X-ray views; only their cameras are used", marrow::over("view"))
       .out("metrics",
-           "for each view the diameter in the middle of its borders, and the magnification there relative to the "
-           "isocentre; a warning where it is no shaft's diameter")
-      .option(
-          "width_mm", &Options::width_mm,
-          "mean outer diameters, one for each direction from which the bone may be seen; none: a femur's, 15 to 55 mm")
-      .option("width_deviation_mm", &Options::width_deviation_mm, "their standard deviations")
+           "for each view, the diameter in the middle of its borders, and the magnification there relative to the "
+           "isocentre; gives a warning if no shaft has this diameter")
+      .option("width_mm", &Options::width_mm,
+              "mean outer diameters of the shaft, one for each direction from which the bone may be seen; empty: those "
+              "of a femur, 15 to 55 mm")
+      .option("width_deviation_mm", &Options::width_deviation_mm, "standard deviations of width_mm")
       .relation(marrow::same_length({"width_mm", "width_deviation_mm"}));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// How far two surfaces lie apart, by exact distances from points of each to the triangles of the other.
+// Distance between two surfaces: exact distances from points on each surface to the triangles of the other.
 #include <vtkImplicitPolyDataDistance.h>
 #include <vtkNew.h>
 
@@ -18,8 +18,9 @@ struct Options {
   int points = 20000;
 };
 
-/// Signed distances (negative inside) of points spread over a surface from another one. The vertices, at which the
-/// largest distance is usually found, count for that alone: they are denser where a mesh is finer.
+/// Signed distances (negative inside) from points spread over one surface to another surface. The vertices count only
+/// for the largest distance, which is usually at a vertex. For the mean they would be unfair: a finer mesh has more of
+/// them.
 struct Distances {
   std::vector<double> of_points_mm;
   double largest_mm = 0;
@@ -69,12 +70,12 @@ Metrics surface_distance(const Mesh& mesh, const Mesh& reference, const Options&
 MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.surface_distance", surface_distance)
       .summary(
-          "Distances between two surfaces, both ways: mean, root mean square, 95th percentile, maximum (Hausdorff) and "
-          "bias")
+          "Distances between two surfaces, in both directions: mean, root mean square, 95th percentile, maximum "
+          "(Hausdorff) and bias")
       .in("mesh", "surface")
       .in("reference", "surface to compare with")
       .out("metrics",
-           "symmetric figures over points of both surfaces; bias: signed mean distance of the mesh from the reference, "
-           "positive where it is too large")
-      .option("points", &Options::points, "points spread over each surface", at_least(100), at_most(1e6));
+           "figures over the points of both surfaces; bias is the mean signed distance of the mesh from the reference, "
+           "positive if the mesh is too large")
+      .option("points", &Options::points, "number of points spread over each surface", at_least(100), at_most(1e6));
 }

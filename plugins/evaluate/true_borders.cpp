@@ -16,7 +16,8 @@ namespace {
 using Points = std::vector<Eigen::Vector2d>;
 using Edges = std::vector<std::pair<Eigen::Vector2d, Eigen::Vector2d>>;
 
-/// The stretch of a pair of borders: x runs along the line midway, from the middle of its start, y to the right [px].
+/// Coordinates in px along a pair of borders: x runs along the line midway between them, from its start; y runs to the
+/// right.
 struct Stretch {
   Eigen::Vector2d start, along, across;
   double length_px;
@@ -36,18 +37,18 @@ struct Stretch {
   }
 };
 
-/// The edges, in the frame of the stretch, at which the surface turns away from the source or ends. Of triangles that
-/// lie beyond the stretch, or not wholly before the source, there are none.
+/// The projected edges where the surface turns away from the source or ends, in the coordinates of the stretch.
+/// Triangles beyond the stretch, or not completely in front of the source, are ignored.
 Edges outline_edges(const marrow::Mesh& model, const marrow::RigidTransform& camera_from_model,
                     const Eigen::Matrix3d& intrinsics, const Stretch& stretch) {
-  std::vector<Eigen::Vector3d> seen(model.vertices_mm.size());  // from the source
+  std::vector<Eigen::Vector3d> seen(model.vertices_mm.size());  // relative to the source
   Points flat(seen.size());
   for (std::size_t i = 0; i < seen.size(); ++i) {
     seen[i] = camera_from_model * model.vertices_mm[i];
     flat[i] = stretch.from_pixel((intrinsics * seen[i]).hnormalized());
   }
   struct Sides {
-    int facing = 0, turned_away = 0;  // triangles at an edge
+    int facing = 0, turned_away = 0;  // numbers of triangles at an edge
   };
   std::unordered_map<std::uint64_t, Sides> sides;
   for (const auto& [a, b, c] : model.triangles) {
@@ -68,7 +69,7 @@ Edges outline_edges(const marrow::Mesh& model, const marrow::RigidTransform& cam
   return edges;
 }
 
-/// The outermost points on the left and on the right, at 0, 1, 2, ... px along the stretch, where it shows the surface.
+/// The outermost points on the left and on the right, at 0, 1, 2, ... px along the stretch, wherever there is an edge.
 std::pair<Points, Points> outermost(const Edges& edges, const Stretch& stretch) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
   const std::size_t count = std::size_t(stretch.length_px) + 1;
@@ -104,7 +105,8 @@ Line least_squares(const Points& points) {
   return {mean.y() - xy / xx * mean.x(), xy / xx};
 }
 
-/// The least-squares line of the points, of which the farthest is left out as long as it is beyond the tolerance.
+/// The least-squares line of the points. The farthest point is removed again and again until it is within the
+/// tolerance.
 Line line_of(Points points, double tolerance_px) {
   for (;;) {
     const Line line = least_squares(points);

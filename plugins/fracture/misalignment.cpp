@@ -11,7 +11,7 @@ using marrow::geometry::displacement;
 using marrow::geometry::FragmentPair;
 using marrow::geometry::pose_of;
 
-/// +1 where the long axis of the moved fragment runs towards the other fragment, else -1.
+/// +1 if the long axis of the moved fragment points to the other fragment, else -1.
 double towards_the_other(const marrow::Pose& moved, const marrow::Pose& reference) {
   return moved.frame.axes.col(2).dot(reference.frame.origin_mm - moved.frame.origin_mm) >= 0 ? 1 : -1;
 }
@@ -34,12 +34,12 @@ marrow::Metrics misalignment(const marrow::List<marrow::Pose>& poses, const Frag
 MARROW_PLUGIN(plugin) {
   plugin.node("fracture.misalignment", misalignment)
       .summary(
-          "Angulation, malrotation, shift and shortening of one fragment against another, beside which the CT shows it "
-          "in place")
+          "Angulation, malrotation, shift and shortening of one fragment relative to another, compared with the CT, "
+          "where both fragments are in place")
       .in("poses", "poses of both fragments", marrow::over("fragment"))
       .out("metrics",
-           "rotations about and shifts along the moved fragment's own axes; shortening is positive where the fragments "
+           "rotations about and shifts along the moved fragment's own axes; shortening is positive if the fragments "
            "overlap")
-      .option("moved", &FragmentPair::moved, "fragment whose misalignment is told")
-      .option("reference", &FragmentPair::reference, "fragment that it is told against");
+      .option("moved", &FragmentPair::moved, "fragment whose misalignment is computed")
+      .option("reference", &FragmentPair::reference, "fragment that counts as being in place");
 }

@@ -23,7 +23,7 @@ Reduction reduction(const marrow::List<marrow::Pose>& poses, const FragmentPair&
   result.pose.world_from_model = reference.world_from_model;
   result.pose.covariance.reset();
   result.pose.convergence.clear();
-  // In the world: how far the fragment's middle moves, and by what rotation vector it turns about it.
+  // In world coordinates: the shift of the fragment's centroid, and the rotation vector about this centroid.
   const Eigen::AngleAxisd turn(
       Eigen::Matrix3d(reference.world_from_model.rotation * moved.world_from_model.rotation.transpose()));
   const Eigen::Vector3d turn_deg = marrow::degrees(turn.angle()) * turn.axis();
@@ -41,11 +41,12 @@ Reduction reduction(const marrow::List<marrow::Pose>& poses, const FragmentPair&
 
 MARROW_PLUGIN(plugin) {
   plugin.node("fracture.reduction", reduction)
-      .summary("Where a fragment has to go to restore the bone as the CT shows it, and the motion that brings it there")
+      .summary("The pose of a fragment that restores the bone as the CT shows it, and the motion to this pose")
       .in("poses", "poses of both fragments", marrow::over("fragment"))
       .out("pose", &Reduction::pose, "pose of the moved fragment in the restored bone")
       .out("motion", &Reduction::motion,
-           "in the world: rotation vector, and shift of the fragment's middle, about which it turns")
+           "in world coordinates: the rotation vector about the fragment's centroid, and the shift of the centroid, "
+           "with their lengths")
       .option("moved", &FragmentPair::moved, "fragment that is moved")
       .option("reference", &FragmentPair::reference, "fragment that stays");
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A start from markers, or landmarks touched by a pointer, that a tracking system finds in the world: least squares
-// over paired points (Arun, Huang and Blostein 1987). Horn's quaternions (J Opt Soc Am A 1987) come to the same
-// optimum.
+// A start from fiducial markers, or from landmarks touched by a pointer, that a tracking system measures in the world.
+// Least squares over paired points (Arun, Huang and Blostein 1987). Horn's quaternions (J Opt Soc Am A 1987) give the
+// same optimum.
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ struct Options {
   double warn_above_mm = 2;
 };
 
-/// Points of the CT and where they were tracked, in the same order.
+/// Points of the CT and their tracked positions, in the same order.
 struct Pairs {
   std::vector<std::string> names;
   std::vector<Eigen::Vector3d> model_mm, world_mm;
@@ -41,7 +41,7 @@ Pairs pairs_of(const Landmarks& landmarks) {
   return pairs;
 }
 
-/// Distances that are left, and what follows from them.
+/// Distances that remain after the fit: sum of squares, largest distance, and the point that has it.
 struct Residuals {
   double squares = 0, largest = 0;
   std::string farthest;
@@ -59,8 +59,8 @@ Residuals residuals_of(const Pairs& pairs, const RigidTransform& world_from_mode
   return residuals;
 }
 
-/// Of the small motion, where each coordinate of a pair is off by `deviation`. At any target it gives the expected
-/// error of Fitzpatrick, West and Maurer (IEEE TMI 17, 1998).
+/// Covariance of the small motion if each coordinate of a pair has the standard deviation `deviation_mm`. At any target
+/// it gives the expected error of Fitzpatrick, West and Maurer (IEEE TMI 17, 1998).
 Matrix6d covariance_of(const Pairs& pairs, const FragmentFrame& frame, double deviation_mm) {
   Matrix6d information = Matrix6d::Zero();
   for (const Eigen::Vector3d& point : pairs.model_mm) {
@@ -100,14 +100,15 @@ Pose fiducials(const Mesh& model, const Landmarks& landmarks, const Options& opt
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.fiducials", fiducials)
       .summary(
-          "Rigid fit of the tracked landmarks to those in the CT (Arun, Huang and Blostein 1987), with its predicted "
-          "error")
-      .in("model", "surface of the fragment: gives its axes")
-      .in("landmarks", "points in the CT and where they were tracked")
+          "Rigid fit of the landmarks in the CT to their tracked positions (Arun, Huang and Blostein 1987), with the "
+          "predicted error")
+      .in("model", "surface of the fragment; it gives the axes")
+      .in("landmarks", "points in the CT and their tracked positions")
       .out("pose",
-           "its cost is the fiducial registration error in mm; its covariance follows from the localisation error")
+           "fitted pose; its cost is the fiducial registration error (FRE) in mm, its covariance follows from the "
+           "localisation error")
       .option("noise_mm", &Options::noise_mm,
-              "standard deviation of each coordinate of a pair; 0: what the residuals say", at_least(0))
-      .option("warn_above_mm", &Options::warn_above_mm, "fiducial registration error that gives a warning",
+              "standard deviation of each coordinate of a pair; 0: estimated from the residuals", at_least(0))
+      .option("warn_above_mm", &Options::warn_above_mm, "a larger fiducial registration error gives a warning",
               at_least(0));
 }

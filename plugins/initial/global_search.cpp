@@ -19,7 +19,8 @@ struct Options {
   int max_evaluations = 400;
 };
 
-/// The search of register.multiresolution, from everywhere within the ranges. First steps get shorter with the reach.
+/// The search of register.multiresolution, started from poses all over the ranges. The first step of each level is
+/// proportional to its reach.
 marrow::search::SearchOptions search_options(const Options& options) {
   marrow::search::SearchOptions search;
   search.scan_poses = options.poses;
@@ -63,33 +64,35 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.global_search", global_search)
-      .summary("The pose of least cost within wide ranges, from many places at once; no start is needed")
+      .summary("The pose of least cost within wide ranges, searched from many poses at once; no start is needed")
       .in("model", "surface of the fragment")
-      .in("cost", "what a pose costs")
-      .in("optimizer", "minimiser that follows the best places up")
-      .in("start", "middle of the ranges; none: where the CT lies in the world")
+      .in("cost", "cost of a pose")
+      .in("optimizer", "minimiser that refines the best poses")
+      .in("start", "middle of the ranges; none: CT coordinates are taken as world coordinates")
       .out("pose", "pose of least cost")
       .option("rotation_side_deg", &Options::rotation_side_deg,
-              "rotations about the frontal and lateral axes that are looked at, to either side", marrow::at_least(0),
+              "range of the rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
               marrow::at_most(180))
-      .option("rotation_axial_deg", &Options::rotation_axial_deg, "rotations about the long axis, to either side",
-              marrow::at_least(0), marrow::at_most(180))
+      .option("rotation_axial_deg", &Options::rotation_axial_deg,
+              "range of the rotation about the long axis, to either side", marrow::at_least(0), marrow::at_most(180))
       .option("translation_side_mm", &Options::translation_side_mm,
-              "shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
-      .option("translation_axial_mm", &Options::translation_axial_mm, "shifts along the long axis, to either side",
-              marrow::at_least(0))
-      .option("poses", &Options::poses, "how many poses are looked at, spread evenly over these ranges",
-              marrow::at_least(1))
-      .option("candidates", &Options::candidates, "best of these, no two of them neighbours, that are followed up",
+              "range of the shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
+      .option("translation_axial_mm", &Options::translation_axial_mm,
+              "range of the shift along the long axis, to either side", marrow::at_least(0))
+      .option("poses", &Options::poses, "number of poses to try, spread evenly over these ranges", marrow::at_least(1))
+      .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
               marrow::at_least(1))
       .option("finalists", &Options::finalists,
-              "best of these after the first level that go through all levels; the last level chooses",
+              "number of best candidates after the first level that go through all levels; the last level chooses",
               marrow::at_least(1))
-      .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
-      .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .option("contour_spacing_px", &Options::contour_spacing_px,
+              "per level: distance between two points of the outline")
+      .option("reach_px", &Options::reach_px,
+              "per level: a point with no edge within this distance counts as unmatched")
       .relation(marrow::same_length({"contour_spacing_px", "reach_px"}))
-      .option("pixel_step", &Options::pixel_step, "per level, of grey values: every how many pixels are compared")
+      .option("pixel_step", &Options::pixel_step,
+              "per level, for costs of grey values: only every n-th pixel is compared")
       .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
-      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost for each search of a level",
-              marrow::at_least(1));
+      .option("max_evaluations", &Options::max_evaluations,
+              "largest number of evaluations of the cost for each search of a level", marrow::at_least(1));
 }

@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that find a pose for others to start from.
 #include <marrow/plugin.hpp>
 
 MARROW_PLUGIN(plugin) {
@@ -7,10 +6,10 @@ MARROW_PLUGIN(plugin) {
       .summary("pose to start from")
       .in<marrow::Mesh>("model", "surface of the fragment")
       .in<marrow::ShaftLines>("lines", "outer borders of the shaft", marrow::over("view"))
-      .in<marrow::View>("views", "X-ray views, for their cameras", marrow::over("view"))
-      .in<marrow::Pose>("start", "nominal placement; none: the CT's coordinates are the world's")
-      .in<marrow::Landmarks>("landmarks", "points in the CT and where they were seen or tracked")
-      .in<marrow::Cost>("cost", "what a pose costs")
+      .in<marrow::View>("views", "X-ray views; only their cameras are used", marrow::over("view"))
+      .in<marrow::Pose>("start", "nominal placement; none: CT coordinates are taken as world coordinates")
+      .in<marrow::Landmarks>("landmarks", "points in the CT and where they were marked in views or tracked")
+      .in<marrow::Cost>("cost", "cost of a pose")
       .in<marrow::Optimizer>("optimizer", "minimiser of the cost")
       .out<marrow::Pose>("pose", "pose to start from, with the fragment's axes");
 }

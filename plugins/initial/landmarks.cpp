@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A start from landmarks that are seen in one view or more. Every way to a first pose is tried: from points that two
-// views show, and from each view by itself; each is refined over all views at once, and the best stands.
+// A start from landmarks that were marked in one view or more. First poses are computed in several ways: from points
+// that two views show, and from each view alone. Each is refined over all views at once. The best one is the result.
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -40,7 +40,7 @@ std::vector<Sight> sights_of(const Landmarks& landmarks, const List<View>& views
   return sights;
 }
 
-/// Throws Error unless there are enough points, not on a line, to determine a pose.
+/// Throws Error if there are too few points for a pose, or if they lie on a line.
 void check_enough(const std::vector<Sight>& sights) {
   std::vector<std::string> names, views;
   std::vector<Eigen::Vector3d> points;
@@ -58,7 +58,7 @@ void check_enough(const std::vector<Sight>& sights) {
   geometry::check_spread(points, "the landmarks that are seen");
 }
 
-/// Sum of squared distances from where the landmarks are seen [px^2]; infinite where one lies behind a source.
+/// Sum of squared reprojection errors [px^2]; infinite if a landmark lies behind a source.
 double squares_px(const std::vector<Sight>& sights, const RigidTransform& pose) {
   double sum = 0;
   for (const Sight& sight : sights) {
@@ -68,7 +68,7 @@ double squares_px(const std::vector<Sight>& sights, const RigidTransform& pose) 
   return sum;
 }
 
-/// Half the Hessian (Gauss and Newton's) and half the gradient of the sum of squares by the small motion.
+/// Half the Gauss-Newton Hessian and half the gradient of the sum of squares, with respect to the small motion.
 struct Normal {
   Matrix6d curvature = Matrix6d::Zero();
   Vector6d gradient = Vector6d::Zero();
@@ -91,7 +91,7 @@ Normal normal_at(const std::vector<Sight>& sights, const RigidTransform& pose, c
   return normal;
 }
 
-/// Least squares over all views by damped steps (Marquardt, SIAM J Appl Math 1963).
+/// Least squares over all views with damped steps (Marquardt, SIAM J Appl Math 1963).
 RigidTransform refined(const std::vector<Sight>& sights, RigidTransform pose, const FragmentFrame& frame) {
   double value = squares_px(sights, pose), damping = 1e-3;
   for (int steps = 0; std::isfinite(value) && steps < 200 && damping < 1e12; ++steps) {
@@ -118,7 +118,7 @@ struct Candidate {
   double squares_px;
 };
 
-/// The minima that the starts lead to, the least first.
+/// The minima found from the starts, the lowest first.
 std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFrame& frame) {
   std::vector<Candidate> found;
   for (const RigidTransform& start : geometry::pose_starts(sights)) {
@@ -130,10 +130,10 @@ std::vector<Candidate> minima(const std::vector<Sight>& sights, const FragmentFr
   return found;
 }
 
-/// Throws Error where another pose explains the landmarks nearly as well.
+/// Throws Error if another pose explains the landmarks nearly as well.
 void check_unique(const std::vector<Candidate>& found, std::size_t sights, double noise_px) {
   constexpr double kSame_rad = 0.01;
-  constexpr double kFactor_100 = 9.2;  // 2 ln 100: a pose that is a hundred times less likely is no rival
+  constexpr double kFactor_100 = 9.2;  // 2 ln 100: a pose that is a hundred times less likely is ignored
   for (const Candidate& other : found) {
     const double apart = geodesic_angle_rad(other.pose.rotation, found.front().pose.rotation);
     if (apart < kSame_rad || other.squares_px - found.front().squares_px > kFactor_100 * noise_px * noise_px) continue;
@@ -189,14 +189,14 @@ Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.landmarks", landmarks)
       .summary(
-          "Pose under which landmarks are seen where they were marked, over all views at once, with its predicted "
+          "Pose with the least reprojection error of marked landmarks, over all views at once, with its predicted "
           "error")
-      .in("model", "surface of the fragment: gives its axes")
-      .in("landmarks", "points in the CT and where views show them")
-      .in("views", "X-ray views, for their cameras", over("view"))
-      .out("pose", "pose of least reprojection error; its cost is the root mean square of that in pixels")
+      .in("model", "surface of the fragment; it gives the axes")
+      .in("landmarks", "points in the CT and their marked pixels in the views")
+      .in("views", "X-ray views; only their cameras are used", over("view"))
+      .out("pose", "pose of least reprojection error; its cost is the root mean square of this error in pixels")
       .option("noise_px", &Options::noise_px,
-              "expected standard deviation of each coordinate of a marked landmark: for the covariance, the warning "
-              "and to tell rivals apart",
+              "expected standard deviation of each coordinate of a marked landmark; used for the covariance, for the "
+              "warning, and to decide whether a second pose is possible too",
               at_least(1e-3));
 }

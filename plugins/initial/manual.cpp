@@ -11,7 +11,7 @@ struct Options {
   double distance_mm = 0;
 };
 
-/// How far the surface's points are moved on average.
+/// Mean distance by which the points of the surface move.
 double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidTransform& to,
                         const std::vector<Eigen::Vector3d>& points_mm) {
   double sum = 0;
@@ -19,8 +19,8 @@ double mean_distance_mm(const marrow::RigidTransform& from, const marrow::RigidT
   return sum / double(points_mm.size());
 }
 
-/// The part or multiple of a motion that moves the surface by a distance, by halving: the distance grows with the
-/// motion up to half a turn.
+/// Scales a motion so that it moves the surface by `distance_mm` on average. It uses bisection, because the distance
+/// grows with the motion up to half a turn.
 marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose, const marrow::Mesh& model,
                         double distance_mm) {
   const std::vector<Eigen::Vector3d> points_mm = marrow::sample_surface(model, 500);
@@ -61,12 +61,12 @@ marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.manual", manual)
-      .summary("The nominal placement, moved by hand about and along the fragment's axes")
+      .summary("The nominal placement, moved by a given rotation about and translation along the fragment's axes")
       .in("model", "surface of the fragment")
-      .in("start", "nominal placement; without one the CT's coordinates are the world's")
+      .in("start", "nominal placement; none: CT coordinates are taken as world coordinates")
       .out("pose", "the moved placement")
       .option("rotation_deg", &Options::rotation_deg, "rotation vector about the frontal, lateral and long axis")
       .option("translation_mm", &Options::translation_mm, "shift along the frontal, lateral and long axis")
       .option("distance_mm", &Options::distance_mm,
-              "scales both until the surface has moved by this mean distance; 0: as they are", marrow::at_least(0));
+              "if above 0, both are scaled until the mean distance moved by the surface is this", marrow::at_least(0));
 }

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's first stage (3.4): the bone's axis from the shaft lines of the views, and the model's axis laid onto
-// it. The chapter back-projects at right angles to the image; here the planes go through the X-ray source, which takes
-// away an error of up to 20 mm (docs/method.md). The model's axis is not a fixed one: at each round it is found from
-// the silhouette that the model would show in the same stretches of the same views, so that a bow, a taper or a ridge
-// moves both axes alike.
-// An image may show the shafts of two fragments. A fragment takes the best pair of lines where it lies itself, which
-// may be one that the image's best pair outdid.
+// The chapter's first stage (3.4): finds the bone's axis from the shaft lines of the views, and moves the model so that
+// its axis coincides. The chapter back-projects at right angles to the image. Here the planes go through the X-ray
+// source, which avoids an error of up to 20 mm (docs/method.md). The model's axis is measured anew in each round, from
+// the silhouette of the model along the same parts of the same views. So a bow, a taper or a ridge shifts both axes by
+// the same amount.
+// An image may show the shafts of two fragments. Each fragment takes the best pair of lines at its own position. This
+// may be a pair that the shaft node rejected in favour of a better one.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/Geometry>
@@ -29,7 +29,7 @@ struct Options {
   double border_inset_mm = 0.5;
 };
 
-constexpr double kWidthTolerance = 0.15;  // a pair whose width differs more from the model's belongs to something else
+constexpr double kWidthTolerance = 0.15;  // a pair is not the model's if the widths differ by a larger fraction
 constexpr double kLeastLength_mm = 25;    // at the isocentre
 
 std::string number(double value) {
@@ -38,7 +38,7 @@ std::string number(double value) {
   return buffer;
 }
 
-/// What one view says: the pair of borders, and the plane in which the axis lies.
+/// Information from one view: the pair of borders, and the plane that contains the axis.
 struct Sight {
   std::string name;
   const Camera* camera;
@@ -46,7 +46,7 @@ struct Sight {
   Plane plane;
 };
 
-/// Distance of a pair's borders in the middle of their stretch, across it, with the inset added on both sides.
+/// Distance of a pair's borders in their middle, measured across them, with the inset added on both sides.
 double width_px(const ShaftLines& lines, double inset_px) {
   const Eigen::Vector2d along =
       (lines.left.to_px - lines.left.from_px + lines.right.to_px - lines.right.from_px).normalized();
@@ -55,8 +55,9 @@ double width_px(const ShaftLines& lines, double inset_px) {
   return std::abs(along.x() * between.y() - along.y() * between.x()) + 2 * inset_px;
 }
 
-/// The best pair of a view where the model appears: what the shaft node chose, or else the first of those it turned
-/// away that is as wide as the model there and long enough to tell a direction.
+/// The best pair of a view at the position of the model. This is the pair that the shaft node chose, if the model
+/// appears there. Otherwise it is the first rejected pair that is as wide as the model and long enough to give a
+/// direction.
 ShaftLines lines_of_model(const Mesh& model, const RigidTransform& start, const Camera& camera, const ShaftLines& found,
                           const std::string& view, const Options& options) {
   const double pixel_mm = std::abs(marrow::pixel_size_at_mm(camera, Eigen::Vector3d::Zero()));
@@ -95,7 +96,7 @@ std::vector<Sight> sights_of(const Mesh& model, const RigidTransform& start, con
   return sights;
 }
 
-/// The model's borders in every view at a pose.
+/// The model's borders in every view, for a given pose.
 std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& world_from_model,
                                      const std::vector<Sight>& sights, double tolerance_mm) {
   std::vector<std::optional<ModelBorders>> found(sights.size());
@@ -115,7 +116,7 @@ std::vector<ModelBorders> borders_of(const Mesh& model, const RigidTransform& wo
   return borders;
 }
 
-/// With two or more views the planes meet in the axis (Eq 7), of the image and of the model alike.
+/// Two or more views: the planes intersect in the axis (Eq 7). This is done for the images and for the model.
 RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders,
                               const Eigen::Vector3d& anchor) {
   std::vector<Plane> target, model;
@@ -126,15 +127,15 @@ RigidTransform move_by_planes(const std::vector<Sight>& sights, const std::vecto
   return world_from_world_move(axis_of_planes(model), axis_of_planes(target), anchor);
 }
 
-/// One view knows the plane of the axis. The depth follows from the angle under which the bone's own width is seen: for
-/// a cylinder r = D sin(half angle), so two depths are as the widths of the image inversely. How far the axis leans out
-/// of the image stays as it was.
+/// One view gives only the plane of the axis. The depth follows from the angle under which the bone's own width is
+/// seen: for a cylinder r = D sin(half angle), so the depth is inversely proportional to the width in the image. The
+/// inclination of the axis to the image plane stays unchanged.
 RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, const Eigen::Vector3d& anchor,
                              double inset_mm) {
   const Eigen::Vector3d source = marrow::source_position_mm(*sight.camera);
   const double inset_px = inset_mm / marrow::pixel_size_at_mm(*sight.camera, anchor);
   const double nearer = borders.width_px / width_px(sight.lines, inset_px);
-  // The model's own axis is laid into the plane that its borders span, so that a perfect start is left where it is.
+  // The model's own axis is projected to the plane between its borders. So a perfect start does not move.
   const Plane model_plane = bisecting_plane(*sight.camera, borders.left, borders.right);
   const auto into = [&](const Plane& plane, const Eigen::Vector3d& vector) {
     return Eigen::Vector3d(vector - plane.normal * plane.normal.dot(vector));
@@ -147,7 +148,7 @@ RigidTransform move_by_width(const Sight& sight, const ModelBorders& borders, co
   return world_from_world_move(model, target, anchor);
 }
 
-/// In words, where the lines of a view cannot be those of this model.
+/// Warnings, in words, about views whose lines do not fit this model.
 std::vector<std::string> doubts(const std::vector<Sight>& sights, const std::vector<ModelBorders>& borders,
                                 const Eigen::Vector3d& anchor, double inset_mm) {
   std::vector<std::string> warnings;
@@ -200,19 +201,18 @@ Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<Vie
 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.shaft_axis", shaft_axis)
-      .summary("Lays the model's shaft axis onto that of the images (the chapter's first stage, Eq 7 and 8)")
+      .summary("Aligns the shaft axis of the model with that of the images (first stage of the chapter, Eq 7 and 8)")
       .in("model", "surface of the fragment")
       .in("lines", "outer borders of the shaft", marrow::over("view"))
-      .in("views", "X-ray views, for their cameras", marrow::over("view"))
-      .in("start", "nominal placement, which keeps its rotation about the axis and its place along it")
-      .out("pose", "four degrees of freedom from the views, two from the start")
-      .option("rounds", &Options::rounds, "most times that the model's axis is measured anew", marrow::at_least(1),
-              marrow::at_most(100))
+      .in("views", "X-ray views; only their cameras are used", marrow::over("view"))
+      .in("start", "nominal placement; its rotation about the axis and its position along the axis are kept")
+      .out("pose", "pose: four degrees of freedom from the views, two from the start")
+      .option("rounds", &Options::rounds, "largest number of rounds; each measures the model's axis again",
+              marrow::at_least(1), marrow::at_most(100))
       .option("tolerance_mm", &Options::tolerance_mm,
-              "largest distance, at the isocentre, of a silhouette point from the model's border line",
+              "largest distance, in mm at the isocentre, of a silhouette point from the model's border line",
               marrow::at_least(0.01))
       .option("border_inset_mm", &Options::border_inset_mm,
-              "how far inside its outline a round bone's edge is seen, because attenuation begins gradually; it "
-              "matters where a single view "
-              "gives the depth by the width");
+              "distance of a round bone's edge inside its outline, in mm at the isocentre, because attenuation begins "
+              "gradually; it matters if a single view gives the depth from the width");
 }

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Under the GPL as it is linked to CGAL's surface mesher; see cgal_mesher.cpp.
+// This file is under the GPL because it is linked to the surface mesher of CGAL (delaunay_refinement.cpp).
 #include <marrow/domain/manifold.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/surface/delaunay_refinement.hpp"
+#include "delaunay_refinement.hpp"
 #include "marrow/toolbox/surface/signs.hpp"
 
 namespace {
@@ -17,7 +17,8 @@ struct Options : marrow::surface::Finish {
   double angle_deg = 30, size_mm = 2, distance_mm = 0.05;
 };
 
-/// Trilinear between the samples, and outside everywhere beyond the layer about the grid.
+/// Trilinear interpolation of the field with one layer of padding around its grid. Everything beyond this layer is
+/// outside.
 class Interpolated {
  public:
   explicit Interpolated(const SignedField& field) : padded_(field), size_(field.grid.size) {}
@@ -45,7 +46,7 @@ class Interpolated {
   std::array<int, 3> size_;
 };
 
-/// Some points of the surface: one in each block of samples, so that there are some on each part of it.
+/// Some points of the surface: one in each block of samples. So there are points on each connected part.
 std::vector<Vector3d> spread_points(const marrow::surface::Signs& signs, int block) {
   std::array<std::size_t, 3> blocks;
   for (std::size_t axis = 0; axis < 3; ++axis) blocks[axis] = std::size_t(signs.size()[axis] / block + 1);
@@ -61,8 +62,8 @@ std::vector<Vector3d> spread_points(const marrow::surface::Signs& signs, int blo
   return points;
 }
 
-/// More vertices than marching cubes would make are no longer about the field, unless triangles are to be smaller than
-/// its cells.
+/// Upper limit for the number of vertices. Many more vertices than marching cubes would make show no more detail of the
+/// field, unless the triangles must be smaller than its cells.
 std::size_t most_points(const marrow::surface::Signs& signs, const Grid& grid, const Options& options) {
   double crossings = 0;
   signs.for_edges([&](int, int, int, int) { ++crossings; });
@@ -74,22 +75,24 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
   const Grid& grid = field.grid;
   const marrow::surface::Signs signs(field);
   const Interpolated interpolated(field);
-  // CGAL works in mm about the middle of the grid, along its axes.
+  // CGAL works in mm, along the axes of the grid, with the origin at the middle of the grid.
   const Vector3d middle = (Vector3d(grid.size[0], grid.size[1], grid.size[2]) - Vector3d::Ones()) / 2;
-  marrow::surface::LevelSet level_set;
+  marrow::delaunay::LevelSet level_set;
   level_set.value = [&](const Vector3d& p) { return interpolated(p.cwiseQuotient(grid.spacing_mm) + middle); };
   level_set.radius_mm = 1.1 * (middle + Vector3d::Constant(2)).cwiseProduct(grid.spacing_mm).norm();
-  const marrow::surface::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
-                                           most_points(signs, grid, options)};
+  const marrow::delaunay::Criteria criteria{options.angle_deg, options.size_mm, options.distance_mm,
+                                            most_points(signs, grid, options)};
   std::string fault;
-  // About as far apart as the triangles are large; parts that are smaller need more points to begin with.
+  // First, the points are about as far apart as the size of the triangles. Smaller parts of the surface need more
+  // points.
   const int largest_block = std::clamp(int(2 * options.size_mm / grid.spacing_mm.minCoeff()), 4, 16);
   for (int block = largest_block; block > 0; block /= 2) {
     level_set.points_mm.clear();
     for (const Vector3d& index : spread_points(signs, block))
       level_set.points_mm.push_back((index - middle).cwiseProduct(grid.spacing_mm));
     try {
-      marrow::surface::Surface surface = marrow::surface::mesh(level_set, criteria, [&] { context.check_cancelled(); });
+      marrow::delaunay::Surface surface =
+          marrow::delaunay::mesh(level_set, criteria, [&] { context.check_cancelled(); });
       Mesh mesh;
       mesh.frame = grid.frame;
       for (const Vector3d& p : surface.vertices_mm)
@@ -113,14 +116,15 @@ Mesh delaunay(const SignedField& field, const Options& options, marrow::Context&
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.delaunay", delaunay)
       .summary(
-          "Delaunay refinement (Boissonnat and Oudot, Graphical Models 2005; CGAL, so under the GPL): even triangles")
+          "Delaunay refinement (Boissonnat and Oudot, Graphical Models 2005; by CGAL, so under the GPL): makes "
+          "triangles of even size")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("angle_deg", &Options::angle_deg, "smallest angle of a triangle, before smoothing", marrow::at_least(0),
-              marrow::at_most(30))
-      .option("size_mm", &Options::size_mm, "largest radius of the circle through a triangle's corners",
+      .option("angle_deg", &Options::angle_deg, "smallest allowed angle of a triangle, before smoothing",
+              marrow::at_least(0), marrow::at_most(30))
+      .option("size_mm", &Options::size_mm, "largest allowed radius of the circle through a triangle's corners",
               marrow::at_least(0.01))
-      .option("distance_mm", &Options::distance_mm, "largest distance of a triangle's middle from the surface",
+      .option("distance_mm", &Options::distance_mm, "largest allowed distance from a triangle's middle to the surface",
               marrow::at_least(0.001))
       .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),

@@ -16,8 +16,8 @@ using marrow::SignedField;
 
 using Options = marrow::surface::Finish;
 
-/// The field in index coordinates, with one layer around it that mirrors it to the outside, so that the surface closes
-/// half a voxel outside the last samples.
+/// Copies the field, in index coordinates, with one more layer around it. The layer is the mirrored field, turned to
+/// outside. So the surface is closed half a voxel beyond the last samples.
 void fill(vtkImageData& image, const SignedField& field) {
   const auto& size = field.grid.size;
   image.SetExtent(-1, size[0], -1, size[1], -1, size[2]);
@@ -39,7 +39,8 @@ Mesh flying_edges(const SignedField& field, const Options& options) {
   filter->ComputeNormalsOff();
   filter->ComputeGradientsOff();
   filter->ComputeScalarsOff();
-  filter->Update();  // on oneTBB, the run's pool; each row's place in the output is known before it is written
+  // Uses the run's oneTBB threads. The output is repeatable, because each row knows its place before it is written.
+  filter->Update();
   vtkPolyData* surface = filter->GetOutput();
 
   Mesh mesh;
@@ -51,7 +52,7 @@ Mesh flying_edges(const SignedField& field, const Options& options) {
   const vtkIdType* corners = nullptr;
   for (surface->GetPolys()->InitTraversal(); surface->GetPolys()->GetNextCell(count, corners);) {
     std::array<std::uint32_t, 3> triangle{};
-    for (int k = 0; k < 3; ++k) triangle[k] = std::uint32_t(corners[2 - k]);  // VTK's normals point down the field
+    for (int k = 0; k < 3; ++k) triangle[k] = std::uint32_t(corners[2 - k]);  // VTK's normals point to lower values
     mesh.triangles.push_back(triangle);
   }
   return marrow::surface::finish(std::move(mesh), options);

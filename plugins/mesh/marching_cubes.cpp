@@ -15,14 +15,15 @@ using marrow::surface::Signs;
 using marrow::surface::Word;
 using Options = marrow::surface::Finish;
 
-/// Where the vertices and triangles of a row of cells begin. A row owns the edges that leave its first points in +x, +y
-/// and +z, and numbers their vertices by axis and then along x.
+/// Indices of the first vertices and of the first triangle of a row of cells along x. A row owns the grid edges that
+/// start at its points of lowest y and z and go in +x, +y and +z. Their vertices are numbered by axis and then along x.
 struct Row {
   std::uint32_t vertex[3] = {};
   std::size_t triangle = 0;
 };
 
-/// Both passes of marching cubes: count, then write to places that are known, so that rows can be done in any order.
+/// Marching cubes in two passes: the first counts, the second writes. In the second pass, each row knows where to
+/// write, so rows can be processed in any order.
 class Surface {
  public:
   explicit Surface(const SignedField& field)
@@ -56,7 +57,7 @@ class Surface {
     signs_.for_cells(y, z, [&](int, unsigned pattern) { counts.triangle += kTable.counts[pattern]; });
   }
 
-  /// Each count becomes the sum of those before it.
+  /// Replaces each count by the sum of all counts before it.
   void add_up() {
     std::size_t vertices = 0, triangles = 0;
     for (Row& row : rows_) {
@@ -79,8 +80,8 @@ class Surface {
 
   void write_triangles(int y, int z) {
     auto* triangle = mesh_.triangles.data() + row(y, z).triangle;
-    // The next vertex on each of the cell's edges. Those at its +x side follow on those at its -x side, and cells
-    // between two visited ones have no vertices.
+    // The index of the next vertex on each of the cell's edges. Vertices at the cell's +x side directly follow those at
+    // its -x side, because cells between two visited cells have no vertices.
     std::uint32_t vertex[12];
     for (int k = 0; k < 4; ++k) vertex[k] = row(y + (k & 1), z + (k >> 1)).vertex[0];
     for (int k = 0; k < 2; ++k) {
@@ -112,7 +113,7 @@ Mesh marching_cubes(const SignedField& field, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.marching_cubes", marching_cubes)
-      .summary("Marching cubes (Lorensen and Cline, SIGGRAPH 1987), closed for every field")
+      .summary("Marching cubes (Lorensen and Cline, SIGGRAPH 1987); the surface is closed for every field")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
       .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)

@@ -21,8 +21,8 @@ constexpr int kLeastDepth = 5, kMostDepth = 11;
 
 std::array<float, 3> to_array(const Vector3d& v) { return {float(v.x()), float(v.y()), float(v.z())}; }
 
-/// Where the field changes sign along the edges of its grid, with the field's direction there, in mm about the middle
-/// of the grid and along its axes.
+/// The points where the field changes its sign along the edges of its grid, with the gradient's direction. In mm, along
+/// the axes of the grid, with the origin at its middle.
 std::vector<marrow::surface::OrientedPoint> sample(const SignedField& field, const Vector3d& middle) {
   const marrow::surface::Signs signs(field);
   const marrow::surface::Padded padded(field);
@@ -48,8 +48,8 @@ std::vector<marrow::surface::OrientedPoint> sample(const SignedField& field, con
   return points;
 }
 
-/// The cube in which PCL reconstructs must leave room about the points, or it cuts the surface open where that bulges
-/// out. In it, the depth of the octree at which the smallest cells are about as large as the field's.
+/// The cube in which PCL reconstructs must be larger than the box of the points. Otherwise it cuts off parts where the
+/// surface bulges out. The depth of the octree is chosen so that its smallest cells are about as large as the voxels.
 marrow::surface::Settings settings_for(const std::vector<marrow::surface::OrientedPoint>& points, double cell_mm,
                                        const Options& options) {
   double extent_mm = 0;
@@ -96,15 +96,18 @@ Mesh poisson(const SignedField& field, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.poisson", poisson)
-      .summary("Poisson reconstruction (Kazhdan and Hoppe, ACM Transactions on Graphics 2013; PCL): smooth")
+      .summary(
+          "Poisson reconstruction (Kazhdan and Hoppe, ACM Transactions on Graphics 2013; by PCL): makes smooth "
+          "surfaces")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
       .option("depth", &Options::depth,
-              "of the octree: at most 2^depth cells a side; 0: cells about as small as the field's",
+              "depth of the octree; it has at most 2^depth cells per side; 0: cells about as large as the voxels",
               marrow::at_least(0), marrow::at_most(kMostDepth))
-      .option("point_weight", &Options::point_weight,
-              "how closely the surface follows the field's zeros against its slopes; 0: slopes only",
-              marrow::at_least(0))
+      .option(
+          "point_weight", &Options::point_weight,
+          "weight of the positions where the field is zero, against the directions of its gradient; 0: directions only",
+          marrow::at_least(0))
       .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
               marrow::at_most(200));

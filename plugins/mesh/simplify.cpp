@@ -35,9 +35,11 @@ marrow::Mesh simplify(const marrow::Mesh& mesh, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.simplify", simplify)
-      .summary("Fewer triangles for display, by quadric error (Garland and Heckbert, SIGGRAPH 1997; VTK)")
+      .summary(
+          "Reduces the number of triangles for display, by quadric error (Garland and Heckbert, SIGGRAPH 1997; by VTK)")
       .in("mesh", "surface")
-      .out("mesh", "the same surface with at most about so many triangles")
-      .option("triangles", &Options::triangles, "how many to keep; a mesh that has fewer is left as it is",
+      .out("mesh", "the same surface with fewer triangles")
+      .option("triangles", &Options::triangles,
+              "approximate number of triangles to keep; a mesh with fewer triangles is not changed",
               marrow::at_least(100));
 }

@@ -21,14 +21,17 @@ Mesh smooth(const Mesh& mesh, const marrow::surface::Taubin& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.smooth", smooth)
-      .summary("Smooths without shrinking (Taubin, A signal processing approach to fair surface design, SIGGRAPH 1995)")
+      .summary(
+          "Smooths a surface without shrinking it (Taubin, A signal processing approach to fair surface design, "
+          "SIGGRAPH 1995)")
       .in("mesh", "closed surface")
-      .out("mesh", "the same triangles, their vertices moved")
-      .option("iterations", &marrow::surface::Taubin::iterations, "pairs of a smoothing and an inflating step",
-              marrow::at_least(0), marrow::at_most(1000))
-      .option("lambda", &marrow::surface::Taubin::lambda, "how far a smoothing step goes to the mean of the neighbours",
-              marrow::at_least(0.01), marrow::at_most(1))
+      .out("mesh", "the same triangles with moved vertices")
+      .option("iterations", &marrow::surface::Taubin::iterations,
+              "number of pairs of a smoothing step and an inflating step", marrow::at_least(0), marrow::at_most(1000))
+      .option("lambda", &marrow::surface::Taubin::lambda,
+              "fraction of the way to the mean of the neighbours that a smoothing step goes", marrow::at_least(0.01),
+              marrow::at_most(1))
       .option("pass_band", &marrow::surface::Taubin::pass_band,
-              "smaller keeps only longer waves: those longer than 2 pi / sqrt(pass_band) edges stay",
+              "waves longer than 2 pi / sqrt(pass_band) edges are kept; a smaller value smooths more",
               marrow::at_least(0.001), marrow::at_most(1));
 }

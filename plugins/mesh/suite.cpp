@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Meshers, on signed fields of known shape: a sphere, a torus, smooth bodies without symmetry, and fields of noise, on
-// grids with non-cubic voxels and turned axes. Nodes that make a mesh of a mesh are given the same shapes as meshes.
+// Checks for nodes of the kind mesh, on signed fields of known shape: a sphere, a torus, smooth bodies without
+// symmetry, and fields of noise. Some grids have voxels that are not cubes, or rotated axes. Nodes that change a mesh
+// get the same shapes as meshes.
 #include "suite.hpp"
 
 #include <Eigen/Geometry>
@@ -43,7 +44,8 @@ SignedField field_of(const Grid& grid, const Distance& distance) {
   return field;
 }
 
-/// A closed surface from a map of the unit square, periodic in both directions (`poles`: the ends of v are points).
+/// A closed surface from a function on the unit square. It is periodic in u and v. With `poles` it is periodic in u
+/// only, and v = 0 and v = 1 are single points.
 Mesh surface_of(const std::function<Eigen::Vector3d(double u, double v)>& point, std::uint32_t around,
                 std::uint32_t along, bool poles) {
   Mesh mesh;
@@ -68,7 +70,7 @@ Mesh surface_of(const std::function<Eigen::Vector3d(double u, double v)>& point,
   return mesh;
 }
 
-/// A shape as a field and as a mesh, and what is known of it.
+/// A shape as a field and as a mesh, with its known figures. The figures that a check does not use are 0.
 struct Shape {
   Distance distance;
   Inputs inputs;
@@ -166,7 +168,7 @@ double volume_error(const Subject& subject, const Shape& shape) {
   return 100 * std::abs(enclosed_volume_mm3(mesh_of(subject, shape.inputs)) / shape.volume_mm3 - 1);
 }
 
-/// A smooth shape without symmetry: a chain of round bodies that run into each other, well resolved by the grid.
+/// A smooth shape without symmetry: a chain of round bodies that merge. The grid resolves it well.
 Shape blobs(unsigned seed) {
   constexpr double kWidth_mm = 5, kLevel = 0.4;
   const Grid grid = grid_of(true);
@@ -192,7 +194,7 @@ Shape blobs(unsigned seed) {
   Shape shape{[=](const Eigen::Vector3d& p) {
                 Eigen::Vector3d slope;
                 const double value = level(p, slope);
-                return value / std::max(slope.norm(), 0.02);  // a distance, close to the surface
+                return value / std::max(slope.norm(), 0.02);  // near the surface, this is a distance
               },
               {},
               0,
@@ -214,8 +216,8 @@ double worst_of_blobs(const Subject& subject, double (*figure)(const Subject&, c
   return worst;
 }
 
-/// How many of the fields the node refuses. What it does not refuse it must close: a field may be too rough for a
-/// method, but no field is a reason for a hole.
+/// The number of fields that the node refuses. For all others it must give a closed surface. A method may refuse a
+/// field that is too rough, but it must not give a surface with a hole.
 double refused(const Subject& subject, const std::vector<SignedField>& fields) {
   int count = 0;
   for (const SignedField& field : fields) {
@@ -230,7 +232,7 @@ double refused(const Subject& subject, const std::vector<SignedField>& fields) {
   return count;
 }
 
-/// Fields without any smoothness: every configuration of neighbouring cells occurs.
+/// Fields of noise. Every configuration of neighbouring cells occurs in them.
 std::vector<SignedField> random_fields() {
   std::vector<SignedField> fields;
   std::mt19937 random(5);
@@ -243,7 +245,8 @@ std::vector<SignedField> random_fields() {
   return fields;
 }
 
-/// A cell with each pattern of signs, in a field that is outside elsewhere; and in one that is inside elsewhere.
+/// One field for each pattern of signs at the corners of a cell. All other samples are outside; and again with all
+/// other samples inside.
 std::vector<SignedField> all_patterns() {
   std::vector<SignedField> fields;
   for (const bool around : {false, true})
@@ -319,24 +322,25 @@ Suite mesh_suite() {
     suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
   };
   const std::string voxels = " at 0.9 x 0.9 x 1.2 mm";
-  add("random_fields", "fields of noise: closed, without a pinch, or refused in words", 20, "of 20 refused",
-      [](const Subject& subject) { return refused(subject, random_fields()); });
-  add("all_patterns", "the sign patterns of a cell: closed, without a pinch, or refused in words", 512,
+  add("random_fields", "fields of noise: the mesh is closed and not pinched, or the node refuses with a reason", 20,
+      "of 20 refused", [](const Subject& subject) { return refused(subject, random_fields()); });
+  add("all_patterns",
+      "all sign patterns of a cell: the mesh is closed and not pinched, or the node refuses with a reason", 512,
       "of 512 refused", [](const Subject& subject) { return refused(subject, all_patterns()); });
   add("blobs_distance", "95th percentile of the distance to smooth shapes" + voxels, 0.15, "mm",
       [](const Subject& subject) { return worst_of_blobs(subject, distance_95); });
-  add("blobs_volume", "error of their volume" + voxels, 1.5, "%",
+  add("blobs_volume", "error of the volume of smooth shapes" + voxels, 1.5, "%",
       [](const Subject& subject) { return worst_of_blobs(subject, volume_error); });
   for (const auto& [name, make] : {std::pair<std::string, std::function<Shape()>>{"sphere", [] { return sphere(); }},
                                    {"turned_sphere", [] { return sphere(true); }},
                                    {"torus", torus}}) {
-    add(name + "_topology", "closed, oriented, its Euler number", 0, "",
+    add(name + "_topology", "the mesh is closed, oriented, and has the right Euler number", 0, "",
         [make = make](const Subject& subject) { return topology(subject, make()); });
-    add(name + "_distance", "95th percentile of the distance to it" + voxels, 0.15, "mm",
+    add(name + "_distance", "95th percentile of the distance to the true surface" + voxels, 0.15, "mm",
         [make = make](const Subject& subject) { return distance_95(subject, make()); });
-    add(name + "_area", "error of its area" + voxels, 1.5, "%",
+    add(name + "_area", "error of the area" + voxels, 1.5, "%",
         [make = make](const Subject& subject) { return area_error(subject, make()); });
-    add(name + "_volume", "error of its volume" + voxels, 1.5, "%",
+    add(name + "_volume", "error of the volume" + voxels, 1.5, "%",
         [make = make](const Subject& subject) { return volume_error(subject, make()); });
   }
   return suite;

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What meshers must do.
+/// The checks that every node of the kind mesh must pass.
 Suite mesh_suite();
 
 }  // namespace marrow::conformance

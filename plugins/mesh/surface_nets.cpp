@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The dual of marching cubes: a vertex for each loop in which the surface crosses the edges of a cell, and a polygon
-// around each edge of the grid that it crosses. The original nets (Gibson, Constrained elastic surface nets, MICCAI
-// 1998) have one vertex a cell, which joins sheets that only pass through the same cell; a vertex a loop keeps them
-// apart.
+// The dual of marching cubes. In each cell, the crossings of the surface with the cell's edges form loops. Each loop
+// gets one vertex. Each edge of the grid that the surface crosses gets a polygon around it. The original surface nets
+// (Gibson, Constrained elastic surface nets, MICCAI 1998) have one vertex per cell. This joins sheets that only pass
+// through the same cell; one vertex per loop keeps them apart.
 //
-// One case remains. Where the surface crosses the face of two cells twice, both crossings may join the same two
-// vertices, whose edge would then have four triangles. There each crossing has a vertex of its own, halfway. Thus the
-// surface is a closed 2-manifold for every field.
+// One case remains. If the surface crosses the common face of two cells twice, both crossings may join the same two
+// vertices. The edge between these would have four triangles. In this case each crossing gets its own vertex on the
+// face. So the surface is a closed 2-manifold for every field.
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
@@ -26,7 +26,7 @@ struct Options : marrow::surface::Finish {
   int relaxation = 0;
 };
 
-/// The loops of each pattern, and to which of them a crossed edge belongs.
+/// The loops of each sign pattern, and the loop to which each crossed edge belongs.
 struct LoopTable {
   std::array<std::vector<std::vector<int>>, 256> loops;
   std::array<std::array<std::uint8_t, 12>, 256> loop_of{};
@@ -40,20 +40,20 @@ struct LoopTable {
 };
 const LoopTable kTable;
 
-/// The corners of a cell's face at the low (high) end of `axis`: bit 0 of k along the next axis, bit 1 along the one
-/// after.
+/// Corner k of a cell's face at the low or high end of `axis`. Bit 0 of k goes along the next axis, bit 1 along the
+/// axis after that.
 constexpr int face_corner(int axis, bool high, int k) {
   return int(high) << axis | (k & 1) << (axis + 1) % 3 | (k >> 1) << (axis + 2) % 3;
 }
 
-/// True when the face is crossed twice, its inside corners lying on a diagonal.
+/// True if the low face is crossed twice: its two inside corners lie on a diagonal.
 bool crossed_twice(unsigned pattern, int axis) {
   const auto inside = [&](int k) { return pattern >> face_corner(axis, false, k) & 1; };
   return inside(0) == inside(3) && inside(1) == inside(2) && inside(0) != inside(1);
 }
 
-/// True when both crossings of such a face are part of one loop of the cell. Opposite sides belong to different
-/// crossings.
+/// True if both crossings of such a face belong to the same loop of the cell. Opposite sides of the face belong to
+/// different crossings.
 bool in_one_loop(unsigned pattern, int axis, bool high) {
   const auto corner = [&](int k) { return face_corner(axis, high, k); };
   const auto& loop_of = kTable.loop_of[pattern];
@@ -61,11 +61,11 @@ bool in_one_loop(unsigned pattern, int axis, bool high) {
          loop_of[std::size_t(marrow::surface::edge_between(corner(2), corner(3)))];
 }
 
-/// What the net has in a cell: first the vertices of its loops, then two for each of its low faces that needs them.
+/// The vertices of the net in a cell: first one for each loop, then two for each low face that is split.
 struct Cell {
   std::uint32_t first_vertex = 0;
   std::uint8_t pattern = 0;
-  std::uint8_t split_faces = 0;  ///< bit per axis
+  std::uint8_t split_faces = 0;  ///< low faces with two vertices of their own, one bit per axis
 
   std::uint32_t count() const {
     return std::uint32_t(kTable.loops[pattern].size()) + 2u * unsigned(std::popcount(split_faces));
@@ -87,7 +87,7 @@ Cell cell_at(const Signs& signs, int x, int y, int z, unsigned pattern) {
   return cell;
 }
 
-/// The cells of one z, by place.
+/// All cells of one z, by x and y.
 class Slice {
  public:
   Slice(const Signs& signs, int z, std::uint32_t first_vertex) : width_(signs.size()[0]) {
@@ -106,10 +106,10 @@ class Slice {
   std::vector<Cell> cells_;
 };
 
-/// Closed chains of vertices, counter-clockwise seen from outside.
+/// Closed chains of vertices, counter-clockwise if seen from outside.
 struct Polygons {
   std::vector<std::uint32_t> corners;
-  std::vector<std::size_t> ends;  ///< of each one's corners
+  std::vector<std::size_t> ends;  ///< index after the last corner of each polygon
 
   void add(const Polygons& others) {
     for (const std::size_t end : others.ends) ends.push_back(corners.size() + end);
@@ -122,13 +122,13 @@ struct Polygons {
   }
 };
 
-/// The polygon around the edge in +axis of a point, of the four cells about it. `slices`: the one below the point and
-/// its own.
+/// Adds the polygon around the grid edge that starts at `point` and goes in +axis. The polygon connects the four cells
+/// around the edge. `slices`: the slice below the point, and the slice of the point.
 void add_polygon(const Slice* const slices[2], int axis, const std::array<int, 3>& point, Polygons& polygons) {
   const int b = (axis + 1) % 3, c = (axis + 2) % 3;
   constexpr int kSteps[4][2] = {{-1, -1}, {0, -1}, {0, 0}, {-1, 0}};  // counter-clockwise about the axis
   Cell around[4];
-  int start[4];  // the corner at which the edge begins, in each cell
+  int start[4];  // in each cell: the corner where the edge begins
   for (int k = 0; k < 4; ++k) {
     std::array<int, 3> place = point;
     place[std::size_t(b)] += kSteps[k][0];
@@ -169,12 +169,12 @@ class Net {
     for (const Polygons& part : parts) polygons_.add(part);
   }
 
-  /// Moves each vertex to the mean of its neighbours, but not out of its cell.
+  /// Moves each vertex to the mean of its neighbours, but keeps it in its cell.
   void relax() {
     std::vector<Vector3d> sum(places_.size(), Vector3d::Zero());
     std::vector<std::uint32_t> count(places_.size(), 0);
     polygons_.for_each([&](const std::uint32_t* corners, std::size_t size) {
-      for (std::size_t k = 0; k < size; ++k) {  // each edge is met once in either direction
+      for (std::size_t k = 0; k < size; ++k) {  // each edge occurs once in each direction
         sum[corners[k]] += places_[corners[(k + 1) % size]];
         ++count[corners[k]];
       }
@@ -225,8 +225,8 @@ class Net {
             add_polygon(slices, axis, {64 * word + std::countr_zero(left), y, z}, polygons);
   }
 
-  /// A loop's vertex lies at the mean of its crossings, a face's halfway between the two sides that meet at an inside
-  /// corner.
+  /// The vertex of a loop is the mean of its crossings. A vertex of a face is the mean of the two crossings next to an
+  /// inside corner.
   void place_vertices(const Slice& slice, int z) {
     for (int y = 0; y + 1 < signs_.size()[1]; ++y)
       signs_.for_cells(y, z, [&](int x, unsigned pattern) {
@@ -259,8 +259,9 @@ class Net {
       });
   }
 
-  /// Where to cut a polygon: along the shorter diagonal; one with a face's vertex from that, as its neighbours on the
-  /// polygon may not be joined once more.
+  /// The corner at which the polygon's fan of triangles starts. A quadrilateral is cut along its shorter diagonal. A
+  /// larger polygon starts at a face's vertex, because the neighbours of this vertex must not be joined by a second
+  /// edge.
   std::size_t fan_from(const std::uint32_t* corners, std::size_t size, const std::vector<Vector3d>& at) const {
     if (size == 4)
       return (at[corners[0]] - at[corners[2]]).squaredNorm() <= (at[corners[1]] - at[corners[3]]).squaredNorm() ? 0 : 1;
@@ -270,9 +271,9 @@ class Net {
   }
 
   Signs signs_;
-  std::vector<std::uint32_t> first_;  ///< vertex of each slice
-  std::vector<Vector3d> places_;      ///< in samples of the field
-  std::vector<Box> cells_;            ///< that a vertex may not leave
+  std::vector<std::uint32_t> first_;  ///< first vertex of each slice
+  std::vector<Vector3d> places_;      ///< positions of the vertices, in index coordinates
+  std::vector<Box> cells_;            ///< the box that each vertex must not leave
   Polygons polygons_;
 };
 
@@ -289,12 +290,14 @@ Mesh surface_nets(const SignedField& field, const Options& options, marrow::Cont
 
 MARROW_PLUGIN(plugin) {
   plugin.node("mesh.surface_nets", surface_nets)
-      .summary("Surface nets (after Gibson, MICCAI 1998), dual to marching cubes, closed for every field")
+      .summary(
+          "Surface nets (after Gibson, MICCAI 1998), the dual of marching cubes; the surface is closed for every field")
       .in("field", "signed distance, negative inside")
       .out("mesh", "closed surface of the field's zero level, normals outward")
-      .option("relaxation", &Options::relaxation,
-              "how often each vertex moves to the mean of its neighbours, never out of its cell; for fields with steps",
-              marrow::at_least(0), marrow::at_most(200))
+      .option(
+          "relaxation", &Options::relaxation,
+          "how often each vertex moves to the mean of its neighbours, within its cell; useful for fields with steps",
+          marrow::at_least(0), marrow::at_most(200))
       .option("largest_only", &Options::largest_only, marrow::surface::kLargestOnlyHelp)
       .option("smoothing", &Options::smoothing, marrow::surface::kSmoothingHelp, marrow::at_least(0),
               marrow::at_most(200));

@@ -21,7 +21,7 @@ std::shared_ptr<const marrow::Optimizer> bobyqa() { return std::make_shared<Boby
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.bobyqa", bobyqa)
-      .summary("Quadratic models in a trust region, without derivatives (BOBYQA: Powell 2009; NLopt)")
+      .summary("Quadratic models in a trust region, without derivatives (BOBYQA: Powell 2009; by NLopt)")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

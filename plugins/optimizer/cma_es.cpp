@@ -15,7 +15,7 @@ struct Options {
   int seed = 1;
 };
 
-/// Normal numbers that are the same with every compiler's library.
+/// Normally distributed random numbers. They are the same with every standard library.
 class Normal {
  public:
   explicit Normal(unsigned seed) : random_(seed) {}
@@ -28,7 +28,7 @@ class Normal {
   std::mt19937 random_;
 };
 
-/// The strategy's state, with the constants of Hansen's tutorial (arXiv 1604.00772, table 1).
+/// The state of the evolution strategy, with the constants of Hansen's tutorial (arXiv 1604.00772, table 1).
 class Strategy {
  public:
   Strategy(Eigen::Index n, const Options& options)
@@ -55,7 +55,7 @@ class Strategy {
     expected_ = std::sqrt(d) * (1 - 1 / (4 * d) + 1 / (21 * d * d));
   }
 
-  /// One generation; true when it has become smaller than the tolerance.
+  /// Computes one generation. True if its spread is below the tolerance.
   bool step(marrow::search::Evaluations& evaluate) {
     std::vector<Eigen::VectorXd> points;
     std::vector<double> values;
@@ -137,12 +137,14 @@ std::shared_ptr<const marrow::Optimizer> cma_es(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.cma_es", cma_es)
-      .summary("Covariance matrix adaptation (Hansen and Ostermeier, Evolutionary Computation 2001; Hansen 2016)")
+      .summary(
+          "Covariance matrix adaptation evolution strategy, CMA-ES (Hansen and Ostermeier, Evolutionary Computation "
+          "2001; Hansen 2016)")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives, for rugged functions")
-      .option("population", &Options::population, "points in a generation; 0: 4 + 3 log n", marrow::at_least(0),
-              marrow::at_most(10000))
-      .option("sigma", &Options::sigma, "spread of the first generation, in initial steps", marrow::at_least(1e-6),
-              marrow::unit("1"))
-      .option("seed", &Options::seed, "of the random numbers", marrow::at_least(0));
+      .option("population", &Options::population, "number of points in a generation; 0: 4 + 3 ln n for n variables",
+              marrow::at_least(0), marrow::at_most(10000))
+      .option("sigma", &Options::sigma, "standard deviation of the first generation, in units of the initial steps",
+              marrow::at_least(1e-6), marrow::unit("1"))
+      .option("seed", &Options::seed, "seed of the random numbers", marrow::at_least(0));
 }

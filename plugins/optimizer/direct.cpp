@@ -33,9 +33,10 @@ std::shared_ptr<const marrow::Optimizer> direct(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.direct", direct)
       .summary(
-          "Divides the whole range into ever smaller boxes where it is promising (DIRECT-L: Gablonsky and Kelley 2001; "
-          "NLopt)")
+          "Divides the whole range into boxes, and promising boxes into smaller ones (DIRECT-L: Gablonsky and Kelley "
+          "2001; by NLopt)")
       .out("optimizer", "global minimiser without derivatives")
-      .option("reach", &Options::reach, "range to either side where the problem has no bounds, in initial steps",
+      .option("reach", &Options::reach,
+              "range to either side of the start if the problem has no bounds, in units of the initial steps",
               marrow::at_least(1e-3), marrow::unit("1"));
 }

@@ -9,8 +9,8 @@ struct Options {
   int points = 3;
 };
 
-/// All points of a grid about the best so far, then a finer one about the best of these: as wide as one step of the
-/// last.
+/// Evaluates all points of a grid around the best point so far, then of a finer grid around the best of these. The
+/// finer grid fills the space up to the neighbouring points of the last grid.
 std::string search(marrow::search::Evaluations& evaluate, int points) {
   const Eigen::Index n = evaluate.size();
   Eigen::VectorXd centre = Eigen::VectorXd::Zero(n);
@@ -26,7 +26,7 @@ std::string search(marrow::search::Evaluations& evaluate, int points) {
       }
       for (k = 0; k < n && ++at[k] > half; ++k) at[k] = -half;
     }
-    // Where the best lies at the border, the grid follows it before it becomes finer.
+    // If the best point lies at the border, the grid first moves there and becomes finer later.
     if ((best - centre).cwiseAbs().maxCoeff() < (half - 0.5) * step || best == centre) step /= half + 1;
     centre = best;
   }
@@ -56,8 +56,9 @@ std::shared_ptr<const marrow::Optimizer> grid(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.grid", grid)
-      .summary("All points of a grid, then of a finer one about the best")
+      .summary("Evaluates all points of a grid, then of a finer grid around the best point")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives")
-      .option("points", &Options::points, "along each coordinate, odd", marrow::at_least(3), marrow::at_most(101));
+      .option("points", &Options::points, "number of grid points along each variable, an odd number",
+              marrow::at_least(3), marrow::at_most(101));
 }

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that search for the least value.
 #include <marrow/plugin.hpp>
 
 #include "suite.hpp"
 
 MARROW_PLUGIN(plugin) {
   plugin.kind("optimizer")
-      .summary("minimises a function of n numbers")
+      .summary("minimises a function of n variables")
       .out<marrow::Optimizer>("optimizer", "minimiser")
-      .trait("needs_start", "finds the minimum near its start only")
+      .trait("needs_start", "finds only a minimum near its start")
       .suite(marrow::conformance::optimizer_suite());
 }

@@ -9,8 +9,8 @@ namespace {
 
 constexpr std::size_t kMemory = 8;
 
-/// The gradient: as the function tells it, else by central differences of h to either side, cut at the bounds (2 n
-/// evaluations). 0 along a coordinate whose bounds meet.
+/// The gradient: from the function itself if it has derivatives, else by central differences with step h, cut at the
+/// bounds (2 n evaluations). 0 along a variable whose bounds are equal.
 Eigen::VectorXd gradient_at(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& y, double h) {
   if (evaluate.has_derivatives())
     if (const auto about = evaluate.expansion(y)) return about->gradient;
@@ -26,19 +26,19 @@ Eigen::VectorXd gradient_at(marrow::search::Evaluations& evaluate, const Eigen::
   return gradient;
 }
 
-/// What the last steps tell of the function's curvature (Liu and Nocedal, Mathematical Programming 1989).
+/// The function's curvature as estimated from the last steps (Liu and Nocedal, Mathematical Programming 1989).
 class Memory {
  public:
   void add(const Eigen::VectorXd& step, const Eigen::VectorXd& change_of_gradient) {
     const double along = step.dot(change_of_gradient);
     if (!(along > 1e-12 * step.norm() * change_of_gradient.norm()))
-      return;  // no curvature, or none that may be believed
+      return;  // the curvature is not positive, or too small to be reliable
     pairs_.push_back({step, change_of_gradient, 1 / along});
     if (pairs_.size() > kMemory) pairs_.pop_front();
   }
   void forget() { pairs_.clear(); }
 
-  /// - inverse Hessian * gradient, by the two loops of their section 2. Without a memory a step of length 1.
+  /// - inverse Hessian * gradient, by the two loops of section 2 of the paper. Without a memory, a step of length 1.
   Eigen::VectorXd direction(const Eigen::VectorXd& gradient) const {
     if (pairs_.empty()) return -gradient / std::max(gradient.norm(), 1e-300);
     Eigen::VectorXd q = gradient;
@@ -56,13 +56,13 @@ class Memory {
  private:
   struct Pair {
     Eigen::VectorXd step, change;
-    double inverse;  ///< of step . change
+    double inverse;  ///< 1 / (step . change)
   };
   std::deque<Pair> pairs_;
 };
 
-/// Goes along the direction to where the value is enough lower (Armijo's condition), by parabolas. False where there is
-/// no such place.
+/// Goes along the direction until the value is low enough (Armijo's condition). Step lengths come from parabolas. False
+/// if no such point is found.
 bool step_along(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& direction, double slope,
                 Eigen::VectorXd& here, double& value) {
   double t = 1;
@@ -80,7 +80,7 @@ bool step_along(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& di
   return false;
 }
 
-/// 1 for the coordinates that may follow -gradient, 0 for those that a bound stops.
+/// 1 for variables that can move along -gradient, 0 for variables that a bound stops.
 Eigen::VectorXd free_coordinates(const marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here,
                                  const Eigen::VectorXd& gradient, double h) {
   const Eigen::VectorXd down = here - h * gradient / std::max(gradient.norm(), 1e-300);
@@ -100,7 +100,7 @@ std::string search(marrow::search::Evaluations& evaluate) {
     const Eigen::VectorXd before = here;
     if (!step_along(evaluate, direction, direction.dot(gradient), here, value)) {
       if (h <= 0.1 * evaluate.tolerance()) return "steps are below the tolerance";
-      // The differences may be too wide to tell the slope here.
+      // The steps of the differences may be too large to give the slope here.
       h = std::max(0.1 * h, 0.1 * evaluate.tolerance());
       memory.forget();
       gradient = gradient_at(evaluate, here, h);
@@ -127,8 +127,8 @@ std::shared_ptr<const marrow::Optimizer> lbfgs() { return std::make_shared<Lbfgs
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.lbfgs", lbfgs)
       .summary(
-          "Quasi-Newton steps by the gradients of the last eight (L-BFGS: Liu and Nocedal 1989), as the cost tells "
-          "them or by differences")
+          "Quasi-Newton steps from the last eight gradients (L-BFGS: Liu and Nocedal 1989); gradients come from the "
+          "cost, or from differences if the cost has none")
       .trait("needs_start")
       .out("optimizer", "minimiser for smooth functions");
 }

@@ -10,7 +10,7 @@ namespace {
 
 using Expansion = marrow::MinimisationProblem::Expansion;
 
-/// Of a function that does not know its derivatives: by differences, the Hessian's negative eigenvalues turned
+/// The expansion of a function without derivatives, by finite differences. Negative eigenvalues of the Hessian are made
 /// positive.
 Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& here, double value, double h) {
   const Eigen::Index n = here.size();
@@ -38,7 +38,7 @@ Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::Vec
   return about;
 }
 
-/// Steps that Marquardt's damping keeps short while the expansion misleads (SIAM J Appl Math 1963).
+/// Damped steps (Marquardt, SIAM J Appl Math 1963). The damping keeps steps short while the expansion is not reliable.
 class Search {
  public:
   explicit Search(marrow::search::Evaluations& evaluate)
@@ -57,7 +57,7 @@ class Search {
       } else if (derivatives_ || h <= least_h) {
         return "steps are below the tolerance";
       } else {
-        h = std::max(least_h, 0.1 * h);  // the differences may be too wide to tell the slope here
+        h = std::max(least_h, 0.1 * h);  // the steps of the differences may be too large to give the slope here
         about_.reset();
       }
     }
@@ -66,7 +66,7 @@ class Search {
  private:
   static constexpr double kLongest = 4, kMostDamping = 1e6;
 
-  /// The value there, with derivatives as long as the function knows them.
+  /// The value at a point, with derivatives as long as the function provides them.
   double look(const Eigen::VectorXd& there) {
     if (derivatives_) {
       if ((seen_ = evaluate_.expansion(there))) return seen_->value;
@@ -76,7 +76,7 @@ class Search {
     return evaluate_(there);
   }
 
-  /// Goes to a lower place; returns how far. 0 where none was found.
+  /// Goes to a point with a lower value and returns the distance. 0 if none was found.
   double step() {
     const Eigen::VectorXd steepness = about_->curvature.diagonal();
     const double floor = 1e-6 * steepness.maxCoeff() + 1e-300;
@@ -105,7 +105,7 @@ class Search {
   Eigen::VectorXd here_;
   double value_ = 0, damping_ = 1e-2;
   bool derivatives_;
-  std::optional<Expansion> about_, seen_;  ///< here, and at the place last looked at
+  std::optional<Expansion> about_, seen_;  ///< at here_, and at the point evaluated last
 };
 
 class LevenbergMarquardt : public marrow::Optimizer {
@@ -123,8 +123,8 @@ std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() { return std::mak
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.levenberg_marquardt", levenberg_marquardt)
       .summary(
-          "Damped Gauss-Newton steps where the cost knows its derivatives, damped Newton steps by differences "
-          "elsewhere (Marquardt 1963)")
+          "Levenberg-Marquardt (Marquardt 1963): damped Gauss-Newton steps if the cost has derivatives, otherwise "
+          "damped Newton steps by finite differences")
       .trait("needs_start")
       .out("optimizer", "minimiser for smooth functions");
 }

@@ -18,7 +18,7 @@ std::shared_ptr<const marrow::Optimizer> nelder_mead() { return std::make_shared
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.nelder_mead", nelder_mead)
-      .summary("Downhill simplex (Nelder and Mead, Computer Journal 1965; NLopt)")
+      .summary("Downhill simplex (Nelder and Mead, Computer Journal 1965; by NLopt)")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

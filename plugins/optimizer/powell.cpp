@@ -6,15 +6,15 @@
 
 namespace {
 
-/// The value along a line, and how far the least of it lies. The steps tried grow to where the value rises again, then
-/// a parabola through the last three, kept within them, is refined.
+/// Minimises the value along a line. The steps grow until the value rises again. Then the minimum between the last
+/// three points is refined by parabolas.
 class Line {
  public:
   Line(marrow::search::Evaluations& evaluate, const Eigen::VectorXd& from, double value,
        const Eigen::VectorXd& direction)
       : evaluate_(evaluate), from_(from), direction_(direction), value_(value) {}
 
-  /// Goes to the least value found; returns how far that is from the start, in lengths of the direction.
+  /// Finds the least value along the line. Returns its signed distance from the start, in lengths of the direction.
   double minimise(double step) {
     double a = 0, fa = value_, b = step, fb = at(b);
     if (fb > fa) std::swap(a, b), std::swap(fa, fb);
@@ -51,8 +51,8 @@ class Line {
   double value_;
 };
 
-/// Powell's method with the discarding rule of his section 3: the direction of the greatest fall gives way to that of
-/// the whole round where this does not make the set dependent.
+/// Powell's method with the rule of section 3 of his paper: the direction of the greatest decrease is replaced by the
+/// direction of the whole round, unless the directions would become linearly dependent.
 std::string search(marrow::search::Evaluations& evaluate) {
   const Eigen::Index n = evaluate.size();
   Eigen::MatrixXd directions = Eigen::MatrixXd::Identity(n, n);
@@ -101,7 +101,7 @@ std::shared_ptr<const marrow::Optimizer> powell() { return std::make_shared<Powe
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.powell", powell)
-      .summary("Line searches along directions that become conjugate (Powell, Computer Journal 1964)")
+      .summary("Line searches along directions that become conjugate (Powell's method, Computer Journal 1964)")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

@@ -18,7 +18,7 @@ std::shared_ptr<const marrow::Optimizer> sbplx() { return std::make_shared<Sbplx
 
 MARROW_PLUGIN(plugin) {
   plugin.node("optimizer.sbplx", sbplx)
-      .summary("Downhill simplex on subspaces (Rowan 1990, as NLopt has it)")
+      .summary("Downhill simplex on subspaces (Subplex: Rowan 1990; NLopt's version)")
       .trait("needs_start")
       .out("optimizer", "minimiser without derivatives");
 }

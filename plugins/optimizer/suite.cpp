@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Optimizers, on functions of six numbers whose least value is known: a bowl, a long bowl, a bent valley, and for those
-// that need no start near the minimum one with many local minima. 1500 evaluations each, from ten starts.
+// Checks for optimizers on functions of six variables with a known minimum: a bowl, a long bowl, a bent valley, and a
+// function with many local minima for optimizers that need no start near the minimum. Each runs from ten starts, with
+// 1500 evaluations.
 #include "suite.hpp"
 
 #include <algorithm>
@@ -18,7 +19,7 @@ constexpr Eigen::Index kSize = 6;
 
 using Function = double (*)(const Eigen::VectorXd&);
 
-// The least value, 0, lies at the origin.
+// All functions have their minimum, 0, at the origin.
 double sphere(const Eigen::VectorXd& x) { return x.squaredNorm(); }
 double ellipsoid(const Eigen::VectorXd& x) {
   double sum = 0;
@@ -75,7 +76,7 @@ void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Val
   expect(!result.stopped_because.empty(), "it does not say why it stopped");
 }
 
-/// Of the start's value, what is left at the end, in %; the worst but two of the starts.
+/// The value at the end in % of the value at the start: the eighth best of ten starts.
 double left_percent(const Subject& subject, Function function) {
   const Made optimizer = made(subject);
   std::vector<double> left;
@@ -107,7 +108,7 @@ double evaluations_over_budget(const Subject& subject) {
   return worst;
 }
 
-/// The least of the function lies beyond the bounds.
+/// The function's minimum lies beyond the bounds.
 double beyond_bounds(const Subject& subject) {
   const Made optimizer = made(subject);
   double beyond = 0;
@@ -143,7 +144,7 @@ double nan_left(const Subject& subject) {
   return 100 * sphere(result.x) / sphere(problem.start);
 }
 
-/// The same optimizer in four threads at once, and again.
+/// The number of results that differ when the same optimizer runs in four threads at once.
 double differing_results(const Subject& subject) {
   const Made optimizer = made(subject);
   const Eigen::VectorXd expected = (*optimizer).minimise(problem_of(rosenbrock, 1)).x;
@@ -176,7 +177,8 @@ double lost_exceptions(const Subject& subject) {
 
 Suite optimizer_suite() {
   Suite suite{[] { return Inputs{}; }, validate, {}, {}};
-  const std::string six = " of six numbers, 1500 evaluations, eight of ten starts: what is left of the start's value";
+  const std::string six =
+      " of six variables, 1500 evaluations, eighth best of ten starts: final value in percent of the start's value";
   const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
                        const std::function<double(const Subject&)>& measure) {
     suite.accuracy.push_back({{name, what, limit, unit}, measure});
@@ -186,16 +188,18 @@ Suite optimizer_suite() {
       [](const Subject& subject) { return left_percent(subject, ellipsoid); });
   add("rosenbrock", "a bent valley" + six, 20, "%",
       [](const Subject& subject) { return left_percent(subject, rosenbrock); });
-  add("rastrigin", "many local minima" + six, 25, "%", [](const Subject& subject) {
+  add("rastrigin", "a function with many local minima" + six, 25, "%", [](const Subject& subject) {
     if (subject.has_trait("needs_start")) throw NotApplicable("it finds the minimum near its start only");
     return left_percent(subject, rastrigin);
   });
-  add("budget", "evaluations more than allowed", 0, "evaluations", evaluations_over_budget);
-  add("bounds", "how far beyond its bounds it looks", 0, "units", beyond_bounds);
-  add("noise", "a bowl with noise: what is left of the start's value", 25, "%", noise_left);
-  add("not_a_number", "a bowl of which a part is not a number: what is left of the start's value", 10, "%", nan_left);
-  add("repeated", "results of four threads at once that differ from the first", 0, "results", differing_results);
-  add("exceptions", "exceptions of the function that it keeps to itself", 0, "exceptions", lost_exceptions);
+  add("budget", "evaluations beyond the allowed number", 0, "evaluations", evaluations_over_budget);
+  add("bounds", "largest distance of an evaluated point beyond the bounds", 0, "units", beyond_bounds);
+  add("noise", "a bowl with noise: final value in percent of the start's value", 25, "%", noise_left);
+  add("not_a_number", "a bowl with NaN in a part of it: final value in percent of the start's value", 10, "%",
+      nan_left);
+  add("repeated", "results of four simultaneous threads that differ from the result of one thread", 0, "results",
+      differing_results);
+  add("exceptions", "exceptions of the function that do not reach the caller", 0, "exceptions", lost_exceptions);
   return suite;
 }
 

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What optimizers must do.
+/// The checks that every optimizer must pass.
 Suite optimizer_suite();
 
 }  // namespace marrow::conformance

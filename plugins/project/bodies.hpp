@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the suite of projectors lays before the nodes: bodies that are known exactly, in one pose, seen from four sides.
+// Test data of the suite for projectors: bodies that are known exactly, in one pose, seen from four sides.
 #include <vector>
 
 #include "marrow/conformance.hpp"
@@ -10,14 +10,14 @@
 namespace marrow::conformance {
 
 constexpr int kSize_px = 160;
-constexpr double kDensity = 1.5;  ///< of what the volumes show, relative to water: 500 HU
+constexpr double kDensity = 1.5;  ///< attenuation of the bodies relative to water: 500 HU
 
 Camera camera_at(double angle_deg);
 const std::vector<double>& angles();
 RigidTransform pose();
 
 analytic::Body ball();
-/// An ellipsoid, askew.
+/// An ellipsoid with rotated axes.
 analytic::Body egg();
 Grid fine_grid();
 

@@ -13,7 +13,7 @@ using marrow::rays::Bricks;
 using marrow::rays::RayProjector;
 using marrow::rays::Slices;
 
-/// Sums over the slices across the axis that a ray runs along most, bilinear within each.
+/// Sums of bilinear values over the slices that are perpendicular to the axis nearest to the ray's direction.
 class JosephProjector : public RayProjector {
  public:
   explicit JosephProjector(Attenuation attenuation)
@@ -46,6 +46,7 @@ std::shared_ptr<const marrow::RadiographProjector> joseph(const marrow::Volume& 
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.joseph", joseph);
-  marrow::rays::declare<AttenuationOptions>(node.summary(
-      "Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): a sum over slices, whole images slice by slice"));
+  marrow::rays::declare<AttenuationOptions>(
+      node.summary("Radiographs by Joseph's method (IEEE Trans Med Imaging 1982): line integrals as sums over slices; "
+                   "whole images are computed slice by slice"));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Radiographs looked up: line integrals of the volume, kept for a set of rays about each view, between which a pixel's
-// ray is interpolated. LaRose (PhD thesis, Carnegie Mellon University 2001, transgraph); Russakoff, Rohlfing et al.
-// (IEEE Trans Med Imaging 24(11), 2005, attenuation fields) after Levoy and Hanrahan (SIGGRAPH 1996).
+// Radiographs from tables: line integrals of the volume are computed once for a set of rays around each view. The value
+// of a pixel is interpolated between them. LaRose (PhD thesis, Carnegie Mellon University 2001, transgraph); Russakoff,
+// Rohlfing et al. (IEEE Trans Med Imaging 24(11), 2005, attenuation fields) after Levoy and Hanrahan (SIGGRAPH 1996).
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -23,7 +23,7 @@ struct Options : marrow::rays::AttenuationOptions {
   int most_mb = 1024;
 };
 
-/// One side of a table: so many samples, the first at `low`.
+/// One dimension of a table: `count` samples, the first at `low`.
 struct Side {
   double low = 0, step = 1;
   int count = 0;
@@ -33,7 +33,7 @@ struct Side {
     return {0.5 * (low + high) - 0.5 * step * (count - 1), step, count};
   }
   double at(int i) const { return low + step * i; }
-  /// Sample and fraction; false outside.
+  /// Finds the sample before `value` and the fraction of the step to the next. False outside the table.
   bool find(double value, int& i, float& fraction) const {
     const double x = (value - low) / step;
     if (!(x >= 0 && x < count - 1)) return false;
@@ -43,14 +43,15 @@ struct Side {
   }
 };
 
-/// The rays about one view: a ray is where it meets the plane across the view's axis through the middle of what
-/// attenuates, and its two slopes against that axis. Coordinates in mm along the grid's axes.
+/// The table of rays around one view. A ray has four coordinates: the point where it meets the plane across the view's
+/// axis through the middle of the attenuating voxels, and its two slopes against that axis. Coordinates are in mm along
+/// the grid's axes.
 class Field {
  public:
   Field(const Attenuation& attenuation, const marrow::Camera& camera, const Options& options) {
     const marrow::Grid& grid = attenuation.grid;
     axes_ = (camera.camera_from_world.rotation * grid.direction)
-                .transpose();  // columns: the camera's axes, of a model that is not turned
+                .transpose();  // columns: the camera's axes, for a model that is not rotated
     Eigen::Vector3d low, high;
     for (int k = 0; k < 3; ++k) {
       low[k] = (attenuation.first[std::size_t(k)] - 1) * grid.spacing_mm[k];
@@ -68,7 +69,7 @@ class Field {
       const double most =
           std::tan(std::min(std::atan(steepest[k]) + marrow::radians(options.range_deg), marrow::radians(60)));
       slopes_[k] = Side::of(-most, most, slope_step);
-      // All rays of these slopes that meet the box.
+      // The places must cover all rays with these slopes that meet the box.
       double reach = 0;
       for (int corner = 0; corner < 8; ++corner) {
         const Eigen::Vector3d half(corner & 1 ? 1 : -1, corner & 2 ? 1 : -1, corner & 4 ? 1 : -1),
@@ -109,8 +110,8 @@ class Field {
     });
   }
 
-  /// The integral along a ray, linear in place and slopes. Nothing where it is steeper than those kept; 0 where it
-  /// misses the box. `start` and `direction` in this field's own axes.
+  /// The integral along a ray, interpolated linearly in place and slopes. Nothing if the ray is steeper than the rays
+  /// in the table; 0 if it misses the box. `start` and `direction` are in this field's own axes.
   std::optional<float> find(const Eigen::Vector3d& start, const Eigen::Vector3d& direction) const {
     int i[4];
     float f[4];
@@ -132,7 +133,7 @@ class Field {
   }
 
  private:
-  static constexpr float kUnit_mm = 0.02f;  // of what is kept: up to 1.3 m of water
+  static constexpr float kUnit_mm = 0.02f;  // unit of the stored integrals, whose largest value is 1.3 m of water
 
   Eigen::Matrix3d axes_;
   Eigen::Vector3d middle_;
@@ -156,7 +157,7 @@ class LightField : public marrow::rays::RayProjector {
       if (const double share = field.axis().dot(along); share > least) least = share, nearest = &field;
     if (nearest) {
       const Eigen::Vector3d start = nearest->from_middle(source.cwiseProduct(spacing));
-      // The source must lie before all that attenuates.
+      // The source must lie in front of all attenuating voxels.
       if (start.z() < -nearest->radius_mm())
         if (const auto value = nearest->find(start, nearest->axes().transpose() * along)) return *value;
     }
@@ -198,23 +199,26 @@ std::shared_ptr<const marrow::RadiographProjector> lightfield(const marrow::Volu
 MARROW_PLUGIN(plugin) {
   plugin.node("project.lightfield", lightfield)
       .summary(
-          "Radiographs looked up among integrals made beforehand about each view (LaRose 2001; Russakoff et al., IEEE "
-          "Trans Med Imaging 2005)")
+          "Radiographs interpolated from line integrals that are computed once around each view (LaRose 2001; "
+          "Russakoff et al., IEEE Trans Med Imaging 2005)")
       .in("volume", "CT")
-      .in("field", "signed field of one fragment, to leave all else out")
-      .in("views", "views, about the directions of which integrals are kept", marrow::over("view"))
-      .out("projector", "draws the radiograph for any camera and pose; by Joseph's method where rays were not kept")
-      .option("below_hu", &Options::below_hu, "voxels below attenuate nothing", marrow::unit("HU"))
-      .option("background_hu", &Options::background_hu, "what attenuates nothing: air, or the tissue around the bone",
-              marrow::unit("HU"))
-      .option("margin_mm", &Options::margin_mm, "voxels further than this outside the field attenuate nothing",
+      .in("field", "signed field of one fragment; everything else is left out")
+      .in("views", "views around which integrals are stored", marrow::over("view"))
+      .out("projector",
+           "draws the radiograph for any camera and pose; rays that are not in the table are integrated by Joseph's "
+           "method")
+      .option("below_hu", &Options::below_hu, "voxels below this do not attenuate", marrow::unit("HU"))
+      .option("background_hu", &Options::background_hu,
+              "value that counts as no attenuation: that of air, or of the tissue around the bone", marrow::unit("HU"))
+      .option("margin_mm", &Options::margin_mm, "voxels farther than this outside the field do not attenuate",
               marrow::at_least(0))
-      .option("range_deg", &Options::range_deg, "how far the bone may be turned, against CT axes that are the world's",
+      .option("range_deg", &Options::range_deg,
+              "largest rotation of the bone that the table covers, from CT axes parallel to the world's axes",
               marrow::at_least(0), marrow::at_most(40))
-      .option("step_mm", &Options::step_mm, "between the places of rays that are kept", marrow::at_least(0.2),
+      .option("step_mm", &Options::step_mm, "distance between neighbouring rays of the table", marrow::at_least(0.2),
               marrow::at_most(20))
-      .option("step_deg", &Options::step_deg, "between the directions of rays that are kept", marrow::at_least(0.1),
-              marrow::at_most(10))
-      .option("most_mb", &Options::most_mb, "memory that the integrals may take", marrow::at_least(1),
+      .option("step_deg", &Options::step_deg, "angle between neighbouring directions of the table",
+              marrow::at_least(0.1), marrow::at_most(10))
+      .option("most_mb", &Options::most_mb, "largest memory for the integrals", marrow::at_least(1),
               marrow::unit("MB"));
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The projectors that a node makes. What they draw is known from the types of its outputs.
+// The projectors that a node makes. The types of its outputs say whether they draw outlines or radiographs.
 #include <cmath>
 #include <functional>
 #include <string>
@@ -17,7 +17,7 @@ bool is_of(const PortInfo& port) {
   return port.type.id == TypeInfo::of<Projector>().id && port.axis.empty();
 }
 
-/// All projectors of a type among a node's outputs. Throws Failure where one is missing.
+/// All projectors of a type among a node's outputs. Throws Failure if one is missing.
 template <class Projector>
 std::vector<const Projector*> projectors_in(const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
   std::vector<const Projector*> found;
@@ -29,10 +29,10 @@ std::vector<const Projector*> projectors_in(const std::vector<PortInfo>& ports, 
   return found;
 }
 
-/// What a node makes of inputs, and these, which its projectors may refer to.
+/// A node's outputs together with its inputs, because its projectors may refer to the inputs.
 class Made {
  public:
-  /// Throws Failure where the node refuses.
+  /// Throws Failure if the node refuses its inputs.
   Made(const Subject& subject, Inputs inputs) : ports_(subject.info().outputs), inputs_(std::move(inputs)) {
     Result result = subject.call(inputs_);
     if (result.refusal) throw Failure("it refuses: " + *result.refusal);
@@ -49,7 +49,8 @@ class Made {
   std::vector<Value> outputs_;
 };
 
-/// The largest figure of a node's projectors of a type. Throws NotApplicable with the reason where it makes none.
+/// The largest figure over all projectors of a type that a node makes. Throws NotApplicable with the reason if it makes
+/// none.
 template <class Projector>
 double largest_of(const Subject& subject, Inputs inputs, const std::string& reason,
                   const std::function<double(const Projector&)>& figure) {

@@ -12,7 +12,7 @@ namespace {
 
 constexpr double kSpacing_px = 1;
 
-/// Points of the true silhouette, densely.
+/// Dense points of the true silhouette.
 std::vector<OutlinePoint> true_outline(const Camera& camera) {
   return analytic::BodyProjector(egg()).outline(camera, pose(), 0.05);
 }
@@ -22,8 +22,8 @@ const OutlinePoint& nearest(const std::vector<OutlinePoint>& points, const Outli
   });
 }
 
-/// Of the outline in all views, against the silhouette: mean and largest distance, mean angle, and the part of the
-/// silhouette without a point near.
+/// Errors of the outline in all views against the true silhouette: mean and largest distance, mean angle of the
+/// normals, the part of the silhouette without a point near it, and the mean error of the surface points.
 struct OutlineErrors {
   double mean_px = 0, worst_px = 0, angle_deg = 0, missing_percent = 0, model_mm = 0;
 };
@@ -64,7 +64,7 @@ double largest(const Subject& subject, const std::function<double(const OutlineP
   return largest_of<OutlineProjector>(subject, inputs_of(egg()), "it draws no outlines", figure);
 }
 
-/// A wider spacing gives as many points fewer.
+/// Four times the spacing should give a quarter of the points.
 double spacing_off_percent(const OutlineProjector& projector) {
   const double fine = double(projector.outline(camera_at(0), pose(), 1).size()),
                coarse = double(projector.outline(camera_at(0), pose(), 4).size());
@@ -91,20 +91,20 @@ std::vector<Check> outline_checks() {
                    return largest(subject, [&](const OutlineProjector& one) { return outline_errors(one).*figure; });
                  }};
   };
-  return {
-      error("outline", "mean distance of the outline from an ellipsoid's silhouette", 0.35, "px",
-            &OutlineErrors::mean_px),
-      error("outline_worst", "largest distance of the outline from an ellipsoid's silhouette", 1.2, "px",
-            &OutlineErrors::worst_px),
-      error("outline_direction", "mean angle between the outline's normals and the silhouette's", 6, "deg",
-            &OutlineErrors::angle_deg),
-      error("outline_complete", "part of the silhouette further than 2.5 px from the outline", 0, "%",
-            &OutlineErrors::missing_percent),
-      error("outline_model",
-            "mean distance, across the ray, between an outline's pixel and the surface point that it is the image of",
-            1, "mm", &OutlineErrors::model_mm),
-      {{"outline_spacing", "four times the spacing: deviation of the number of points from a quarter", 30, "%"},
-       [](const Subject& subject) { return largest(subject, spacing_off_percent); }}};
+  return {error("outline", "mean distance between the outline and an ellipsoid's silhouette", 0.35, "px",
+                &OutlineErrors::mean_px),
+          error("outline_worst", "largest distance between the outline and an ellipsoid's silhouette", 1.2, "px",
+                &OutlineErrors::worst_px),
+          error("outline_direction", "mean angle between the outline's normals and the silhouette's normals", 6, "deg",
+                &OutlineErrors::angle_deg),
+          error("outline_complete", "part of the silhouette that is more than 2.5 px from the outline", 0, "%",
+                &OutlineErrors::missing_percent),
+          error("outline_model",
+                "mean distance, across the ray, between an outline point and the projection of its surface point", 1,
+                "mm", &OutlineErrors::model_mm),
+          {{"outline_spacing", "four times the spacing should give a quarter of the points: deviation of their number",
+            30, "%"},
+           [](const Subject& subject) { return largest(subject, spacing_off_percent); }}};
 }
 
 }  // namespace marrow::conformance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What projectors of outlines must do.
+// Checks for projectors of outlines.
 #include <vector>
 
 #include "marrow/conformance.hpp"
@@ -8,10 +8,10 @@
 
 namespace marrow::conformance {
 
-/// Throws Failure where points are no outline in this camera's image.
+/// Throws Failure if the points are not a valid outline in this camera's image.
 void check_outline(const std::vector<OutlinePoint>& points, const Camera& camera);
 
-/// Outlines against the silhouette of an ellipsoid.
+/// Compares outlines with the silhouette of an ellipsoid.
 std::vector<Check> outline_checks();
 
 }  // namespace marrow::conformance

@@ -12,15 +12,15 @@ namespace {
 
 using namespace analytic;
 
-const Eigen::Vector3d kBox_mm(12, 16, 9.6);        // half of its sides, whole voxels
-const Eigen::Vector3d kOctahedron_mm(20, 16, 24);  // half of its diagonals
+const Eigen::Vector3d kBox_mm(12, 16, 9.6);        // half the lengths of its sides, in whole voxels
+const Eigen::Vector3d kOctahedron_mm(20, 16, 24);  // half the lengths of its diagonals
 Grid turned_grid() { return grid_of({56, 70, 48}, {1, 0.8, 1.2}, rotation_from_vector({0.5, -0.3, 0.8})); }
 
 double largest(const Subject& subject, Inputs inputs, const std::function<double(const RadiographProjector&)>& figure) {
   return largest_of<RadiographProjector>(subject, std::move(inputs), "it makes no radiographs", figure);
 }
 
-/// The mean error over the pixels that see the solid by more than 2 mm of water, of all views.
+/// Mean error in all views, over the pixels where the solid is thicker than 2 mm of water.
 double mean_error_mm(const RadiographProjector& projector,
                      const std::function<double(const Eigen::Vector3d&, const Eigen::Vector3d&)>& chord) {
   double sum = 0;
@@ -47,7 +47,7 @@ double ball_error_mm(const RadiographProjector& projector) {
                        [](const auto& start, const auto& direction) { return chord_mm(ball(), start, direction); });
 }
 
-/// The mesh is that of the ball: no radiograph depends on it.
+/// The mesh is that of the ball, because radiographs do not depend on the mesh.
 double solid_error_mm(const Subject& subject, const PlaneSolid& solid, const Grid& grid) {
   const Inputs inputs =
       inputs_of(volume_of(solid, grid, 1000 * kDensity - 1000), field_of(solid, grid), mesh_of(ball()));
@@ -57,7 +57,8 @@ double solid_error_mm(const Subject& subject, const PlaneSolid& solid, const Gri
   });
 }
 
-/// Root mean square of the differences; the bodies' borders are steep, where interpolation differs most.
+/// Root mean square of the differences. The largest differences are at the steep borders of the bodies, due to
+/// interpolation.
 double pixels_off_mm(const RadiographProjector& projector, bool single) {
   double squares = 0;
   std::size_t count = 0;
@@ -82,7 +83,7 @@ double pixels_off_mm(const RadiographProjector& projector, bool single) {
   return std::sqrt(squares / double(count));
 }
 
-/// The largest value outside of the region, with the body in and partly out of the image.
+/// The largest value outside the region, with the body inside the image and partly outside it.
 double beyond_region_mm(const RadiographProjector& projector) {
   float most = 0;
   for (const Eigen::Vector3d& shift :
@@ -106,7 +107,7 @@ double beyond_region_mm(const RadiographProjector& projector) {
   return double(most);
 }
 
-/// Out of view, and behind the source: nothing to be seen.
+/// The largest value if the body is out of view or behind the source.
 double seen_from_behind(const RadiographProjector& projector) {
   double most = 0;
   for (const Eigen::Vector3d& shift :
@@ -121,7 +122,7 @@ double seen_from_behind(const RadiographProjector& projector) {
   return most;
 }
 
-/// The source within the body: only what lies in front of it counts.
+/// Largest error if the source lies within the body. Only the part in front of the source counts.
 double source_within_mm(const RadiographProjector& projector) {
   RigidTransform at = moved_by({0, 0, 0}, source_position_mm(camera_at(0)) + Eigen::Vector3d(2, 5, -3));
   const Camera camera = camera_at(0);
@@ -136,7 +137,7 @@ double source_within_mm(const RadiographProjector& projector) {
   return most;
 }
 
-/// The field is of one of two balls: what is seen of the other.
+/// The field is that of one of two balls. Returns the value where the other ball lies.
 double other_fragment_mm(const RadiographProjector& projector) {
   const RigidTransform at = moved_by({0, 0, 0}, {0, 0, 0});
   const auto pixel = [](const Eigen::Vector3d& point) {
@@ -157,7 +158,7 @@ double other_fragment_mm(const Subject& subject) {
                  [](const RadiographProjector& projector) { return other_fragment_mm(projector); });
 }
 
-/// A check of what is made of one body.
+/// A check on the radiographs of one body.
 Check check_of(const char* name, const char* what, double limit, Body (*body)(),
                const std::function<double(const RadiographProjector&)>& figure) {
   return {{name, what, limit, "mm of water"},
@@ -178,21 +179,23 @@ std::vector<float> radiograph_of(const RadiographProjector& projector, const Cam
 
 std::vector<Check> radiograph_checks() {
   return {check_of("ball", "radiograph of a ball of 36 mm: mean error", 0.4, ball, ball_error_mm),
-          {{"box", "radiograph of a box in a turned grid: mean error", 0.6, "mm of water"},
+          {{"box", "radiograph of a box: mean error", 0.6, "mm of water"},
            [](const Subject& subject) { return solid_error_mm(subject, box_between(kBox_mm), fine_grid()); }},
-          {{"octahedron", "radiograph of a closed mesh made voxels in a turned grid: mean error", 0.6, "mm of water"},
+          {{"octahedron", "radiograph of an octahedron in a rotated grid: mean error", 0.6, "mm of water"},
            [](const Subject& subject) {
              return solid_error_mm(subject, octahedron_between(kOctahedron_mm), turned_grid());
            }},
-          check_of("single_pixels", "single pixels against the same of a whole radiograph: root mean square", 0.4, egg,
+          check_of("single_pixels",
+                   "single pixels against the same pixels of a whole radiograph: root mean square difference", 0.4, egg,
                    [](const RadiographProjector& projector) { return pixels_off_mm(projector, true); }),
-          check_of("sub_sampled", "every third pixel against the same of a whole radiograph: root mean square", 1, egg,
-                   [](const RadiographProjector& projector) { return pixels_off_mm(projector, false); }),
-          check_of("region", "largest value outside of the region", 0, egg, beyond_region_mm),
-          check_of("out_of_view", "largest value where the body is out of view or behind the source", 0, ball,
+          check_of("sub_sampled",
+                   "every third pixel against the same pixels of a whole radiograph: root mean square difference", 1,
+                   egg, [](const RadiographProjector& projector) { return pixels_off_mm(projector, false); }),
+          check_of("region", "largest value outside the projector's region", 0, egg, beyond_region_mm),
+          check_of("out_of_view", "largest value if the body is out of view or behind the source", 0, ball,
                    seen_from_behind),
-          check_of("source_within", "with the source in the body: largest error", 2.5, ball, source_within_mm),
-          {{"other_fragment", "value where only another fragment is", 0, "mm of water"},
+          check_of("source_within", "largest error if the source lies within the body", 2.5, ball, source_within_mm),
+          {{"other_fragment", "value at a pixel that shows only another fragment", 0, "mm of water"},
            [](const Subject& subject) { return other_fragment_mm(subject); }}};
 }
 

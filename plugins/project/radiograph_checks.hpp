@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What projectors of radiographs must do.
+// Checks for projectors of radiographs.
 #include <vector>
 
 #include "bodies.hpp"
@@ -11,11 +11,11 @@ namespace marrow::conformance {
 
 /// All pixels of the images.
 PixelGrid whole();
-/// Throws Failure where there is not one value for each pixel.
+/// Throws Failure if the number of values is not the number of pixels.
 std::vector<float> radiograph_of(const RadiographProjector& projector, const Camera& camera, const PixelGrid& grid,
                                  const RigidTransform& at = pose());
 
-/// Radiographs against the chords of a ball, a box and an octahedron.
+/// Compares radiographs with the chords of a ball, a box and an octahedron.
 std::vector<Check> radiograph_checks();
 
 }  // namespace marrow::conformance

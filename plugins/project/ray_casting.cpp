@@ -14,7 +14,7 @@ struct Options : AttenuationOptions {
   double step_mm = 0.5;
 };
 
-/// Trilinear values at even steps, each standing for the step around it.
+/// Sums trilinear values at even steps. Each value counts for the step around it.
 class RayCastingProjector : public RayProjector {
  public:
   RayCastingProjector(marrow::rays::Attenuation attenuation, double step_mm)
@@ -69,6 +69,8 @@ std::shared_ptr<const marrow::RadiographProjector> ray_casting(const marrow::Vol
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.ray_casting", ray_casting);
-  marrow::rays::declare<Options>(node.summary("Radiographs by ray casting: trilinear values at even steps"))
-      .option("step_mm", &Options::step_mm, "from one value to the next", marrow::at_least(0.01));
+  marrow::rays::declare<Options>(
+      node.summary("Radiographs by ray casting: line integrals as sums of trilinear values at even steps"))
+      .option("step_mm", &Options::step_mm, "largest distance from one value to the next along a ray",
+              marrow::at_least(0.01));
 }

@@ -10,7 +10,8 @@ using marrow::rays::AttenuationOptions;
 using marrow::rays::RayProjector;
 using marrow::rays::Span;
 
-/// Exact for voxels of even attenuation: from one voxel wall to the next, which Jacobs et al. find by adding.
+/// Exact for voxels of constant attenuation. A ray is followed from one voxel wall to the next. As in Jacobs et al.,
+/// the next wall is found by additions.
 class SiddonProjector : public RayProjector {
  public:
   using RayProjector::RayProjector;
@@ -20,7 +21,7 @@ class SiddonProjector : public RayProjector {
     const Span span = marrow::rays::span_in_box(attenuation_.first, attenuation_.last, source, direction, 0.5);
     if (!(span.from < span.to)) return 0;
     const marrow::Grid& grid = attenuation_.grid;
-    // A voxel's box reaches half a voxel to each side of its centre.
+    // A voxel extends half a voxel to each side of its centre.
     const Eigen::Vector3d entry = source + (span.from + 1e-9 * (span.to - span.from)) * direction;
     const std::ptrdiff_t strides[3] = {1, grid.size[0], std::ptrdiff_t(grid.size[0]) * grid.size[1]};
     std::ptrdiff_t at = 0;
@@ -63,5 +64,6 @@ std::shared_ptr<const marrow::RadiographProjector> siddon_jacobs(const marrow::V
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("project.siddon_jacobs", siddon_jacobs);
   marrow::rays::declare<AttenuationOptions>(
-      node.summary("Radiographs by exact path lengths (Siddon, Med Phys 1985), voxel by voxel (Jacobs et al., 1998)"));
+      node.summary("Radiographs by exact path lengths through the voxels (Siddon, Med Phys 1985), followed voxel by "
+                   "voxel (Jacobs et al., 1998)"));
 }

@@ -12,7 +12,7 @@ struct Options {
   double border_voxels = 2;
 };
 
-/// The picture of a surface: for each pixel the last triangle drawn over its centre, or -1.
+/// A drawn surface: for each pixel the last triangle that covers its centre, or -1.
 class Silhouette {
  public:
   Silhouette(int width, int height) : triangle_of(height, width, CV_32S, cv::Scalar(-1)) {}
@@ -46,10 +46,11 @@ class Silhouette {
   cv::Mat triangle_of;
 };
 
-/// Pixels of border on either side that give a point its direction.
+/// The direction at a border pixel follows from this many pixels of the border on each side.
 constexpr int kReach_px = 4;
 
-/// Outward unit normal at point `i` of a closed chain of border pixels that runs with the bone on a known side.
+/// Outward unit normal at point `i` of a closed chain of border pixels. `sense` is +1 or -1: the side of the chain on
+/// which the bone lies.
 cv::Point2d chain_normal(const std::vector<cv::Point>& chain, std::size_t i, double sense) {
   const std::size_t n = chain.size(), reach = std::min(std::size_t(kReach_px), n / 3);
   const cv::Point2d tangent = chain[(i + reach) % n] - chain[(i + n - reach) % n];
@@ -102,16 +103,16 @@ class SilhouetteProjector : public marrow::OutlineProjector {
       const cv::Point step = pixel - chain[(i + chain.size() - 1) % chain.size()];
       passed += std::hypot(step.x, step.y);
       if (passed < spacing_px) continue;
-      // At the image's edge it is the image that ends.
+      // Near the edge of the image, the border may be the image's and not the bone's.
       if (std::min({pixel.x, pixel.y, mask.cols - 1 - pixel.x, mask.rows - 1 - pixel.y}) <= kReach_px) continue;
       passed = std::fmod(passed, spacing_px);
       const auto& t = mesh_.triangles[std::size_t(silhouette.triangle_of.at<int>(pixel))];
       if (at_border_[t[0]] || at_border_[t[1]] || at_border_[t[2]]) continue;
-      // OpenCV traces outer borders and holes alike with the object on the same side.
+      // OpenCV traces outer borders and holes with the object on the same side.
       const cv::Point2d normal = chain_normal(chain, i, -1);
       if (normal == cv::Point2d(0, 0)) continue;
       marrow::OutlinePoint point;
-      // The bone ends half a pixel beyond the centre of its last pixel, on average.
+      // On average, the bone ends half a pixel beyond the centre of its last pixel.
       point.u_px = float(pixel.x + 0.5 * normal.x);
       point.v_px = float(pixel.y + 0.5 * normal.y);
       point.normal_u = float(normal.x);
@@ -137,10 +138,10 @@ std::shared_ptr<const marrow::OutlineProjector> silhouette(const marrow::Mesh& m
 
 MARROW_PLUGIN(plugin) {
   plugin.node("project.silhouette", silhouette)
-      .summary("Outer outline of a surface, drawn: its triangles are filled and the border pixels traced")
+      .summary("Outer outline of a surface by drawing: its triangles are filled and the border pixels are traced")
       .in("mesh", "surface of the bone")
-      .in("volume", "CT that the surface was made from: outline within border_voxels of its end is left out")
+      .in("volume", "CT from which the surface was made; outline within border_voxels of its end is left out")
       .out("projector", "draws the outline for any camera and pose")
-      .option("border_voxels", &Options::border_voxels, "how far the end of the CT is felt", marrow::at_least(0),
-              marrow::unit("voxels"));
+      .option("border_voxels", &Options::border_voxels, "outline closer than this to the end of the CT is left out",
+              marrow::at_least(0), marrow::unit("voxels"));
 }

@@ -7,7 +7,7 @@
 #include "marrow/toolbox/surface/coarse_surface.hpp"
 #include "marrow/toolbox/surface/surface_patches.hpp"
 
-// The hot loop is compiled for newer processors as well, and the fitting version taken at run time.
+// The hot loop is also compiled for newer processors. The best version is chosen at run time.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define MARROW_DISPATCH __attribute__((target_clones("avx2", "default")))
 #else
@@ -20,12 +20,12 @@ struct Options {
   double border_voxels = 2;
 };
 
-/// A camera and a pose as this projector uses them: everything relative to the model's own origin.
+/// A camera and a pose, relative to the origin of the surface patches.
 struct Geometry {
-  Eigen::Vector3f source;        ///< in the model's axes
+  Eigen::Vector3f source;        ///< position of the source in the model's axes
   Eigen::Matrix3f pixel_matrix;  ///< homogeneous pixel = pixel_matrix * model point + pixel_offset
   Eigen::Vector3f pixel_offset;
-  Eigen::Matrix3f line_matrix;  ///< image line of the plane through the source with a model normal
+  Eigen::Matrix3f line_matrix;  ///< image line = line_matrix * model normal of a plane through the source
 };
 
 Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform& world_from_model,
@@ -41,23 +41,23 @@ Geometry geometry_of(const marrow::Camera& camera, const marrow::RigidTransform&
   return g;
 }
 
-/// A point of the border between the surface's parts that face the source and those that do not: on the edge between
-/// two vertices of the surface.
+/// A point on the contour generator, the border between the parts of the surface that face the source and the parts
+/// that do not. It lies on the edge between two vertices of the surface.
 struct ContourPoint {
   float u, v;
-  float fraction;  ///< of the way from `from` to `to`
+  float fraction;  ///< position on the edge: 0 at `from`, 1 at `to`
   std::uint32_t from, to;
-  bool usable;  ///< in front of the source, and made by the bone
+  bool usable;  ///< in front of the source, and a true outline of the bone
 };
 
-/// A piece of that border, the facing part on its left when seen from the source.
+/// A piece of this border. Seen from the source, the facing part lies on its left.
 struct ContourPiece {
   ContourPoint from, to;
 };
 
-/// Marks the patches of which a normal can be perpendicular to a line of sight: the sine of the angle between the
-/// cone's axis and the plane across the sight is at most sin(cone + angle under which the patch is seen), of which
-/// sin(cone) + radius / distance is an upper bound.
+/// Marks the patches that may have a normal perpendicular to a line of sight. For such a patch, the angle between the
+/// axis of its cone of normals and the plane across the line of sight is at most the cone's angle plus the angle under
+/// which the patch is seen. sin(cone) + radius / distance is an upper bound for the sine of this sum.
 MARROW_DISPATCH void mark_patches(const SurfacePatches::Bounds& b, const float* source, char* may_cross) {
   const std::size_t count = b.radius.size();
   const float sx = source[0], sy = source[1], sz = source[2];
@@ -69,8 +69,8 @@ MARROW_DISPATCH void mark_patches(const SurfacePatches::Bounds& b, const float* 
   }
 }
 
-/// Finds the border on the surface as the zero line of g = n . (source - x), linear within each triangle. With the
-/// interpolated normals of the vertices it is a smooth curve, where the mesh's own edges zigzag.
+/// Finds the contour generator as the zero line of g = n . (source - x), which is linear within each triangle. It uses
+/// interpolated normals of the vertices, so it is a smooth curve. A curve along the edges of the mesh would zigzag.
 class ContourFinder {
  public:
   ContourFinder(const SurfacePatches& surface, const Geometry& geometry) : s_(surface), geometry_(geometry) {}
@@ -105,14 +105,14 @@ class ContourFinder {
   void add_triangle(const std::array<std::uint8_t, 3>& t) {
     const int front[3] = {front_[t[0]], front_[t[1]], front_[t[2]]}, count = front[0] + front[1] + front[2];
     if (count == 0 || count == 3) return;
-    // The corner that differs from the two others.
+    // The corner whose sign differs from the other two.
     int lone = 0;
     while (front[lone] != int(count == 1)) ++lone;
     const ContourPoint p = between(t[lone], t[(lone + 1) % 3]), q = between(t[lone], t[(lone + 2) % 3]);
     pieces_.push_back(count == 1 ? ContourPiece{p, q} : ContourPiece{q, p});
   }
 
-  /// The rim of an open surface bounds the facing part as well, but is no outline of a bone.
+  /// The rim of an open surface also bounds the facing part, but it is not an outline of the bone.
   void add_rim(const std::array<std::uint8_t, 2>& rim) {
     const bool from_front = front_[rim[0]], to_front = front_[rim[1]];
     if (!from_front && !to_front) return;
@@ -149,18 +149,19 @@ class ContourFinder {
   std::vector<ContourPiece> pieces_;
 };
 
-/// Where a piece of contour crosses a line of a square grid laid over the image.
+/// A crossing of a contour piece with a line of a square grid over the image.
 struct Crossing {
   float at_px;  ///< position along the line
   std::int32_t line;
   std::int32_t piece;
   float fraction;  ///< along the piece
-  int layers;      ///< change of the number of facing layers when passing it upwards
+  int layers;  ///< change of the number of facing layers at the crossing, in the direction of increasing coordinates
 };
 
-/// Keeps, of all contour pieces, the points on the outer outline: those where the number of facing layers that cover a
-/// line of the image changes between none and some. The lines are the rows and columns of a grid, so that the points
-/// move smoothly with the pose; a row gives the points of an upright outline, a column those of a level one.
+/// Selects the points on the outer outline from all contour pieces. At these points, the number of facing layers along
+/// a line of the image changes between 0 and more. The lines are the rows and columns of a grid, so that the points
+/// move smoothly with the pose. Rows give the points of nearly vertical outlines, columns those of nearly horizontal
+/// ones.
 class OuterOutline {
  public:
   OuterOutline(const SurfacePatches& surface, const std::vector<ContourPiece>& pieces, const marrow::Camera& camera,
@@ -179,7 +180,7 @@ class OuterOutline {
   }
 
  private:
-  /// Coordinate across the lines (v for rows), and along them.
+  /// The coordinate across the lines (v for rows), and the coordinate along them.
   float across(const ContourPoint& p, bool rows) const { return rows ? p.v : p.u; }
   float along(const ContourPoint& p, bool rows) const { return rows ? p.u : p.v; }
 
@@ -204,19 +205,20 @@ class OuterOutline {
       const ContourPiece& piece = pieces_[i];
       const float a = across(piece.from, rows) * lines_per_px, b = across(piece.to, rows) * lines_per_px;
       const float low = std::min(a, b), high = std::max(a, b);
-      if (!(low < top && high > 0)) continue;  // also refuses NaN
-      // Half open, so that a joint of two pieces is crossed once.
+      if (!(low < top && high > 0)) continue;  // NaN is left out too
+      // The interval is half open, so that the joint of two pieces is crossed once.
       const int begin = ceil_of(std::max(low, 0.0f)), end = ceil_of(std::min(high, top));
       for (int line = begin; line < end; ++line) {
         const float t = (float(line) - a) / (b - a);
         const float at = along(piece.from, rows) + t * (along(piece.to, rows) - along(piece.from, rows));
-        // The facing part lies on the left of the piece: passing rightwards one enters it where the piece runs down.
+        // The facing part lies on the left of the piece. So a line towards the right enters it where the piece runs
+        // down.
         crossings_.push_back({at, line, std::int32_t(i), t, (b > a) == rows ? 1 : -1});
       }
     }
   }
 
-  /// Of a number that is not negative; std::ceil is a call of a function without SSE 4.1.
+  /// Rounds up a number that is not negative. Without SSE 4.1, std::ceil is a slow function call.
   static int ceil_of(float x) {
     const int whole = int(x);
     return whole + (float(whole) < x);
@@ -224,7 +226,7 @@ class OuterOutline {
 
   template <class Iterator>
   void walk(bool rows, Iterator begin, Iterator end) {
-    constexpr float kGap_px = 3;  // a narrower gap between two parts of the bone shows no edges of its own
+    constexpr float kGap_px = 3;  // a narrower gap between two parts of the bone shows no edges in the image
     std::sort(begin, end, [](const Crossing& a, const Crossing& b) {
       return a.at_px != b.at_px ? a.at_px < b.at_px : a.piece < b.piece;
     });
@@ -237,13 +239,13 @@ class OuterOutline {
     }
   }
 
-  /// `outside`: the sense along the line in which the bone ends.
+  /// `outside`: the direction along the line, +1 or -1, in which the bone ends.
   void add(bool rows, const Crossing& crossing, int outside) {
     const ContourPiece& piece = pieces_[std::size_t(crossing.piece)];
     if (!piece.from.usable || !piece.to.usable) return;
     const float t = crossing.fraction;
     const Eigen::Vector3f normal = (1 - t) * normal_at(piece.from) + t * normal_at(piece.to);
-    // The tangent plane contains the ray, so its image is the tangent of the outline.
+    // The tangent plane contains the ray, so it is projected to the tangent of the outline.
     const Eigen::Vector2f image_normal = (geometry_.line_matrix * normal).head<2>().normalized();
     const float cosine = image_normal[rows ? 0 : 1], sine = image_normal[rows ? 1 : 0];
     if (cosine * float(outside) <= 0 || std::abs(cosine) < std::abs(sine)) return;
@@ -293,14 +295,14 @@ class SilhouetteEdges : public marrow::OutlineProjector {
   }
 
  private:
-  static constexpr double kCoarse_px = 4;  ///< from this spacing on a coarse surface serves as well
+  static constexpr double kCoarse_px = 4;  ///< from this spacing on, the coarse surface is accurate enough
   SurfacePatches surface_, coarse_;
 };
 
 std::shared_ptr<const marrow::OutlineProjector> silhouette_edges(const marrow::Mesh& mesh, const marrow::Volume* volume,
                                                                  const Options& options) {
   marrow::check_mesh(mesh, "the mesh to project");
-  constexpr std::size_t kWorthIt = 20000;  // triangles
+  constexpr std::size_t kWorthIt = 20000;  // with fewer triangles, a coarse surface saves no time
   const std::vector<char> at_border = marrow::rays::vertices_at_volume_border(mesh, volume, options.border_voxels);
   SurfacePatches coarse;
   if (mesh.triangles.size() >= kWorthIt) {
@@ -314,10 +316,10 @@ std::shared_ptr<const marrow::OutlineProjector> silhouette_edges(const marrow::M
 
 MARROW_PLUGIN(plugin) {
   plugin.node("project.silhouette_edges", silhouette_edges)
-      .summary("Outer outline of a surface, exactly: where the surface turns away from the X-ray source")
+      .summary("Exact outer outline of a surface: the curve where it turns away from the X-ray source")
       .in("mesh", "surface of the bone")
-      .in("volume", "CT that the surface was made from: outline within border_voxels of its end is left out")
+      .in("volume", "CT from which the surface was made; outline within border_voxels of its end is left out")
       .out("projector", "draws the outline for any camera and pose")
-      .option("border_voxels", &Options::border_voxels, "how far the end of the CT is felt", marrow::at_least(0),
-              marrow::unit("voxels"));
+      .option("border_voxels", &Options::border_voxels, "outline closer than this to the end of the CT is left out",
+              marrow::at_least(0), marrow::unit("voxels"));
 }

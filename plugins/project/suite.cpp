@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Projectors: radiographs against the chords of a ball, a box and an octahedron that are known exactly, and outlines
-// against the silhouette of an ellipsoid. A node draws one or the other, or both, as the types of its outputs say.
+// Checks for projectors. Radiographs are compared with the exact chords of a ball, a box and an octahedron, outlines
+// with the silhouette of an ellipsoid. A node draws one or both, as the types of its outputs say.
 #include "suite.hpp"
 
 #include <oneapi/tbb/global_control.h>
@@ -31,7 +31,7 @@ void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vect
   }
 }
 
-/// With 1, 2 and 7 threads.
+/// The number of drawings with 1, 2 and 7 threads that differ from the first one.
 int differing(const std::function<std::string()>& draw) {
   const std::string expected = draw();
   int count = 0;
@@ -62,7 +62,7 @@ double differing_drawings(const Subject& subject) {
   return count;
 }
 
-/// Model and camera moved alike: the picture is the same.
+/// The largest change of a radiograph if model and camera move together. There should be none.
 double moved_together(const Subject& subject) {
   const Made made(subject, inputs_of(egg()));
   const RigidTransform motion{"world", "world", rotation_from_vector({0.5, 1.2, -0.8}), {100, -50, 70}};
@@ -73,7 +73,7 @@ double moved_together(const Subject& subject) {
   for (const OutlineProjector* projector : made.all<OutlineProjector>()) {
     const std::size_t count = projector->outline(camera, pose(), 2).size(),
                       same = projector->outline(other, at, 2).size();
-    // A point on a pixel's border may fall to either side.
+    // A point on the border of a pixel may fall on either side.
     expect(std::abs(double(same) - double(count)) <= 2 + 0.02 * double(count),
            "moved together, the outline has " + std::to_string(same) + " points, not " + std::to_string(count));
   }
@@ -148,9 +148,10 @@ Suite project_suite() {
   suite.trials = trials();
   suite.accuracy = radiograph_checks();
   suite.accuracy.push_back(
-      {{"moved_together", "model and camera moved alike: largest change", 0.05, "mm of water"}, moved_together});
+      {{"moved_together", "model and camera moved together: largest change", 0.05, "mm of water"}, moved_together});
   suite.accuracy.push_back(
-      {{"any_threads", "pictures that differ with 1, 2 and 7 threads", 0, "pictures"}, differing_drawings});
+      {{"any_threads", "outlines and radiographs that differ with 1, 2 and 7 threads", 0, "pictures"},
+       differing_drawings});
   for (const Check& check : outline_checks()) suite.accuracy.push_back(check);
   return suite;
 }

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What projectors must do.
+/// The checks that every projector must pass.
 Suite project_suite();
 
 }  // namespace marrow::conformance

@@ -23,8 +23,8 @@ marrow::Camera camera(const Options& options, marrow::Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.camera", camera)
-      .summary("Camera from XMALab's text or marrow's YAML")
-      .out("camera", "geometry of the view")
-      .option("path", &Options::path, "camera file; .yaml is marrow's own, anything else XMALab's text",
-              marrow::required());
+      .summary("Reads a camera from a text file of XMALab or from marrow's YAML")
+      .out("camera", "the camera")
+      .option("path", &Options::path,
+              "camera file; .yaml: marrow's own format, any other extension: XMALab's text format", marrow::required());
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case: one patient's folder with case.yaml, which names everything else in it (docs/case.md).
+// Reads a case: a patient's folder with case.yaml. This file names all other files of the case (docs/case.md).
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
@@ -20,8 +20,8 @@ struct Options {
   fs::path path;
 };
 
-/// The file that a key names. A path option counts by the content of the folder it names, so no file outside that
-/// folder may be opened.
+/// The file that a key names. The key of this node's result covers only the content of the case's folder, so no file
+/// outside the folder may be opened.
 std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, const std::string& key) {
   const auto text = map.text(key);
   if (!text) return std::nullopt;
@@ -41,7 +41,7 @@ std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, cons
     map.fault(key, key + ": '" + *text + "' is a link to a place outside the case's folder; copy it into the folder");
     return std::nullopt;
   }
-  // What a link to a folder names can change without any file of the case changing.
+  // A link to a folder could later point to other files although no file of the case has changed.
   for (fs::path part = inside; !part.empty(); part = part.parent_path())
     if (fs::is_symlink(folder / part, failure) && fs::is_directory(folder / part, failure)) {
       map.fault(key, key + ": '" + part.string() + "' is a link to a folder; move the folder itself there");
@@ -50,7 +50,7 @@ std::optional<fs::path> file_in(const fs::path& folder, const YamlMap& map, cons
   return folder / inside;
 }
 
-/// Calls a reader; what it throws becomes a fault at the key.
+/// Calls a reader. An Error that it throws becomes a fault at the key.
 template <class Read>
 auto read_or_fault(const YamlMap& map, const std::string& key, Read read) -> std::optional<decltype(read())> {
   try {
@@ -97,7 +97,7 @@ std::optional<marrow::Image> read_image(const fs::path& folder, const YamlMap& m
   return read_or_fault(map, key, [&] { return marrow::files::read_image_file(*file); });
 }
 
-/// The mask is drawn on the image as it is stored: where that is mirrored as it is read, so is the mask.
+/// The mask belongs to the image as it is stored. If the image is mirrored when it is read, the mask is mirrored too.
 std::optional<cv::Mat> read_mask(const fs::path& folder, const YamlMap& map, bool has_image) {
   const auto mask = read_image(folder, map, "mask");
   if (!mask) return std::nullopt;
@@ -172,7 +172,7 @@ void read_fragments(const YamlMap& map, marrow::Case& result) {
     const bool wanted = seeds.wanted;
     result.seeds.add(name, std::move(seeds));
     if (wanted) registered.push_back(name);
-    // Lists on one axis go in step, so only what is registered has a start and a truth.
+    // Lists on one axis must have the same items, so only fragments to register get a start and a truth.
     if (fragment.has("start"))
       if (const auto start = read_transform(fragment, "start"); start && wanted) {
         marrow::Pose pose;
@@ -217,11 +217,13 @@ marrow::Case read_case(const Options& options) {
 MARROW_PLUGIN(plugin) {
   using marrow::Case;
   plugin.node("read.case", read_case)
-      .summary("One patient: CT, views with cameras, seeds per fragment, and start and truth where known")
+      .summary(
+          "Reads the case of one patient: CT, views with cameras, seeds of each fragment, and start and truth if they "
+          "are given")
       .out("ct", &Case::ct, "CT in Hounsfield units")
       .out("seeds", &Case::seeds, "points inside each fragment", marrow::over("fragment"))
       .out("views", &Case::views, "X-ray views with cameras", marrow::over("view"))
-      .out("start", &Case::start, "pose to start from", marrow::over("fragment"))
-      .out("truth", &Case::truth, "exact pose, of simulated cases", marrow::over("fragment"))
-      .option("path", &Options::path, "folder of the case", marrow::required());
+      .out("start", &Case::start, "pose to start from, if the case gives one", marrow::over("fragment"))
+      .out("truth", &Case::truth, "exact pose, if the case gives one (simulated cases)", marrow::over("fragment"))
+      .option("path", &Options::path, "folder of the case, with case.yaml", marrow::required());
 }

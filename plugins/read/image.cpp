@@ -16,11 +16,11 @@ marrow::Image image(const Options& options) { return marrow::files::read_image_f
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.image", image)
-      .summary("Grey image from PNG or TIFF (8 or 16 bit, or float) or DICOM")
+      .summary("Reads a grey image from PNG, TIFF (8 or 16 bit, or float) or DICOM")
       .out("image",
-           "grey values; of DICOM scaled as its header says, and of X-ray images mirrored and inverted to what "
-           "the camera of their header sees, bright = air")
+           "grey values, bright = air; a DICOM image is scaled as its header says; a DICOM X-ray image is also "
+           "mirrored and inverted if needed, so that it fits the camera of its header")
       .option("path", &Options::path, "image file", marrow::required())
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+      .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0));
 }

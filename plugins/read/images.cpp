@@ -28,11 +28,11 @@ marrow::List<marrow::Image> images(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.images", images)
-      .summary("Grey images whose cameras are not known yet, as a calibration takes them")
-      .out("images", "grey values, as read.image gives them", marrow::over("view"))
+      .summary("Reads grey images without cameras, as a calibration needs them")
+      .out("images", "grey values, as from read.image", marrow::over("view"))
       .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
-      .option("names", &Options::names, "one name per image; without names, the files' names without extension")
+      .option("names", &Options::names, "one name per image; if empty, the file names without extension")
       .relation(marrow::as_many_or_none("names", "paths"))
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+      .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0));
 }

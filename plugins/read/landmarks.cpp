@@ -13,7 +13,7 @@ struct Options {
   std::filesystem::path path;
 };
 
-/// Notes a fault where a point that is seen or tracked is none of the CT's.
+/// Notes a fault if the points in the CT have none with the name of a seen or tracked point.
 void check_known(const YamlMap& places, const YamlMap& map, const std::string& name) {
   if (places.has(name)) return;
   const std::string near = map.file().is_full() ? "" : nearest_name(name, places.keys());
@@ -76,8 +76,9 @@ List<Landmarks> landmarks(const Options& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("read.landmarks", landmarks)
       .summary(
-          "Landmarks or markers of each fragment: where the CT has them, the images show them and a tracker found "
-          "them, from marrow's YAML")
-      .out("landmarks", "points in CT coordinates, seen in pixels of views, tracked in the world", over("fragment"))
-      .option("path", &Options::path, "file of landmarks", required());
+          "Reads landmarks or markers of each fragment from marrow's YAML: their positions in the CT, in the images, "
+          "and in the world as measured by a tracking system")
+      .out("landmarks", "points in CT coordinates (mm), in pixels of views, and in world coordinates (mm)",
+           over("fragment"))
+      .option("path", &Options::path, "file with landmarks", required());
 }

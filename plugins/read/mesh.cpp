@@ -29,11 +29,12 @@ marrow::Mesh mesh(const Options& options, marrow::Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.mesh", mesh)
-      .summary("Triangle surface from STL or PLY, equal vertices merged")
+      .summary("Reads a triangle surface from STL or PLY; equal vertices are merged")
       .out("mesh", "the surface in mm")
       .option("path", &Options::path, "STL or PLY file", marrow::required())
-      .option("scale", &Options::scale, "factor to mm: 1000 for a file in metres", marrow::at_least(1e-6))
+      .option("scale", &Options::scale, "factor that converts the file's unit to mm: 1000 for metres",
+              marrow::at_least(1e-6))
       .option("frame", &Options::frame,
-              "what its coordinates are: those of the CT, or of the world (a surface that was tracked)",
+              "frame of the file's coordinates: ct, or world (for a surface that was tracked)",
               marrow::one_of({"ct", "world"}));
 }

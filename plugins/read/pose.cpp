@@ -15,7 +15,8 @@ marrow::Pose pose(const Options& options) { return marrow::files::read_pose_file
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.pose", pose)
-      .summary("Pose from marrow's YAML, such as a start that was found by hand or the result of another run")
-      .out("pose", "where the model lies in the world")
+      .summary(
+          "Reads a pose from marrow's YAML, for example a start that was found by hand, or the result of another run")
+      .out("pose", "pose of the model in the world")
       .option("path", &Options::path, "pose file", marrow::required());
 }

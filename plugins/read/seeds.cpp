@@ -15,7 +15,7 @@ marrow::List<marrow::Seeds> seeds(const Options& options) { return marrow::files
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.seeds", seeds)
-      .summary("Points inside each bone fragment, from marrow's YAML")
+      .summary("Reads points inside each bone fragment from marrow's YAML")
       .out("seeds", "points per fragment in CT coordinates", marrow::over("fragment"))
-      .option("path", &Options::path, "file of seeds", marrow::required());
+      .option("path", &Options::path, "file with seeds", marrow::required());
 }

@@ -24,15 +24,16 @@ marrow::View view(const marrow::Camera* camera, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.view", view)
-      .summary("One X-ray view: an image and its camera; a distortion that is known of is removed")
-      .in("camera", "geometry, where no camera file is given")
+      .summary("Reads one X-ray view: an image and its camera; a known distortion is removed")
+      .in("camera", "the camera, if no camera file is given")
       .out("view", "the view")
       .option("name", &Options::name, "name of the view")
       .option("image", &Options::image, "image file (PNG, TIFF, DICOM)", marrow::required())
-      .option("camera", &Options::camera, "camera file (XMALab text, or marrow's YAML)")
+      .option("camera", &Options::camera, "camera file (XMALab's text or marrow's YAML)")
       .relation(marrow::exactly_one({"in.camera", "camera"}))
       .option("calibration", &Options::calibration,
-              "calibration file: its camera matrix replaces the camera's, its distortion is removed from the image")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              "calibration file; its camera matrix replaces that of the camera, and its distortion is removed from the "
+              "image")
+      .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0));
 }

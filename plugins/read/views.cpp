@@ -46,19 +46,18 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.views", views)
-      .summary("X-ray views: images and their cameras; a distortion that is known of is removed")
-      .in("camera", "geometry per view, by the views' names, where no camera files are given", marrow::over("view"))
+      .summary("Reads X-ray views: images and their cameras; a known distortion is removed")
+      .in("camera", "one camera per view, with the view's name, if no camera files are given", marrow::over("view"))
       .out("views", "the views", marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
       .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
       .relation(marrow::same_length({"names", "images"}))
-      .option("cameras", &Options::cameras, "one camera file (XMALab text, or marrow's YAML) per view")
+      .option("cameras", &Options::cameras, "one camera file (XMALab's text or marrow's YAML) per view")
       .relation(marrow::exactly_one({"in.camera", "cameras"}))
       .relation(marrow::as_many_or_none("cameras", "names"))
       .option("calibration", &Options::calibration,
-              "calibration file of the device that took all views: its camera matrix replaces the cameras', its "
-              "distortion is "
-              "removed from the images")
-      .option("frame", &Options::frame, "frame of a multi-frame file, from 1; 0 = there is only one",
+              "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
+              "and its distortion is removed from the images")
+      .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",
               marrow::at_least(0));
 }

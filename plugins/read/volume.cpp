@@ -22,15 +22,18 @@ marrow::Volume volume(const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("read.volume", volume)
-      .summary("CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its data)")
+      .summary(
+          "Reads a CT volume from MHA, NRRD, NIfTI, multi-page TIFF or a folder (DICOM series, MHD or NHDR with its "
+          "data)")
       .out("volume",
-           "CT in Hounsfield units; patient axes are LPS; what a DICOM series marks as padding (PixelPaddingValue) "
-           "is air, at most -1000 HU")
-      .option("path", &Options::path, "file, or folder of one series", marrow::required())
+           "CT in Hounsfield units; patient axes are LPS; samples that a DICOM series marks as padding "
+           "(PixelPaddingValue) become air, at most -1000 HU")
+      .option("path", &Options::path, "file, or folder of a series", marrow::required())
       .option("voxel_size_mm", &Options::voxel_size_mm,
-              "size of a voxel [x, y, z]; needed for TIFF, replaces the file's own")
+              "size of a voxel [x, y, z]; required for TIFF; replaces the size in the file")
       .option("flip", &Options::flip, "axes of the grid (x, y, z) along which the samples are reversed")
       .option("value_offset_hu", &Options::value_offset_hu,
-              "added to every sample: -1024 where the file holds HU + 1024")
-      .option("series_uid", &Options::series_uid, "SeriesInstanceUID, where a DICOM folder holds several series");
+              "value added to every sample: -1024 if the file holds HU + 1024")
+      .option("series_uid", &Options::series_uid,
+              "SeriesInstanceUID of the series to read, if a DICOM folder holds several");
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Iterative closest points: Besl and McKay, A method for registration of 3-D shapes, IEEE PAMI 14, 1992, as PCL has it.
-// The target is a surface in the world: what a pointer touched, or another scan shows. The two may show more than they
-// share.
+// Iterative closest points (ICP): Besl and McKay, A method for registration of 3-D shapes, IEEE PAMI 14, 1992, in PCL's
+// version. The target is a surface in the world, for example touched with a pointer or from another scan. Model and
+// target need not show the same part of the bone.
 #include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
@@ -61,7 +61,7 @@ void add_warnings(const marrow::match::Result& found, const Options& options, Po
 
 Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Options& options, Context& context) {
   check_frames(initial, model, target);
-  // About the target's middle, so that single precision is enough.
+  // Coordinates are relative to the target's centroid, so that PCL's single precision is enough.
   std::vector<Eigen::Vector3d> points = sample_surface(model, std::size_t(options.points)),
                                goal = sample_surface(target, std::size_t(options.target_points));
   Eigen::Vector3d middle = Eigen::Vector3d::Zero();
@@ -96,18 +96,19 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
 
 MARROW_PLUGIN(plugin) {
   plugin.node("register.icp", icp)
-      .summary("Surface to surface by iterative closest points (Besl and McKay 1992; PCL)")
+      .summary("Registers a surface to a surface by iterative closest points, ICP (Besl and McKay 1992; by PCL)")
       .in("initial", "pose to start from, and the fragment's axes")
       .in("model", "surface of the fragment")
-      .in("target", "surface in the world, whole or a part")
+      .in("target", "surface in world coordinates, of the whole fragment or a part")
       .out("pose", &Result::pose,
-           "pose of least distance; its cost is the root mean square of the pairs' distances in mm")
-      .out("stages", &Result::stages, "poses on the way: start, final", over("stage"))
-      .option("max_iterations", &Options::max_iterations, "most times that pairs are made", at_least(1))
-      .option("reach_mm", &Options::reach_mm, "points of the model with nothing of the target so near do not count",
+           "pose of least distance; its cost is the root mean square distance of the pairs in mm")
+      .out("stages", &Result::stages, "poses of the search: start, final", over("stage"))
+      .option("max_iterations", &Options::max_iterations, "largest number of iterations; each makes new pairs",
+              at_least(1))
+      .option("reach_mm", &Options::reach_mm, "points of the model farther than this from the target do not count",
               at_least(1e-3))
-      .option("points", &Options::points, "points spread over the model", at_least(10), at_most(1e6))
+      .option("points", &Options::points, "number of points spread over the model", at_least(10), at_most(1e6))
       .option("target_points", &Options::target_points,
-              "points spread over the target: the closer they lie, the closer they are to its surface", at_least(10),
-              at_most(1e7));
+              "number of points spread over the target; more points represent its surface more accurately",
+              at_least(10), at_most(1e7));
 }

@@ -34,11 +34,13 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("register.multiresolution", multiresolution);
-  node.summary("Coarse to fine: first axial rotation and translation, then all six, with shrinking steps")
-      .in("cost", "what a pose costs")
+  node.summary(
+          "Registration from coarse to fine with shrinking steps: first rotation about and translation along the long "
+          "axis, then all six parameters")
+      .in("cost", "cost of a pose")
       .in("optimizer", "minimiser")
       .in("initial", "pose to start from, and the fragment's axes")
       .out("pose", &Result::pose, "pose of least cost, with its predicted covariance")
-      .out("stages", &Result::stages, "poses on the way: start, axial, final", marrow::over("stage"));
+      .out("stages", &Result::stages, "poses of the search: start, axial, final", marrow::over("stage"));
   marrow::search::declare<SearchOptions>(node);
 }

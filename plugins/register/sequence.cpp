@@ -32,7 +32,7 @@ void check_finer(const Options& options) {
     marrow::search::check_level_list(*values, name);
 }
 
-/// A sentence where the second cost leads far from what the first one found: then one of them is wrong.
+/// A warning if the results of both costs are far apart, because then one of them is wrong. Empty if they agree.
 std::string disagreement(const marrow::Pose& first, const marrow::Pose& second, const Options& options) {
   const marrow::Vector6d motion = motion_between(first.world_from_model, second.world_from_model, first.frame);
   const double apart_deg = marrow::degrees(motion.head<3>().norm()), apart_mm = motion.tail<3>().norm();
@@ -82,26 +82,31 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
 
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("register.sequence", sequence);
-  node.summary("First by one cost, coarse to fine; then by another from there: contour, then grey values")
-      .in("cost", "the cost of a pose")
-      .in("finer_cost", "what a pose costs, told from near")
+  node.summary(
+          "Registration by two costs: first one cost from coarse to fine, then another from its result (for example "
+          "contour, then grey values)")
+      .in("cost", "cost of a pose for the first search")
+      .in("finer_cost", "cost of a pose for a second search, near the result of the first")
       .in("optimizer", "minimiser")
-      .in("finer_optimizer", "minimiser of finer_cost; none: the same")
+      .in("finer_optimizer", "minimiser of finer_cost; none: the same as for cost")
       .in("initial", "pose to start from, and the fragment's axes")
-      .out("pose", &Result::pose, "pose of least finer_cost near that of least cost")
-      .out("stages", &Result::stages, "poses on the way: start, first, final", marrow::over("stage"));
+      .out("pose", &Result::pose,
+           "pose with the least finer_cost, near the pose with the least cost; with its predicted covariance")
+      .out("stages", &Result::stages, "poses of the search: start, first, final", marrow::over("stage"));
   marrow::search::declare<Options>(node);
   node.option("finer_pixel_step", &Options::finer_pixel_step,
-              "per level of the finer cost: every how many pixels are compared")
+              "per level of finer_cost: only every n-th pixel is compared")
       .option("finer_step_deg", &Options::finer_step_deg,
-              "per level: first step of the rotations about the frontal and lateral axes")
-      .option("finer_step_axial_deg", &Options::finer_step_axial_deg, "per level: first step of the axial rotation")
-      .option("finer_step_mm", &Options::finer_step_mm, "per level: first step of the translations")
+              "per level of finer_cost: first step of the rotations about the frontal and lateral axes")
+      .option("finer_step_axial_deg", &Options::finer_step_axial_deg,
+              "per level of finer_cost: first step of the axial rotation")
+      .option("finer_step_mm", &Options::finer_step_mm, "per level of finer_cost: first step of the translations")
       .option("finer_step_tolerance", &Options::finer_step_tolerance,
-              "per level: it ends when steps fall below this part of its first step")
+              "per level of finer_cost: the level ends when steps are shorter than this fraction of its first step")
       .relation(marrow::same_length(
           {"finer_pixel_step", "finer_step_deg", "finer_step_axial_deg", "finer_step_mm", "finer_step_tolerance"}))
       .option("most_apart_deg", &Options::most_apart_deg,
-              "rotation between the results of the two costs that gives a warning", marrow::at_least(0))
-      .option("most_apart_mm", &Options::most_apart_mm, "shift between them that gives a warning", marrow::at_least(0));
+              "a larger rotation between the results of the two costs gives a warning", marrow::at_least(0))
+      .option("most_apart_mm", &Options::most_apart_mm,
+              "a larger shift between the results of the two costs gives a warning", marrow::at_least(0));
 }

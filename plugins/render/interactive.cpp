@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a report shows in 3D (the interactive display of the chapter's Fig. 8): the models where the registration put
-// them, where it began and where they are in truth, to be looked at through each view's camera over its image.
+// The 3D view of a report (the interactive display of the chapter's Fig. 8). It shows the models at the poses found, at
+// the start and at the true poses. They can be seen through the camera of each view, over its image.
 #include <marrow/plugin.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -52,15 +52,15 @@ marrow::Scene interactive(const marrow::List<marrow::Mesh>& meshes, const marrow
 
 MARROW_PLUGIN(plugin) {
   plugin.node("render.interactive", interactive)
-      .summary("Models, poses and views for the 3D view of a report")
-      .in("meshes", "surfaces to draw, simplified ones where they are large", marrow::over("fragment"))
-      .in("poses", "where the registration put them", marrow::over("fragment"))
+      .summary("Collects models, poses and views for the 3D view of a report")
+      .in("meshes", "surfaces to draw; simplify large ones first (mesh.simplify)", marrow::over("fragment"))
+      .in("poses", "poses found", marrow::over("fragment"))
       .in("views", "X-ray views", marrow::over("view"))
-      .in("starts", "where the registration began", marrow::over("fragment"))
-      .in("truths", "where they are, for simulated data", marrow::over("fragment"))
-      .out("scene", "what `marrow show` and comparisons show")
-      .option("size_px", &Options::size_px, "longer side of the views' images at most", marrow::at_least(64),
-              marrow::at_most(4096))
-      .option("contrast", &Options::contrast, "how grey values become brightness",
+      .in("starts", "poses at the start of the registration", marrow::over("fragment"))
+      .in("truths", "exact poses, for simulated data", marrow::over("fragment"))
+      .out("scene", "scene for `marrow show` and for the reports of comparisons")
+      .option("size_px", &Options::size_px, "largest length of the longer side of the views' images",
+              marrow::at_least(64), marrow::at_most(4096))
+      .option("contrast", &Options::contrast, "how grey values are shown",
               marrow::one_of({"linear", "logarithmic", "local"}));
 }

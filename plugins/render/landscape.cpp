@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Six plots of the cost about a pose (the chapter's Fig. 7b).
+// Six plots of the cost around a pose (Fig. 7b of the chapter).
 #include <cmath>
 #include <cstdio>
 #include <marrow/plugin.hpp>
@@ -12,7 +12,7 @@ namespace {
 using namespace marrow::draw;
 using Profile = marrow::Landscape::Profile;
 
-/// Where the cost is least; nothing where no cost is finite.
+/// The point with the least cost. Nothing if no cost is finite.
 std::optional<cv::Point2d> least_of(const Profile& profile) {
   std::optional<cv::Point2d> least;
   for (std::size_t i = 0; i < profile.costs.size(); ++i)
@@ -53,7 +53,7 @@ marrow::Picture draw(const marrow::Landscape& landscape) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("render.landscape", draw)
-      .summary("Plots of the cost about a pose, one for each axis")
+      .summary("Plots of the cost around a pose, one for each axis")
       .in("landscape", "profiles to draw")
-      .out("picture", "three plots a row");
+      .out("picture", "the plots, three in a row");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The model's outline drawn over an X-ray view, before and after registration (the chapter's Fig. 8).
+// Draws the model's outline over an X-ray view, before and after registration (Fig. 8 of the chapter).
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -17,7 +17,7 @@ struct Options {
   bool zoom = false;
 };
 
-/// One outline to draw; the later ones lie over the earlier ones.
+/// One outline to draw. Later layers cover earlier ones.
 struct Layer {
   std::string text;
   cv::Scalar colour;
@@ -34,8 +34,7 @@ Layer make_layer(const std::string& text, const cv::Scalar& colour, int thicknes
   return layer;
 }
 
-/// The points of an outline are not promised to follow each other, so each is drawn as a short stroke along the
-/// outline.
+/// The points of an outline come in any order, so each is drawn as a short stroke along the outline.
 void draw_outline(Panel& panel, const Layer& layer, double spacing_px) {
   const double half = 0.5 * spacing_px * panel.scale;
   for (const marrow::OutlinePoint& point : layer.outline) {
@@ -44,7 +43,8 @@ void draw_outline(Panel& panel, const Layer& layer, double spacing_px) {
   }
 }
 
-/// The part of the image that holds all outlines, a tenth wider on each side; the whole image where there are none.
+/// The part of the image that contains all outlines, with a margin of a tenth on each side. The whole image if there
+/// are no outlines.
 cv::Rect region(const marrow::View& view, const std::vector<Layer>& layers) {
   const cv::Rect whole = whole_image(view);
   double left = whole.width, right = 0, top = whole.height, bottom = 0;
@@ -106,18 +106,18 @@ marrow::Picture overlay(const marrow::Pose& pose, const marrow::OutlineProjector
 MARROW_PLUGIN(plugin) {
   plugin.node("render.overlay", overlay)
       .summary("The model's outline over an X-ray view, before and after registration")
-      .in("pose", "result")
-      .in("projector", "draws the outline")
+      .in("pose", "pose found")
+      .in("projector", "projector that gives the outline")
       .in("view", "X-ray view")
-      .in("start", "pose before registration: adds a panel on the left")
-      .in("truth", "exact pose, drawn wider beneath the others")
-      .in("edges", "edges of the view, as faint dots")
-      .in("lines", "the shaft's borders")
-      .out("picture", "view with outlines and a legend")
+      .in("start", "pose before registration; adds a panel on the left")
+      .in("truth", "exact pose; its outline is drawn wider, below the others")
+      .in("edges", "edges of the view; drawn as faint dots")
+      .in("lines", "borders of the shaft")
+      .out("picture", "the view with outlines and a legend")
       .option("size_px", &Options::size_px, "longer side of a panel", marrow::at_least(64), marrow::at_most(8192))
       .option("contrast", &Options::contrast, "how grey values are shown",
               marrow::one_of({"local", "logarithmic", "linear"}))
-      .option("spacing_px", &Options::spacing_px, "distance between outline points", marrow::at_least(0.1),
+      .option("spacing_px", &Options::spacing_px, "distance between two outline points", marrow::at_least(0.1),
               marrow::at_most(100))
       .option("zoom", &Options::zoom, "show only the part of the image around the outlines");
 }

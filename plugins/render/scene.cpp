@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The models in their poses, shaded, as the X-ray source sees them, beside the X-ray itself (the chapter's Fig. 8).
+// Draws the models in their poses, shaded, as seen from the X-ray source, beside the X-ray itself (Fig. 8 of the
+// chapter).
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -18,7 +19,7 @@ struct Options {
   std::string contrast = "local";
 };
 
-/// Area-weighted normals of the vertices; zero where a vertex has no triangle.
+/// Area-weighted normals of the vertices; zero if a vertex has no triangle.
 std::vector<Vector3d> vertex_normals(const marrow::Mesh& mesh) {
   std::vector<Vector3d> normals(mesh.vertices_mm.size(), Vector3d::Zero());
   for (const auto& t : mesh.triangles) {
@@ -31,8 +32,8 @@ std::vector<Vector3d> vertex_normals(const marrow::Mesh& mesh) {
   return normals;
 }
 
-/// A vertex as drawn: place in the canvas, inverse depth (which is linear in the image), brightness under a light at
-/// the source.
+/// A vertex to draw: its position in the canvas, its inverse depth (linear in the image), and its brightness with a
+/// light at the source.
 struct Corner {
   double x, y, inverse_depth, brightness;
 };
@@ -54,11 +55,11 @@ std::vector<Corner> project_corners(const marrow::Mesh& mesh, const marrow::Rigi
   return corners;
 }
 
-/// Draws a triangle into the canvas where it is nearer than what was drawn before.
+/// Draws a triangle into the canvas wherever it is nearer than the triangles drawn before.
 void fill(cv::Mat& canvas, cv::Mat& nearest, const Corner& a, const Corner& b, const Corner& c,
           const cv::Scalar& colour) {
   const double doubled_area = (b.x - a.x) * (c.y - a.y) - (b.y - a.y) * (c.x - a.x);
-  if (!(std::abs(doubled_area) > 0)) return;  // also NaN
+  if (!(std::abs(doubled_area) > 0)) return;  // also for NaN
   const auto clamped = [](double value, int size) { return int(std::clamp(value, 0.0, double(size - 1))); };
   const int left = clamped(std::floor(std::min({a.x, b.x, c.x})), canvas.cols);
   const int right = clamped(std::ceil(std::max({a.x, b.x, c.x})), canvas.cols);
@@ -79,7 +80,7 @@ void fill(cv::Mat& canvas, cv::Mat& nearest, const Corner& a, const Corner& b, c
     }
 }
 
-/// The matching pose of a model, by the fragment's name.
+/// The pose of a fragment, by its name.
 const marrow::Pose& pose_of(const std::string& fragment, const marrow::List<marrow::Pose>& poses) {
   const marrow::Pose* pose = poses.find(fragment);
   if (!pose) throw marrow::Error("fragment '" + fragment + "': there is a mesh, but no pose of that name");
@@ -92,7 +93,7 @@ marrow::Picture scene(const marrow::List<marrow::Mesh>& meshes, const marrow::Li
   static const cv::Scalar kColours[] = {{240, 200, 120}, kSkyBlue, kPurple, kGreen};
   const Contrast contrast = contrast_of(options.contrast);
   Panel image = make_panel(view, whole_image(view), options.size_px, contrast);
-  // Drawn at twice the size and reduced, which smooths the borders.
+  // The models are drawn at twice the size and then reduced. This smooths their borders.
   Panel canvas = make_panel(view, whole_image(view), 2 * options.size_px, contrast);
   canvas.pixels *= 0.5;
   cv::Mat nearest(canvas.pixels.size(), CV_32F, cv::Scalar(0));
@@ -120,11 +121,11 @@ marrow::Picture scene(const marrow::List<marrow::Mesh>& meshes, const marrow::Li
 
 MARROW_PLUGIN(plugin) {
   plugin.node("render.scene", scene)
-      .summary("The models in their poses, shaded, as the X-ray source sees them, beside the X-ray")
+      .summary("Draws the models in their poses, shaded, as seen from the X-ray source, beside the X-ray")
       .in("meshes", "surfaces of the fragments", marrow::over("fragment"))
-      .in("poses", "their poses", marrow::over("fragment"))
+      .in("poses", "poses of the fragments", marrow::over("fragment"))
       .in("view", "X-ray view")
-      .out("picture", "the X-ray, and beside it the models over the dimmed X-ray")
+      .out("picture", "on the left the X-ray, on the right the models over the dimmed X-ray")
       .option("size_px", &Options::size_px, "longer side of a panel", marrow::at_least(64), marrow::at_most(4096))
       .option("contrast", &Options::contrast, "how grey values are shown",
               marrow::one_of({"local", "logarithmic", "linear"}));

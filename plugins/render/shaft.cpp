@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The pair of lines that was taken for the shaft's outer borders, and the pairs that were not, with the reasons (the
-// chapter's Fig. 4).
+// Draws the pair of lines that was chosen as the shaft's outer borders, and the rejected pairs with the reasons (Fig. 4
+// of the chapter).
 #include <algorithm>
 #include <cstdio>
 #include <marrow/plugin.hpp>
@@ -24,7 +24,7 @@ std::string describe(const marrow::ShaftLines& lines) {
   return text;
 }
 
-/// A number beside the upper end of a pair's left line, so that the legend can name its reason.
+/// Draws a number beside the upper end of a line. The legend gives the reason of the rejection with this number.
 void draw_number(Panel& panel, const marrow::LineSegment& line, std::size_t number, const cv::Scalar& colour) {
   const Eigen::Vector2d& upper = line.from_px.y() < line.to_px.y() ? line.from_px : line.to_px;
   if (!upper.allFinite()) return;
@@ -34,7 +34,7 @@ void draw_number(Panel& panel, const marrow::LineSegment& line, std::size_t numb
   draw_text(panel.pixels, std::to_string(number), place, colour);
 }
 
-/// Midway between the borders.
+/// The line midway between the borders.
 marrow::LineSegment mid_line(const marrow::ShaftLines& lines) {
   return {0.5 * (lines.left.from_px + lines.right.from_px), 0.5 * (lines.left.to_px + lines.right.to_px)};
 }
@@ -66,14 +66,14 @@ marrow::Picture shaft(const marrow::ShaftLines& lines, const marrow::View& view,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("render.shaft", shaft)
-      .summary("The shaft's borders found in a view, and the pairs of lines that were rejected with the reasons")
+      .summary("Draws the shaft's borders found in a view, and the rejected pairs of lines with the reasons")
       .in("lines", "borders found in the view")
       .in("view", "X-ray view")
-      .in("edges", "edges of the view, as faint dots")
-      .out("picture", "view with the lines and a legend")
+      .in("edges", "edges of the view; drawn as faint dots")
+      .out("picture", "the view with the lines and a legend")
       .option("size_px", &Options::size_px, "longer side of the view", marrow::at_least(64), marrow::at_most(8192))
       .option("contrast", &Options::contrast, "how grey values are shown",
               marrow::one_of({"local", "logarithmic", "linear"}))
-      .option("rejected", &Options::rejected, "rejected pairs to draw, the best first", marrow::at_least(0),
+      .option("rejected", &Options::rejected, "number of rejected pairs to draw, the best first", marrow::at_least(0),
               marrow::at_most(100));
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Segmentation by an atlas: the surface of a whole bone is moved onto the bone in the CT, by a similarity or an affine
-// map (closest points: Besl and McKay, IEEE Trans. Pattern Anal. Mach. Intell. 14, 1992; similarity: Umeyama, same
-// journal 13, 1991), and taken for it. It knows one unbroken bone: of displaced fragments it can be right for one at
-// most, which the chapter says and a test shows. What belongs to which fragment is decided by the nearest seed alone.
+// Segmentation by an atlas: the surface of a whole bone (the template) is fitted to the bone in the CT, by a similarity
+// or an affine map. The moved template is the segmentation. (Closest points: Besl and McKay, IEEE Trans. Pattern Anal.
+// Mach. Intell. 14, 1992; similarity: Umeyama, same journal 13, 1991.) The template is one unbroken bone. So for
+// displaced fragments the result can be right for one fragment at most, as the chapter says and a test shows. A point
+// belongs to the fragment of the nearest seed.
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
@@ -34,9 +35,10 @@ struct Options {
   double band_mm = 4;
 };
 
-constexpr double kReach_mm = 40;  // of the CT's distances, in which closest points are found
+constexpr double kReach_mm = 40;  // largest distance to the bone for which closest points are found
 
-/// Distances to the bone that the race from all seeds finds, whatever fragment it is of.
+/// Distances to the bone, without regard to fragments. The bone is what the fronts from all seeds reach
+/// (expansion.hpp).
 class Target {
  public:
   Target(const Volume& volume, const std::vector<std::vector<Vector3d>>& seeds, double floor_hu) : volume_(volume) {
@@ -55,8 +57,8 @@ class Target {
             points_mm_.push_back(field_.grid.point_from_index(Vector3d(x, y, z)));
     marrow::field::march_distances(field_.grid, field_.values_mm, kReach_mm);
   }
-  /// The closest point of the bone's surface, as far as the distances reach; `at_edge`: drawn to the steepest descent
-  /// of the CT, as the race ends a little outside the bone.
+  /// The closest point of the bone's surface, within kReach_mm. `at_edge`: the point is moved to the steepest descent
+  /// of the CT, because the fronts end a little outside the bone.
   Vector3d closest(const Vector3d& point, bool at_edge) const {
     const Grid& grid = field_.grid;
     Vector3d index = grid.index_from_point(point), slope;
@@ -93,12 +95,12 @@ class Target {
 
   const Volume& volume_;
   SignedField field_;
-  std::vector<Vector3d> points_mm_;  // of the bone's voxels
+  std::vector<Vector3d> points_mm_;  // centres of the bone's voxels
 };
 
 struct Moments {
   Vector3d centre = Vector3d::Zero();
-  Eigen::Matrix3d axes;  // columns, the longest last
+  Eigen::Matrix3d axes;  // columns; the longest axis is last
   double size = 0;
 };
 
@@ -113,7 +115,7 @@ Moments moments_of(double volume, const Vector3d& first, const Eigen::Matrix3d& 
   return moments;
 }
 
-/// Of the voxels.
+/// Moments of points.
 Moments moments_of(const std::vector<Vector3d>& points) {
   Vector3d first = Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
@@ -124,7 +126,7 @@ Moments moments_of(const std::vector<Vector3d>& points) {
   return moments_of(double(points.size()), first, second);
 }
 
-/// Of what a closed surface encloses: the sum over the tetrahedra between its triangles and the origin.
+/// Moments of the volume inside a closed surface: a sum over the tetrahedra between its triangles and the origin.
 Moments moments_of(const Mesh& mesh) {
   double volume = 0;
   Vector3d first = Vector3d::Zero();
@@ -140,7 +142,8 @@ Moments moments_of(const Mesh& mesh) {
   return moments_of(volume, first, second);
 }
 
-/// As the template lies, and by its centre and axes in the four ways that keep it from being mirrored.
+/// Five start maps: the template as it is, and four that align its centre and axes with the bone's. The four differ in
+/// the directions of the axes; mirrored ones are left out.
 std::vector<Map> starts(const Mesh& whole, const std::vector<Vector3d>& bone) {
   std::vector<Map> maps{Map::Identity()};
   const Moments from = moments_of(whole), to = moments_of(bone);
@@ -153,7 +156,8 @@ std::vector<Map> starts(const Mesh& whole, const std::vector<Vector3d>& bone) {
   return maps;
 }
 
-/// The pairs of template vertex and closest bone that are best in agreement.
+/// Pairs of template vertices and closest points of the bone, without the pairs of largest distance. Returns their mean
+/// distance.
 double pair_up(const Target& target, const std::vector<Vector3d>& vertices, const Map& map, double keep_part,
                bool at_edge, Eigen::Matrix3Xd& from, Eigen::Matrix3Xd& to) {
   std::vector<std::pair<double, std::size_t>> order;
@@ -176,7 +180,7 @@ double pair_up(const Target& target, const std::vector<Vector3d>& vertices, cons
   return sum / double(order.size());
 }
 
-/// Moves the map towards the bone; returns the mean distance of the pairs before the last step.
+/// Fits the map to the bone. Returns the mean distance of the pairs before the last step.
 double fit(const Target& target, const std::vector<Vector3d>& vertices, double keep_part, bool at_edge, bool affine,
            int iterations, Map& map) {
   double distance = 0;
@@ -196,7 +200,7 @@ double fit(const Target& target, const std::vector<Vector3d>& vertices, double k
   return distance;
 }
 
-/// What of the template is nearer to the fragment's seeds than to another's.
+/// The part of the template that is nearer to the fragment's seeds than to the seeds of any other fragment.
 SignedField part_of(const SignedField& whole, const List<Seeds>& seeds, std::size_t fragment) {
   SignedField part = whole;
   const auto nearest = [&](std::size_t f, const Vector3d& p) {
@@ -212,7 +216,7 @@ SignedField part_of(const SignedField& whole, const List<Seeds>& seeds, std::siz
         const Vector3d p = whole.grid.point_from_index(Vector3d(x, y, z)), own = nearest(fragment, p);
         for (std::size_t f = 0; f < seeds.size(); ++f) {
           if (f == fragment) continue;
-          const Vector3d other = nearest(f, p);  // halfway between both seeds, signed
+          const Vector3d other = nearest(f, p);  // the border is halfway between both seeds
           const double beyond =
               ((p - own).squaredNorm() - (p - other).squaredNorm()) / (2 * std::max((own - other).norm(), 1e-6));
           value = std::max(value, float(std::min(beyond, double(std::abs(whole.grid.spacing_mm.maxCoeff()) * 100))));
@@ -244,7 +248,7 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
   char line[200];
   std::snprintf(line, sizeof line, "the template lies %.2f mm from the bone on average, scaled by %.3f", least_mm,
                 std::cbrt(best.linear().determinant()));
-  context.info(line);
+  context.debug(line);
   Mesh moved = whole;
   for (Vector3d& vertex : moved.vertices_mm) vertex = best * vertex;
   const SignedField field = marrow::field::field_of_mesh(volume.grid, moved, options.band_mm);
@@ -266,17 +270,21 @@ List<SignedField> atlas(const Volume& volume, const List<Seeds>& seeds, const Me
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.atlas", atlas)
-      .summary("A whole bone's surface moved onto the bone in the CT; it knows no fracture")
+      .summary("Fits the surface of a whole bone to the bone in the CT; it cannot represent a fracture")
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
-      .in("template", "closed surface of a whole bone of this kind, in mm, anywhere")
+      .in("template", "closed surface of a whole bone of this kind, in mm; it may lie anywhere")
       .out("field", "signed distance to the moved template, cut halfway between the fragments' seeds",
            marrow::over("fragment"))
-      .option("floor_hu", &Options::floor_hu, "what is darker is not taken for bone; nor may a seed be",
+      .option("floor_hu", &Options::floor_hu,
+              "voxels below this value are not bone; the mean of the voxels around a seed must not be below it",
               marrow::unit("HU"))
-      .option("affine", &Options::affine, "an affine map at last, not only a similarity")
-      .option("iterations", &Options::iterations, "of closest points, from each of five starts", marrow::at_least(1))
-      .option("keep_part", &Options::keep_part, "of the template's points, those that agree best",
-              marrow::at_least(0.3), marrow::at_most(1))
-      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+      .option("affine", &Options::affine, "end with an affine map instead of a similarity")
+      .option("iterations", &Options::iterations, "iterations of closest points from each of the five starts",
+              marrow::at_least(1))
+      .option("keep_part", &Options::keep_part,
+              "fraction of the template's points to use, those with the smallest distances", marrow::at_least(0.3),
+              marrow::at_most(1))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
+              marrow::at_most(50));
 }

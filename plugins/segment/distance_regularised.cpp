@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A level set that keeps itself a distance: Li, Xu, Gui and Fox, Distance regularized level set evolution and its
-// application to image segmentation, IEEE Trans. Image Process. 19, 2010 (after Li, Xu, Gui and Fox, CVPR 2005). Its
-// evolution (their Eq 30):
+// A level set that regularises its own distance function: Li, Xu, Gui and Fox, Distance regularized level set evolution
+// and its application to image segmentation, IEEE Trans. Image Process. 19, 2010 (after Li, Xu, Gui and Fox, CVPR
+// 2005). Its evolution (their Eq 30):
 //   d phi / dt = mu div(d_p(|grad phi|) grad phi) + lambda delta(phi) div(g grad phi / |grad phi|) + alpha g delta(phi)
-// with d_p from the double-well potential (their Eq 16), g = 1 / (1 + |grad G * I|^2 / K^2) and phi negative inside. No
-// step makes distances anew; it begins, as they do, from a step function: here that of the race from all seeds
-// (expansion.hpp).
+// with d_p from the double-well potential (their Eq 16), g = 1 / (1 + |grad G * I|^2 / K^2) and phi negative inside.
+// The distance function is never re-initialised. As in the paper, phi starts as a step function. Here its inside is
+// what the front from the fragment's seeds reaches (expansion.hpp), with everything that it encloses.
 #include <tbb/parallel_for.h>
 
 #include <cmath>
@@ -37,10 +37,10 @@ struct Options {
 };
 
 constexpr float kStart = 2, kDiracWidth = 1.5;  // c0 and epsilon of the paper, in voxels of the finest spacing
-constexpr int kReach = 4;                       // of the narrow band, in voxels: beyond it phi stays a constant
+constexpr int kReach = 4;  // half the width of the narrow band, in voxels; beyond it phi stays constant
 constexpr int kStepsPerBand = 5;
 
-/// d_p(s) = p'(s) / s of the double-well potential, whose minima are at |grad phi| = 0 and 1.
+/// d_p(s) = p'(s) / s of the double-well potential. Its minima are at |grad phi| = 0 and 1.
 float diffusion(float s) {
   if (s < 1e-6f) return 1;
   return s <= 1 ? std::sin(2 * float(M_PI) * s) / (2 * float(M_PI) * s) : (s - 1) / s;
@@ -81,7 +81,7 @@ class Evolution {
   const std::vector<float>& phi() const { return phi_; }
 
  private:
-  /// g from the smoothed CT's gradient.
+  /// Computes g from the gradient of the smoothed CT.
   void make_indicator(std::vector<float> hu, const Eigen::Vector3d& spacing_mm) {
     for (int k = 0; k < 3; ++k) smooth(hu, k, options_.sigma_mm / spacing_mm[k]);
     indicator_.resize(hu.size());
@@ -125,7 +125,7 @@ class Evolution {
     });
   }
 
-  /// The voxels within a few of the zero level.
+  /// The band: all voxels within kReach voxels of the zero level.
   void choose_band() {
     std::vector<std::uint8_t> is_near(phi_.size(), 0);
     for_interior([&](std::size_t at) {
@@ -155,18 +155,19 @@ class Evolution {
   }
 
   void advance() {
-    constexpr float kStep = 1;  // regularity * step stays below 1/6, which keeps the diffusion stable in 3D
+    constexpr float kStep = 1;  // regularity * step is below 1/6, so the diffusion is stable in 3D
     tbb::parallel_for(std::size_t(0), band_.size(), [&](std::size_t i) {
       const std::size_t at = band_[i];
       const float delta = dirac(phi_[at]);
       float regular = 0, edge = 0;
-      // Both divergences from what flows through the voxel's neighbours.
+      // Both divergences are sums of the flows to the six neighbouring voxels.
       for (int k = 0; k < 3; ++k)
         for (const int side : {-1, 1}) {
           const std::size_t beside = std::size_t(std::ptrdiff_t(at) + side * steps_[k]);
           const Eigen::Vector3f slope = gradient(beside);
           const float length = slope.norm();
-          // The flow through the face between both voxels: the difference across it is exact there.
+          // The flow goes through the face between both voxels, so the derivative across the face is a simple
+          // difference.
           const float across = float(side) * (phi_[beside] - phi_[at]) * per_step_[k];
           const float face_length = std::max(0.5f * (length + gradient(at).norm()), 1e-3f);
           regular += float(side) * diffusion(face_length) * across * per_step_[k];
@@ -221,21 +222,27 @@ List<SignedField> distance_regularised(const Volume& volume, const List<Seeds>& 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.distance_regularised", distance_regularised)
-      .summary("Level set that regularises its own distance (Li et al. 2010), without re-initialisation")
+      .summary("Level set with distance regularisation (DRLSE: Li et al. 2010), without re-initialisation")
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
       .option("floor_hu", &Options::floor_hu,
-              "the race from the seeds does not enter what is darker; nor may a seed be", marrow::unit("HU"))
-      .option("sigma_mm", &Options::sigma_mm, "Gaussian before the gradient", marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: gradient of the CT that halves g", marrow::at_least(1),
-              marrow::unit("HU/mm"))
-      .option("regularity", &Options::regularity, "mu: weight of the distance's regularity", marrow::at_least(0.01),
+              "the front from the seeds does not enter voxels below this value; the mean of the voxels around a seed "
+              "must not be below it",
+              marrow::unit("HU"))
+      .option("sigma_mm", &Options::sigma_mm,
+              "standard deviation of the Gaussian that smooths the CT before its gradient is taken",
+              marrow::at_least(0.1), marrow::at_most(5))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "K: at this gradient of the CT, g is 1/2",
+              marrow::at_least(1), marrow::unit("HU/mm"))
+      .option("regularity", &Options::regularity, "mu: weight of the distance regularisation", marrow::at_least(0.01),
               marrow::at_most(0.16))
-      .option("length", &Options::length, "lambda: weight of the surface's length along edges", marrow::at_least(0),
+      .option("length", &Options::length,
+              "lambda: weight of the length term, which smooths the surface and draws it to edges", marrow::at_least(0),
               marrow::at_most(5))
-      .option("area", &Options::area, "alpha: shrinks the body where it is positive, expands it where negative",
+      .option("area", &Options::area, "alpha: weight of the area term; positive shrinks the body, negative expands it",
               marrow::at_least(-2), marrow::at_most(2))
-      .option("steps", &Options::steps, "time steps", marrow::at_least(0))
-      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+      .option("steps", &Options::steps, "number of time steps", marrow::at_least(0))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
+              marrow::at_most(50));
 }

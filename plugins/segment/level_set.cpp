@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's narrow-band level set (its Eq 5 and 6 in their corrected reading: see front.hpp): one front for each
-// fragment, all moving together and never into each other. They begin where a race from the seeds ends (expansion.hpp),
-// with everything inside filled, and come to rest on the CT's edges.
+// The chapter's narrow-band level set (Eq 5 and 6 as corrected, see front.hpp). There is one front for each fragment.
+// All fronts move together and never into each other. They start where the fast expansion from the seeds ends
+// (expansion.hpp), with everything inside filled. They come to rest on the edges in the CT.
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
@@ -37,7 +37,7 @@ struct Options {
   int steps = 32;
 };
 
-constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant, Friedrichs and Lewy)
+constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant-Friedrichs-Lewy condition)
 constexpr int kStepsPerCycle = 4;
 
 void keep_all_apart(std::vector<Front>& fronts) {
@@ -70,12 +70,12 @@ void log_fronts(const std::vector<Front>& fronts, const List<Seeds>& seeds, int 
     std::snprintf(line, sizeof line, "step %d, %s: mean speed %.3f of F0, %zu voxels in the moving band", step,
                   seeds.name(f).c_str(), fronts[f].mean_motion_mm() / (kStepsPerCycle * step_mm),
                   fronts[f].band_voxels());
-    context.info(line);
+    context.debug(line);
   }
 }
 
-/// Moves all fronts together until each of them rests on the walls of its bone: on the steepest descent of the CT along
-/// its normal, or, where there is none (the mouth of a canal), where it began.
+/// Moves all fronts together until each of them rests on the wall of its bone. The wall is the steepest descent of the
+/// CT along the normal. Where there is none (at the mouth of a canal), the front rests where it started.
 void move(const Volume& volume, const List<Seeds>& seeds, const Options& options, std::vector<Front>& fronts,
           Context& context) {
   const EdgeProfile profile(options.edge_sigma_mm, options.blur_mm, options.cortex_hu);
@@ -135,35 +135,40 @@ List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seed
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.level_set", level_set_fields)
-      .summary("3D narrow-band level set with an image force along the normal")
+      .summary("3D narrow-band level set whose fronts are drawn to the CT's edges along their normals")
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("band_voxels", &Options::band_voxels, "half width of the narrow band, in in-plane voxels",
+      .option("band_voxels", &Options::band_voxels, "half the width of the narrow band, in in-plane voxels",
               marrow::at_least(3), marrow::at_most(20), marrow::unit("voxels"))
-      .option("sigma_mm", &Options::sigma_mm, "smoothing of the CT in which the fronts race from the seeds",
+      .option("sigma_mm", &Options::sigma_mm,
+              "standard deviation of the Gaussian that smooths the CT for the first expansion from the seeds",
               marrow::at_least(0.1), marrow::at_most(5))
-      .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that holds a racing front up", marrow::at_least(0.5),
+      .option("cleft_mm", &Options::cleft_mm, "widest dark cleft that slows the first expansion", marrow::at_least(0.5),
               marrow::at_most(10))
       .option("cleft_part", &Options::cleft_part,
-              "a cleft darker than its walls by this part of them slows a front e times", marrow::at_least(0.02),
-              marrow::at_most(1))
-      .option("floor_hu", &Options::floor_hu, "no front advances into what is darker; nor may a seed be",
-              marrow::unit("HU"))
-      .option("advection", &Options::advection, "F0: how much a front expands where no edge holds it",
+              "a cleft that is darker than its walls by this fraction of their value slows the first expansion e times",
+              marrow::at_least(0.02), marrow::at_most(1))
+      .option(
+          "floor_hu", &Options::floor_hu,
+          "no front advances into voxels below this value; the mean of the voxels around a seed must not be below it",
+          marrow::unit("HU"))
+      .option("advection", &Options::advection, "F0: speed at which a front expands if no edge stops it",
               marrow::at_least(0), marrow::at_most(1))
-      .option("edge_hu", &Options::edge_hu, "K: drop of the CT that halves the speed", marrow::at_least(1),
-              marrow::unit("HU"))
-      .option("edge_sigma_mm", &Options::edge_sigma_mm, "Gaussian derivative along the normal", marrow::at_least(0.1),
+      .option("edge_hu", &Options::edge_hu, "K: drop of the CT's value at an edge that halves the speed",
+              marrow::at_least(1), marrow::unit("HU"))
+      .option("edge_sigma_mm", &Options::edge_sigma_mm,
+              "standard deviation of the Gaussian derivative along the normal", marrow::at_least(0.1),
               marrow::at_most(5))
       .option("blur_mm", &Options::blur_mm, "standard deviation of the CT's own blur", marrow::at_least(0),
               marrow::at_most(5))
       .option("cortex_hu", &Options::cortex_hu,
-              "density of cortical bone, to correct the edge of a thin cortex by; 0: no correction",
+              "CT value of dense cortical bone, used to correct the position of a thin cortex's edge; 0: no correction",
               marrow::at_least(0), marrow::unit("HU"))
       .option("curvature_mm", &Options::curvature_mm, "epsilon: weight of the curvature", marrow::at_least(0),
               marrow::at_most(0.5))
-      .option("stop_speed", &Options::stop_speed, "a part of a front that is slower (F0 is 1) comes to rest",
+      .option("stop_speed", &Options::stop_speed,
+              "a part of a front that is slower than this comes to rest; in units in which F0 is 1",
               marrow::at_least(0.001), marrow::at_most(0.5))
-      .option("steps", &Options::steps, "most time steps of the fronts", marrow::at_least(0));
+      .option("steps", &Options::steps, "largest number of time steps", marrow::at_least(0));
 }

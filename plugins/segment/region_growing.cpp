@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994): of all voxels beside the
-// regions the one that is most like the region beside it joins it first. The fragments' regions grow at the same time,
-// so what lies between them is shared out last, and a gap that is a little darker than the bone keeps them apart.
+// Seeded region growing (Adams and Bischof, IEEE Trans. Pattern Anal. Mach. Intell. 16, 1994). Of all voxels beside a
+// region, the voxel most similar to its region joins first. The regions of all fragments grow at the same time. So the
+// voxels between them join last, and a gap that is a little darker than the bone keeps the regions apart.
 #include <cmath>
 #include <deque>
 #include <marrow/plugin.hpp>
@@ -23,7 +23,8 @@ struct Options {
   double band_mm = 4;
 };
 
-/// The regions and the voxels beside them, which wait in the order of unlikeness, in steps of one HU.
+/// The regions, and the voxels beside them in a queue. The queue is sorted by the difference to the region's mean, in
+/// steps of one HU.
 class Growth {
  public:
   Growth(const Volume& volume, std::size_t fragments, double least_hu)
@@ -86,13 +87,13 @@ class Growth {
   std::vector<double> sums_hu_;
   std::vector<std::size_t> counts_;
   std::vector<std::deque<Candidate>> waiting_;
-  std::size_t first_ = kSteps;  // no step before it has a candidate
+  std::size_t first_ = kSteps;  // all steps before this one are empty
 };
 
 List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds, const Options& options,
                                  Context& context) {
   marrow::check_volume(volume, "volume");
-  // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
+  // Sparse spongy bone may be darker than the bone's surface. Seeds in it are allowed, although they claim no voxel.
   const auto indices = marrow::field::seed_indices(volume, seeds, std::min(options.floor_hu, options.least_hu));
   Growth growth(volume, seeds.size(), options.least_hu);
   for (std::size_t f = 0; f < indices.size(); ++f)
@@ -125,12 +126,15 @@ List<SignedField> region_growing(const Volume& volume, const List<Seeds>& seeds,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.region_growing", region_growing)
-      .summary("Regions that grow from the seeds of all fragments at once, the likest voxel first")
+      .summary("Regions grow from the seeds of all fragments at once; the most similar voxel joins first")
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("least_hu", &Options::least_hu, "nothing darker is bone; the surface is where the CT crosses it",
+      .option("least_hu", &Options::least_hu,
+              "darker voxels are not bone; the surface is where the CT crosses this value", marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu,
+              "least allowed mean of the voxels around a seed; least_hu is used instead if it is lower",
               marrow::unit("HU"))
-      .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker", marrow::unit("HU"))
-      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
+              marrow::at_most(50));
 }

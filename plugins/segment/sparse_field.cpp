@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// ITK's geodesic active contour (Caselles, Kimmel and Sapiro, IJCV 22, 1997) on Whitaker's sparse field (IJCV 29,
-// 1998), one contour for each fragment. It begins where the race from all seeds ended (expansion.hpp), which also says
-// what belongs to another fragment.
+// ITK's geodesic active contour (Caselles, Kimmel and Sapiro, IJCV 22, 1997) with Whitaker's sparse field (IJCV 29,
+// 1998), one contour for each fragment. It starts where the fast expansion from all seeds ended (expansion.hpp). Voxels
+// that the expansion gave to another fragment stay outside.
 #include <cmath>
 #include <marrow/plugin.hpp>
 
@@ -48,7 +48,7 @@ SignedField field_of(const Volume& volume, const marrow::field::Mask& mask, cons
   char line[200];
   std::snprintf(line, sizeof line, "%s: %d iterations, last change %.4f", name.c_str(), contour.iterations,
                 contour.rms);
-  context.info(line);
+  context.debug(line);
   for (int z = 0; z < box.size[2]; ++z)
     for (int y = 0; y < box.size[1]; ++y)
       for (int x = 0; x < box.size[0]; ++x) {
@@ -90,21 +90,26 @@ List<SignedField> sparse_field(const Volume& volume, const List<Seeds>& seeds, c
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.sparse_field", sparse_field)
-      .summary("ITK's geodesic active contour, a sparse-field level set")
+      .summary("Geodesic active contour on a sparse-field level set (ITK)")
       .in("volume", "CT in Hounsfield units")
       .in("seeds", "points inside each fragment", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
       .option("floor_hu", &Options::floor_hu,
-              "the race from the seeds does not enter what is darker; nor may a seed be", marrow::unit("HU"))
-      .option("sigma_mm", &Options::sigma_mm, "Gaussian of the gradient", marrow::at_least(0.1), marrow::at_most(5))
-      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "gradient of the CT that halves the speed",
+              "the front from the seeds does not enter voxels below this value; the mean of the voxels around a seed "
+              "must not be below it",
+              marrow::unit("HU"))
+      .option("sigma_mm", &Options::sigma_mm,
+              "standard deviation of the Gaussian that smooths the CT before its gradient is taken",
+              marrow::at_least(0.1), marrow::at_most(5))
+      .option("edge_hu_per_mm", &Options::edge_hu_per_mm, "the speed is halved at this gradient of the CT",
               marrow::at_least(1), marrow::unit("HU/mm"))
       .option("propagation", &Options::propagation, "weight of the expansion", marrow::at_least(-5), marrow::at_most(5))
       .option("curvature", &Options::curvature, "weight of the curvature", marrow::at_least(0), marrow::at_most(5))
-      .option("advection", &Options::advection, "weight of the pull towards edges", marrow::at_least(0),
+      .option("advection", &Options::advection, "weight of the force towards edges", marrow::at_least(0),
               marrow::at_most(10))
-      .option("iterations", &Options::iterations, "most iterations", marrow::at_least(1))
-      .option("least_rms", &Options::least_rms, "mean change at which it stops", marrow::at_least(0.0001),
-              marrow::at_most(1))
-      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+      .option("iterations", &Options::iterations, "largest number of iterations", marrow::at_least(1))
+      .option("least_rms", &Options::least_rms, "stops if the root mean square change of an iteration is below this",
+              marrow::at_least(0.0001), marrow::at_most(1))
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
+              marrow::at_most(50));
 }

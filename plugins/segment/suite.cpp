@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Segmenters, on a hollow bone broken in two: a tube of cortical bone around marrow, in soft tissue, cut obliquely with
-// a gap of 1.2 mm, sampled on the grid of a CT with its blur and noise.
+// Checks for segmentation on a hollow bone that is broken in two: a tube of cortical bone around marrow, in soft
+// tissue, with an oblique cut of 1.2 mm. It is sampled on the grid of a CT, with blur and noise.
 #include "suite.hpp"
 
 #include <Eigen/Geometry>
@@ -16,7 +16,7 @@ namespace {
 constexpr double kOuter_mm = 12.4, kInner_mm = 7.2, kGap_mm = 1.2, kBlur_mm = 0.5, kNoise_hu = 30;
 constexpr double kCortex_hu = 1300, kMarrow_hu = -40, kTissue_hu = 45;
 
-/// The tube's own coordinates: z along it, the cut through the origin.
+/// The tube with its own coordinates: z runs along the tube, the cut goes through the origin.
 struct Tube {
   Grid grid;
   RigidTransform tube_from_ct{"tube", "ct"};
@@ -36,10 +36,10 @@ Tube tube(bool turned) {
   return tube;
 }
 
-/// Height over the cut, along its normal; the fragments begin at half the gap to either side.
+/// Height above the cut, along its normal. The fragments start at half the gap on each side.
 double over_cut_mm(const Eigen::Vector3d& p) { return p.dot(Eigen::Vector3d(0.35, 0.1, 1).normalized()); }
 
-/// A step from one value to another, blurred: 1 on the negative side.
+/// A blurred step: 1 on the negative side, 0 on the positive side.
 double inside(double distance_mm) { return 0.5 * std::erfc(distance_mm / (kBlur_mm * std::sqrt(2.0))); }
 
 double hu_at(const Eigen::Vector3d& p) {
@@ -56,7 +56,7 @@ Volume volume_of(const Tube& tube) {
   for (int z = 0; z < tube.grid.size[2]; ++z)
     for (int y = 0; y < tube.grid.size[1]; ++y)
       for (int x = 0; x < tube.grid.size[0]; ++x) {
-        double sum = 0;  // a normal number: the sum of twelve uniform ones
+        double sum = 0;  // nearly normal: the sum of twelve uniform numbers
         for (int i = 0; i < 12; ++i) sum += double(random()) / 4294967296.0;
         volume.values.push_back(float(hu_at(tube.in_tube({double(x), double(y), double(z)})) + kNoise_hu * (sum - 6)));
       }
@@ -76,7 +76,7 @@ Value seeds_of(const Tube& tube) {
   return Value::of<Seeds>(list, "fragment");
 }
 
-/// The unbroken tube's outer surface, for nodes that begin with a template.
+/// The outer surface of the unbroken tube, for nodes that need a template.
 Mesh template_of(const Tube& tube) {
   const RigidTransform ct_from_tube = inverse(tube.tube_from_ct);
   constexpr int kAround = 64, kRings = 33;
@@ -105,7 +105,8 @@ Inputs inputs_of(const Tube& tube) {
   return {{"volume", item(volume_of(tube))}, {"seeds", seeds_of(tube)}, {"template", item(template_of(tube))}};
 }
 
-/// A template is of an unbroken bone: where the fracture is cannot be asked of a node that takes one.
+/// Throws NotApplicable for nodes that need a template. A template is an unbroken bone, so they cannot find the
+/// fracture.
 void needs_the_fracture(const Subject& subject) {
   for (const PortInfo& port : subject.info().inputs)
     if (port.name == "template" && !port.optional)
@@ -137,8 +138,8 @@ List<SignedField> fields_of(const Subject& subject, const Tube& tube) {
   return fields.as_list<SignedField>();
 }
 
-/// Calls visit(point in the tube, proximal field, distal field) for each voxel outside the canal and away from the
-/// volume's ends.
+/// Calls visit(point in the tube, value of the proximal field, value of the distal field) for each voxel outside the
+/// canal and away from the volume's ends.
 template <class Visit>
 void for_voxels(const Subject& subject, const Tube& tube, const Visit& visit) {
   const List<SignedField> fields = fields_of(subject, tube);
@@ -173,7 +174,7 @@ double overlap(const Subject& subject, const Tube& tube) {
   return double(both);
 }
 
-/// Where a fragment reaches into the other's bone, as a part of that.
+/// Percentage of the bone that the field of the other fragment contains, away from the cut.
 double leak_percent(const Subject& subject, const Tube& tube) {
   needs_the_fracture(subject);
   long leaked = 0, all = 0;
@@ -186,8 +187,8 @@ double leak_percent(const Subject& subject, const Tube& tube) {
   return 100.0 * double(leaked) / double(all);
 }
 
-/// Distances of the fields' zero level to the true wall, along the grid's x axis, at least 4 mm from the cut; positive:
-/// too fat.
+/// Distances from the true wall to the points where the fields cross zero along the grid's x axis, at least 4 mm from
+/// the cut. Positive: the found bone is too thick.
 std::vector<double> wall_distances(const Subject& subject, const Tube& tube) {
   const List<SignedField> fields = fields_of(subject, tube);
   std::vector<double> distances;
@@ -195,7 +196,8 @@ std::vector<double> wall_distances(const Subject& subject, const Tube& tube) {
     for (int y = 0; y < tube.grid.size[1]; ++y)
       for (int x = 0; x + 1 < tube.grid.size[0]; ++x) {
         const Eigen::Vector3d p = tube.in_tube({double(x), double(y), double(z)});
-        if (std::abs(over_cut_mm(p)) < 4 || std::abs(p.y()) > 6) continue;  // where the wall is steep to the x axis
+        // Only where the wall is nearly perpendicular to the x axis.
+        if (std::abs(over_cut_mm(p)) < 4 || std::abs(p.y()) > 6) continue;
         const SignedField& field = fields[over_cut_mm(p) > 0 ? 0 : 1];
         const double a = field.at(x, y, z), b = field.at(x + 1, y, z);
         if ((a < 0) == (b < 0)) continue;
@@ -287,20 +289,21 @@ std::vector<Trial> trials() {
 
 Suite segment_suite() {
   Suite suite{[] { return inputs_of(tube(false)); }, validate, trials(), {}};
-  // The limits leave room for one global threshold, which cannot be right for cortical and spongy bone at once.
-  const std::string ct = "broken tube, 0.8 x 0.8 x 1 mm, noise 30 HU";
+  // The limits are wide enough for a single global threshold, which cannot be right for cortical and spongy bone at
+  // once.
+  const std::string ct = "broken tube, voxels of 0.8 x 0.8 x 1 mm, noise of 30 HU";
   for (const bool turned : {false, true}) {
-    const std::string prefix = turned ? "turned_" : "", of = ct + (turned ? ", turned axes: " : ": ");
+    const std::string prefix = turned ? "turned_" : "", of = ct + (turned ? ", rotated axes: " : ": ");
     const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
                          double (*measure)(const Subject&, const Tube&)) {
       suite.accuracy.push_back({{prefix + name, of + what, limit, unit},
                                 [=](const Subject& subject) { return measure(subject, tube(turned)); }});
     };
     add("dice", "100 (1 - Dice) of the worse fragment", 12, "%", dice_error);
-    add("wall_bias", "mean signed distance to the outer wall", 0.6, "mm", wall_bias);
+    add("wall_bias", "absolute value of the mean signed distance to the outer wall", 0.6, "mm", wall_bias);
     add("wall_distance", "mean distance to the outer wall", 0.6, "mm", wall_distance);
-    add("overlap", "voxels of both fragments", 0, "voxels", overlap);
-    add("leak", "of a fragment's bone, what the other one has taken", 2.5, "%", leak_percent);
+    add("overlap", "voxels that belong to both fragments", 0, "voxels", overlap);
+    add("leak", "part of the bone that the other fragment contains", 2.5, "%", leak_percent);
   }
   return suite;
 }

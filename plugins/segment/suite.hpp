@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What segmenters must do.
+/// The checks that every node of the kind segment must pass.
 Suite segment_suite();
 
 }  // namespace marrow::conformance

@@ -35,8 +35,7 @@ void for_neighbours(const Grid& grid, std::size_t at, const Visit& visit) {
   if (z + 1 < grid.size[2]) visit(at + slice);
 }
 
-/// Gives each bright voxel that a seed reaches through bright voxels to the fragment whose seed is the fewest steps
-/// away.
+/// Gives each bright voxel to the fragment whose seed reaches it in the fewest steps through bright voxels.
 void claim_from_seeds(const Grid& grid, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
                       std::vector<std::uint8_t>& owner) {
   std::queue<std::size_t> reached;
@@ -79,7 +78,7 @@ void check_claims(const List<Seeds>& seeds, const Options& options, const std::v
           " HU, or it belongs to another fragment; add a point in cortical bone, or lower threshold_hu");
 }
 
-/// Gives the largest connected set of bright voxels to fragment 0.
+/// Gives the largest connected component of bright voxels to fragment 0.
 void claim_largest(const Grid& grid, std::vector<std::uint8_t>& owner) {
   std::vector<std::size_t> component, largest;
   for (std::size_t start = 0; start < owner.size(); ++start) {
@@ -120,7 +119,7 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
     return bone;
   }
   std::vector<SignedField> fields;
-  // Sparse spongy bone is bone, but darker than its surface: seeds in it are good, though they claim no voxel.
+  // Sparse spongy bone may be darker than the bone's surface. Seeds in it are allowed, although they claim no voxel.
   const double least_hu = std::min(options.floor_hu, options.threshold_hu);
   claim_from_seeds(volume.grid, marrow::field::seed_indices(volume, *seeds, least_hu), owner);
   check_claims(*seeds, options, owner);
@@ -136,12 +135,14 @@ List<SignedField> threshold(const Volume& volume, const List<Seeds>* seeds, cons
 
 MARROW_PLUGIN(plugin) {
   plugin.node("segment.threshold", threshold)
-      .summary("Bone brighter than a threshold, shared out between the fragments by the nearest seed")
+      .summary("Bone is brighter than a threshold; it is divided between the fragments by the nearest seed")
       .in("volume", "CT in Hounsfield units")
-      .in("seeds", "points inside each fragment; without any, the largest connected bone", marrow::over("fragment"))
+      .in("seeds", "points inside each fragment; none: the largest connected bone", marrow::over("fragment"))
       .out("field", "signed distance to the outer surface of each wanted fragment", marrow::over("fragment"))
-      .option("threshold_hu", &Options::threshold_hu, "CT number at the surface", marrow::unit("HU"))
-      .option("floor_hu", &Options::floor_hu, "no seed may be in what is darker, nor than the threshold",
+      .option("threshold_hu", &Options::threshold_hu, "CT value at the bone's surface", marrow::unit("HU"))
+      .option("floor_hu", &Options::floor_hu,
+              "least allowed mean of the voxels around a seed; threshold_hu is used instead if it is lower",
               marrow::unit("HU"))
-      .option("band_mm", &Options::band_mm, "distances beyond are clamped", marrow::at_least(1), marrow::at_most(50));
+      .option("band_mm", &Options::band_mm, "larger distances are clamped to this", marrow::at_least(1),
+              marrow::at_most(50));
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The chapter's extraction of the shaft (3.2): lines by the classical Hough transform (rho = u cos t + v sin t), paired
-// and accepted by the outer diameter of femora (Noble et al., CORR 1988). The chapter accepts widths within one
-// standard deviation, which turns away a third of all femora in each view; here widths have a likelihood and a limit of
-// three. The canal's borders lie inside and are turned away by which of their sides is brighter.
+// The chapter's extraction of the shaft (3.2): lines by the classical Hough transform (rho = u cos t + v sin t). They
+// are paired and accepted by the outer diameter of femora (Noble et al., CORR 1988). The chapter accepts widths within
+// one standard deviation, but this rejects a third of all femora in each view. Here widths have a likelihood, and a
+// limit of three standard deviations. The borders of the canal are rejected because their bright sides are on the wrong
+// side.
 #include <algorithm>
 #include <cmath>
 
@@ -13,11 +14,11 @@ namespace {
 using namespace marrow::shaft;
 using marrow::EdgeMap, marrow::EdgePixel;
 
-constexpr int kAngles = 360;    // directed lines: the normal turns once around
-constexpr int kVoteSpread = 6;  // degrees by which noise turns a gradient
+constexpr int kAngles = 360;    // lines have a direction, so normals go through 360 degrees
+constexpr int kVoteSpread = 6;  // degrees; noise rotates a gradient by about this
 constexpr double kRhoStep_px = 2;
 
-/// Votes of the edge pixels for directed lines: each votes for normals near its own gradient only.
+/// Votes of the edge pixels for directed lines. Each pixel votes only for normals near its own gradient.
 struct Accumulator {
   int rhos = 0;
   Eigen::Vector2d centre;
@@ -39,7 +40,7 @@ struct Accumulator {
     return {std::cos(marrow::radians(angle)), std::sin(marrow::radians(angle))};
   }
 
-  /// True where no cell of the neighbourhood has more votes; of equals, the first.
+  /// True if no cell of the neighbourhood has more votes. Of equal cells, only the first is a peak.
   bool is_peak(int angle, int rho) {
     const int votes_here = at(angle, rho);
     for (int a = -3; a <= 3; ++a)
@@ -51,7 +52,7 @@ struct Accumulator {
   }
 };
 
-/// The lines of many votes, the most first.
+/// The lines with many votes, sorted by votes.
 std::vector<Border> hough_lines(const EdgeMap& edges, const Scale& scale) {
   Accumulator accumulator(edges);
   struct Peak {
@@ -82,10 +83,10 @@ marrow::ShaftLines hough_pairs(const EdgeMap& edges, const marrow::View& view, c
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_line_options(
-      plugin.node("shaft.hough_pairs", hough_pairs)
-          .summary("Shaft borders: Hough lines, paired by the likelihood of their outer diameter (the chapter's 3.2)")
-          .in("edges", "edge pixels of the view")
-          .in("view", "X-ray view, for its camera and brightness")
-          .out("lines", "the two outer borders of the shaft, and what was turned away"));
+  declare_line_options(plugin.node("shaft.hough_pairs", hough_pairs)
+                           .summary("Borders of the shaft: lines from a Hough transform, paired by the likelihood of "
+                                    "the outer diameter (section 3.2 of the chapter)")
+                           .in("edges", "edge pixels of the view")
+                           .in("view", "X-ray view; its camera and its grey values are used")
+                           .out("lines", "the two outer borders of the shaft, and the rejected pairs"));
 }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines by the segment detector of Grompone von Gioi, Jakubowicz, Morel and Randall (IEEE TPAMI 2010), as OpenCV has
-// it: it grows regions of equal gradient direction in the image and keeps those that noise would not make. The segments
-// say where to look; the borders are fitted to the edge pixels beside them, so their accuracy is that of the edges.
-// Then they are paired as in shaft.hough_pairs.
+// Lines by OpenCV's version of the line segment detector LSD (Grompone von Gioi, Jakubowicz, Morel and Randall, IEEE
+// TPAMI 2010). It grows regions of equal gradient direction in the image and keeps those that are unlikely to be noise.
+// The segments only say where to search. The borders are fitted to the edge pixels beside them, so they are as accurate
+// as the edges. Then they are paired as in shaft.hough_pairs.
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
@@ -19,10 +19,12 @@ struct Options : LineOptions {
 };
 
 constexpr double kSurroundings_mm = 15;
-constexpr double kShortest = 0.15;  // segment, of the length that borders must share: noise cuts lines to pieces
+// The shortest segment, as a fraction of the length that borders must share. Noise cuts lines into pieces.
+constexpr double kShortest = 0.15;
 
-/// The logarithm of the image less its mean in the surroundings, as 8 bits. Steps of attenuation are then equally high
-/// everywhere, and the slope of the limb, which points as the bone's border does, is gone.
+/// The logarithm of the image minus its local mean, as 8 bits. In it, steps of attenuation have the same height
+/// everywhere. The slope of the limb is removed; its direction is that of the bone's border and would disturb the
+/// search.
 cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
   cv::Mat grey;
   view.image.pixels.convertTo(grey, CV_32F);
@@ -42,11 +44,11 @@ cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
   return scaled;
 }
 
-/// Moves a line to where the edge pixels beside a segment are densest: the middle of a region of equal gradient
-/// direction is not where the gradient is greatest. False where there are none.
+/// Moves a line to where the edge pixels beside a segment are densest. This is necessary because the gradient is not
+/// always largest in the middle of a region of equal gradient direction. False if there are no edge pixels.
 bool snap(const EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to, const Support& support,
           Border& line) {
-  constexpr double kReach = 4;  // tolerances
+  constexpr double kReach = 4;  // in tolerances of `support`
   const Eigen::Vector2d way = (to - from).normalized();
   std::vector<double> distances;
   for (const marrow::EdgePixel& edge : edges.pixels) {
@@ -67,7 +69,7 @@ bool snap(const EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector
   return most > 0;
 }
 
-/// The lines of the segments, the longest first, each with the one or the other side brighter as the edge pixels say.
+/// The lines of the segments, the longest first. The edge pixels decide which side of a line is brighter.
 std::vector<Border> segment_lines(const EdgeMap& edges, const marrow::View& view, const Scale& scale,
                                   const Options& options) {
   const double shrink = std::min(1.0, scale.pixel_mm / options.resolution_mm);
@@ -102,12 +104,12 @@ marrow::ShaftLines line_segments(const EdgeMap& edges, const marrow::View& view,
 MARROW_PLUGIN(plugin) {
   declare_line_options(
       plugin.node("shaft.line_segments", line_segments)
-          .summary(
-              "Shaft borders: segments of the image (LSD; OpenCV), paired by the likelihood of their outer diameter")
+          .summary("Borders of the shaft: line segments in the image (LSD, by OpenCV), paired by the likelihood of the "
+                   "outer diameter")
           .in("edges", "edge pixels of the view")
-          .in("view", "X-ray view, for its image and camera")
-          .out("lines", "the two outer borders of the shaft, and what was turned away")
+          .in("view", "X-ray view; its camera and its grey values are used")
+          .out("lines", "the two outer borders of the shaft, and the rejected pairs")
           .option("resolution_mm", &Options::resolution_mm,
-                  "pixel, at the isocentre, to which the image is shrunk for the segments", marrow::at_least(0.05),
-                  marrow::at_most(10)));
+                  "size of a pixel, in mm at the isocentre, to which the image is reduced to find segments",
+                  marrow::at_least(0.05), marrow::at_most(10)));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lines by random sample consensus (Fischler and Bolles, CACM 1981), one after the other: of lines through two edge
-// pixels whose gradients agree with it, the one with the most edge pixels is taken, its pixels are put aside, and the
-// search goes on among the others. Then borders are paired as in shaft.hough_pairs.
+// Lines by random sample consensus, RANSAC (Fischler and Bolles, CACM 1981). Lines are found one after the other.
+// Candidates go through two random edge pixels whose gradients agree with the line. The candidate with the most edge
+// pixels is taken, and its pixels are removed before the next search. Then borders are paired as in shaft.hough_pairs.
 #include <algorithm>
 #include <cmath>
 #include <optional>
@@ -18,17 +18,19 @@ struct Options : LineOptions {
   int samples = 400;
 };
 
-constexpr int kBins = 36;  // of gradient directions: the two pixels of a sample come from the same or the next
-constexpr double kDirectionCosine = 0.95;  // between a line's normal and its pixels' gradients
+// Bins of gradient directions. Both pixels of a sample come from the same bin or from neighbouring bins.
+constexpr int kBins = 36;
+constexpr double kDirectionCosine = 0.95;  // least cosine between a line's normal and its pixels' gradients
 
-/// The edge pixels that no line has yet, by direction of their gradients.
+/// The edge pixels that belong to no line yet, in bins by the direction of their gradients.
 class Pool {
  public:
   explicit Pool(const EdgeMap& edges) : edges_(edges), bins_(kBins) {
     for (std::size_t i = 0; i < edges.pixels.size(); ++i) bins_[bin(edges.pixels[i])].push_back(i);
   }
 
-  /// A line through two pixels at least `apart_px` from each other, or nothing: the pixels drawn do not lie on one.
+  /// A line through two random pixels that are at least `apart_px` apart. Nothing if the two pixels do not fit one
+  /// line.
   std::optional<Border> sample(std::mt19937_64& random, std::size_t of, double apart_px) const {
     const EdgePixel& one = nth(of);
     const std::vector<std::size_t>& near = bins_[(bin(one) + random() % 3 + kBins - 1) % kBins];
@@ -44,11 +46,11 @@ class Pool {
     return line;
   }
 
-  /// Calls function(index) for the pixels of the pool within the tolerance of a line and with its gradient.
+  /// Calls function(index) for the pixels of the pool that are near a line and whose gradient agrees with it.
   template <class Function>
   void for_near(const Border& line, double tolerance_px, Function function) const {
     const int middle = bin_of(line.normal.x(), line.normal.y());
-    for (int step = -2; step <= 2; ++step)  // 15 degrees to either side at least
+    for (int step = -2; step <= 2; ++step)  // at least 15 degrees to each side
       for (const std::size_t i : bins_[std::size_t((middle + step + kBins) % kBins)]) {
         const EdgePixel& pixel = edges_.pixels[i];
         const double distance = line.normal.x() * pixel.u_px + line.normal.y() * pixel.v_px - line.rho;
@@ -84,7 +86,7 @@ class Pool {
   std::vector<std::vector<std::size_t>> bins_;
 };
 
-/// Lines of many pixels, the most first.
+/// Lines with many pixels, in the order in which they are found.
 std::vector<Border> ransac_lines(const EdgeMap& edges, const Scale& scale, const Options& options,
                                  marrow::Context& context) {
   std::mt19937_64 random(context.seed());
@@ -121,13 +123,13 @@ marrow::ShaftLines ransac(const EdgeMap& edges, const marrow::View& view, const 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  declare_line_options(
-      plugin.node("shaft.ransac", ransac)
-          .summary("Shaft borders: lines by random sample consensus, paired by the likelihood of their outer diameter")
-          .random()
-          .in("edges", "edge pixels of the view")
-          .in("view", "X-ray view, for its camera and brightness")
-          .out("lines", "the two outer borders of the shaft, and what was turned away")
-          .option("samples", &Options::samples, "lines tried for each one that is taken", marrow::at_least(1),
-                  marrow::at_most(100000)));
+  declare_line_options(plugin.node("shaft.ransac", ransac)
+                           .summary("Borders of the shaft: lines by random sample consensus (RANSAC), paired by the "
+                                    "likelihood of the outer diameter")
+                           .random()
+                           .in("edges", "edge pixels of the view")
+                           .in("view", "X-ray view; its camera and its grey values are used")
+                           .out("lines", "the two outer borders of the shaft, and the rejected pairs")
+                           .option("samples", &Options::samples, "number of candidates for each line",
+                                   marrow::at_least(1), marrow::at_most(100000)));
 }

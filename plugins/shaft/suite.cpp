@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shaft nodes, on the exact lines of a hollow cylinder in soft tissue: edge pixels with errors of position and
-// direction, gaps and clutter, in an image of the same cylinder.
+// Checks for nodes of the kind shaft, with the exact lines of a hollow cylinder in soft tissue. The edge pixels have
+// errors of position and direction, gaps and clutter. The image shows the same cylinder.
 #include "suite.hpp"
 
 #include <Eigen/Geometry>
@@ -17,22 +17,22 @@ namespace {
 constexpr int kWidth = 480, kHeight = 512;
 constexpr double kFocal_px = 1700, kDistance_mm = 600, kThigh_mm = 70;
 constexpr double kPosition_px = 0.6, kDirection_deg = 6,
-                 kFound = 0.85;  // errors of edge pixels, and how many are there
+                 kFound = 0.85;  // standard deviations of edge pixels, and the fraction of pixels that are found
 
-/// A straight hollow bone in a round thigh, as one view sees it.
+/// A straight hollow bone.
 struct Bone {
   Eigen::Vector3d point, direction;
   double outer_mm = 28, canal_mm = 12;  // diameters
 };
 
-/// An image line with its bright side: normal . p = rho, the normal to the brighter side.
+/// A line in the image: normal . p = rho. The normal points to the brighter side.
 struct Line {
   Eigen::Vector2d normal;
   double rho;
   double distance(const Eigen::Vector2d& p) const { return normal.dot(p) - rho; }
 };
 
-double noise(std::mt19937& random) {  // a normal number: the sum of twelve uniform ones
+double noise(std::mt19937& random) {  // nearly normal: the sum of twelve uniform numbers
   double sum = -6;
   for (int i = 0; i < 12; ++i) sum += double(random()) / 4294967296.0;
   return sum;
@@ -60,7 +60,7 @@ Camera camera() {
   return camera;
 }
 
-/// Where planes through the source touch a cylinder, with normals away from its axis.
+/// The image lines of the planes through the source that touch a cylinder, with normals away from its axis.
 std::array<Line, 2> tangents(const Bone& bone, double diameter_mm) {
   const Camera view = camera();
   const Eigen::Vector3d source = source_position_mm(view);
@@ -97,7 +97,7 @@ void draw(const Line& line, std::mt19937& random, std::vector<EdgePixel>& pixels
   }
 }
 
-/// Edge pixels anywhere, each with a few beside it as noise has them.
+/// Edge pixels at random places, each with a few neighbours, like edges from noise.
 void scatter(int count, std::mt19937& random, std::vector<EdgePixel>& pixels) {
   for (int i = 0; i < count; ++i) {
     const Eigen::Vector2d at(uniform(random, 1, kWidth - 12), uniform(random, 1, kHeight - 12));
@@ -115,7 +115,7 @@ EdgeMap map_of(std::vector<EdgePixel> pixels, int width = kWidth, int height = k
   return {width, height, std::move(pixels)};
 }
 
-/// What of a bone is in the edge map. The image always shows all of it.
+/// The parts that appear in the edge map. The image always shows all parts.
 struct Shown {
   bool outer = true, canal = true, thigh = true;
   int clutter = 120;
@@ -192,7 +192,7 @@ void validate(const Inputs&, const std::vector<PortInfo>&, const std::vector<Val
     expect(pair.reason.size() > 10, "a pair is rejected without saying why: '" + pair.reason + "'");
 }
 
-/// How far a border is from a true line: in the middle of its length, and in direction.
+/// Error of a border against a true line: in direction, and in the middle of its length.
 struct Offness {
   double angle_deg, middle_mm;
 };
@@ -202,7 +202,7 @@ Offness error_of(const LineSegment& border, const Line& truth) {
           std::abs(truth.distance(0.5 * (border.from_px + border.to_px))) * kDistance_mm / kFocal_px};
 }
 
-/// The larger errors of a pair against two true lines, whichever is which.
+/// The larger errors of a pair against two true lines, in the better of both assignments.
 Offness error_of(const LineSegment& left, const LineSegment& right, const std::array<Line, 2>& truth) {
   const auto both = [&](std::size_t i) {
     const Offness one = error_of(left, truth[i]), other = error_of(right, truth[1 - i]);
@@ -216,7 +216,7 @@ ShaftLines lines_of(const Subject& subject, const Bone& bone) {
   return subject.output(inputs_of(bone), "lines").as<ShaftLines>();
 }
 
-/// The largest over all bones.
+/// The largest figure over all bones.
 double largest(const Subject& subject, const std::function<double(const Bone&, const ShaftLines&)>& figure) {
   double most = 0;
   for (const Bone& bone : bones()) most = std::max(most, figure(bone, lines_of(subject, bone)));
@@ -243,7 +243,7 @@ double canal_unseen_percent(const Subject& subject) {
   return 100.0 * unseen / double(bones().size());
 }
 
-/// The largest error of the width at the isocentre's depth, in its own deviations.
+/// The largest error of the width at the isocentre's depth, in units of the deviation that the node gives.
 double width_error(const Subject& subject) {
   return largest(subject, [](const Bone& bone, const ShaftLines& lines) {
     const double nearer = kDistance_mm / (kDistance_mm + bone.point.z());
@@ -318,7 +318,8 @@ std::vector<Trial> trials() {
 
 Suite shaft_suite() {
   Suite suite{[] { return inputs_of(bones()[0]); }, validate, trials(), {}};
-  const std::string of = "8 hollow cylinders in soft tissue, edges off by 0.6 px, 15 % missing, clutter: ";
+  const std::string of =
+      "8 hollow cylinders in soft tissue, edges with errors of 0.6 px, 15 % of them missing, clutter: ";
   const auto add = [&](const std::string& name, const std::string& what, double limit, const std::string& unit,
                        std::function<double(const Subject&)> measure) {
     suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
@@ -327,23 +328,26 @@ Suite shaft_suite() {
     return error_of(lines.left, lines.right, tangents(bone, bone.outer_mm));
   };
   add("right_pair", of + "pairs that are not the outer borders", 0, "%", wrong_percent);
-  add("angle", of + "largest angle of a border to the true one", 0.15, "deg", [=](const Subject& subject) {
+  add("angle", of + "largest angle between a border and the true one", 0.15, "deg", [=](const Subject& subject) {
     return largest(subject, [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).angle_deg; });
   });
-  add("offset", of + "largest distance of a border, in its middle, from the true one", 0.1, "mm",
+  add("offset", of + "largest distance from the middle of a border to the true one", 0.1, "mm",
       [=](const Subject& subject) {
         return largest(subject,
                        [=](const Bone& bone, const ShaftLines& lines) { return error(bone, lines).middle_mm; });
       });
-  add("width", of + "largest error of the width, in deviations that the node gives", 3, "sigma", width_error);
-  add("length", of + "largest part of the shaft that is missed", 25, "%", length_missed);
-  add("canal_named", of + "without the canal among the rejected pairs", 13, "%", canal_unseen_percent);
-  add("canal_alone", "refuses the canal's borders where there are no others", 0, "", [](const Subject& subject) {
-    return refuses(subject, {false, true, false, 120});
-  });
-  add("tissue_alone", "refuses the limb's borders where there are no others", 0, "", [](const Subject& subject) {
-    return refuses(subject, {false, false, true, 120});
-  });
+  add("width", of + "largest error of the width, in units of the deviation that the node gives", 3, "sigma",
+      width_error);
+  add("length", of + "largest part of the shaft that the borders miss", 25, "%", length_missed);
+  add("canal_named", of + "cases in which the rejected pairs do not include the canal", 13, "%", canal_unseen_percent);
+  add("canal_alone", "refuses an image with no other edges than the canal's borders", 0, "",
+      [](const Subject& subject) {
+        return refuses(subject, {false, true, false, 120});
+      });
+  add("tissue_alone", "refuses an image with no other edges than the limb's borders", 0, "",
+      [](const Subject& subject) {
+        return refuses(subject, {false, false, true, 120});
+      });
   return suite;
 }
 

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What shaft nodes must do.
+/// The checks that every node of the kind shaft must pass.
 Suite shaft_suite();
 
 }  // namespace marrow::conformance

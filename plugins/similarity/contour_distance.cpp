@@ -27,13 +27,13 @@ struct Options {
 
 using marrow::match::weight_of;
 
-/// The offset between outline and edges is sought this far from the one that is given.
+/// The offset between outline and edges is estimated within this distance of the given one.
 constexpr double kMostOffset_px = 3;
 
-/// One point of the outline against the edge nearest to it.
+/// A point of the outline and its nearest edge.
 struct Residual {
-  float along_normal;  ///< signed, positive where the edge lies outside the outline
-  float beyond;        ///< how far the edge lies beyond the point along the outline: 0 on an edge without gaps
+  float along_normal;  ///< signed distance along the normal, positive if the edge lies outside the outline
+  float beyond;  ///< distance along the outline from the point to the end of the edge pixel; 0 on an edge without gaps
   float u, v;
   float normal_u, normal_v;
   Eigen::Vector3f model_mm;
@@ -41,11 +41,11 @@ struct Residual {
 
 struct Matches {
   std::vector<Residual> residuals;
-  std::size_t points = 0;          ///< compared, with or without an edge
-  std::vector<Residual> of_edges;  ///< of the edges near the outline to it; only where both ways count
+  std::size_t points = 0;          ///< number of points compared, with or without an edge
+  std::vector<Residual> of_edges;  ///< from the edges near the outline to the outline; only if the cost is symmetric
 };
 
-/// What does not depend on the level: made once, shared by all.
+/// Data that does not depend on the level. It is made once and shared by all levels.
 struct Scene {
   const marrow::OutlineProjector* projector;
   marrow::List<marrow::View> views;
@@ -63,8 +63,8 @@ class ContourDistance : public marrow::Cost {
     return value_of(views, offset_of(views));
   }
 
-  /// By the motion of each point against its edge, along the normal, both held fast (Gauss-Newton with the weights of
-  /// the loss). The edge offset is one more unknown, eliminated.
+  /// Gauss-Newton with the weights of the loss. Each point keeps its edge and its normal and moves along this normal.
+  /// The edge offset is one more unknown, which is eliminated.
   std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model,
                                      const marrow::FragmentFrame& frame) const override {
     const std::vector<Matches> views = match(world_from_model);
@@ -104,14 +104,14 @@ class ContourDistance : public marrow::Cost {
     return std::make_shared<ContourDistance>(scene_, level);
   }
 
-  /// Ratio between the curvature of the cost and the variance of its slope, both by the residuals at this pose (the
-  /// sandwich of M-estimation: Huber 1981, 6.3). Errors along the outline are related to each other, so the slopes are
-  /// first summed over blocks of the image, and the sums taken as independent. To each block the error of model and
-  /// edges is added that is the same all over it: the fit takes up much of such errors, so the residuals do not tell
-  /// them.
+  /// Ratio between the curvature of the cost and the variance of its slope, both from the residuals at this pose (the
+  /// sandwich estimator of M-estimation: Huber 1981, 6.3). Errors along the outline are correlated. So the slopes are
+  /// first summed over blocks of the image, and the sums are taken as independent. Each block also gets an error of
+  /// model and edges that is common to the whole block. The residuals do not show such errors, because the fit absorbs
+  /// much of them.
   std::optional<double> likelihood_factor(const marrow::RigidTransform& world_from_model) const override {
     constexpr float kBlock_px = 32;
-    constexpr double kLeastNoise_px = 0.05;  // no edge pixel is known better than this
+    constexpr double kLeastNoise_px = 0.05;  // no edge pixel is more accurate than this
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
     double curvature = 0, variance = 0, weights = 0;
@@ -142,7 +142,7 @@ class ContourDistance : public marrow::Cost {
   }
 
  private:
-  /// Fewer points in a view than this many are filled up with unmatched ones.
+  /// If a view has fewer points than this, the missing ones count as unmatched.
   double least_points() const { return 60 / level_.contour_spacing_px; }
 
   double value_of(const std::vector<Matches>& views, double offset) const {
@@ -153,7 +153,7 @@ class ContourDistance : public marrow::Cost {
     return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
-  /// How far a point moves along its normal in the image, for each motion about the frame.
+  /// Derivative of a point's motion along its normal in the image, with respect to the six parameters of the motion.
   static marrow::Vector6d outward_motion_px(const Residual& r, const marrow::Camera& camera,
                                             const marrow::RigidTransform& camera_from_model,
                                             const marrow::FragmentFrame& frame) {
@@ -168,18 +168,19 @@ class ContourDistance : public marrow::Cost {
     return motion;
   }
 
-  /// The mean over the points of the outline.
+  /// The mean loss over the points of the outline.
   double forward(const Matches& view, double offset) const {
     double sum = 0;
     for (const Residual& r : view.residuals) sum += loss_(distance2(r, offset));
-    // Outline that leaves the image costs nothing, but a view that shows hardly any is no evidence.
+    // Parts of the outline outside the image cost nothing. But a view that shows very little of the outline is no
+    // evidence.
     const double points = std::max(double(view.points), least_points());
     return (sum + (points - double(view.residuals.size())) * loss_.worst()) / points;
   }
 
-  /// The same from the edges back to the outline: what each edge near it takes off the worst, over the length of the
-  /// outline in pixels, for each of which an image has one edge. Edges further off belong to something else, and so
-  /// count nothing.
+  /// The same in the other direction, from the edges to the outline: the worst loss minus the gain of each edge near
+  /// the outline, divided by the length of the outline in pixels. (A perfect image has one edge for each of these
+  /// pixels.) Edges farther away belong to something else and do not count.
   double backward(const Matches& view, double offset) const {
     double gain = 0;
     for (const Residual& r : view.of_edges) gain += loss_.worst() - loss_(distance2(r, offset));
@@ -199,7 +200,7 @@ class ContourDistance : public marrow::Cost {
   }
 
   Matches match(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;  // edge detectors see nothing at the very border of an image
+    constexpr float kMargin_px = 3;  // edge detectors find nothing next to the border of an image
     const marrow::View& view = scene_->views[index];
     const float right = float(view.camera.width_px - 1) - kMargin_px,
                 bottom = float(view.camera.height_px - 1) - kMargin_px;
@@ -233,7 +234,7 @@ class ContourDistance : public marrow::Cost {
   }
 
   static Residual residual(const marrow::OutlinePoint& p, const marrow::EdgePixel& edge) {
-    constexpr float kOwnLength_px = 1.5f;  // an edge pixel stands for this much of border on either side
+    constexpr float kOwnLength_px = 1.5f;  // an edge pixel represents this length of the edge on each side
     const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px;
     const float along = std::abs(dv * p.normal_u - du * p.normal_v);
     return {du * p.normal_u + dv * p.normal_v,
@@ -245,9 +246,9 @@ class ContourDistance : public marrow::Cost {
             p.model_mm};
   }
 
-  /// How far the images' edges lie outside the model's outline, the same in all views: X-ray edges of a round bone lie
-  /// inside its silhouette, and a segmented model may be too fat or too thin. The value that costs least at this pose,
-  /// by iteratively reweighted means.
+  /// Distance of the images' edges outside the model's outline, the same in all views. It is needed because X-ray edges
+  /// of a round bone lie inside its silhouette, and a segmented model may be too thick or too thin. It is the value
+  /// with the least cost at this pose, by iteratively reweighted means.
   double offset_of(const std::vector<Matches>& views) const {
     constexpr int kRounds = 5;
     double offset = scene_->options.edge_offset_px;
@@ -307,34 +308,37 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjec
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.contour_distance", contour_distance)
       .summary(
-          "Mean distance from the points of the projected outline to the nearest edges of like direction, over all "
+          "Mean distance from the points of the projected outline to the nearest edges of similar direction, over all "
           "views")
       .trait("derivatives")
-      .in("projector", "draws the outline of the model")
+      .in("projector", "projector that gives the outline of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
-      .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
-      .in("other_projectors", "draw their outlines, and maybe this one's", marrow::over("fragment"))
+      .in("others", "poses of other fragments; edges of these fragments are left out", marrow::over("fragment"))
+      .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
+          marrow::over("fragment"))
       .out("cost", "mean distance [px]")
-      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between points of the outline",
+      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between two points of the outline",
               marrow::at_least(0.25))
-      .option("reach_px", &Options::reach_px, "distance from which on a point counts as unmatched",
+      .option("reach_px", &Options::reach_px, "a point with no edge within this distance counts as unmatched",
               marrow::at_least(0.5))
-      .option("scale_px", &Options::scale_px, "distances below this count by their squares", marrow::at_least(0.01))
+      .option("scale_px", &Options::scale_px, "distances below about this count by their squares",
+              marrow::at_least(0.01))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "by how much the directions of edge and outline may differ", marrow::at_least(10), marrow::at_most(180))
+              "largest angle between the directions of edge and outline", marrow::at_least(10), marrow::at_most(180))
       .option("edge_offset_px", &Options::edge_offset_px,
-              "how far edges lie outside the model's outline; where it is estimated, the middle of the +-3 px that are "
-              "tried")
+              "distance of the edges outside the model's outline; if estimate_offset is set, the middle of the range "
+              "of +-3 px that is tried")
       .option("estimate_offset", &Options::estimate_offset,
-              "find, at each pose, the edge offset common to all views that fits best")
+              "find the best edge offset at each pose; it is the same in all views")
       .option("model_error_px", &Options::model_error_px,
-              "for the predicted deviation: how far model and edges may differ all along 32 px of outline",
+              "for the predicted deviation: common error of model and edges along 32 px of outline",
               marrow::at_least(0))
       .option("symmetric", &Options::symmetric,
-              "half of the cost: distances from the edges near the outline back to it")
+              "half of the cost comes from the distances in the other direction, from the edges near the outline to "
+              "the outline")
       .option("others_reach_px", &Options::others_reach_px,
-              "edges as near as this to another fragment's outline are its own", marrow::at_least(0),
+              "edges within this distance of another fragment's outline belong to that fragment", marrow::at_least(0),
               marrow::at_most(50))
-      .option("weights", &Options::weights, "of each view; none: all the same");
+      .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

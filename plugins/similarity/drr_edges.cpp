@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Edges of the radiograph against edges of the image: both are gradient maxima of something blurred, so both lie inside
-// the bone's outline by about as much, where a surface's own outline does not (docs/method.md, Stage 2). Radiograph's
-// edges against the image's: Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med
-// Imaging 1998) compare gradients; here the truncated distance of the contour cost is taken.
+// Edges of the rendered radiograph (DRR) against edges of the image. Both are gradient maxima of a blurred image, so
+// blur moves both inside the bone's outline by about the same distance. This is not so for the outline of a surface
+// (docs/method.md, Stage 2). Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med
+// Imaging 1998) compare the gradients of radiograph and image. Here the truncated distance of the contour cost is used.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -25,13 +25,14 @@ struct Options {
   std::vector<double> weights;
 };
 
-/// An edge of the radiograph, as edge pixels are, with what it counts.
+/// An edge pixel of the radiograph with its weight.
 struct DrawnEdge {
   float u, v, direction_u, direction_v, weight;
 };
 
-/// Ridges of the gradient's magnitude, sub-pixel by a parabola across (Canny 1986; Devernay 1995). An edge counts the
-/// more the steeper it is, from nothing at the threshold to 1 at twice of it, so that none appears or vanishes at once.
+/// Ridges of the gradient's magnitude. A parabola across the ridge gives the sub-pixel position (Canny 1986; Devernay
+/// 1995). The weight rises from 0 at the threshold to 1 at twice the threshold, so that no edge appears or vanishes
+/// suddenly.
 std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGrid& grid, double threshold_percent) {
   cv::Mat du, dv, magnitude;
   cv::Sobel(radiograph, du, CV_32F, 1, 0, 3, 0.125);
@@ -47,7 +48,8 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
       const float here = magnitude.at<float>(row, column);
       if (here <= threshold) continue;
       const float x = du.at<float>(row, column), y = dv.at<float>(row, column);
-      // Neighbours one step across along the longer axis, between two pixels along the other.
+      // Neighbours across the ridge: one step along the axis of the larger component, interpolated along the other
+      // axis.
       const bool level = std::abs(x) >= std::abs(y);
       const float slope = level ? y / x : x / y;
       const int side = slope >= 0 ? 1 : -1;
@@ -64,13 +66,13 @@ std::vector<DrawnEdge> edges_of(const cv::Mat& radiograph, const marrow::PixelGr
       const float moved_u = level ? off : off * slope, moved_v = level ? off * slope : off;
       const Eigen::Vector2d at = grid.pixel(0, 0) + grid.step_px * Eigen::Vector2d(double(column) + double(moved_u),
                                                                                    double(row) + double(moved_v));
-      // Bone is where the integral is large, and brighter means less of it.
+      // The direction of an edge points to the brighter side, where the line integral is smaller.
       edges.push_back({float(at.x()), float(at.y()), -x / here, -y / here, std::min(here / threshold - 1, 1.0f)});
     }
   return edges;
 }
 
-/// What does not depend on the level: made once, shared by all.
+/// Data that does not depend on the level. It is made once and shared by all levels.
 struct Scene {
   const marrow::RadiographProjector* projector;
   marrow::List<marrow::View> views;
@@ -96,7 +98,7 @@ class DrrEdges : public marrow::Cost {
 
  private:
   double value_in(std::size_t index, const marrow::RigidTransform& world_from_model) const {
-    constexpr float kMargin_px = 3;  // edge detectors see nothing at the very border of an image
+    constexpr float kMargin_px = 3;  // edge detectors find nothing next to the border of an image
     const marrow::View& view = scene_->views[index];
     const marrow::Camera& camera = view.camera;
     const marrow::PixelGrid region = scene_->projector->region(camera, world_from_model);
@@ -107,7 +109,7 @@ class DrrEdges : public marrow::Cost {
                                  int((region.rows + 2 * margin) / step_) + 1};
     std::vector<float> values = scene_->projector->radiograph(camera, world_from_model, grid);
     cv::Mat radiograph(grid.rows, grid.columns, CV_32F, values.data());
-    // Steps and Sobel's operator smooth already.
+    // The pixel step and Sobel's operator already smooth the radiograph.
     const double own2 = 0.5 * step_ * step_, blur2 = scene_->options.blur_px * scene_->options.blur_px - own2;
     if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
       cv::GaussianBlur(radiograph, radiograph, {}, blur);
@@ -120,12 +122,13 @@ class DrrEdges : public marrow::Cost {
       weights += double(edge.weight);
       sum += double(edge.weight) * loss_(distance2(index, edge));
     }
-    // A view that shows hardly any is no evidence.
+    // A view that shows very few edges of the radiograph is no evidence.
     const double least = 60.0 / step_;
     return (sum + std::max(0.0, least - weights) * loss_.worst()) / std::max(weights, least);
   }
 
-  /// To the nearest edge of like direction: across the edge, and along it what goes beyond an edge pixel's own length.
+  /// Squared distance to the nearest edge of similar direction. The distance along the edge counts only beyond the
+  /// length that an edge pixel represents.
   double distance2(std::size_t view, const DrawnEdge& edge) const {
     constexpr float kOwnLength_px = 1.5f;
     const marrow::EdgePixel* nearest = scene_->edges[view].find(edge.u, edge.v, edge.direction_u, edge.direction_v);
@@ -168,27 +171,31 @@ std::shared_ptr<const marrow::Cost> drr_edges(const marrow::RadiographProjector&
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.drr_edges", drr_edges)
       .summary(
-          "Mean distance from the radiograph's edges to the image's nearest edges of like direction, both displaced "
-          "alike by blur")
+          "Mean distance from the edges of the radiograph (DRR) to the nearest edges of the image with similar "
+          "direction; blur shifts both by the same distance")
       .in("projector", "makes radiographs of the model")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
-      .in("outline", "draws this fragment's outline: tells it from the others")
-      .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
-      .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
+      .in("outline", "projector of this fragment's outline; it identifies this fragment in other_projectors")
+      .in("others", "poses of other fragments; edges of these fragments are left out", marrow::over("fragment"))
+      .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
+          marrow::over("fragment"))
       .out("cost", "mean distance [px]")
-      .option("pixel_step", &Options::pixel_step, "every how many pixels the radiograph is drawn", marrow::at_least(1),
+      .option("pixel_step", &Options::pixel_step, "the radiograph is computed at every n-th pixel", marrow::at_least(1),
               marrow::at_most(16))
       .option("blur_px", &Options::blur_px,
-              "of the radiograph, as the edges' detector and the device blur the image: standard deviation",
+              "blur of the radiograph (standard deviation); should equal the blur of the edges by the X-ray device and "
+              "the edge extractor",
               marrow::at_least(0), marrow::at_most(10))
       .option("threshold_percent", &Options::threshold_percent,
-              "of the radiograph's steepest gradient, from which on there is an edge", marrow::at_least(0.1),
+              "least gradient of an edge, as a percentage of the radiograph's steepest gradient", marrow::at_least(0.1),
               marrow::at_most(90), marrow::unit("%"))
-      .option("reach_px", &Options::reach_px, "distance from which on an edge counts as unmatched",
+      .option("reach_px", &Options::reach_px,
+              "an edge of the radiograph with no edge of the image within this distance counts as unmatched",
               marrow::at_least(0.5))
-      .option("scale_px", &Options::scale_px, "distances below this count by their squares", marrow::at_least(0.01))
+      .option("scale_px", &Options::scale_px, "distances below about this count by their squares",
+              marrow::at_least(0.01))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "by how much the directions of the edges may differ", marrow::at_least(10), marrow::at_most(180))
-      .option("weights", &Options::weights, "of each view; none: all the same");
+              "largest angle between the directions of the edges", marrow::at_least(10), marrow::at_most(180))
+      .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

@@ -12,13 +12,14 @@ struct Options : marrow::match::IntensityOptions {
   int bins = 64;
 };
 
-/// Entropy of the whole image after scale * rendered is taken off, over its entropy before. Bins are as wide as a part
-/// of the image's own range, and go as far below it, where the difference may lie.
+/// Entropy of the whole image after scale * rendered is subtracted, divided by its entropy before. Bins cover the
+/// image's own range, and the same range below it for values of the difference.
 marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
   const int bins = options.bins;
   marrow::match::Bins within = bins_of(whole.seen, whole.counts, bins);
   if (within.per_unit == 0) return [](const Patch&) { return 1.0; };
-  within.low -= (bins + 0.5) / within.per_unit;  // the brightest, often the background, in the middle of its bin
+  // The lowest integral, often that of the background, lies in the middle of its bin.
+  within.low -= (bins + 0.5) / within.per_unit;
   within.count = 2 * bins + 1;
   std::vector<double> image(static_cast<std::size_t>(within.count));
   double n = 0;
@@ -45,10 +46,10 @@ constexpr auto entropy_of_difference = marrow::match::intensity_node<measure_of,
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.entropy_of_difference", entropy_of_difference);
   node.summary(
-          "Entropy of the difference image over that of the image (Buzug et al. 1997; Penney et al., IEEE Trans Med "
-          "Imaging 1998)")
+          "Entropy of the difference between image and radiograph, divided by the entropy of the image (Buzug et al. "
+          "1997; Penney et al., IEEE Trans Med Imaging 1998)")
       .trait("unmoved_by_gain");
   marrow::match::declare<Options>(node);
-  node.option("bins", &Options::bins, "of the histogram, as wide as of the image's", marrow::at_least(4),
-              marrow::at_most(1024));
+  node.option("bins", &Options::bins, "number of bins of the histogram over the image's range of values",
+              marrow::at_least(4), marrow::at_most(1024));
 }

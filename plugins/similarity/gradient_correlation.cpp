@@ -20,8 +20,8 @@ constexpr auto gradient_correlation = marrow::match::intensity_node<value>;
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_correlation", gradient_correlation);
   node.summary(
-          "1 - mean correlation of the horizontal and of the vertical gradients (Penney et al., IEEE Trans Med Imaging "
-          "1998)")
+          "1 - mean of the correlations of the horizontal and of the vertical gradients (Penney et al., IEEE Trans Med "
+          "Imaging 1998)")
       .trait("unmoved_by_gain");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

@@ -9,9 +9,9 @@ namespace {
 
 using marrow::match::Patch;
 
-/// Structure left: the sums over the image, for each of the two directions, of 1 - A / (A + d^2), with d the difference
-/// of gradients and A the variance of the image's, over the same sums without the model. That is Penney's sum over a
-/// fixed region, the image, but for constants.
+/// Remaining structure: the sums over the image, for both directions, of 1 - A / (A + d^2), divided by the same sums
+/// without the model. d is the difference of the gradients, and A the variance of the image's gradients. Except for
+/// constants, this is Penney's sum over a fixed region, the image.
 marrow::match::Measure measure_of(const Patch& whole) {
   Patch unseen = whole;
   unseen.rendered.assign(whole.seen.size(), 0.0f);
@@ -45,8 +45,8 @@ constexpr auto gradient_difference = marrow::match::intensity_node<measure_of>;
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_difference", gradient_difference);
   node.summary(
-          "Gradients that the difference image has left of the image's (gradient difference), which thin bright lines "
-          "hardly disturb (Penney et al., IEEE Trans Med Imaging 1998)")
+          "Gradients that remain after the radiograph is subtracted from the image (gradient difference); thin bright "
+          "lines hardly disturb this measure (Penney et al., IEEE Trans Med Imaging 1998)")
       .trait("unmoved_by_gain");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

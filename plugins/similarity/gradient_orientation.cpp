@@ -19,8 +19,8 @@ double median_length(const std::vector<float>& u, const std::vector<float>& v, c
   return lengths[lengths.size() / 2];
 }
 
-/// Mean of (1 - cos of the angle) / 2 where both gradients are longer than the median of theirs; over a tenth of the
-/// pixels at least.
+/// Mean of (1 - cos(angle)) / 2 over the pixels where both gradients are longer than their medians. If these are less
+/// than a tenth of the pixels, the missing ones count as 1.
 double value(const Patch& patch) {
   const marrow::match::Gradients g = marrow::match::gradients_of(patch);
   const double least_rendered = median_length(g.rendered_u, g.rendered_v, g.counts),
@@ -44,8 +44,8 @@ constexpr auto gradient_orientation = marrow::match::intensity_node<value, marro
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.gradient_orientation", gradient_orientation);
   node.summary(
-          "How far the directions of gradients differ (after De Silva et al., Phys Med Biol 2016, with the cosine for "
-          "its logarithm)")
+          "Difference between the directions of the gradients (after De Silva et al., Phys Med Biol 2016, with the "
+          "cosine instead of the logarithm)")
       .trait("unmoved_by_gain");
   marrow::match::declare<marrow::match::IntensityOptions>(node);
 }

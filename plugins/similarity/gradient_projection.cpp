@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Gradients of the images, projected back to the surface, against those of the CT: Tomazevic, Likar, Slivnik and Pernus
-// (IEEE Trans Med Imaging 22(11), 2003), only where rays touch the surface as Livyatan, Yaniv and Joskowicz do (same
-// issue). Needs no radiograph and no edges.
+// Compares gradients of the images, back-projected to the surface, with gradients of the CT (Tomazevic, Likar, Slivnik
+// and Pernus, IEEE Trans Med Imaging 22(11), 2003). It does so only where rays touch the surface, as Livyatan, Yaniv
+// and Joskowicz do (same issue). It needs no radiograph and no edges.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -19,19 +19,21 @@ struct Options {
   std::vector<double> weights;
 };
 
-/// A point of the surface, and there the CT's gradient [HU/mm]: towards bone.
+/// A point of the surface and the CT's gradient there: the unit vector `direction` towards bone, and its length
+/// `strength`, first in HU/mm, then relative to the median.
 struct SurfacePoint {
   Eigen::Vector3d point_mm, normal, direction;
   double strength = 0;
 };
 
-/// A view's gradients: of line integrals, so towards bone as well, in units of the steep ones.
+/// Gradients of a view's line integrals, so they point towards bone too. They are in units of the view's steep
+/// gradients.
 struct GradientImage {
   cv::Mat u, v;    ///< CV_32F
   cv::Mat counts;  ///< CV_8U
 };
 
-/// The gradient of the trilinear volume over one voxel to each side.
+/// The gradient in HU/mm: central differences of trilinear values, one voxel to each side.
 Eigen::Vector3d gradient_at(const marrow::Volume& volume, const Eigen::Vector3d& point_mm) {
   const Eigen::Vector3d index = volume.grid.index_from_point(point_mm);
   Eigen::Vector3d slope;
@@ -45,7 +47,7 @@ Eigen::Vector3d gradient_at(const marrow::Volume& volume, const Eigen::Vector3d&
   return volume.grid.direction * slope;
 }
 
-/// Points of the surface where the CT changes across it; within two voxels of its end it does not tell.
+/// Points of the surface where the CT has a gradient. Points within two voxels of the CT's end are left out.
 std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::Mesh& mesh, int count) {
   std::vector<SurfacePoint> points;
   for (const Eigen::Vector3d& at : marrow::sample_surface(mesh, std::size_t(count))) {
@@ -55,12 +57,12 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
       is_inside = is_inside && index[k] >= 2 && index[k] <= volume.grid.size[std::size_t(k)] - 3;
     if (!is_inside) continue;
     const Eigen::Vector3d slope = gradient_at(volume, at);
-    // The CT's own gradient is the normal as well: less rough than the triangles'.
+    // The CT's gradient also gives the normal, because it is smoother than the triangles' normals.
     if (slope.norm() > 1e-6) points.push_back({at, -slope.normalized(), slope.normalized(), slope.norm()});
   }
   if (points.empty())
     throw marrow::Error("the volume has no gradient on the mesh: wire the volume that the mesh was made from");
-  // One bright spot shall not outweigh the rest.
+  // A single bright spot must not outweigh all other points.
   std::vector<double> strengths;
   for (const SurfacePoint& point : points) strengths.push_back(point.strength);
   std::nth_element(strengths.begin(), strengths.begin() + std::ptrdiff_t(strengths.size() / 2), strengths.end());
@@ -74,7 +76,7 @@ GradientImage gradients_of(const marrow::View& view, double blur_px) {
   cv::Mat smooth = marrow::match::line_integrals(view.image.pixels);
   image.counts = view.mask.empty() ? cv::Mat(smooth.size(), CV_8U, cv::Scalar(1)) : cv::Mat((view.mask != 0) & 1);
   image.counts.setTo(0, smooth != smooth);
-  // Near the mask's end a gradient is in part of what lies beyond.
+  // Near the border of the mask, a gradient depends on pixels outside the mask.
   const int reach = int(std::ceil(4 * blur_px)) + 1;
   cv::erode(image.counts, image.counts, cv::Mat::ones(2 * reach + 1, 2 * reach + 1, CV_8U));
   cv::patchNaNs(smooth, 0);
@@ -93,7 +95,7 @@ GradientImage gradients_of(const marrow::View& view, double blur_px) {
     std::nth_element(steep.begin(), at, steep.end());
     unit = *at;
   }
-  const double scale = unit > 1e-6f ? 1 / double(unit) : 0;  // of an even image nothing is left
+  const double scale = unit > 1e-6f ? 1 / double(unit) : 0;  // a constant image has no gradients
   image.u *= scale;
   image.v *= scale;
   return image;
@@ -118,19 +120,19 @@ class GradientProjection : public marrow::Cost {
     return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
-  /// Fewer points where an outline's would be further apart; smoother images where pixels would be.
+  /// Uses fewer points on levels with a wider contour spacing, and smoother images on levels with a larger pixel step.
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
     const std::size_t step = std::size_t(std::clamp(level.contour_spacing_px, 1.0, 16.0));
     return std::make_shared<GradientProjection>(scene_, scene_->options.blur_px * std::max(1, level.pixel_step), step);
   }
 
  private:
-  /// Of Tomazevic's criterion, the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle: over
-  /// the sum of |a|, with |b| in units of the image's own steep gradients and no more than 1, so that a few steep ones
-  /// do not decide. Each point counts by exp(-s^2/2): s = sine of the angle between ray and surface, over that of
-  /// touch_deg.
+  /// Tomazevic's criterion is the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle. Here it
+  /// is divided by the sum of |a|. |b| is in units of the image's own steep gradients and at most 1, so that a few
+  /// steep ones do not dominate. The weight of a point is exp(-s^2 / 2), where s is the sine of the angle between ray
+  /// and surface, divided by the sine of touch_deg.
   double value_in(std::size_t view, const marrow::RigidTransform& world_from_model) const {
-    constexpr double kLeastShare = 0.1;  // of the weight of all, that must lie inside of image and mask
+    constexpr double kLeastShare = 0.1;  // least part of the whole weight that must lie inside image and mask
     const marrow::Camera& camera = scene_->views[view].camera;
     const marrow::RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
     const Eigen::Vector3d source = inverse(camera_from_model).translation_mm;
@@ -153,8 +155,9 @@ class GradientProjection : public marrow::Cost {
     return inside > 0 ? 1 - sum / inside : 1;
   }
 
-  /// min(|b|, 1) cos^4 of the angle between the CT's gradient and the image's, projected back: what the image's value
-  /// at the point's pixel would change by as the point moved, so at right angles to the ray.
+  /// min(|b|, 1) cos^4(angle between the CT's gradient and the back-projected image gradient). The back-projected
+  /// gradient is the derivative of the image's value at the point's pixel by the position of the point. So it is
+  /// perpendicular to the ray.
   static double likeness(const marrow::Camera& camera, const Eigen::Vector3d& at, const Eigen::Vector3d& direction,
                          const Eigen::Vector2d& g) {
     const double strength = g.norm();
@@ -166,7 +169,7 @@ class GradientProjection : public marrow::Cost {
     return cosine > 0 ? std::min(strength, 1.0) * std::pow(cosine, 4) : 0;
   }
 
-  /// Bilinear; false where a pixel is out or does not count.
+  /// Bilinear interpolation. False if one of the four pixels is outside the image or does not count.
   static bool sample(const GradientImage& image, const Eigen::Vector2d& pixel, Eigen::Vector2d& g) {
     if (!(pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < image.u.cols - 1 && pixel.y() < image.u.rows - 1))
       return false;
@@ -213,23 +216,28 @@ std::shared_ptr<const marrow::Cost> gradient_projection(
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.gradient_projection", gradient_projection)
       .summary(
-          "1 - likeness of the images' gradients, projected back, and the CT's where rays touch the bone (Tomazevic et "
-          "al.; Livyatan et al., IEEE TMI 2003)")
+          "1 - similarity of the back-projected image gradients and the CT's gradients where rays touch the bone "
+          "(Tomazevic et al.; Livyatan et al., IEEE TMI 2003)")
       .trait("unmoved_by_gain")
       .in("mesh", "surface of the bone")
-      .in("volume", "CT that the surface was made from")
+      .in("volume", "CT from which the surface was made")
       .in("views", "views with their cameras and masks", marrow::over("view"))
-      .in("projector", "makes radiographs of this fragment: tells it from the others")
-      .in("others", "where other fragments are, whose shadows are left out", marrow::over("fragment"))
-      .in("other_projectors", "draw them, and maybe this one", marrow::over("fragment"))
-      .in("other_outlines", "draw other bodies that are known as surfaces only; their shadows are left out",
+      .in("projector", "projector of this fragment's radiographs; it identifies this fragment in other_projectors")
+      .in("others", "poses of other fragments; pixels that show these fragments are left out", marrow::over("fragment"))
+      .in("other_projectors", "projectors of the other fragments' radiographs; this fragment's own may be among them",
           marrow::over("fragment"))
-      .out("cost", "how badly the gradients agree, 0 to 1")
-      .option("points", &Options::points, "spread over the surface, of which those near its outlines count",
-              marrow::at_least(100), marrow::at_most(1000000))
-      .option("blur_px", &Options::blur_px, "smoothing of the images: standard deviation of a Gaussian",
+      .in("other_outlines",
+          "outline projectors of other bodies that are known only as surfaces; pixels that show these bodies are left "
+          "out",
+          marrow::over("fragment"))
+      .out("cost", "disagreement of the gradients, from 0 to 1")
+      .option("points", &Options::points,
+              "number of points spread over the surface; only points near its outlines count", marrow::at_least(100),
+              marrow::at_most(1000000))
+      .option("blur_px", &Options::blur_px, "standard deviation of the Gaussian that smooths the images",
               marrow::at_least(0.5), marrow::at_most(20))
-      .option("touch_deg", &Options::touch_deg, "angle between ray and surface by which a point counts less",
+      .option("touch_deg", &Options::touch_deg,
+              "the larger the angle between ray and surface compared with this angle, the less a point counts",
               marrow::at_least(1), marrow::at_most(45))
-      .option("weights", &Options::weights, "of each view; none: all the same");
+      .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

@@ -1,26 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that compare a model with images.
 #include <marrow/plugin.hpp>
 
 #include "suite.hpp"
 
 MARROW_PLUGIN(plugin) {
   plugin.kind("similarity")
-      .summary("how badly a pose explains the images")
+      .summary("cost of a pose: how badly it explains the images")
       .in<marrow::OutlineProjector, marrow::RadiographProjector>("projector", "draws the model for any camera and pose")
-      .in<marrow::OutlineProjector>("outline", "draws this fragment's outline, where 'projector' makes radiographs")
+      .in<marrow::OutlineProjector>("outline", "projector of this fragment's outline, if 'projector' makes radiographs")
       .in<marrow::Mesh>("mesh", "surface of the bone")
-      .in<marrow::Volume>("volume", "CT that the surface was made from")
+      .in<marrow::Volume>("volume", "CT from which the surface was made")
       .in<marrow::SignedField>("field", "signed distance to the surface")
       .in<marrow::View>("views", "views with their cameras and masks", marrow::over("view"))
       .in<marrow::EdgeMap>("edges", "edge pixels of each view", marrow::over("view"))
-      .in<marrow::Pose>("others", "where other fragments are, which are left out", marrow::over("fragment"))
+      .in<marrow::Pose>("others", "poses of other fragments, which are left out of the comparison",
+                        marrow::over("fragment"))
       .in<marrow::OutlineProjector, marrow::RadiographProjector>(
-          "other_projectors", "draw the other fragments, and maybe this one", marrow::over("fragment"))
-      .in<marrow::OutlineProjector>("other_outlines", "draw other bodies that are known as surfaces only",
+          "other_projectors", "projectors of the other fragments; this fragment's own may be among them",
+          marrow::over("fragment"))
+      .in<marrow::OutlineProjector>("other_outlines",
+                                    "outline projectors of other bodies that are known only as surfaces",
                                     marrow::over("fragment"))
-      .out<marrow::Cost>("cost", "how badly a pose explains the images; smaller is better")
-      .trait("derivatives", "its costs know their derivatives")
+      .out<marrow::Cost>("cost", "cost of a pose: how badly it explains the images; smaller is better")
+      .trait("derivatives", "its costs have derivatives")
       .trait("unmoved_by_gain", "gain and offset of the line integrals do not change its costs")
       .suite(marrow::conformance::similarity_suite());
 }

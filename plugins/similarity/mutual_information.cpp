@@ -13,7 +13,7 @@ struct Options : marrow::match::IntensityOptions {
   int bins = 32;
 };
 
-/// 2 - (H(a) + H(b)) / H(a, b): 0 where one tells the other, 1 where neither tells anything of the other.
+/// 2 - (H(a) + H(b)) / H(a, b): 0 if a and b determine each other, 1 if they are independent.
 double value(const Patch& patch, const Options& options) {
   const int bins = options.bins;
   const auto a = bins_of(patch.rendered, patch.counts, bins), b = bins_of(patch.seen, patch.counts, bins);
@@ -38,9 +38,9 @@ constexpr auto mutual_information = marrow::match::intensity_node<value, Options
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.mutual_information", mutual_information);
   node.summary(
-          "2 - normalised mutual information, which knows no relation of grey values (Studholme et al. 1999; Penney et "
-          "al. 1998)")
+          "2 - normalised mutual information; it assumes no particular relation between the grey values (Studholme et "
+          "al. 1999; Penney et al. 1998)")
       .trait("unmoved_by_gain");
   marrow::match::declare<Options>(node);
-  node.option("bins", &Options::bins, "of the histograms", marrow::at_least(4), marrow::at_most(256));
+  node.option("bins", &Options::bins, "number of bins of each histogram", marrow::at_least(4), marrow::at_most(256));
 }

@@ -18,8 +18,8 @@ constexpr auto patch_correlation = marrow::match::intensity_node<value, PatchOpt
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.patch_correlation", patch_correlation);
   node.summary(
-          "1 - correlation of grey values within small squares, weighted by the radiograph's variance (LaRose 2001; "
-          "Knaan and Joskowicz, MICCAI 2003)")
+          "1 - mean correlation of the grey values within small squares, weighted by the radiograph's variance (LaRose "
+          "2001; Knaan and Joskowicz, MICCAI 2003)")
       .trait("unmoved_by_gain");
   marrow::match::declare_patches(node);
 }

@@ -20,8 +20,8 @@ constexpr auto patch_gradient_correlation = marrow::match::intensity_node<value,
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.patch_gradient_correlation", patch_gradient_correlation);
   node.summary(
-          "1 - correlation of gradients within small squares, weighted by the radiograph's (Grupp et al., IEEE Trans "
-          "Biomed Eng 2020)")
+          "1 - mean correlation of the gradients within small squares, weighted by the variance of the radiograph's "
+          "gradients (Grupp et al., IEEE Trans Biomed Eng 2020)")
       .trait("unmoved_by_gain");
   marrow::match::declare_patches(node);
 }

@@ -13,7 +13,8 @@ struct Options : marrow::match::IntensityOptions {
   double sigma = 0.5;
 };
 
-/// Pairs of pixels within the radius that count, each once: of(i, j) of their places in the patch.
+/// Calls of(i, j) once for each pair of pixels that count and lie within the radius; i and j are their indices in the
+/// patch.
 template <class Of>
 void each_pair(const Patch& patch, int radius, const Of& of) {
   for (int row = 0; row < patch.rows; ++row)
@@ -27,10 +28,10 @@ void each_pair(const Patch& patch, int radius, const Of& of) {
       }
 }
 
-/// Structure left: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), D = seen - scale * rendered
-/// and s the given part of the deviation of the image, over the same sum without the model. That is Weese's and
-/// Penney's sum over a fixed region, the image, but for constants; a mean over the model's surroundings would be best
-/// where the image is even.
+/// Remaining structure: the sum over all pairs in the image of 1 - s^2 / (s^2 + (D_i - D_j)^2), divided by the same sum
+/// without the model. D = seen - scale * rendered, and s is the given fraction of the image's standard deviation.
+/// Except for constants, this is the sum of Weese and of Penney over a fixed region, the image. A mean over the
+/// surroundings of the model would be lowest where the image is flat.
 marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
   const double deviation = marrow::match::deviation(whole.seen, whole.counts),
                s2 = std::pow(options.sigma * deviation, 2);
@@ -58,12 +59,12 @@ constexpr auto pattern_intensity = marrow::match::intensity_node<measure_of, Opt
 MARROW_PLUGIN(plugin) {
   auto node = plugin.node("similarity.pattern_intensity", pattern_intensity);
   node.summary(
-          "Structure that the difference image has left of the image's (pattern intensity: Weese et al., IEEE Trans "
-          "Inf Technol Biomed 1997; Penney et al. 1998)")
+          "Structure that remains after the radiograph is subtracted from the image (pattern intensity: Weese et al., "
+          "IEEE Trans Inf Technol Biomed 1997; Penney et al. 1998)")
       .trait("unmoved_by_gain");
   marrow::match::declare<Options>(node);
-  node.option("radius_pixels", &Options::radius_pixels, "of the neighbourhood", marrow::at_least(1),
+  node.option("radius_pixels", &Options::radius_pixels, "radius of the neighbourhood", marrow::at_least(1),
               marrow::at_most(20))
-      .option("sigma", &Options::sigma, "differences below it are no structure, in deviations of the image",
+      .option("sigma", &Options::sigma, "smaller differences are not structure; in standard deviations of the image",
               marrow::at_least(1e-3), marrow::unit("1"));
 }

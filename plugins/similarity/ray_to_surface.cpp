@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): where the pose is right, the ray from the
-// source through an edge of the image touches the surface, so the signed distance has a minimum of 0 along it (their
-// section 3). Needs no outline.
+// Lavallee and Szeliski (IEEE Trans Pattern Anal Mach Intell 17(4), 1995): if the pose is right, the ray from the
+// source through an edge of the image touches the surface. So the signed distance has a minimum of 0 along the ray
+// (their section 3). No outline is needed.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -19,7 +19,7 @@ struct Options {
   std::vector<double> weights;
 };
 
-/// A signed distance where it matters: in the box of all voxels nearer than its largest value.
+/// A signed distance, restricted to the box of all voxels whose distance is below the largest value.
 class Distance {
  public:
   explicit Distance(const marrow::SignedField& field) : field_(field) {
@@ -43,7 +43,8 @@ class Distance {
   float most_mm() const { return most_; }
   const marrow::Grid& grid() const { return field_.grid; }
 
-  /// Part of the line inside the box, in units of the direction and in front of its start; empty where from >= to.
+  /// The part of the line that lies inside the box and in front of its start, in units of the direction. Empty if from
+  /// >= to.
   std::pair<double, double> span(const Eigen::Vector3d& start, const Eigen::Vector3d& direction) const {
     double from = 0, to = 1e30;
     for (int k = 0; k < 3; ++k) {
@@ -58,7 +59,7 @@ class Distance {
     return {from, to};
   }
 
-  /// Trilinear, at an index inside the box.
+  /// Trilinear value at an index inside the box.
   float at(const Eigen::Vector3d& index) const {
     const int x = int(index.x()), y = int(index.y()), z = int(index.z());
     const float u = float(index.x() - x), v = float(index.y() - y), w = float(index.z() - z);
@@ -70,8 +71,8 @@ class Distance {
     return mix(near, far, w);
   }
 
-  /// The gradient over a voxel to each side, in the model's frame: without the steps of a trilinear one from cell to
-  /// cell.
+  /// The gradient in the model's frame, from differences over one voxel to each side. Unlike the exact gradient of the
+  /// trilinear function, it does not jump from cell to cell.
   Eigen::Vector3d gradient(const Eigen::Vector3d& index) const {
     Eigen::Vector3d slope;
     for (int k = 0; k < 3; ++k) {
@@ -90,27 +91,27 @@ class Distance {
   Eigen::Vector3d low_, high_;
 };
 
-/// An edge pixel's ray in the camera's frame, and the image's direction there.
+/// The ray of an edge pixel in the camera's frame, and the direction of the edge in the image.
 struct Ray {
   Eigen::Vector3d direction;
   Eigen::Vector2d towards_brighter;
 };
 
-/// Tukey's biweight: d^2 / 2 near 0, a constant from the reach on (Huber 1981, 4.8).
+/// Tukey's biweight: d^2 / 2 near 0, constant beyond the reach (Huber 1981, 4.8).
 struct Loss {
   double reach;
   double worst() const { return reach * reach / 6; }
   double operator()(double d) const { return worst() * (1 - std::pow(1 - share(d), 3)); }
-  /// Derivative by the distance, divided by it.
+  /// Derivative with respect to the distance, divided by the distance.
   double weight(double d) const { return std::pow(1 - share(d), 2); }
   double share(double d) const { return std::min(1.0, d * d / (reach * reach)); }
 };
 
-/// What one ray tells of a pose.
+/// The information of one ray about a pose.
 struct Touch {
   double distance_mm = 0;
-  double like = 0;                ///< from 0 to 1: how well the edge's direction suits the surface there
-  Eigen::Vector3d point, normal;  ///< in the model's frame
+  double like = 0;                ///< from 0 to 1: how well the edge's direction fits the surface there
+  Eigen::Vector3d point, normal;  ///< both in the model's frame
 };
 
 class RayToSurface : public marrow::Cost {
@@ -137,8 +138,8 @@ class RayToSurface : public marrow::Cost {
     return marrow::match::weighted_mean(of_view, scene_->options.weights);
   }
 
-  /// Where the least distance along a ray changes, the point where it lies need not be followed: its own motion along
-  /// the ray changes nothing to first order. How the direction's fit changes with the pose is left out.
+  /// The derivative of the least distance along a ray. The shift of the touching point along the ray can be ignored,
+  /// because it has no effect to first order. The change of `like` with the pose is neglected.
   std::optional<Expansion> expansion(const marrow::RigidTransform& world_from_model,
                                      const marrow::FragmentFrame& frame) const override {
     Expansion about;
@@ -152,7 +153,8 @@ class RayToSurface : public marrow::Cost {
       for (const auto& touch : touches) {
         if (!touch) continue;
         const double one = share / double(touches.size()) * touch->like;
-        // A small motion of the model by (r, t) moves the ray against it by -(r x (p - o) + t), in the fragment's axes.
+        // If the model moves by a small (r, t), the ray moves relative to it by -(r x (p - o) + t), in the fragment's
+        // axes.
         const Eigen::Vector3d normal = frame.axes.transpose() * touch->normal,
                               arm = frame.axes.transpose() * (touch->point - frame.origin_mm);
         marrow::Vector6d slope;
@@ -166,7 +168,7 @@ class RayToSurface : public marrow::Cost {
     return about;
   }
 
-  /// Every so many edge pixels as the outline's points would be apart; the reach in mm at the isocentre.
+  /// Uses every n-th edge pixel, with n from the contour spacing. The reach is converted to mm at the isocentre.
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
     const marrow::Camera& camera = scene_->views[0].camera;
     const Eigen::Vector3d isocentre = Eigen::Vector3d::Zero();
@@ -191,21 +193,21 @@ class RayToSurface : public marrow::Cost {
     return touches;
   }
 
-  /// Of all places where the distance along the ray is least around, the one that explains the edge best: X-rays show a
-  /// bone's inner outlines as well, where rays touch it that run through it elsewhere. Nothing where the ray passes too
-  /// far off.
+  /// Of all local minima of the distance along the ray, the one that explains the edge best. A ray can have several,
+  /// because X-ray images also show inner outlines: the ray touches the surface there and runs through the bone
+  /// elsewhere. Nothing if the ray passes too far from the surface.
   std::optional<Touch> touch_of(const Ray& ray, const marrow::RigidTransform& model_from_camera,
                                 const Eigen::Matrix3d& line_from_normal) const {
     const Distance& distance = scene_->distance;
     const marrow::Grid& grid = distance.grid();
     const Eigen::Vector3d start = grid.index_from_point(model_from_camera.translation_mm);
-    const Eigen::Vector3d along = model_from_camera.rotation * ray.direction;  // 1 mm long
+    const Eigen::Vector3d along = model_from_camera.rotation * ray.direction;  // of length 1 mm
     const Eigen::Vector3d direction = (grid.direction.transpose() * along).cwiseQuotient(grid.spacing_mm);
     const auto [from, to] = distance.span(start, direction);
     const double finest_mm = 0.5 * grid.spacing_mm.minCoeff(), offset = scene_->options.edge_offset_mm;
     std::optional<Touch> best;
     double least = loss_.worst(), before = 1e30, here = 1e30, at = from;
-    // A distance changes by no more than 1 mm per mm, so nothing within reach is passed over.
+    // A distance changes by at most 1 mm per mm, so these steps do not miss a place within reach.
     for (double t = from; t < to;) {
       const double after = distance.at(start + t * direction);
       if (here < before && here <= after && std::abs(here - offset) < loss_.reach) {
@@ -232,13 +234,14 @@ class RayToSurface : public marrow::Cost {
     return touch;
   }
 
-  /// Where the parabola through three distances is lowest, in steps from the middle one.
+  /// Position of the minimum of the parabola through three distances, in steps from the middle one.
   static double vertex(double before, double here, double after) {
     const double bend = before - 2 * here + after;
     return bend > 1e-9 && bend < 1e9 ? std::clamp(0.5 * (before - after) / bend, -1.0, 1.0) : 0;
   }
 
-  /// 1 where the surface's normal, as the image shows it, points to the edge's brighter side; 0 from the tolerance on.
+  /// 1 if the projected normal of the surface points to the brighter side of the edge; 0 if it deviates by the
+  /// tolerance or more.
   double likeness(const Eigen::Vector3d& line, const Ray& ray) const {
     const double length = line.head<2>().norm();
     if (!(length > 0)) return 0;
@@ -295,23 +298,24 @@ std::shared_ptr<const marrow::Cost> ray_to_surface(const marrow::SignedField& fi
 MARROW_PLUGIN(plugin) {
   plugin.node("similarity.ray_to_surface", ray_to_surface)
       .summary(
-          "How far the rays through the images' edges pass the surface (Lavallee and Szeliski, IEEE PAMI 1995), with "
-          "derivatives")
+          "Distance between the rays through the images' edges and the surface (Lavallee and Szeliski, IEEE PAMI "
+          "1995), with derivatives")
       .trait("derivatives")
       .in("field", "signed distance to the surface")
       .in("views", "views with their cameras and masks", marrow::over("view"))
       .in("edges", "edge pixels of each view", marrow::over("view"))
-      .in("projector", "draws this fragment's outline: tells it from the others")
-      .in("others", "where other fragments are, whose edges are left out", marrow::over("fragment"))
-      .in("other_projectors", "draw their outlines, and maybe this one", marrow::over("fragment"))
+      .in("projector", "projector of this fragment's outline; it identifies this fragment in other_projectors")
+      .in("others", "poses of other fragments; edges of these fragments are left out", marrow::over("fragment"))
+      .in("other_projectors", "projectors of the other fragments' outlines; this fragment's own may be among them",
+          marrow::over("fragment"))
       .out("cost", "mean of Tukey's biweight of the distances [mm^2]")
       .option("reach_mm", &Options::reach_mm,
-              "rays further off belong to something else; no more than the field's largest value",
+              "rays farther from the surface than this belong to something else; limited by the field's largest value",
               marrow::at_least(0.1))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
-              "by how much the directions of edge and surface may differ", marrow::at_least(10), marrow::at_most(180))
-      .option("edge_offset_mm", &Options::edge_offset_mm, "how far edges lie outside the surface; below 0: inside")
-      .option("ray_step", &Options::ray_step, "every how many edge pixels are used", marrow::at_least(1),
+              "largest angle between the directions of edge and surface", marrow::at_least(10), marrow::at_most(180))
+      .option("edge_offset_mm", &Options::edge_offset_mm, "distance of the edges outside the surface; negative: inside")
+      .option("ray_step", &Options::ray_step, "every n-th edge pixel is used", marrow::at_least(1),
               marrow::at_most(100))
-      .option("weights", &Options::weights, "of each view; none: all the same");
+      .option("weights", &Options::weights, "weight of each view; empty: all views have the same weight");
 }

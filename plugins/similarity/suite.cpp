@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Costs, on two simulated views of a body whose pose is known: three ellipsoids in soft tissue, blurred and with noise,
-// and the edges of these images. What a node asks for beside them (volume, field, surface, projector) is the same body.
+// Checks for costs on two simulated views of a body with a known pose: three ellipsoids in soft tissue, with blur and
+// noise, and the edges of these images. Other inputs of a node (volume, field, surface, projector) show the same body.
 #include "suite.hpp"
 
 #include <oneapi/tbb/global_control.h>
@@ -27,7 +27,7 @@ const Eigen::Vector3d kTurn_rad(0.2, -0.15, 0.3), kShift_mm(3, -2, 5);
 
 RigidTransform truth() { return moved_by(kTurn_rad, kShift_mm); }
 
-/// The body moved away from its true pose: turned by r [deg] about its middle and shifted by t [mm].
+/// The true pose, rotated by `turn_deg` about the body's middle and shifted by `shift_mm`.
 RigidTransform off_truth(const Eigen::Vector3d& turn_deg, const Eigen::Vector3d& shift_mm) {
   RigidTransform pose = truth();
   pose.rotation = rotation_from_vector(turn_deg * radians(1)) * pose.rotation;
@@ -45,16 +45,16 @@ Body bone() {
 }
 Body other_bone() { return {{{24, 6, 26}, {7, 6, 15}}}; }
 
-/// The same one each time: a cost knows its own projector among those of all fragments.
+/// Always the same object, because a cost recognises its own projector among those of all fragments.
 std::shared_ptr<const BodyProjector> bone_projector() {
   static const auto kProjector = std::make_shared<const BodyProjector>(bone());
   return kProjector;
 }
 
-/// What else the images show, and how.
+/// Variants of the images.
 struct Scene {
   bool with_other = false;
-  double gain = 1, offset = 0;  ///< of the line integrals
+  double gain = 1, offset = 0;  ///< applied to the line integrals
   double noise = 1;
 };
 
@@ -67,7 +67,7 @@ View view_of(int index, const Scene& scene) {
   return x_ray_view(x_ray, index ? "lateral" : "frontal", BodyProjector(bodies), truth());
 }
 
-/// All inputs that the kind knows, but for other fragments. `change` may alter a view and its edges.
+/// All inputs of the kind, except those about other fragments. `change` may change a view and its edges.
 Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>& change = nullptr) {
   List<View> views;
   List<EdgeMap> edges;
@@ -90,7 +90,7 @@ Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>&
           {"edges", Value::of(edges, "view")}};
 }
 
-/// The node's cost with what it refers to.
+/// The node's cost together with the inputs that it refers to.
 class Made {
  public:
   Made(const Subject& subject, Inputs inputs) : inputs_(std::move(inputs)), value_(subject.output(inputs_, "cost")) {}
@@ -108,7 +108,7 @@ std::vector<RigidTransform> strange_poses() {
   out.translation_mm += Eigen::Vector3d(0, 0, 400);
   behind.translation_mm += Eigen::Vector3d(0, -900, 0);
   far.translation_mm += Eigen::Vector3d(1e7, 0, 1e7);
-  around.translation_mm += Eigen::Vector3d(0, -600, 0);  // about the frontal view's source
+  around.translation_mm += Eigen::Vector3d(0, -600, 0);  // the body surrounds the frontal view's source
   return {truth(), out, behind, far, around};
 }
 
@@ -153,7 +153,7 @@ double better_than_truth_percent(const Subject& subject) {
   return 100.0 * better / kPoses;
 }
 
-/// Along each of the six axes, away from the truth to 6 degrees or 6 mm in steps of 1.5.
+/// Steps of 1.5 degrees or mm along each of the six axes, from 1.5 to 6 away from the truth.
 double steps_down_percent(const Subject& subject) {
   const Made cost = made(subject);
   int down = 0, all = 0;
@@ -176,7 +176,7 @@ Pose pose_of(const RigidTransform& world_from_model) {
   return pose;
 }
 
-/// How far from the truth the least value lies along an axis, sought at steps of 0.2 [deg or mm].
+/// Distance between the truth and the minimum along an axis, in steps of 0.2 [deg or mm].
 double off_along(const Cost& cost, int axis) {
   double least = cost.value(truth()), at = 0;
   for (double by = -3; by < 3.1; by += 0.2)
@@ -189,7 +189,7 @@ double off_the_truth(const Made& cost) {
   return sum;
 }
 
-/// How far the values between truth and 6 mm off reach.
+/// The range of the cost: the largest difference between a pose 6 degrees or mm off and the truth.
 double range_of(const Cost& cost) {
   double most = 0;
   for (int axis = 0; axis < 6; ++axis) most = std::max(most, cost.value(off_truth(axis, 6)) - cost.value(truth()));
@@ -207,7 +207,7 @@ double gain_percent(const Subject& subject) {
   return 100 * most / range_of(*plain);
 }
 
-/// What is masked out is changed: grey values and edges of one corner, where the body also lies.
+/// Changes grey values and edges in the masked part of the images, where a part of the body lies.
 double mask_percent(const Subject& subject) {
   const auto masked = [](bool change) {
     return inputs_of({}, [change](View& view, EdgeMap& map) {
@@ -216,7 +216,8 @@ double mask_percent(const Subject& subject) {
       view.mask(corner).setTo(0);
       if (!change) return;
       view.image.pixels = view.image.pixels.clone();
-      view.image.pixels(cv::Rect(0, 0, kSize_px, kSize_px / 3 - 12)).setTo(9000);  // blur reaches a few pixels
+      // Not up to the border of the mask, because blur mixes a few pixels there.
+      view.image.pixels(cv::Rect(0, 0, kSize_px, kSize_px / 3 - 12)).setTo(9000);
       std::erase_if(map.pixels, [&](const EdgePixel& edge) { return edge.v_px < kSize_px / 3 - 12; });
     });
   };
@@ -259,7 +260,8 @@ double nothing_seen(const Subject& subject) {
   return better;
 }
 
-/// The derivatives that it tells against differences, in a pose where they are not small; in parts of their length.
+/// Difference between the cost's own derivatives and finite differences, in percent of their length, at a pose where
+/// they are not small.
 double slope_percent(const Subject& subject) {
   const Made cost = made(subject);
   const RigidTransform pose = off_truth({1, -0.7, 0.8}, {0.8, 0.6, -0.7});
@@ -280,13 +282,13 @@ double slope_percent(const Subject& subject) {
   for (int k = 0; k < 6; ++k) {
     const double h = k < 3 ? 4e-3 : 0.1;
     const Vector6d step = h * Vector6d::Unit(k);
-    scale[k] = k < 3 ? 0.03 : 1;  // rad to mm at the body's size
+    scale[k] = k < 3 ? 0.03 : 1;  // converts rad to mm for the size of the body
     slope[k] = (cost->value(moved(pose, frame, step)) - cost->value(moved(pose, frame, -step))) / (2 * h);
   }
   return 100 * (slope - about->gradient).cwiseProduct(scale).norm() / slope.cwiseProduct(scale).norm();
 }
 
-/// Adds the fragments of the case: this one, and maybe another one.
+/// Adds the fragments of the case: this one, and another one if wanted.
 void add_fragments(Inputs& inputs, bool with_other) {
   List<OutlineProjector> outlines;
   List<RadiographProjector> radiographs;
@@ -303,8 +305,8 @@ void add_fragments(Inputs& inputs, bool with_other) {
   inputs.set("others", Value::of(poses, "fragment"));
 }
 
-/// Alone in a list of fragments nothing may change; beside another one in the images, the least value stays near the
-/// truth.
+/// If the list of fragments holds only the own fragment, nothing may change. With another fragment in the images, the
+/// minimum must stay near the truth.
 double off_beside_another(const Subject& subject) {
   bool knows = false;
   for (const PortInfo& port : subject.info().inputs) knows = knows || port.name == "other_projectors";
@@ -371,23 +373,25 @@ Suite similarity_suite() {
                        std::function<double(const Subject&)> measure) {
     suite.accuracy.push_back({{name, what, limit, unit}, std::move(measure)});
   };
-  add("truth", "poses 2 to 5 mm and degrees off that cost no more than the true one", 0, "%",
+  add("truth", "poses 2 to 5 mm and degrees from the truth that cost no more than the true pose", 0, "%",
       better_than_truth_percent);
-  add("six_axes", "along each axis, away from the truth to 6 mm or degrees: steps at which the cost does not rise", 15,
-      "%", steps_down_percent);
-  add("minimum", "distance of the least value from the truth along each axis, mean", 0.5, "mm or degrees",
+  add("six_axes", "steps away from the truth along each axis, up to 6 mm or degrees, in which the cost does not rise",
+      15, "%", steps_down_percent);
+  add("minimum", "mean distance between the truth and the minimum along each axis", 0.5, "mm or degrees",
       [](const Subject& subject) { return off_the_truth(made(subject)); });
-  add("gain", "change of the cost with gain and offset of the line integrals, of its range", 5, "%", gain_percent);
-  add("mask", "change of the cost with what is masked out, of its range", 2, "%", mask_percent);
+  add("gain", "change of the cost if gain and offset of the line integrals change, in percent of its range", 5, "%",
+      gain_percent);
+  add("mask", "change of the cost if masked pixels change, in percent of its range", 2, "%", mask_percent);
   add("any_threads", "values that differ with 1, 2 and 7 threads", 0, "values", differing_values);
   add("coarse_level",
-      "at a coarse level: sides of the six axes on which 5 mm or degrees off cost no more than the truth", 10, "%",
-      coarse_level_off);
-  add("nothing_seen", "poses out of view or behind the source that cost less than 1 mm off the truth", 0, "poses",
-      nothing_seen);
-  add("slope", "its derivatives against differences", 10, "%", slope_percent);
-  add("beside_another", "distance of the least value from the truth where another fragment is in the images and known",
-      0.5, "mm or degrees", off_beside_another);
+      "at a coarse level: directions of the six axes in which a pose 5 mm or degrees off costs no more than the truth",
+      10, "%", coarse_level_off);
+  add("nothing_seen", "poses out of view or behind the source that cost no more than a pose 1 mm from the truth", 0,
+      "poses", nothing_seen);
+  add("slope", "difference between the cost's derivatives and finite differences", 10, "%", slope_percent);
+  add("beside_another",
+      "distance between the truth and the minimum if the images show another fragment with a known pose", 0.5,
+      "mm or degrees", off_beside_another);
   return suite;
 }
 

@@ -4,7 +4,7 @@
 
 namespace marrow::conformance {
 
-/// What costs must do.
+/// The checks that every node of the kind similarity must pass.
 Suite similarity_suite();
 
 }  // namespace marrow::conformance

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Puts a simulated CT and images together with seeds and the exact truth.
+// Combines a simulated CT and images with the seeds and the exact truth to a case.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -16,7 +16,7 @@ struct CaseOptions {
   std::string start = "none";
 };
 
-/// The fragment's seeds that lie in the CT, two voxels from its border at least.
+/// The points that lie in the CT, at least two voxels from its border.
 std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm) {
   constexpr double kBorder = 2;
   std::vector<Eigen::Vector3d> inside;
@@ -69,15 +69,14 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.case", assemble)
-      .summary("case of a simulated patient: CT, views, seeds and the exact truth")
+      .summary("Makes the case of a simulated patient: CT, views, seeds and the exact truth")
       .in("volume", "CT of the phantom")
       .in("views", "X-ray images of the phantom", over("view"))
-      .in("phantom", "fragments with their seeds and truth")
+      .in("phantom", "bone and fragments, with their seeds and exact poses")
       .out("case", "CT, views, seeds and truth")
       .option("register", &CaseOptions::wanted,
-              "fragments whose pose is wanted; the others are only kept apart in the CT")
+              "fragments whose pose is wanted; other fragments are only segmented, to keep them apart in the CT")
       .option("start", &CaseOptions::start,
-              "none: the case has no pose to start from; exact: it starts at the truth, for experiments that displace "
-              "the start themselves",
+              "none: the case has no start; exact: the start is the true pose, for experiments that displace it",
               one_of({"none", "exact"}));
 }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A CT of the phantom: the continuous shape on rays 0.3 mm apart at most, blurred and sampled, with noise.
+// A CT of the phantom. The continuous shape is cut by rays that are at most 0.3 mm apart, blurred, sampled, and gets
+// noise.
 #include <tbb/parallel_for.h>
 
 #include <algorithm>
@@ -32,7 +33,7 @@ constexpr double kAirHu = -1000;
 constexpr double kFinestMm = 0.3;
 constexpr int kSlabSlices = 16;
 
-/// The fine raster under a grid: along x in bins that take exact lengths, along y and z in rays.
+/// The fine raster of a grid. Along y and z it consists of rays, along x of bins that take exact lengths.
 struct Raster {
   std::array<int, 3> steps;  // fine samples per voxel
   std::array<int, 3> halo;   // fine samples beyond the grid on each side, for the blur
@@ -40,7 +41,7 @@ struct Raster {
   std::array<int, 3> size;
 };
 
-/// x0 <= x < x1, y0 <= y < y1; empty where x0 >= x1.
+/// All x, y with x0 <= x < x1 and y0 <= y < y1. Empty if x0 >= x1.
 struct Rectangle {
   int x0, x1, y0, y1;
 };
@@ -85,7 +86,7 @@ Raster raster_under(const Grid& grid, double blur_mm) {
   return raster;
 }
 
-/// Weights of a sampled Gaussian over the halo; sum 1.
+/// Weights of a sampled Gaussian over the halo. Their sum is 1.
 std::vector<double> point_spread(double blur_mm, double spacing_mm, int halo) {
   std::vector<double> weights;
   double sum = 0;
@@ -119,7 +120,7 @@ class Scanner {
     blur(background_fine_, {0, raster_.size[0], 0, raster_.size[1]}, background_);
   }
 
-  /// Slices first to last - 1 without noise.
+  /// Computes the slices first to last - 1, without noise.
   void scan(int first, int last, std::vector<float>& values) const {
     const std::size_t slice = background_.size();
     const int fine_first = first * raster_.steps[2],
@@ -168,8 +169,8 @@ class Scanner {
     return plane;
   }
 
-  /// Adds what bone changes in one fine row of rays to the plane, in each bin by the length that the bone takes of it.
-  /// Returns where.
+  /// Adds the bone in one fine row of rays to the plane, as the difference to the background. Each bin counts by the
+  /// length of bone in it. Returns the changed part of the plane.
   Rectangle draw(std::span<const phantom::Crossing> crossings, int row, std::vector<double>& plane) const {
     Rectangle touched{raster_.size[0], 0, raster_.size[1], 0};
     const double z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
@@ -199,12 +200,12 @@ class Scanner {
     return touched;
   }
 
-  /// A fine plane that is zero outside `bone`, blurred in x and y, at the grid's positions. Returns where the result is
-  /// set.
+  /// Blurs a fine plane in x and y and samples it at the grid's positions. The plane must be zero outside `bone`.
+  /// Returns the part of `blurred` that is set.
   Rectangle blur(const std::vector<double>& plane, const Rectangle& bone, std::vector<double>& blurred) const {
     const int nx = grid_.size[0], ny = grid_.size[1], sx = raster_.steps[0], sy = raster_.steps[1];
     const int hx = raster_.halo[0], hy = raster_.halo[1];
-    // Position i takes the fine samples i * step to i * step + 2 * halo.
+    // Position i uses the fine samples i * step to i * step + 2 * halo.
     const auto first = [](int fine, int halo, int step) { return std::max(0, (fine - 2 * halo + step - 1) / step); };
     const Rectangle seen{first(bone.x0, hx, sx), std::min(nx, (bone.x1 - 1) / sx + 1), first(bone.y0, hy, sy),
                          std::min(ny, (bone.y1 - 1) / sy + 1)};
@@ -236,7 +237,7 @@ class Scanner {
   phantom::Fill fill_;
   phantom::SolidRays rays_;
   std::array<std::vector<double>, 3> spread_;
-  std::vector<double> background_fine_, background_;  ///< without bone, the same for all z
+  std::vector<double> background_fine_, background_;  ///< slice without bone, the same for all z
 };
 
 Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) {
@@ -267,19 +268,19 @@ Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) 
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.ct", scan)
-      .summary("CT of a simulated bone, sampled from its continuous shape with blur and noise")
+      .summary("Simulates a CT of a bone, sampled from its continuous shape with blur and noise")
       .random()
       .in("phantom", "bone, fracture and fragments")
-      .out("volume", "CT in Hounsfield units, whole numbers")
+      .out("volume", "CT in Hounsfield units, rounded to whole numbers")
       .option("spacing_mm", &CtOptions::spacing_mm, "voxel size along x, y, z")
       .option("margin_mm", &CtOptions::margin_mm, "space around the bone", at_least(0))
       .option("range_mm", &CtOptions::range_mm,
-              "only the slices between these heights above the bone's distal end; [0, 0] = the whole bone")
+              "scans only between these two heights above the bone's distal end; [0, 0]: the whole bone")
       .option("blur_mm", &CtOptions::blur_mm, "standard deviation of the Gaussian point-spread function", at_least(0),
               at_most(3))
       .option("noise_hu", &CtOptions::noise_hu, "standard deviation of the noise", at_least(0), unit("HU"))
-      .option("cortical_hu", &CtOptions::cortical_hu, "compact bone", unit("HU"))
-      .option("marrow_hu", &CtOptions::marrow_hu, "marrow", unit("HU"))
-      .option("muscle_hu", &CtOptions::muscle_hu, "muscle", unit("HU"))
-      .option("fat_hu", &CtOptions::fat_hu, "fat under the skin", unit("HU"));
+      .option("cortical_hu", &CtOptions::cortical_hu, "CT value of compact bone", unit("HU"))
+      .option("marrow_hu", &CtOptions::marrow_hu, "CT value of marrow", unit("HU"))
+      .option("muscle_hu", &CtOptions::muscle_hu, "CT value of muscle", unit("HU"))
+      .option("fat_hu", &CtOptions::fat_hu, "CT value of the fat under the skin", unit("HU"));
 }

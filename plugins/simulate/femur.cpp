@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A femur made from the measures of the literature: no data needed, and as many different ones as a study wants.
+// A femur made from measures in the literature. It needs no data, and a study can have any number of different femora.
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
@@ -35,7 +35,7 @@ struct FemurOptions {
   double fat_mm = 12;
 };
 
-/// Draws each measure from a normal distribution with the spread found among people, within 2 standard deviations.
+/// Draws each measure from a normal distribution with the variation between people, cut at 2 standard deviations.
 phantom::FemurShape drawn(const FemurOptions& options) {
   marrow::Random random(std::uint64_t(options.shape_seed), 1);
   const auto draw = [&](double mean, double spread) {
@@ -43,7 +43,7 @@ phantom::FemurShape drawn(const FemurOptions& options) {
   };
   phantom::FemurShape shape;
   shape.length_mm = draw(options.length_mm, 26.6);
-  // People's widths go together with their length: half of the spread is common.
+  // Widths are correlated with length. Half of the variation is common.
   const double size = shape.length_mm / options.length_mm;
   shape.head_diameter_mm = size * draw(options.head_diameter_mm, 2.5);
   shape.neck_length_mm = size * draw(50, 3);
@@ -78,7 +78,7 @@ Bone femur(const FemurOptions& options, Context& context) {
   bone.inner = phantom::polygonise([&](const Eigen::Vector3d& p) { return field.inner(p); }, field.low_mm(),
                                    field.high_mm(), options.resolution_mm, kSteepest);
   bone.outer.frame = bone.inner.frame = "bone";
-  // Cancellous bone of 200-500 HU at both ends, marrow alone in the canal.
+  // Cancellous bone of 200-500 HU at both ends, only marrow in the canal.
   const double length = shape.length_mm;
   bone.fill_z_mm = {0, 0.06 * length, 0.16 * length, 0.24 * length, 0.74 * length, 0.84 * length, length};
   bone.fill_fraction = {0.30, 0.24, 0.15, 0, 0, 0.16, 0.30};
@@ -94,38 +94,40 @@ Bone femur(const FemurOptions& options, Context& context) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.femur", femur)
-      .summary("femur made from published measures: condyles, trochanters, bow, linea aspera, cortex and canal")
-      .out("bone", "closed outer and inner surface")
-      .option("length_mm", &FemurOptions::length_mm, "from the condyles to the top of the head", at_least(250),
+      .summary("Makes a femur from published measures, with condyles, trochanters, bow, linea aspera, cortex and canal")
+      .out("bone", "bone with a closed outer and a closed inner surface")
+      .option("length_mm", &FemurOptions::length_mm, "length from the condyles to the top of the head", at_least(250),
               at_most(600))
-      .option("head_diameter_mm", &FemurOptions::head_diameter_mm, "of the femoral head", at_least(30), at_most(65))
+      .option("head_diameter_mm", &FemurOptions::head_diameter_mm, "diameter of the femoral head", at_least(30),
+              at_most(65))
       .option("neck_shaft_deg", &FemurOptions::neck_shaft_deg, "angle between neck and shaft", at_least(100),
               at_most(150))
-      .option("anteversion_deg", &FemurOptions::anteversion_deg, "turn of the neck to the front", at_least(-20),
+      .option("anteversion_deg", &FemurOptions::anteversion_deg, "rotation of the neck to the front", at_least(-20),
               at_most(50))
       .option("bow_radius_mm", &FemurOptions::bow_radius_mm, "radius of the shaft's bow, convex to the front",
               at_least(400))
-      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "across both condyles", at_least(55),
+      .option("bicondylar_width_mm", &FemurOptions::bicondylar_width_mm, "width across both condyles", at_least(55),
               at_most(110))
       .option("shaft_ml_mm", &FemurOptions::shaft_ml_mm, "mid-shaft diameter, medial to lateral", at_least(18),
               at_most(45))
-      .option("shaft_ap_mm", &FemurOptions::shaft_ap_mm, "mid-shaft diameter, front to back, linea aspera included",
-              at_least(18), at_most(45))
-      .option("canal_diameter_mm", &FemurOptions::canal_diameter_mm, "of the marrow canal at its narrowest",
-              at_least(4), at_most(30))
-      .option("linea_aspera_mm", &FemurOptions::linea_aspera_mm, "height of the ridge behind the shaft", at_least(0),
-              at_most(8))
+      .option("shaft_ap_mm", &FemurOptions::shaft_ap_mm,
+              "mid-shaft diameter, front to back, including the linea aspera", at_least(18), at_most(45))
+      .option("canal_diameter_mm", &FemurOptions::canal_diameter_mm,
+              "diameter of the marrow canal at its narrowest place", at_least(4), at_most(30))
+      .option("linea_aspera_mm", &FemurOptions::linea_aspera_mm,
+              "height of the linea aspera, the ridge on the back of the shaft", at_least(0), at_most(8))
       .option("side", &FemurOptions::side, "left or right femur", one_of({"left", "right"}))
-      .option("shape_seed", &FemurOptions::shape_seed, "draws the variation and the irregularities", at_least(0))
+      .option("shape_seed", &FemurOptions::shape_seed, "seed of the variation and of the irregularities", at_least(0))
       .option("variation", &FemurOptions::variation,
-              "0: exactly these measures; 1: drawn around them with the spread among people", at_least(0), at_most(1))
+              "0: exactly these measures; 1: random measures around them, with the variation between people",
+              at_least(0), at_most(1))
       .option("ripple_mm", &FemurOptions::ripple_mm, "amplitude of smooth irregularities of the surface", at_least(0),
               at_most(2))
       .option("resolution_mm", &FemurOptions::resolution_mm,
-              "edge of the cubes in which the surface is cut into triangles", at_least(0.3), at_most(4))
+              "edge length of the cubes in which the surface is made into triangles", at_least(0.3), at_most(4))
       .option("isocentre_from_distal_end_mm", &FemurOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
-      .option("thigh_radius_mm", &FemurOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none",
+      .option("thigh_radius_mm", &FemurOptions::thigh_radius_mm, "radius of the soft tissue around the bone; 0: none",
               at_least(0))
       .option("fat_mm", &FemurOptions::fat_mm, "thickness of the layer of fat", at_least(0));
 }

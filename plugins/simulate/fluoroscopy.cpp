@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// X-ray images of the phantom: exact path lengths through its continuous surfaces, several energies, quantum noise,
-// scatter and the detector's blur.
+// X-ray images of the phantom, with exact path lengths through its continuous surfaces, several energies, quantum
+// noise, scatter and the blur of the detector.
 #include <tbb/parallel_for.h>
 
 #include <Eigen/LU>
@@ -27,12 +27,12 @@ struct FluoroscopyOptions {
 };
 
 constexpr int kSubsamples = 2;         // rays per pixel in each direction
-constexpr int kBandRows = 8;           // image rows that one task renders
-constexpr double kTissueGrey = 12000;  // where the image behind soft tissue alone lies, of 65535
+constexpr int kBandRows = 8;           // image rows rendered by one task
+constexpr double kTissueGrey = 12000;  // grey value behind soft tissue alone; the largest is 65535
 constexpr double kNearestMm = 10;
 
-/// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables) and the share of the
-/// detected signal that each energy carries: a 70 kV beam behind 3.5 mm of aluminium, mean 49 keV.
+/// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables), and the share of each
+/// energy in the detected signal, for a 70 kV beam behind 3.5 mm of aluminium with a mean of 49 keV.
 constexpr std::array<double, 4> kShare{0.40, 0.33, 0.20, 0.07};
 constexpr std::array<double, 4> kBone{0.1235, 0.07937, 0.05934, 0.04871};
 constexpr std::array<double, 4> kMarrow{0.02649, 0.02277, 0.02082, 0.01959};
@@ -43,7 +43,7 @@ struct Lengths {
   double bone = 0, marrow = 0, muscle = 0, fat = 0;
 };
 
-/// Share of the beam that passes.
+/// Share of the beam that passes through these lengths.
 double transmission(const Lengths& mm) {
   double sum = 0;
   for (std::size_t e = 0; e < kShare.size(); ++e)
@@ -52,8 +52,7 @@ double transmission(const Lengths& mm) {
   return sum;
 }
 
-/// The straight line from the source through a place of the detector, scaled so that its parameter is the camera's
-/// depth.
+/// The line from the source through a point of the detector, scaled so that its parameter is the depth in the camera.
 struct Ray {
   Eigen::Vector3d source, direction;
   double mm_per_depth;
@@ -92,7 +91,7 @@ class XRay {
     return lengths;
   }
 
-  /// Adds the bone that the crossings of a ray enclose, and takes it from the muscle.
+  /// Adds the bone between the crossings of a ray, and subtracts its length from the muscle.
   void add_bone(const Ray& ray, const std::vector<Interval>& intervals, Lengths& lengths) const {
     for (const Interval& interval : intervals) {
       const double from = -1 / interval.from, to = -1 / interval.to;
@@ -109,7 +108,7 @@ class XRay {
     lengths.muscle = std::max(0.0, lengths.muscle - lengths.bone - lengths.marrow);
   }
 
-  /// Mean transmission of each pixel's rays, for rows first to last - 1.
+  /// Computes the mean transmission of each pixel's rays, for the rows first to last - 1.
   void render(int first, int last, cv::Mat1d& primary) const {
     const auto crossings = rays_.bundle().crossings(first * kSubsamples, last * kSubsamples);
     std::size_t next = 0;
@@ -163,12 +162,12 @@ cv::Mat1d primary_image(const XRay& xray, const Camera& camera, Context& context
   return primary;
 }
 
-/// Scatter as a blurred image of its source, T ln(1 / T) for a transmission T: none in air, little behind much tissue
-/// (Ohnesorge, Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). Scaled so that wide soft tissue gets the wanted ratio to
-/// the primary radiation.
+/// Scatter as a blurred image of its source. The source is T ln(1 / T) for a transmission T: 0 in air, little behind
+/// thick tissue (Ohnesorge, Flohr, Klingenbeck-Regn, Eur. Radiol. 1999). It is scaled so that the ratio of scattered to
+/// primary radiation is the wanted one behind wide soft tissue.
 cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& options, double behind_tissue) {
   if (options.scatter_to_primary == 0 || !(behind_tissue < 1)) return cv::Mat1d(primary.size(), 0.0);
-  constexpr int kShrink = 8;  // made at an eighth of the size, where the blur is still many pixels wide
+  constexpr int kShrink = 8;  // computed at an eighth of the size, where the blur is still many pixels wide
   cv::Mat1d source = primary.clone(), small, scatter;
   for (double& t : source) t *= std::log(1 / t);
   cv::resize(source, small, {std::max(1, primary.cols / kShrink), std::max(1, primary.rows / kShrink)}, 0, 0,
@@ -179,7 +178,7 @@ cv::Mat1d scatter_image(const cv::Mat1d& primary, const FluoroscopyOptions& opti
   return options.scatter_to_primary / std::log(1 / behind_tissue) * scatter;
 }
 
-/// Photons drawn for each pixel from its own stream of random numbers.
+/// Draws the photons of each pixel from the pixel's own stream of random numbers.
 void add_quantum_noise(cv::Mat1d& expected, std::uint64_t seed) {
   tbb::parallel_for(0, expected.rows, [&](int row) {
     for (int column = 0; column < expected.cols; ++column) {
@@ -195,7 +194,7 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   check_camera(camera, "simulate.fluoroscopy: camera '" + name + "'");
   const XRay xray(phantom, camera);
   cv::Mat1d signal = primary_image(xray, camera, context);
-  // Exposure control: the dose is set so that soft tissue alone, at its thickest, gets the wanted photons.
+  // Exposure control: the dose is such that the wanted number of photons arrives behind the thickest soft tissue.
   const double radius = std::max(phantom.bone.thigh_radius_mm, 0.0), fat = std::min(phantom.bone.fat_mm, radius);
   const double tissue = transmission({0, 0, 2 * (radius - fat), 2 * fat});
   signal += scatter_image(signal, options, tissue);
@@ -212,7 +211,7 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   View view;
   view.name = name;
   view.camera = camera;
-  signal.convertTo(view.image.pixels, CV_16U, kTissueGrey);  // saturates, as a detector does in air
+  signal.convertTo(view.image.pixels, CV_16U, kTissueGrey);  // saturates in air, like a detector
   return view;
 }
 
@@ -233,16 +232,17 @@ List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, cons
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.fluoroscopy", fluoroscopy)
       .summary(
-          "X-ray images of a simulated bone, by exact path lengths at several energies, with noise, scatter and blur")
+          "Simulates X-ray images of a bone from exact path lengths at several energies, with noise, scatter and blur")
       .random()
       .in("phantom", "bone, fracture and fragments")
-      .in("cameras", "geometry of each view", over("view"))
+      .in("cameras", "camera of each view", over("view"))
       .out("views", "16-bit images, bright = air", over("view"))
-      .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0 = no noise",
+      .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0: no noise",
               at_least(0), unit("1/px"))
       .option("blur_px", &FluoroscopyOptions::blur_px, "standard deviation of the detector's blur", at_least(0),
               at_most(10))
-      .option("scatter_to_primary", &FluoroscopyOptions::scatter_to_primary, "scattered by primary radiation",
-              at_least(0), at_most(5))
-      .option("scatter_px", &FluoroscopyOptions::scatter_px, "standard deviation of the scatter's spread", at_least(8));
+      .option("scatter_to_primary", &FluoroscopyOptions::scatter_to_primary,
+              "ratio of scattered to primary radiation behind soft tissue", at_least(0), at_most(5))
+      .option("scatter_px", &FluoroscopyOptions::scatter_px,
+              "standard deviation of the Gaussian that spreads the scatter", at_least(8));
 }

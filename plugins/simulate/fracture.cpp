@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Breaks the shaft of a bone by an oblique, rough surface and moves the fragments by known rigid transforms.
+// Breaks the shaft of a bone along an oblique, rough surface and moves the fragments by known rigid transforms.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -43,7 +43,7 @@ Box bounds(const Mesh& mesh) {
   return box;
 }
 
-/// Centre of the bone's outline at a height: the mean of the cut edges, weighted by their length.
+/// Centre of the bone's outline at a height: the mean of the outline's segments, weighted by their lengths.
 Eigen::Vector2d centre_at(const Mesh& mesh, double z) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double length = 0;
@@ -62,8 +62,9 @@ Eigen::Vector2d centre_at(const Mesh& mesh, double z) {
   return length > 0 ? Eigen::Vector2d(sum / length) : Eigen::Vector2d::Zero();
 }
 
-/// Height of the fracture over (x, y): a plane with a self-affine relief on it, a sum of waves whose amplitude falls
-/// with their length to the power 0.8 (Hurst exponent of fracture surfaces: Bouchaud, J. Phys. Condens. Matter 1997).
+/// Height of the fracture at (x, y): a plane with a self-affine relief. The relief is a sum of waves whose amplitude is
+/// proportional to their length to the power 0.8 (Hurst exponent of fracture surfaces: Bouchaud, J. Phys. Condens.
+/// Matter 1997).
 class Relief {
  public:
   Relief(const FractureOptions& options, const Eigen::Vector3d& centre) : centre_(centre) {
@@ -98,7 +99,7 @@ class Relief {
   std::array<Wave, 48> waves_;
 };
 
-/// The closed block below the relief that holds the distal side of the bone.
+/// A closed block below the relief. It contains the distal side of the bone.
 Mesh block_below(const Relief& relief, const Box& box) {
   constexpr double kMarginMm = 5;
   const Eigen::Vector2d low = box.low.head<2>().array() - kMarginMm,
@@ -119,7 +120,7 @@ Mesh block_below(const Relief& relief, const Box& box) {
       mesh.triangles.push_back({top(x, y), top(x + 1, y), top(x + 1, y + 1)});
       mesh.triangles.push_back({top(x, y), top(x + 1, y + 1), top(x, y + 1)});
     }
-  std::vector<std::uint32_t> rim;  // counter-clockwise seen from above
+  std::vector<std::uint32_t> rim;  // counter-clockwise if seen from above
   for (std::uint32_t x = 0; x + 1 < nx; ++x) rim.push_back(top(x, 0));
   for (std::uint32_t y = 0; y + 1 < ny; ++y) rim.push_back(top(nx - 1, y));
   for (std::uint32_t x = nx - 1; x > 0; --x) rim.push_back(top(x, ny - 1));
@@ -140,7 +141,7 @@ Mesh block_below(const Relief& relief, const Box& box) {
   return mesh;
 }
 
-/// The bone's outer surface on one side of the fracture, in CT coordinates: what the fragment's axes are taken from.
+/// The bone's outer surface on one side of the fracture, in CT coordinates. The fragment's axes come from it.
 Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   Mesh mesh;
   for (const auto& vertex : bone.outer.vertices_mm) mesh.vertices_mm.push_back(fragment.ct_from_bone * vertex);
@@ -155,8 +156,9 @@ Mesh side_of(const Bone& bone, const Relief& relief, const Fragment& fragment) {
   return mesh;
 }
 
-/// The middle of every stretch of bone along lines in x (`along` 0) or y (1) through the bone's centre, at several
-/// heights: in thick cortex, and in cancellous bone where it is dense enough to be told from marrow.
+/// Adds seeds along lines in x (`along` 0) or y (`along` 1) through the bone's centre, at several heights. A seed is
+/// the middle of a section of the line that lies in thick cortex, or in cancellous bone that is clearly denser than
+/// marrow.
 void add_seeds(const Phantom& phantom, const Fragment& fragment, int along, std::vector<Eigen::Vector3d>& seeds) {
   constexpr int kHeights = 14;
   constexpr double kThickMm = 3, kDense = 0.12;
@@ -238,25 +240,27 @@ Phantom fracture(const Bone& bone, const FractureOptions& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.fracture", fracture)
-      .summary("breaks a shaft by an oblique, rough surface and moves the fragments by known transforms")
+      .summary("Breaks the shaft of a bone along an oblique, rough surface and moves the fragments by known transforms")
       .in("bone", "whole bone")
-      .out("phantom", "two fragments, proximal and distal, in the CT and in the images")
+      .out("phantom", "two fragments, proximal and distal, with their poses in the CT and in the images")
       .option("level", &FractureOptions::level,
               "height of the fracture, as a fraction of the length from the distal end", at_least(0.1), at_most(0.9),
               unit(""))
-      .option("obliquity_deg", &FractureOptions::obliquity_deg, "tilt of the fracture; 0 = transverse", at_least(0),
+      .option("obliquity_deg", &FractureOptions::obliquity_deg, "tilt of the fracture; 0: transverse", at_least(0),
               at_most(65))
       .option("direction_deg", &FractureOptions::direction_deg,
-              "where the fracture rises: 0 to the patient's left, 90 to the back")
+              "direction in which the fracture rises: 0: to the patient's left, 90: to the back")
       .option("roughness_mm", &FractureOptions::roughness_mm, "root mean square of the fracture's relief", at_least(0),
               at_most(4))
-      .option("fracture_seed", &FractureOptions::fracture_seed, "draws the relief", at_least(0))
+      .option("fracture_seed", &FractureOptions::fracture_seed, "seed of the relief", at_least(0))
       .option("ct_gap_mm", &FractureOptions::ct_gap_mm, "displacement of the distal fragment in the CT")
       .option("rotation_deg", &FractureOptions::rotation_deg,
               "motion of the distal fragment between CT and images: rotation vector about its frontal, lateral and "
               "long axis")
-      .option("translation_mm", &FractureOptions::translation_mm, "and its displacement along these axes")
-      .option("proximal_rotation_deg", &FractureOptions::proximal_rotation_deg, "the same for the proximal fragment")
+      .option("translation_mm", &FractureOptions::translation_mm,
+              "motion of the distal fragment between CT and images: translation along these axes")
+      .option("proximal_rotation_deg", &FractureOptions::proximal_rotation_deg,
+              "like rotation_deg, for the proximal fragment")
       .option("proximal_translation_mm", &FractureOptions::proximal_translation_mm,
-              "the same for the proximal fragment");
+              "like translation_mm, for the proximal fragment");
 }

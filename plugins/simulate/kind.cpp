@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Nodes that make data up. They choose their ports freely.
+// The kind of nodes that simulate data. These nodes choose their ports freely.
 #include <marrow/plugin.hpp>
 
-MARROW_PLUGIN(plugin) { plugin.kind("simulate").summary("data with exact truth").runs_apart(marrow::Apart::computes); }
+MARROW_PLUGIN(plugin) {
+  plugin.kind("simulate").summary("simulated data with exact truth").runs_apart(marrow::Apart::computes);
+}

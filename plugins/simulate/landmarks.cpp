@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Landmarks of a phantom's fragments as a person or a tracker would find them: with noise, so that a method never sees
-// the truth.
+// Landmarks of a phantom's fragments as a person or a tracking system would find them. They have noise, so that a
+// method never sees the truth.
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
@@ -24,8 +24,8 @@ bool is_seen(const Camera& camera, const Eigen::Vector3d& world_mm) {
          pixel.y() <= camera.height_px - 1;
 }
 
-/// Points of the surface that all views show, each as far as can be from those before it; the first is the farthest
-/// from the centroid. None where too little is seen.
+/// Points of the surface that all views show. The first is the farthest from the centroid, and each other one is the
+/// farthest from those before it. Empty if the views show too few points.
 std::vector<Eigen::Vector3d> spread_points(const Fragment& fragment, const List<Camera>& cameras, int count) {
   constexpr std::size_t kCandidates = 4000;
   std::vector<Eigen::Vector3d> candidates;
@@ -94,13 +94,14 @@ List<Landmarks> landmarks(const phantom::Phantom& phantom, const List<Camera>* c
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.landmarks", landmarks)
-      .summary("landmarks of each fragment of a phantom, seen and tracked with noise")
-      .in("phantom", "fragments with their surfaces and truth")
-      .in("cameras", "where they are seen from; only points that all of them show are taken", over("view"))
-      .out("landmarks", "points in CT coordinates, seen in pixels of the views, tracked in the world", over("fragment"))
+      .summary("Simulates landmarks on each fragment of a phantom, marked in views and tracked, with noise")
+      .in("phantom", "fragments with their surfaces and exact poses")
+      .in("cameras", "cameras of the views; only points that all of them show are used", over("view"))
+      .out("landmarks", "points in CT coordinates (mm), in pixels of the views, and in world coordinates (mm)",
+           over("fragment"))
       .random()
-      .option("count", &Options::count, "landmarks of each fragment, spread over its outer surface", at_least(1),
-              at_most(200))
-      .option("noise_px", &Options::noise_px, "standard deviation of each coordinate of what is seen", at_least(0))
-      .option("noise_mm", &Options::noise_mm, "standard deviation of each coordinate of what is tracked", at_least(0));
+      .option("count", &Options::count, "number of landmarks of each fragment, spread over its outer surface",
+              at_least(1), at_most(200))
+      .option("noise_px", &Options::noise_px, "standard deviation of each coordinate in the views", at_least(0))
+      .option("noise_mm", &Options::noise_mm, "standard deviation of each tracked coordinate", at_least(0));
 }

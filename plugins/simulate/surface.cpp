@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A bone from surface files, such as a real femur's outer and endosteal surface.
+// A bone from surface files, for example the outer and the endosteal surface of a real femur.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <filesystem>
@@ -66,22 +66,23 @@ Bone surface(const SurfaceOptions& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.surface", surface)
-      .summary("bone from closed surfaces in STL files")
-      .out("bone", "closed outer and inner surface")
+      .summary("Makes a bone from closed surfaces in STL files")
+      .out("bone", "bone with a closed outer and a closed inner surface")
       .option("outer", &SurfaceOptions::outer, "STL file of the outer surface", required())
-      .option("inner", &SurfaceOptions::inner, "STL file of the endosteal surface; empty = solid cortical bone")
-      .option("scale", &SurfaceOptions::scale, "factor to mm: 1000 for a file in metres", at_least(1e-6), unit(""))
+      .option("inner", &SurfaceOptions::inner, "STL file of the endosteal surface; empty: solid cortical bone")
+      .option("scale", &SurfaceOptions::scale, "factor that converts the file's unit to mm: 1000 for metres",
+              at_least(1e-6), unit(""))
       .option("rotation_deg", &SurfaceOptions::rotation_deg,
-              "turns about x, then y, then z that bring the long axis to z, distal end low, +x to the patient's left, "
-              "+y to the back")
-      .option("fill_at", &SurfaceOptions::fill_at, "heights, as fractions of the length, where the bone share is given",
-              unit(""))
+              "rotations about x, then y, then z, after which the long axis is z with the distal end at low z, +x to "
+              "the patient's left and +y to the back")
+      .option("fill_at", &SurfaceOptions::fill_at,
+              "heights, as fractions of the length, for which fill_fraction gives values", unit(""))
       .option("fill_fraction", &SurfaceOptions::fill_fraction,
               "share of bone inside the inner surface at these heights; the rest is marrow", unit(""))
       .relation(same_length({"fill_at", "fill_fraction"}))
       .option("isocentre_from_distal_end_mm", &SurfaceOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
-      .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "of the soft tissue around the bone; 0 = none",
+      .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "radius of the soft tissue around the bone; 0: none",
               at_least(0))
       .option("fat_mm", &SurfaceOptions::fat_mm, "thickness of the layer of fat", at_least(0));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is known exactly about a phantom's fragments, for studies of steps that need no CT.
+// The exact surfaces and poses of a phantom's fragments, for studies of steps that need no CT.
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -30,8 +30,8 @@ Known truth(const phantom::Phantom& phantom) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.truth", truth)
-      .summary("the exact surface and pose of each fragment of a phantom")
-      .in("phantom", "fragments with their surfaces and truth")
-      .out("models", &Known::models, "outer surface in CT coordinates, open where the bone broke", over("fragment"))
+      .summary("Gives the exact surface and pose of each fragment of a phantom")
+      .in("phantom", "fragments with their surfaces and exact poses")
+      .out("models", &Known::models, "outer surface in CT coordinates, open at the fracture", over("fragment"))
       .out("truths", &Known::truths, "exact pose in the images", over("fragment"));
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Folders: a view, and a whole case as read.case takes it (docs/case.md).
+// Writes folders: a view, or a whole case in the format of read.case (docs/case.md).
 #include <algorithm>
 #include <cctype>
 #include <map>
@@ -15,11 +15,10 @@ namespace {
 namespace fs = std::filesystem;
 using marrow::files::quoted;
 
-/// PNG for 8 and 16 bits, TIFF for float.
+/// PNG for images of 8 and 16 bits, TIFF for float images.
 std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
 
-/// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png, or with an empty stem image.png, camera.yaml and
-/// mask.png.
+/// Writes <stem>.png, <stem>.camera.yaml and <stem>.mask.png. With an empty stem: image.png, camera.yaml and mask.png.
 struct ViewFiles {
   std::string image, camera, mask;
 };
@@ -47,14 +46,14 @@ bool is_plain(const std::string& name) {
          std::all_of(name.begin(), name.end(), [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; });
 }
 
-/// Names that differ by capital letters alone are one file to some file systems.
+/// On some file systems, names that differ only in capital letters mean the same file.
 std::string in_small_letters(std::string name) {
   for (char& c : name)
     if (c >= 'A' && c <= 'Z') c = char(c - 'A' + 'a');
   return name;
 }
 
-/// The views' names as the names of their files; where one cannot be, a number that no other view has.
+/// The file names of the views. A view's own name is used if it is plain, otherwise a number that no other view has.
 std::vector<std::string> file_stems(const std::vector<std::string>& names) {
   std::vector<std::string> stems, taken;
   for (const std::string& name : names) taken.push_back(in_small_letters(name));
@@ -94,7 +93,7 @@ std::string fragments_text(const marrow::Case& value) {
   return text;
 }
 
-/// That read.case will take what is written.
+/// Throws Error if read.case would refuse the written case.
 void check_case(const marrow::Case& value, const std::string& path) {
   if (value.views.empty()) throw marrow::Error(path + ": the case has no view");
   if (value.seeds.empty()) throw marrow::Error(path + ": the case has no fragment with seeds");
@@ -107,7 +106,7 @@ void check_case(const marrow::Case& value, const std::string& path) {
         throw marrow::Error(path + ": two " + what + "s are named '" + names[i] + "'");
   };
   check_names(value.views.names(), "view");
-  std::map<std::string, std::string> files;  // by small letters
+  std::map<std::string, std::string> files;  // the key is in small letters
   for (const std::string& name : value.views.names())
     if (const auto [other, is_new] = files.emplace(in_small_letters(name), name); !is_new)
       throw marrow::Error(path + ": the views '" + other->second + "' and '" + name +
@@ -135,7 +134,8 @@ void write_case(const marrow::Case& value, const std::string& path) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.writer<marrow::View>("", view, "folder with image.png, camera.yaml and mask.png");
+  plugin.writer<marrow::View>(
+      "", view, "folder with image.png (image.tif for float), camera.yaml and, if the view has a mask, mask.png");
   plugin.writer<marrow::Case>("", write_case,
-                              "folder with case.yaml, ct.mha, images and cameras, as read.case takes it");
+                              "folder with case.yaml, ct.mha, images and cameras, to be read by read.case");
 }

@@ -15,14 +15,14 @@ void append(std::string& bytes, const T& value) {
   bytes.append(first, sizeof value);
 }
 
-/// A name in one line of the header: a line break in it would begin another one.
+/// A name for one line of the header. A line break in the name would start another line.
 std::string in_one_line(std::string name) {
   for (char& c : name)
     if (static_cast<unsigned char>(c) < 0x20 || c == 0x7F) c = ' ';
   return name;
 }
 
-/// Binary PLY with double coordinates, so that what is read back is the same to the last bit.
+/// Binary PLY with double coordinates, so that reading gives exactly the same numbers.
 void mesh(const marrow::Mesh& mesh, const std::string& path) {
   std::string bytes = "ply\nformat binary_little_endian 1.0\ncomment marrow, mm, frame " + in_one_line(mesh.frame) +
                       "\nelement vertex " + std::to_string(mesh.vertices_mm.size()) +
@@ -41,5 +41,5 @@ void mesh(const marrow::Mesh& mesh, const std::string& path) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.writer<marrow::Mesh>(".ply", mesh, "PLY surface in mm (MeshLab, Slicer, Blender open it)");
+  plugin.writer<marrow::Mesh>(".ply", mesh, "PLY surface in mm (can be opened with MeshLab, Slicer, Blender)");
 }

@@ -11,7 +11,8 @@ void write_png(const std::string& path, const cv::Mat& pixels) {
   marrow::files::write_atomically(path, [&](const auto& temporary) { marrow::files::write_pixels(temporary, pixels); });
 }
 
-/// 8 and 16 bits are kept as they are. PNG has no float, so float is scaled from its least to its greatest value.
+/// 8 and 16 bits are kept as they are. PNG has no float, so a float image is scaled: its least value becomes 0, its
+/// greatest 65535.
 void image(const marrow::Image& image, const std::string& path) {
   if (image.pixels.depth() != CV_32F) return write_png(path, image.pixels);
   double least = 0, greatest = 0;
@@ -36,7 +37,7 @@ void edge_map(const marrow::EdgeMap& edges, const std::string& path) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.writer<marrow::Image>(".png", image, "PNG, 8 or 16 bits as they are, float scaled to 16 bits");
-  plugin.writer<marrow::Picture>(".png", picture, "PNG in colours");
+  plugin.writer<marrow::Image>(".png", image, "PNG; 8 or 16 bits are kept, float is scaled to 16 bits");
+  plugin.writer<marrow::Picture>(".png", picture, "PNG in colour");
   plugin.writer<marrow::EdgeMap>(".png", edge_map, "PNG, edges white on black");
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What reports show interactively, as JSON: tools/report/data.js says how they read it.
+// Writes the data of a report's interactive parts as JSON. tools/report/data.js reads it and describes it.
 #include <bit>
 #include <cmath>
 #include <cstring>
@@ -90,5 +90,5 @@ void landscape(const marrow::Landscape& landscape, const std::string& path) {
 
 MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::Scene>(".json", scene, "models, poses, cameras and images of a 3D view");
-  plugin.writer<marrow::Landscape>(".json", landscape, "the cost along each of the six axes");
+  plugin.writer<marrow::Landscape>(".json", landscape, "profiles of the cost along each of the six axes");
 }

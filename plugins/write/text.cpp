@@ -37,7 +37,7 @@ MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::Pose>(".yaml", pose, "pose with its frames, 4x4 matrix, predicted deviations and warnings");
   plugin.writer<marrow::Truth>(".yaml", truth, "exact pose with its frames and 4x4 matrix");
   plugin.writer<marrow::Camera>(".yaml", camera, "camera with its matrices");
-  plugin.writer<marrow::ShaftLines>(".yaml", shaft_lines, "the pair of borders, and the rejected ones with reasons");
+  plugin.writer<marrow::ShaftLines>(".yaml", shaft_lines, "the pair of borders, and the rejected pairs with reasons");
   plugin.writer<marrow::Seeds>(".yaml", seeds, "points of one fragment");
   plugin.writer<marrow::Metrics>(".json", metrics, "figures of merit with units");
 }

@@ -63,7 +63,7 @@ TEST(Yaml, KeysStandOnceAndAreNames) {
   EXPECT_EQ(
       said,
       "2: merge keys (<<) are not supported; 3: 'a' is given twice in it; 4: a key in it must be a name, got a list "
-      "of 1; 5: the key 'b\\x1b' in it holds a control character; ");
+      "of 1; 5: the key 'b\x1b' in it holds a control character; ");
 }
 
 TEST(Yaml, Limits) {

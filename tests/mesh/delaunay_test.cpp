@@ -107,13 +107,13 @@ TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
 
 TEST(Delaunay, StopsWhereTheFieldIsTooRoughForWhatIsAsked) {
   const auto field = shapes::noise_field({9, 8, 10}, 3, 0.4);
-  marrow::surface::LevelSet level_set;
+  marrow::delaunay::LevelSet level_set;
   const Interpolated value(field);
   level_set.value = [&](const Vector3d& p) { return value(p + Vector3d(4, 3.5, 4.5)); };
   level_set.radius_mm = 12;
   for (const Vector3d& index : spread_points(marrow::surface::Signs(field), 2))
     level_set.points_mm.push_back(index - Vector3d(4, 3.5, 4.5));
-  const auto surface = marrow::surface::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
+  const auto surface = marrow::delaunay::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
   EXPECT_FALSE(surface.complete);
   EXPECT_LT(surface.vertices_mm.size(), 5000u);
 }

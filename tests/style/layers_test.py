@@ -15,7 +15,7 @@ LAYERS = {
     "compare": {"domain", "runtime", "compare"},
     "toolbox": {"domain", "runtime"},
     "plugins": {"domain", "runtime", "toolbox"},
-    "tools": {"domain", "runtime", "compare", "tools"},
+    "tools": {"domain", "runtime", "compare", "toolbox", "tools"},
 }
 TOPICS = {"calibration": {"files"}, "phantom": {"calibration", "files"}}
 

@@ -3,7 +3,7 @@
 
 namespace marrow::cli {
 
-/// Of megabytes and seconds: more than nothing, and less than what a clock or a counter cannot hold.
+/// Bounds for megabytes and seconds: above 0, and small enough for clocks and counters.
 inline constexpr double kLeastAmount = 0.001, kMostAmount = 1e9;
 
 }  // namespace marrow::cli

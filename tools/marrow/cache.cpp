@@ -16,7 +16,7 @@ struct Share {
   double seconds = 0;
 };
 
-/// The command's exit code; says what is at fault, where anything is.
+/// The exit code of the command. Prints the fault if there is one.
 int code_after(const std::string& fault) {
   if (!fault.empty()) std::fprintf(stderr, "marrow: error: %s\n", printable_lines(fault).c_str());
   return fault.empty() ? 0 : 2;
@@ -37,7 +37,7 @@ void print(const Store::Entry& entry) {
   for (const std::string& warning : from.warnings) std::printf("  warning: %s\n", printable_lines(warning).c_str());
 }
 
-/// That no one can tell which of them is meant.
+/// The message that several keys begin with `key`, with some of them.
 std::string several(const std::string& key, const std::set<std::string>& keys) {
   constexpr std::size_t kMostShown = 5;
   std::string text = std::to_string(keys.size()) + " keys begin with '" + key + "'; give more digits of one of them:";
@@ -85,7 +85,7 @@ int cache_why(const std::string& key) {
   const Store store;
   if (const int code = code_after(store.fault())) return code;
   std::vector<Store::Entry> meant;
-  std::set<std::string> keys;  // several results may have one and the same output
+  std::set<std::string> keys;  // several results may have the same output
   for (Store::Entry& entry : store.entries()) {
     std::vector<Digest> all = entry.outputs;
     all.push_back(entry.key);

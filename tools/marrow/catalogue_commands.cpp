@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// inspect, doctor, describe: what can be used, from manifests alone.
+// The commands inspect, doctor and describe: they show what can be used. Only describe loads a library; the others read
+// manifests.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -51,7 +52,7 @@ void print_kind(const NodeInfo& node, const KindInfo* kind) {
       std::printf("  %s: %s\n", printable(trait.name).c_str(), printable(trait.help).c_str());
 }
 
-/// The figures that `marrow conformance` measures of a node, with their limits.
+/// The figures that `marrow conformance` measures for a node, with their limits.
 void print_checks(const NodeInfo& node, const KindInfo* kind) {
   if (!kind || kind->checks.empty()) return;
   std::printf("\nConformance (marrow conformance %s)\n", printable(node.name).c_str());

@@ -90,7 +90,7 @@ std::string yaml_text(const OptionValue& value) {
       value);
 }
 
-/// A bound of an option's range; none where it is only what an int can hold.
+/// A bound of an option's range. Nothing if the bound is only the limit of the type int.
 std::optional<double> bound_told(const OptionInfo& option, std::optional<double> bound) {
   using Limits = std::numeric_limits<int>;
   const bool is_of_int = option.type == OptionType::integer && (bound == Limits::min() || bound == Limits::max());

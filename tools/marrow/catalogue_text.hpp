@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is known of a node, as JSON and in words.
+// The description of a node, as JSON and in words.
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -13,7 +13,7 @@ nlohmann::json node_json(const NodeInfo& node);
 /// "edge_map", "list of view over view".
 std::string port_text(const PortInfo& port);
 std::string port_text(const KindPort& port);
-/// An option's default as it is written in YAML.
+/// The default of an option, as YAML.
 std::string yaml_text(const OptionValue& value);
 /// "number, 0 to 100 px", "one of: a, b".
 std::string range_text(const OptionInfo& option);

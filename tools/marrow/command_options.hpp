@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Options that several commands have.
+// Options that several commands share.
 #include "commands.hpp"
 #include "number_options.hpp"
 
@@ -12,7 +12,7 @@ void add_pipeline_arguments(CLI::App* command, PipelineRequest& request);
 void add_file_limits(CLI::App* command, FileLimits& limits, const std::string& otherwise = "by its size");
 /// --log-level.
 void add_log_level(CLI::App* command, LogLevel& level);
-/// Says below the help that the command may load libraries to describe them.
+/// Adds a note below the help: the command may load libraries to describe them.
 void say_that_libraries_are_described(CLI::App* command);
 
 }  // namespace marrow::cli

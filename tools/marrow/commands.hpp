@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The commands of the program, and what they share. Exit codes: 0 done, 1 a node or a library failed, 2 the request or
-// a file is at fault, 130 stopped by Ctrl-C.
+// The commands of the program, and what they share. Exit codes: 0 success, 1 a node or a library failed, 2 fault in the
+// request or in a file, 130 stopped by Ctrl-C.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -24,26 +24,27 @@ struct PipelineRequest {
 
 struct RunRequest {
   PipelineRequest pipeline;
-  std::filesystem::path folder;  ///< empty = runs/NAME, with a number where that is taken
+  std::filesystem::path folder;  ///< empty = runs/NAME, with a number if it exists
   std::uint64_t seed = 1;
   int threads = 0;
   bool no_cache = false;
-  LogLevel log_level = LogLevel::info;  ///< the least that is shown
+  LogLevel log_level = LogLevel::info;  ///< the lowest level that is shown
   bool quiet = false;                   ///< only errors are shown
   bool json = false;
   FileLimits file_limits;
 };
 
 struct RerunRequest {
-  std::filesystem::path run;     ///< folder of the run that is repeated
-  std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number where that is taken
+  std::filesystem::path run;     ///< folder of the run to repeat
+  std::filesystem::path folder;  ///< empty = runs/NAME-rerun, with a number if it exists
   LogLevel log_level = LogLevel::info;
   bool quiet = false;
   bool json = false;
-  FileLimits file_limits;  ///< instead of those of the run
+  FileLimits file_limits;  ///< replace the limits of the run
 };
 
-/// Each adds one command to the program: its options, its help and what it does. That sets `code`.
+/// Each function adds one command to the program: its options, its help and its callback, which sets `code` to the exit
+/// code.
 void add_run(CLI::App& app, int& code);
 void add_compare(CLI::App& app, int& code);
 void add_cell(CLI::App& app, int& code);
@@ -63,11 +64,11 @@ void add_conformance(CLI::App& app, int& code);
 void add_check_worker(CLI::App& app, int& code);
 void add_describe(CLI::App& app, int& code);
 
-/// Whether results can be kept. Says why not, unless `quiet`.
+/// Whether results can be kept in the store. If not, prints why, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);
-/// Splits name=value texts. Throws Error for one without '='.
+/// Splits texts of the form name=value. Throws Error for a text without '='.
 PipelineArguments arguments_of(const PipelineRequest& request);
-/// Reads the pipeline; prints all its faults and returns false when there are any.
+/// Reads the pipeline. If it has faults, prints all of them and returns false.
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
           bool json = false);
 
@@ -76,15 +77,15 @@ struct RunOutcome {
   std::vector<RunFolder::Written> written;
   bool is_faulty = false;  ///< a node failed, or an output was not written
 };
-/// Runs a pipeline into a folder, showing what goes on as the request wishes; its threads and seed count, not its
-/// pipeline.
+/// Runs a pipeline into a folder and shows the progress as the request wants. Of the request, threads and seed count,
+/// but not its pipeline.
 RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request,
                    const PipelineArguments& arguments, const Store* store, RunFolder& folder);
 
-/// That the pipeline reads no folder to which the run writes; an empty one is below runs/. Throws Error.
+/// Throws Error if the pipeline reads a folder to which the run writes. An empty `folder` means a folder below runs/.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
 
-/// Prints what a person wants to see of results at once: poses and figures of merit.
+/// Prints the most important results: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);
 
 }  // namespace marrow::cli

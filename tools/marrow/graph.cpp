@@ -14,7 +14,7 @@ std::string axes_text(const std::vector<std::string>& axes) {
   return text;
 }
 
-/// Between the quotes of a DOT file.
+/// A text between the quotes of a DOT file.
 std::string dot_text(const std::string& text) {
   std::string result;
   for (const char c : printable(text)) {
@@ -57,7 +57,7 @@ void print_dot(const Pipeline& pipeline) {
   const auto edge = [&](const Reference& source, const std::string& target, const std::string& port) {
     const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
     const PortInfo& output = from.info.outputs[std::size_t(source.output)];
-    // Functions travel along dashed edges, data along solid ones.
+    // Dashed edges carry functions, solid edges carry data.
     std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", dot_text(from.id).c_str(), dot_text(target).c_str(),
                 dot_text(port).c_str(), output.type.is_function ? ", style=dashed" : "");
   };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// list: the nodes that can be used, all or those that fit a place in a pipeline.
+// The command list: shows all nodes that can be used, or those that fit a place in a pipeline.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>

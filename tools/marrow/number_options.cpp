@@ -8,7 +8,7 @@
 namespace marrow::cli {
 namespace {
 
-/// Without trailing zeros.
+/// A number without trailing zeros.
 std::string text_of(double value) {
   char text[32];
   return std::string(text, std::to_chars(text, text + sizeof text, value, std::chars_format::fixed).ptr);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Options that take a number. The text must be the number and nothing else: decimal, finite and within its bounds, for
-// a number that is taken for another one changes results without a word.
+// Options that take a number. The text must be a decimal, finite number within its bounds, and nothing else. A number
+// that is misread would change results silently.
 #include <CLI/CLI.hpp>
 #include <cstdint>
 #include <limits>
@@ -9,10 +9,10 @@
 
 namespace marrow::cli {
 
-/// Throws CLI::ValidationError for anything but digits without leading zeros, from `least` to `most`.
+/// Throws CLI::ValidationError unless the text is a whole number from `least` to `most`, without leading zeros.
 std::uint64_t whole_number(const std::string& option, const std::string& text, std::uint64_t least, std::uint64_t most);
-/// Throws CLI::ValidationError for anything but a decimal number from `least` to `most`. `unit` and `end` are for the
-/// sentence.
+/// Throws CLI::ValidationError unless the text is a decimal number from `least` to `most`. `unit` and `end` are parts
+/// of the message.
 double number(const std::string& option, const std::string& text, double least, double most, const std::string& unit,
               const std::string& end = "");
 
@@ -23,11 +23,11 @@ CLI::Option* add_whole_number(CLI::App* command, const std::string& option, T& t
   return command->add_option_function<std::string>(option, take, help)->type_name("WHOLE NUMBER");
 }
 
-/// Of megabytes or seconds, within the bounds of amounts.
+/// Adds an option for megabytes or seconds, from kLeastAmount to kMostAmount.
 CLI::Option* add_amount(CLI::App* command, const std::string& option, double& target, const std::string& unit,
                         const std::string& help);
 
-/// What the help shows as the default.
+/// Sets the default that the help shows.
 template <class T>
 void show_default(CLI::Option* option, const T& value) {
   option->default_str(CLI::detail::to_string(value));

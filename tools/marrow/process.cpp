@@ -17,12 +17,13 @@ namespace {
 std::atomic<bool> stopped{false};
 std::atomic<int> stopped_by{0};
 
-/// To the standard error without asking for memory, of which there may be none.
+/// Writes to the standard error without allocating memory, because there may be none left.
 void say(const char* text) {
-  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody is left to be told
+  if (::write(STDERR_FILENO, text, std::strlen(text)) < 0) return;  // nobody can read it
 }
 
-/// For an exception that nobody caught, as in a thread or before main(): a sentence, where the system would abort.
+/// For an exception that nobody caught, for example in a thread or before main(). Prints a sentence instead of
+/// aborting.
 [[noreturn]] void on_terminate() {
   say("marrow: error: ");
   try {
@@ -40,7 +41,7 @@ void say(const char* text) {
 }
 
 extern "C" void on_stop(int signal) {
-  if (stopped.exchange(true)) {  // asked twice: do not wait for the nodes
+  if (stopped.exchange(true)) {  // the second signal: do not wait for the nodes
     say("\nmarrow: stopped at once; what was being done is lost\n");
     _exit(130);
   }
@@ -57,7 +58,7 @@ bool nobody_reads(int stream) {
 void prepare_process() {
   std::set_terminate(on_terminate);
   for (const int stream : {STDIN_FILENO, STDOUT_FILENO, STDERR_FILENO})
-    if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) break;  // it takes the lowest number that is free
+    if (fcntl(stream, F_GETFD) < 0 && open("/dev/null", O_RDWR) < 0) break;  // open() takes the lowest free number
   std::signal(SIGPIPE, SIG_IGN);
   std::signal(SIGXFSZ, SIG_IGN);
 }

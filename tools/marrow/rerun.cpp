@@ -25,8 +25,8 @@ int rerun(const RerunRequest& request) {
   if (request.file_limits.seconds > 0) how.file_limits.seconds = request.file_limits.seconds;
   how.log_level = request.log_level;
   how.quiet = request.quiet || request.json;
-  // Without the store: what is read back proves nothing, and a result that came out otherwise must not replace the
-  // first one.
+  // The store is not used: a result that is read back proves nothing, and a different result must not replace the
+  // first.
   const RunOutcome outcome = execute(pipeline, catalogue, how, before.arguments, nullptr, folder);
   if (outcome.result.cancelled()) return 130;
   KnownValues values;

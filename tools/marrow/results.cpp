@@ -25,10 +25,10 @@ void print_pose(const std::string& name, const Pose& pose) {
   for (const std::string& warning : pose.warnings) std::printf("    warning: %s\n", printable_lines(warning).c_str());
 }
 
-/// One row a figure, one column an item: the stages of a registration stand side by side.
+/// One row per figure, one column per item. So the stages of a registration are side by side.
 void print_metrics(const std::string& name, const std::vector<std::string>& columns,
                    const std::vector<const Metrics*>& items) {
-  std::vector<const Metric*> rows;  // the first of each name
+  std::vector<const Metric*> rows;  // the first metric of each name
   for (const Metrics* item : items)
     for (const Metric& metric : item->items)
       if (std::none_of(rows.begin(), rows.end(), [&](const Metric* row) { return row->name == metric.name; }))

@@ -20,7 +20,7 @@ namespace {
 using nlohmann::json;
 using Kind = RunEvent::Kind;
 
-/// Shows a run's events: lines that stay for what has ended, one that is rewritten for what goes on.
+/// Shows the events of a run: one line for each finished step, and one line for the current step that is rewritten.
 class Progress {
  public:
   Progress(const RunRequest& request, RunFolder& folder)
@@ -78,7 +78,7 @@ class Progress {
     log_.write(level, where, text);
   }
 
-  /// On a terminal at most ten times a second; in a log file every five seconds.
+  /// Shows the current progress: on a terminal at most ten times a second, otherwise every five seconds.
   void moving_line(const std::string& where, const RunEvent& event) {
     const auto now = std::chrono::steady_clock::now();
     if (!log_.shows(LogLevel::info) ||
@@ -125,7 +125,7 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
-    // Why a node failed was said when it did.
+    // The reason of a failure was printed when the node failed.
     const std::string reason = record.status == NodeRecord::Status::failed ? "" : printable_lines(record.reason);
     std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
                 record.seconds, record.calls, status_text(record).c_str(), reason.empty() ? "" : ": ", reason.c_str());

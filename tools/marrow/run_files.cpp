@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 
 constexpr std::uint64_t kMostPixels = 40'000'000;
 
-/// Where a name below the folder leads, with all links followed; empty where it leads nowhere.
+/// The real path of a name below the folder, with all links followed. Empty if nothing is there.
 fs::path target_of(const fs::path& folder, const std::string& name) {
   std::error_code error;
   const fs::path target = fs::canonical(folder / name, error);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The files of a run's folder, which may be damaged, or come from somebody else.
+// Reads the files of a run's folder. They may be damaged, or come from somebody else.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -9,29 +9,29 @@
 
 namespace marrow::cli {
 
-/// run.json of a run's folder. Throws Error where it is no object, or cannot be read.
+/// run.json of a run's folder. Throws Error if it cannot be read or is not a JSON object.
 nlohmann::json read_record(const std::filesystem::path& folder);
 
-/// [throws Error] that run.json is damaged, and how.
+/// Throws Error: run.json is damaged, and why.
 [[noreturn]] void refuse_record(const std::filesystem::path& folder, const std::string& why);
 
-/// A regular file that a record names below the run's folder. Nothing where there is none, or where the name or a link
-/// leads out of the folder: a page or a comparison of runs shows nothing else of this machine.
+/// A regular file in the run's folder that a record names. Nothing if it does not exist, or if the name or a link leads
+/// out of the folder. So a page or a comparison of runs never shows other files of this machine.
 std::optional<std::filesystem::path> file_of_run(const std::filesystem::path& folder, const std::string& name);
 
 /// Whether the name leads to something outside the folder.
 bool leads_outside(const std::filesystem::path& folder, const std::string& name);
 
-/// Throws Error where it does.
+/// Throws Error if leads_outside().
 void refuse_outside(const std::filesystem::path& folder, const std::string& name);
 
-/// A PNG's pixels, three bytes each.
+/// The pixels of a PNG, three bytes each.
 struct RgbPixels {
   int width_px = 0, height_px = 0;
-  bool is_wide = false;  ///< the file has 16 bits a channel
+  bool is_wide = false;  ///< the file has 16 bits per channel
   std::vector<std::uint8_t> bytes;
 };
-/// Throws Error for a file that is no PNG, is damaged, or has more than 40 million pixels.
+/// Throws Error if the file is not a PNG, is damaged, or has more than 40 million pixels.
 RgbPixels read_png(const std::filesystem::path& file);
 
 }  // namespace marrow::cli

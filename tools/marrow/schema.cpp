@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The JSON Schema (draft 7) of pipeline files, made from exactly the nodes that are installed here.
+// The JSON Schema (draft 7) of pipeline files, made from the nodes that are installed.
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -14,7 +14,7 @@ namespace {
 using json = nlohmann::ordered_json;
 
 json scalar_schema(const OptionInfo& option) {
-  // A value may be the name of an input ("$case"), whatever the option's type.
+  // For every type of option, the value may be the name of an input ("$case").
   const json name = {{"type", "string"}, {"pattern", "\\$"}};
   json value;
   switch (option.type) {

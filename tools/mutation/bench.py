@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Builds what a changed file changes, runs the tests near it, and puts everything back: sources, objects, programs,
-with their times."""
+"""Builds what depends on a changed file, runs the tests near it, and puts everything back: sources, objects and
+programs, with their times."""
 import filecmp
 import json
 import os
@@ -14,7 +14,7 @@ import time
 
 from graph import Graph
 
-# The tests near a folder, by the beginnings of their programs' or of their own names.
+# For each folder, the tests near it, by the beginnings of the names of tests or of their programs.
 NEAR = {
     "framework/domain": [
         "domain_",
@@ -58,7 +58,7 @@ LEAST_LIMIT_S = 30
 
 
 class Test:
-    """One program of the test run: all GoogleTest cases of a program count as one."""
+    """One program of the test run. All GoogleTest cases of a program count as one test."""
 
     def __init__(self, name, command, properties):
         self.name, self.command = name, command
@@ -109,7 +109,7 @@ class Bench:
         return [test for test in self.tests.values() if test.name.startswith(tuple(names))]
 
     def run(self, test, limit_s):
-        """None where the test passes, else what failed."""
+        """None if the test passes, otherwise what failed."""
         self.last = test
         scratch = self.own / "scratch"
         shutil.rmtree(scratch, ignore_errors=True)
@@ -152,8 +152,8 @@ class Bench:
         )
 
     def measure(self, tests):
-        """Times the tests as the sources are; a test that fails so tells nothing. Times are kept until a program is
-        another."""
+        """Measures the times of the tests with unchanged sources. Ends if one fails, because it could not catch a
+        change. Times are kept until the program of a test changes."""
         programs = {test.command[0] for test in tests if test.command[0].startswith(str(self.build))}
         built = self.ninja(programs | {str(self.build / "bin/marrow")})
         if built.returncode:
@@ -172,8 +172,8 @@ class Bench:
             test.seconds = times[test.name][1]
 
     def try_change(self, path, text, tests):
-        """What catches the file with another text; None where nothing does. Everything is put back. A test that then
-        fails as well tells nothing."""
+        """The test that fails if the file has another text, or None. Everything is put back. If this test then still
+        fails, ends, because the failure says nothing about the change."""
         source = self.root / path
         made = self.graph.made_from(source)
         self.save([str(source), *made])
@@ -191,14 +191,14 @@ class Bench:
         return caught
 
     def first_failure(self, tests, made):
-        """Builds for each test what it needs, the tests that hold the changed code themselves first."""
+        """Builds what each test needs and runs it. Tests that contain the changed code themselves come first."""
         libraries = {name for name in made if ".so" in name}
         changed, waiting = False, []
         for test in tests:
             wanted = {test.command[0]} if test.command[0] in made else libraries
             changed |= self.compile(made, wanted)
             if self.ninja(wanted).returncode:
-                return "build of " + test.name  # a node cannot be described, or a test not listed
+                return "build of " + test.name  # a node could not be described, or the tests could not be listed
             if not changed:
                 waiting.append(test)
                 continue
@@ -210,7 +210,7 @@ class Bench:
         return next(filter(None, (self.run(test, test.limit_s()) for test in waiting)), None)
 
     def compile(self, made, wanted):
-        """Whether the machine code differs from before."""
+        """Whether the machine code has changed."""
         objects = [name for name in made if name.endswith(".o") and self.graph.made_from(name) & wanted]
         if objects and self.ninja(objects).returncode:
             raise DoesNotCompile()
@@ -225,10 +225,10 @@ class Bench:
             if os.path.isfile(name):
                 self.saved[name] = str(self.undo / str(number))
                 shutil.copy2(name, self.saved[name])
-        (self.undo / "list.json").write_text(json.dumps(self.saved))  # last: from now on there is something to put back
+        (self.undo / "list.json").write_text(json.dumps(self.saved))  # last: put_back() does nothing without it
 
     def put_back(self):
-        """Also what a run that was killed has left."""
+        """Puts everything back, also after a run that was killed."""
         listed = self.undo / "list.json"
         if listed.exists():
             for name, copy in json.loads(listed.read_text()).items():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What ninja makes of a source file: read from build.ninja and from the headers that the compiler named."""
+"""What ninja makes from a source file, read from build.ninja and from the headers that the compiler listed."""
 import os
 import re
 import subprocess
@@ -17,7 +17,7 @@ class Graph:
             text = stream.read().replace("$\n", "")
         for line in re.findall(r"^build (.*)$", text, re.M):
             outputs, _, inputs = line.replace("$:", "\0").partition(": ")
-            inputs = inputs.partition(" || ")[0]  # what is only made before it does not count
+            inputs = inputs.partition(" || ")[0]  # order-only inputs do not count
             names = [
                 [
                     name.replace("\0", ":").replace("$ ", " ")
@@ -45,8 +45,8 @@ class Graph:
         return os.path.normpath(os.path.join(self.build, name))
 
     def made_from(self, source):
-        """All that is made from a file, through any number of steps; what is only linked against the framework's shared
-        library is not."""
+        """Everything that is made from a file, in any number of steps. Files that are only linked against the
+        framework's shared library are left out."""
         made, left = set(), [os.path.abspath(source)]
         while left:
             for user in self.users.get(left.pop(), ()):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Places of a C++ file that can be changed so that it does something else: found by its tokens, not by its grammar."""
+"""Finds places of a C++ file where a change gives another behaviour. It uses the tokens, not the grammar."""
 import re
 from dataclasses import dataclass, field
 
@@ -75,7 +75,7 @@ class Token:
     text: str
     start: int
     spaced: bool = False  # white space before it
-    partner: int = -1  # of a bracket: the index of the one that it belongs to
+    partner: int = -1  # of a bracket: the index of the matching bracket
 
     @property
     def end(self):
@@ -84,7 +84,7 @@ class Token:
 
 @dataclass
 class Place:
-    """What may be written instead of text[start:end]."""
+    """A place text[start:end] with its possible replacements."""
 
     path: str
     line: int
@@ -96,7 +96,7 @@ class Place:
 
 
 def tokens_of(text):
-    """The tokens that the compiler sees, without directives of the preprocessor."""
+    """The tokens of the compiler, without preprocessor directives."""
     tokens, spaced = [], True
     for match in TOKEN.finditer(text):
         if match.lastgroup in ("space", "comment", "directive"):
@@ -118,7 +118,7 @@ def tokens_of(text):
 
 
 def end_of_statement(tokens, i):
-    """The index of the semicolon that ends what begins at i; -1 where brackets close or end first."""
+    """The index of the semicolon that ends the statement at i; -1 if a bracket closes or the text ends first."""
     while i < len(tokens):
         text = tokens[i].text
         if tokens[i].kind == "sign" and text == ";":
@@ -134,8 +134,8 @@ def end_of_statement(tokens, i):
 
 
 def silent_tokens(tokens):
-    """Indices where a change is none of behaviour, or cannot be compiled: messages, static_assert, sizes of types and
-    of buffers for text, reserve()."""
+    """Indices of tokens whose change would not change the behaviour or would not compile: messages, static_assert,
+    sizes of types and of text buffers, reserve()."""
     silent = set()
     for i, token in enumerate(tokens):
         following = tokens[i + 1].text if i + 1 < len(tokens) else ""
@@ -151,7 +151,8 @@ def silent_tokens(tokens):
 
 
 def end_of_template(tokens, i):
-    """The index of the bracket that closes the template arguments beginning at i; -1 where there are none."""
+    """The index of the bracket that closes the template arguments starting at i; -1 if these are not template
+    arguments."""
     depth = 0
     while i < len(tokens):
         token = tokens[i]
@@ -168,7 +169,7 @@ def end_of_template(tokens, i):
 
 
 def in_registration(tokens):
-    """Indices of what registers nodes: of these the limits and defaults count, the rest is text."""
+    """Indices of the tokens that register nodes. Only numbers are changed there, because the rest is text."""
     inside = set()
     for i, token in enumerate(tokens):
         if token.text == "MARROW_PLUGIN" and i + 1 < len(tokens) and tokens[i + 1].text == "(":
@@ -179,8 +180,8 @@ def in_registration(tokens):
 
 
 def changed_number(text):
-    """Other numbers to write instead: one more or less, twice or half, and three orders where it is written with an
-    exponent."""
+    """Numbers to write instead: one more or less for integers, twice or half for others, and 1000 times more or less
+    for numbers with an exponent."""
     match = re.fullmatch(r"(0[xX][0-9a-fA-F']+|[0-9.']+(?:[eE][+-]?\d+)?)([a-zA-Z]*)", text)
     if not match:
         return []
@@ -197,7 +198,7 @@ def changed_number(text):
 
 
 def holds_code(tokens, i):
-    """Whether the brace at i opens statements, and no type, namespace or list of values."""
+    """Whether the brace at i opens a block of statements, and not a type, a namespace or a list of values."""
     if not i:
         return False
     before = tokens[i - 1]
@@ -216,7 +217,7 @@ def holds_code(tokens, i):
 
 
 def is_expression(tokens, i, end):
-    """Whether the statement does something and declares nothing."""
+    """Whether the statement does something and is not a declaration."""
     first = tokens[i]
     if first.text in ("break", "continue", "throw"):
         return True
@@ -302,7 +303,7 @@ class Finder:
         )
 
     def statements(self, opening):
-        """Single statements of a block, and the one that follows an if, for or while without braces."""
+        """Adds the single statements of a block, also those after an if, for or while without braces."""
         i, closing = opening + 1, self.tokens[opening].partner
         while i < closing:
             text = self.tokens[i].text
@@ -329,5 +330,5 @@ class Finder:
 
 
 def places_of(path, text):
-    """All places of a file, in their order."""
+    """All places of a file, in order."""
     return Finder(path, text).find()

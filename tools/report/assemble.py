@@ -1,12 +1,12 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""Joins the template, style, scripts, three.js and a report's data into one HTML file that needs nothing else.
+"""Joins the template, style, scripts, three.js and the data of a report into one HTML file that needs no other file.
 
     tools/report/assemble.py data.json report.html
-    tools/report/assemble.py --page page.html          # without data, as the program carries it
+    tools/report/assemble.py --page page.html          # without data, as it is built into marrow
 
-Each marker of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, is
-replaced by the file or the data that it names, so the template also says in which order the scripts come.
+The markers of the template, <!-- marrow:style NAME -->, <!-- marrow:script NAME --> and <!-- marrow:data -->, are
+replaced by the files or the data. So the template also gives the order of the scripts.
 """
 import argparse
 import json
@@ -26,8 +26,8 @@ def script(path):
 
 
 def assemble(data, three=THREE):
-    """The page's text; its marker for data stays where `data` is None. Without three.js the page says what is missing
-    and shows all but the 3D view."""
+    """The text of the page. If `data` is None, its marker for data stays. Without three.js, the page shows everything
+    but the 3D view, and says what is missing."""
 
     def part(marker):
         kind, name = marker.group(1), marker.group(2)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every node of a kind must do, wherever it was compiled. The library that brings a kind brings its suite of
-// checks, and `marrow conformance` runs them.
+// Checks of what every node of a kind must do, no matter who compiled the node. The library that declares a kind also
+// brings its suite of checks. `marrow conformance` runs them.
 #include <filesystem>
 #include <functional>
 #include <initializer_list>
@@ -17,17 +17,17 @@
 
 namespace marrow::conformance {
 
-/// Values by port. A node takes those that it has a port for; where a port stands here in several types, the one of its
-/// own type.
+/// Input values by the name of the port. A node takes the values of those ports that it has. One port may be here
+/// several times, with different types: a node takes the value of its own port's type.
 class Inputs {
  public:
   Inputs() = default;
   Inputs(std::initializer_list<std::pair<std::string, Value>> values) : values_(values) {}
   /// Adds a value, or replaces the one of the same port and type.
   void set(const std::string& port, Value value);
-  /// nullptr where there is none of the port's name and type.
+  /// The value with the port's name and type, or nullptr.
   const Value* find(const PortInfo& port) const;
-  /// The first of that name. Throws std::out_of_range.
+  /// The first value with that name. Throws std::out_of_range if there is none.
   Value& at(const std::string& port);
   const Value& at(const std::string& port) const;
 
@@ -40,25 +40,27 @@ Value item(T value) {
   return Value::of<T>(std::make_shared<const T>(std::move(value)));
 }
 
-/// The outputs of a call, or what it refused its inputs with.
+/// The outputs of a call, or the message with which the node refused its inputs.
 struct Result {
   std::vector<Value> outputs;
   std::optional<std::string> refusal;
 };
 
-/// The node that is looked at, with its options as they are by default, but for those that its suite gives a value.
+/// The node under test. Its options have their default values, except those for which its suite gives a value.
 class Subject {
  public:
-  /// `further` is for inputs that the kind does not have; a check's own inputs go before.
+  /// `further` holds values for inputs that the kind does not declare. The inputs of a check take precedence.
   explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {}, Inputs further = {})
       : node_(node), options_(std::move(options)), further_(std::move(further)) {}
   const NodeInfo& info() const { return node_.info; }
   /// Whether the node declares this trait of its kind.
   bool has_trait(const std::string& name) const;
-  /// Calls the node. An Error that it throws is a refusal; any other exception passes through. Throws NotApplicable for
-  /// an input or an option that the node needs and this check has not.
+  /// Calls the node with `threads` threads; 0 means one per hardware thread. An Error of the node counts as a refusal;
+  /// any other exception passes through. Throws NotApplicable if the node needs an input or an option that this check
+  /// does not have.
   Result call(const Inputs& inputs, int threads = 0) const;
-  /// The output of that name of a call that must not refuse. Throws Failure.
+  /// Calls the node and returns its output of that name. Throws Failure if the node refuses or does not give this
+  /// output.
   Value output(const Inputs& inputs, const std::string& port) const;
 
   /// The same node with another value of an option.
@@ -70,53 +72,53 @@ class Subject {
   Inputs further_;
 };
 
-/// Thrown by a check that fails; the text says what was found and what was expected.
+/// Thrown by a check that fails. The text says what was found and what was expected.
 class Failure : public Error {
  public:
   using Error::Error;
 };
-/// Thrown where a check has not the inputs that the node needs: a mesher's random field, for a node that changes a
-/// mesh.
+/// Thrown if a check does not have the inputs that the node needs. Example: the checks of meshers give a random field,
+/// but the node under test changes a mesh.
 class NotApplicable : public Error {
  public:
   using Error::Error;
 };
 /// Throws Failure unless `good`.
 void expect(bool good, const std::string& text);
-/// Throws Failure for a refusal that says too little.
+/// Throws Failure if the text of a refusal is too short to be a reason (10 bytes or fewer).
 void expect_reason(const std::string& refusal);
-/// "0.41", with three significant digits.
+/// The number as text with three significant digits, such as "0.41".
 std::string digits(double value);
-/// A folder for files that checks write. It belongs to this run of `marrow conformance`, which removes it. Throws Error
-/// outside of one.
+/// The folder for files that checks write. `marrow conformance` makes it for its run and removes it afterwards. Throws
+/// Error outside of such a run.
 std::filesystem::path files_folder();
-/// Called by `marrow conformance` before the first check.
+/// Sets the folder of files_folder(). `marrow conformance` calls it before the first check.
 void set_files_folder(const std::filesystem::path& folder);
 
-/// One figure with its limit.
+/// One measurement and its limit.
 struct Check : CheckInfo {
-  /// The figure, which must not exceed the limit; may throw Failure.
+  /// Returns the measured value, which must not exceed the limit. May throw Failure.
   std::function<double(const Subject&)> measure;
 };
 
-/// An input that is no good, or at the edge of it: the node refuses it in words or gives a valid output.
+/// Bad or borderline inputs. The node must either refuse them with a reason or give a valid output.
 struct Trial {
   std::string name;
   std::function<Inputs()> inputs;
 };
 
 struct Suite {
-  std::function<Inputs()> sample;  ///< good inputs of moderate size; empty: there is no suite
-  std::function<void(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>&)>
-      validate;  ///< throws Failure for outputs that break the contract
+  std::function<Inputs()> sample;  ///< makes good inputs of moderate size; empty if the kind has no suite
+  /// Throws Failure for outputs that break the contract.
+  std::function<void(const Inputs&, const std::vector<PortInfo>&, const std::vector<Value>&)> validate;
   std::vector<Trial> trials;
   std::vector<Check> accuracy;
-  std::function<std::map<std::string, OptionValue>()> options =
-      nullptr;  ///< values for options by their names, where a node has them
+  /// Values of options by their names. A value is used if the node has that option.
+  std::function<std::map<std::string, OptionValue>()> options = nullptr;
 };
 
-/// All checks of a suite: contract, determinism, threads, its trials, accuracy. They refer to the suite's functions,
-/// and not to the suite. None of a suite without a sample.
+/// All checks of a suite: contract, determinism, threads, its trials, accuracy. They hold a copy of the suite, so the
+/// suite may be destroyed before them. Empty if the suite has no sample.
 std::vector<Check> checks_of(const Suite& suite);
 
 }  // namespace marrow::conformance

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// All that a plugin author includes. A node is a plain function, declared once:
+// The only header that a plugin must include. A node is a plain function that is declared once:
 //
 //   struct Options { double low = 50; };
 //   marrow::EdgeMap find(const marrow::View& view, const Options& options) { ... }
@@ -13,15 +13,15 @@
 //         .option("low", &Options::low, "lower threshold", marrow::at_least(0), marrow::unit("%"));
 //   }
 //
-// Ports come from the signature, and .in() calls follow the order of its arguments:
+// The function's signature defines the ports. The .in() calls name them in the order of the arguments:
 //   const T&          a required input           const List<T>&   a whole list (say which axis: over("view"))
 //   const T*          an optional input          const List<T>*   an optional list
 //   Context&          seed, cancel, progress, log
-//   const Options&    the one struct that is no registered value type: the options
-// Returned: a value, std::optional of one, List<T>, std::shared_ptr<const Interface> for a function, a std::tuple, or a
-// struct whose members are named with .out("port", &Struct::member, "help").
+//   const Options&    the options: the only argument whose type is not a registered value type
+// A node returns a value, a std::optional of one, a List<T>, a std::shared_ptr<const Interface> for a function, a
+// std::tuple of these, or a struct whose members are named with .out("port", &Struct::member, "help").
 //
-// A kind is the part of a node's name before the dot. A library may bring one of its own (runtime/kind_builder.hpp).
+// A kind is the part of a node's name before the dot. A library may declare its own kinds (runtime/kind_builder.hpp).
 #include <deque>
 #include <string>
 #include <utility>
@@ -43,8 +43,8 @@ class Plugin {
     nodes.back().info.name = std::move(name);
     return NodeBuilder<R, Args...>(nodes.back(), function);
   }
-  /// How values of type T are written when they are outputs of a pipeline: `function` gets the full path, which ends in
-  /// `extension` (an empty extension means a folder). It throws Error when it cannot.
+  /// Registers how values of type T are written to disk as outputs of a pipeline. `function` gets the full path, which
+  /// ends in `extension`; an empty extension means a folder. `function` throws Error if it cannot write the value.
   template <Registered T>
   void writer(std::string extension, void (*function)(const T&, const std::string& path), std::string help) {
     writers.push_back(
@@ -52,7 +52,7 @@ class Plugin {
          [function](const void* value, const std::string& path) { function(*static_cast<const T*>(value), path); }});
   }
 
-  /// A kind of nodes, with its contract: the library that brings it may be another one than those of its nodes.
+  /// Declares a kind of nodes with its contract. The nodes of the kind may be in other libraries.
   KindBuilder kind(std::string name) {
     kinds.emplace_back();
     kinds.back().info.name = std::move(name);
@@ -64,7 +64,7 @@ class Plugin {
   std::vector<WriterDefinition> writers;
 };
 
-/// Opens the one function that makes a shared library a plugin.
+/// Begins the function that registers nodes and kinds. It makes a shared library a plugin.
 #define MARROW_PLUGIN(plugin)                                                                            \
   static void marrow_register_nodes(::marrow::Plugin& plugin);                                           \
   extern "C" __attribute__((visibility("default"))) const ::marrow::PluginEntry* marrow_plugin_entry() { \

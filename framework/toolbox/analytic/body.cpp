@@ -9,7 +9,7 @@
 namespace marrow::analytic {
 namespace {
 
-/// In the space where the ellipsoid is the unit ball.
+/// A vector in the space in which the ellipsoid is the unit ball.
 Eigen::Vector3d as_ball(const Ellipsoid& e, const Eigen::Vector3d& vector) {
   return (e.axes.transpose() * vector).cwiseQuotient(e.radii_mm);
 }
@@ -22,8 +22,8 @@ double chord_mm(const Ellipsoid& e, const Eigen::Vector3d& start, const Eigen::V
   return std::max(0.0, to - from);
 }
 
-/// The nearest point of the surface is q = r^2 p / (t + r^2) with sum (r p / (t + r^2))^2 = 1, by Newton's steps from
-/// below.
+/// The nearest point of the surface is q = r^2 p / (t + r^2), where sum (r p / (t + r^2))^2 = 1. Newton's method finds
+/// t, from below.
 double signed_distance_mm(const Ellipsoid& e, const Eigen::Vector3d& point, double band) {
   const Eigen::Array3d p = (e.axes.transpose() * (point - e.centre_mm)).array().abs() + 1e-7, r = e.radii_mm.array(),
                        r2 = r * r;
@@ -51,7 +51,7 @@ void fill(const Grid& grid, std::vector<float>& values, const Value& value) {
         values.push_back(float(value(grid.point_from_index({double(x), double(y), double(z)}))));
 }
 
-/// Where rays from the source touch an ellipsoid: a circle of the unit ball.
+/// Points at which rays from the source touch an ellipsoid. In the space of the unit ball they form a circle.
 std::vector<Eigen::Vector3d> touching_circle(const Ellipsoid& e, const Eigen::Vector3d& source, int count) {
   const Eigen::Vector3d s = as_ball(e, source - e.centre_mm);
   const double distance = s.norm();

@@ -33,7 +33,7 @@ PlaneSolid octahedron_between(const Eigen::Vector3d& half) {
 }
 
 Volume volume_of(const PlaneSolid& solid, const Grid& grid, double hu) {
-  constexpr int kParts = 4;  // of a voxel, along each axis
+  constexpr int kParts = 4;  // a voxel is divided into this many parts along each axis
   Volume volume{grid, {}};
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y)

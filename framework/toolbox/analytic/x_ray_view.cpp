@@ -68,7 +68,7 @@ View x_ray_view(const XRay& x_ray, const std::string& name, const RadiographProj
 
 EdgeMap edges_of(const View& view) {
   constexpr double kSigma_px = 1.4;
-  constexpr float kThreshold = 0.1f;  // of the steepest
+  constexpr float kThreshold = 0.1f;  // as a fraction of the steepest gradient
   cv::Mat values;
   view.image.pixels.convertTo(values, CV_32F);
   for (auto at = values.begin<float>(); at != values.end<float>(); ++at) *at = std::log(std::max(*at, 1.0f));

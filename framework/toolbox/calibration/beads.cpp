@@ -11,11 +11,12 @@
 namespace marrow::calibration {
 namespace {
 
-constexpr double kNoiseFactor = 6;       ///< what is this many deviations of the noise darker may be a bead
-constexpr double kLeastRoundness = 0.8;  ///< shorter by longer axis
+constexpr double kNoiseFactor = 6;       ///< a bead is darker by at least this many standard deviations of the noise
+constexpr double kLeastRoundness = 0.8;  ///< shorter axis divided by longer axis
 constexpr double kLeastArea_px = 12;
 
-/// How much darker a pixel is than what a closing over more than a bead's diameter leaves.
+/// The morphological closing of the image minus the image itself: how much darker a pixel is than its surroundings. The
+/// closing is wider than a bead.
 cv::Mat1f darkness_of(const cv::Mat1f& image, double largest_px) {
   const int width = 2 * int(std::ceil(0.7 * largest_px)) + 1;
   cv::Mat1f smooth, background;
@@ -30,7 +31,7 @@ float quantile(std::vector<float>& values, double fraction) {
   return *at;
 }
 
-/// The darkness from which on a pixel may belong to a bead.
+/// The least darkness of a pixel that may belong to a bead.
 double threshold_of(const cv::Mat1f& darkness, double least_contrast) {
   std::vector<float> values(darkness.begin(), darkness.end());
   const float middle = quantile(values, 0.5), darkest = quantile(values, 0.9995);
@@ -64,8 +65,8 @@ Blob blob_at_half_peak(const cv::Mat1f& darkness, const cv::Mat1i& labels, int l
   return blob;
 }
 
-/// A full ellipse has the area 4 pi sqrt(det) of its second moments; two beads that merge, a ring or a corner have
-/// less.
+/// A filled ellipse has the area 4 pi sqrt(det of its second moments). Two merged beads, a ring or a corner have a
+/// smaller one.
 bool is_round(const Blob& blob) {
   const Eigen::Vector2d axes =
       Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(blob.spread, Eigen::EigenvaluesOnly).eigenvalues();
@@ -73,7 +74,7 @@ bool is_round(const Blob& blob) {
   return axes[0] > kLeastRoundness * kLeastRoundness * axes[1] && filled > 0.9 && filled < 1.1;
 }
 
-/// Plane through the grey values of a ring around a bead, without those that another bead darkens.
+/// A plane fitted to the grey values of a ring around a bead. Pixels that another bead darkens are left out.
 class Background {
  public:
   Background(const cv::Mat1f& image, const Eigen::Vector2d& centre, double inner, double outer) {
@@ -115,7 +116,7 @@ class Background {
   Eigen::Vector3d plane_ = Eigen::Vector3d::Zero();
 };
 
-/// Centre of mass of the darkness in a window that follows it.
+/// Centre of mass of the darkness in a window. The window is centred on the result, repeatedly.
 Eigen::Vector2d refined_centre(const cv::Mat1f& image, Eigen::Vector2d centre, double diameter) {
   const double window = 0.5 * diameter + 2;
   for (int round = 0; round < 5; ++round) {
@@ -125,7 +126,7 @@ Eigen::Vector2d refined_centre(const cv::Mat1f& image, Eigen::Vector2d centre, d
          ++v)
       for (int u = std::max(0, int(centre.x() - window)); u <= std::min(image.cols - 1, int(centre.x() + window) + 1);
            ++u) {
-        // Weights fall off over the last pixel, so that the window's edge does not jump over whole pixels.
+        // Weights fall to 0 over the last pixel, so that the result changes smoothly when the window moves.
         const double weight = std::clamp(window - std::hypot(u - centre.x(), v - centre.y()), 0.0, 1.0);
         if (weight > 0) sum += weight * (background.at(u, v) - image(v, u)) * Eigen::Vector3d(u, v, 1);
       }

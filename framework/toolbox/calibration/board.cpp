@@ -15,9 +15,9 @@ namespace {
 using files::YamlFile;
 using files::YamlMap;
 
-constexpr double kFlat_mm = 1;             ///< how far the beads of a side may lie out of its plane
-constexpr double kLeastThickness_mm = 10;  ///< between the sides: without depth there is no focal length
-constexpr double kLandmarkRatio = 1.3;     ///< landmarks are this much larger than the other beads
+constexpr double kFlat_mm = 1;             ///< largest distance of a bead from its side's plane
+constexpr double kLeastThickness_mm = 10;  ///< between the sides: without depth the focal length is not determined
+constexpr double kLandmarkRatio = 1.3;     ///< least ratio of the diameters of landmarks and other beads
 constexpr std::size_t kMostBeads = 1000;
 
 std::string millimetres(double length) {

@@ -18,9 +18,9 @@ Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   return svd.matrixU() * svd.matrixV().transpose();
 }
 
-/// The first two rows of [R|t] up to a common factor, from the radial alignment constraint: whatever the focal length,
-/// the distance and the radial distortion, a point is seen in the direction (r_1 X + t_x, r_2 X + t_y) from the
-/// principal point.
+/// The first two rows of [R|t] up to a common factor, from the radial alignment constraint: for any focal length,
+/// distance and radial distortion, a point is seen in the direction (r_1 X + t_x, r_2 X + t_y) from the principal
+/// point.
 std::optional<Eigen::Matrix<double, 2, 4>> aligned_rows(const std::vector<Eigen::Vector4d>& points,
                                                         const std::vector<Eigen::Vector2d>& seen) {
   Eigen::MatrixXd system(points.size(), 8);
@@ -28,7 +28,7 @@ std::optional<Eigen::Matrix<double, 2, 4>> aligned_rows(const std::vector<Eigen:
     system.block<1, 4>(Eigen::Index(i), 0) = seen[i].y() * points[i].transpose();
     system.block<1, 4>(Eigen::Index(i), 4) = -seen[i].x() * points[i].transpose();
   }
-  // By the squares: they are exact enough for a start, and a singular value decomposition takes a minute to compile.
+  // The normal equations are exact enough for a start. A singular value decomposition would take a minute to compile.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 8, 8>> least(system.transpose() * system);
   // Points in one plane leave more than one direction undetermined.
   if (least.eigenvalues()[1] < 1e-12 * least.eigenvalues()[7]) return std::nullopt;
@@ -93,7 +93,7 @@ Eigen::Vector2d seen_at(const Calibration& calibration, const RigidTransform& ca
 
 namespace {
 
-/// Derivatives of where a point is seen by f_u, f_v, u_0, v_0, k_1..k_3 and by a small rotation and translation of the
+/// Derivatives of a point's pixel by f_u, f_v, u_0, v_0, k_1..k_3 and by a small rotation and translation of the
 /// camera.
 Eigen::Matrix<double, 2, 13> derivatives(const Calibration& calibration, const RigidTransform& pose,
                                          const Eigen::Vector3d& board_mm) {
@@ -128,9 +128,9 @@ std::vector<int> free_columns(const CalibrationModel& model) {
   return columns;
 }
 
-/// Fills in residuals and, from the derivatives at the minimum and the size of the residuals, one standard deviation of
-/// each parameter. The poses of the views meet only in the inner parameters, so each is eliminated by itself (Schur
-/// complement).
+/// Adds the residuals, and one standard deviation of each parameter, from the derivatives at the minimum and the size
+/// of the residuals. The poses of different views are coupled only through the inner parameters, so each pose is
+/// eliminated by itself (Schur complement).
 void add_deviations(const std::vector<ViewPoints>& views, const CalibrationModel& model, CalibrationResult& result) {
   const std::vector<int> columns = free_columns(model);
   const Eigen::Index inner = Eigen::Index(columns.size());

@@ -15,16 +15,18 @@
 namespace marrow::calibration {
 namespace {
 
-constexpr double kLeastFound = 0.6;     ///< of a side's beads that lie in the image, beside the four that make the map
-constexpr std::size_t kLeastBeads = 8;  ///< found per side
-constexpr std::size_t kSurelyFound = 12;  ///< more are never hit by chance where most of the side's beads are
-constexpr double kReach =
-    0.02;  ///< of the image's width: how far the distortion may move a bead off the projective map
-constexpr double kReachOfCamera = 0.006;  ///< the same once a camera with distortion is fitted
+/// Least part of a side's beads in the image that must be found. The four that define the map do not count.
+constexpr double kLeastFound = 0.6;
+constexpr std::size_t kLeastBeads = 8;  ///< least number of beads to be found per side
+/// So many hits are never by chance, if they are most of the side's beads.
+constexpr std::size_t kSurelyFound = 12;
+/// Largest distance of a bead from its position by the projective map, due to distortion; a part of the image's width.
+constexpr double kReach = 0.02;
+constexpr double kReachOfCamera = 0.006;  ///< the same after a camera with distortion was fitted
 
 using Points = std::vector<Eigen::Vector2d>;
 
-/// A point and the disc that it falls on.
+/// A point and the disc on which it falls.
 struct Hit {
   int point, disc;
 };
@@ -33,14 +35,14 @@ double turn(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vec
   return (b - a).x() * (c - a).y() - (b - a).y() * (c - a).x();
 }
 
-/// Which way the four triangles of four points run: a projective map of a plane in front of the source keeps or
-/// reverses all.
+/// Orientations of the four triangles of four points. A projective map of a plane in front of the source keeps all of
+/// them or reverses all of them.
 std::array<bool, 4> turns_of(const std::array<Eigen::Vector2d, 4>& p) {
   return {turn(p[0], p[1], p[2]) > 0, turn(p[0], p[1], p[3]) > 0, turn(p[0], p[2], p[3]) > 0,
           turn(p[1], p[2], p[3]) > 0};
 }
 
-/// True when no three of the four lie nearly on a line.
+/// Whether no three of the four points lie nearly on a line.
 bool in_general_position(const std::array<Eigen::Vector2d, 4>& p) {
   double longest = 0, least = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 4; ++i)
@@ -50,7 +52,7 @@ bool in_general_position(const std::array<Eigen::Vector2d, 4>& p) {
   return least > 0.05 * longest;
 }
 
-/// The four beads that make a map are hit whatever they are, so the others decide.
+/// The four beads that define a map are always hit, so only the others count.
 bool are_enough(std::size_t hits, int expected, double share) { return double(hits) - 4 >= share * (expected - 4); }
 
 Eigen::Matrix3d to_eigen(const cv::Mat& m) {
@@ -69,7 +71,7 @@ Eigen::Matrix3d map_of_four(const std::array<Eigen::Vector2d, 4>& from, const st
   return to_eigen(cv::getPerspectiveTransform(a, b));
 }
 
-/// Each predicted point with the disc nearest to it within reach, where neither has another nearer.
+/// Pairs of a predicted point and a disc within reach that are each other's nearest.
 std::vector<Hit> hits_of(const Points& predicted, const Points& discs, double reach) {
   std::vector<int> owner(discs.size(), -1);
   std::vector<double> best(discs.size(), reach * reach);
@@ -97,7 +99,7 @@ Points mapped(const Eigen::Matrix3d& map, const Points& points) {
   return result;
 }
 
-/// Calls `visit` for every choice of four out of `count`, in rising order; it returns true to stop.
+/// Calls `visit` for every choice of four indices below `count`, in ascending order. `visit` returns true to stop.
 void for_each_four(int count, const std::function<bool(const std::array<int, 4>&)>& visit) {
   for (int a = 0; a < count; ++a)
     for (int b = a + 1; b < count; ++b)
@@ -107,7 +109,7 @@ void for_each_four(int count, const std::function<bool(const std::array<int, 4>&
 }
 
 struct Side {
-  Points points;               ///< of all its beads, flat
+  Points points;               ///< all its beads in the plane, in mm
   std::vector<int> landmarks;  ///< indices into points
 };
 
@@ -124,8 +126,8 @@ std::array<Eigen::Vector2d, 4> pick(const Points& points, const std::array<int, 
           points[std::size_t(indices[3])]};
 }
 
-/// The map of a side into the image under which most of its beads fall on discs. `judge` sees every map that is tried,
-/// with its number of hits, and returns true to stop.
+/// Calls `judge` for every projective map that takes four landmarks of a side to four of the first `candidates` discs.
+/// `judge` returns true to stop.
 void for_each_map(const Side& side, const Points& discs, int candidates,
                   const std::function<bool(const Eigen::Matrix3d&)>& judge) {
   bool stop = false;
@@ -174,7 +176,7 @@ SideFound find_side(const Side& side, const Points& discs, int landmarks_in_imag
     if (found.hits.size() > best.hits.size()) best = std::move(found);
     return best.hits.size() >= kSurelyFound && are_enough(best.hits.size(), best.in_image, 0.8);
   });
-  // The map by all beads found reaches some that the four landmarks' map does not.
+  // A map fitted to all beads found so far reaches beads that the map of four landmarks misses.
   for (int round = 0; round < 3 && best.hits.size() >= 4; ++round) {
     std::vector<cv::Point2d> from, to;
     for (const Hit& hit : best.hits) {
@@ -206,8 +208,8 @@ double root_mean_square(const std::vector<Eigen::Vector2d>& residuals) {
   return std::sqrt(squares / double(std::max<std::size_t>(1, residuals.size())));
 }
 
-/// A camera through the beads of both sides predicts where each bead is seen: what lies there is that bead, and what
-/// was matched elsewhere was not.
+/// Fits a camera to the beads of both sides, predicts where each bead is seen, and matches again. This adds beads and
+/// removes wrong matches.
 ViewPoints match_by_camera(const Board& board, const Points& discs, ViewPoints points, int width_px, int height_px) {
   const CalibrationModel model{.radial_terms = 1, .square_pixels = true, .principal_point = false};
   for (const double reach : {2 * kReachOfCamera * width_px, kReachOfCamera * width_px, kReachOfCamera * width_px}) {
@@ -244,7 +246,7 @@ ViewPoints match_board(const Board& board, const std::vector<BeadImage>& images,
           " beads; at least 4 of its landmarks must be seen whole, not hidden by another bead or cut by the border");
     for (const Hit& hit : found.hits) hits.push_back({beads[std::size_t(hit.point)], hit.disc});
   }
-  // A disc that both sides claim is left to the camera.
+  // A disc that both sides claim is left out here. The camera decides about it.
   std::vector<int> claims(discs.size());
   for (const Hit& hit : hits) ++claims[std::size_t(hit.disc)];
   std::erase_if(hits, [&](const Hit& hit) { return claims[std::size_t(hit.disc)] > 1; });
@@ -256,8 +258,8 @@ bool can_be_mistaken(const Board& board, int side, int other) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < as.points.size(); ++i)
     for (std::size_t k = 0; k < i; ++k) nearest = std::min(nearest, (as.points[i] - as.points[k]).norm());
-  // The other side takes the place of an image, its landmarks first; of the same side, only the map that leaves all
-  // beads where they are may fit.
+  // The other side is used as an image, with its landmarks first. A side compared with itself may only fit under the
+  // map that leaves all beads in place.
   Points discs;
   for (int i : as.landmarks) discs.push_back(as.points[std::size_t(i)]);
   for (std::size_t i = 0; i < as.points.size(); ++i)

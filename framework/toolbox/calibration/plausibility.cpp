@@ -11,11 +11,11 @@
 namespace marrow::calibration {
 namespace {
 
-constexpr double kLeastAngle_deg = 2, kLargestAngle_deg = 60;  ///< that an image opens
-constexpr double kNearest_mm = 150, kFarthest_mm = 5000;       ///< from the source to what is seen
-constexpr double kSmallest_mm = 3, kLargest_mm = 2500;         ///< extent of what is seen
-constexpr double kBetter = 5;        ///< times that a mistake has to explain the points better
-constexpr double kExplained = 0.02;  ///< of the image's width: what may be left then
+constexpr double kLeastAngle_deg = 2, kLargestAngle_deg = 60;  ///< opening angle of the image
+constexpr double kNearest_mm = 150, kFarthest_mm = 5000;       ///< distance of the object from the source
+constexpr double kSmallest_mm = 3, kLargest_mm = 2500;         ///< extent of the object
+constexpr double kBetter = 5;                                  ///< factor by which undoing a mistake reduces the error
+constexpr double kExplained = 0.02;  ///< largest error that may remain then, as a part of the image's width
 
 std::string text(double value) {
   char characters[32];
@@ -107,7 +107,7 @@ void check_object(const Camera& camera, const std::vector<Eigen::Vector3d>& obje
     found.push_back("the object is projected wholly outside the image; is the camera that of another image?");
 }
 
-/// One mistake: what to say, and how camera, points and pixels would be without it.
+/// One mistake: the sentence about it, and a function that undoes it in camera, points and pixels.
 struct Mistake {
   std::string sentence;
   std::function<void(Camera&, SeenPoints&)> undo;
@@ -198,7 +198,7 @@ double reprojection_error_px(const Camera& camera, const SeenPoints& points) {
 }
 
 std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points) {
-  // Three points can be explained by chance, and an error of a hundredth of the image is no mistake of these kinds.
+  // Three points can be explained by chance. An error below 1 % of the image is not due to a mistake of these kinds.
   const double error = reprojection_error_px(camera, points);
   if (points.world_mm.size() < 4 || error < 0.01 * camera.width_px) return std::nullopt;
   double best = std::min(error / kBetter, kExplained * camera.width_px);

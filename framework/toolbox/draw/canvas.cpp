@@ -12,7 +12,7 @@ namespace {
 constexpr int kShift = 4;  // OpenCV draws at positions of 1/16 pixel
 constexpr int kRowHeight = 24;
 
-/// True when a position can be drawn: fixed-point coordinates overflow far outside.
+/// Whether a position can be drawn. Fixed-point coordinates overflow far outside the canvas.
 bool drawable(cv::Point2d p) { return std::abs(p.x) < 1e5 && std::abs(p.y) < 1e5; }
 cv::Point fixed_point(cv::Point2d p) {
   return {int(std::lround(p.x * (1 << kShift))), int(std::lround(p.y * (1 << kShift)))};
@@ -24,8 +24,8 @@ float percentile(std::vector<float> values, double fraction) {
   return *at;
 }
 
-/// Detector values fall exponentially with the thickness passed, so their logarithm shows bone under much and little
-/// tissue alike. The floor keeps dead pixels from taking the whole range.
+/// Detector values fall exponentially with the thickness of tissue. Their logarithm shows bone equally well under thick
+/// and thin tissue. The lower limit keeps dead pixels from taking up the whole range.
 void take_logarithm(cv::Mat& values) {
   double largest = 0;
   cv::minMaxLoc(values, nullptr, &largest);
@@ -143,7 +143,7 @@ cv::Mat with_legend(const cv::Mat& picture, const std::vector<LegendItem>& items
 
 void draw_title(Panel& panel, const std::string& title) {
   const cv::Rect box({0, 0}, cv::Size(text_size(title, 0.6).width + 20, 32));
-  panel.pixels(box & cv::Rect({0, 0}, panel.pixels.size())).setTo(kDark);  // readable over air as over bone
+  panel.pixels(box & cv::Rect({0, 0}, panel.pixels.size())).setTo(kDark);  // readable over air and over bone
   draw_text(panel.pixels, title, {10, 22}, kWhite, 0.6);
 }
 

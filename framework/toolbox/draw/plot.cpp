@@ -18,7 +18,7 @@ struct Range {
   double fraction(double value) const { return (value - low) / (high - low); }
 };
 
-/// The range of the finite values, a little wider; of some width even for equal or no values.
+/// The range of the finite values, slightly widened. Never empty, even if all values are equal or there are none.
 Range range_of(const std::vector<double>& values, double margin) {
   Range range{std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
   for (double value : values)

@@ -19,7 +19,7 @@ constexpr int kBlock = 32;
 constexpr std::uint8_t kStopped = 255;
 constexpr double kFreeCost = 2, kMostCost = 254;
 
-/// Cost of crossing each voxel, 1 over the speed, in blocks that are made where a front may come.
+/// Cost of crossing each voxel (1 / speed), in blocks. A block is computed only if a front can reach it.
 class Costs {
  public:
   Costs(const Volume& volume, const Race& race) : volume_(volume), race_(race) {
@@ -87,7 +87,8 @@ class Costs {
     return false;
   }
 
-  /// The block and its halo; beyond the volume its border goes on.
+  /// Copies the block and its halo. Outside the volume the border's values are repeated. False if nothing in it is as
+  /// bright as bone.
   bool load(const std::array<int, 3>& first, const std::array<int, 3>& size, std::vector<float>& values) const {
     const auto& whole = volume_.grid.size;
     float brightest = -1e9f;
@@ -104,8 +105,8 @@ class Costs {
     return brightest >= race_.floor_hu;
   }
 
-  /// combine(sum so far, value, tap) along one axis. Rows run into each other at the buffer's rim, which the halo is
-  /// there for.
+  /// Filters along one axis by combine(result so far, value, tap). At the buffer's rim neighbouring rows mix. Only the
+  /// halo is affected, and it is not used afterwards.
   template <class Combine>
   static void filter(std::vector<float>& values, std::vector<float>& out, std::size_t step, int reach, float start,
                      const Combine& combine) {
@@ -142,8 +143,8 @@ class Costs {
     std::vector<float> around = smooth, least = smooth;
     for (int k = 0; k < 3; ++k) filter(around, scratch, steps[k], radius_[k], -1e9f, brightest);
     for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], 1, 1e9f, darkest);
-    std::vector<float> closed =
-        around;  // grey closing: what is dark between two bright things is as bright as they are
+    // Grey closing: a dark gap between two bright walls becomes as bright as they are.
+    std::vector<float> closed = around;
     for (int k = 0; k < 3; ++k) filter(closed, scratch, steps[k], radius_[k], 1e9f, darkest);
     std::vector<std::uint8_t>& costs = costs_[block];
     costs.assign(std::size_t(kBlock) * kBlock * kBlock, kStopped);
@@ -152,8 +153,8 @@ class Costs {
         for (int x = 0; x < kBlock; ++x) {
           const std::size_t at = (z + halo_[2]) * steps[2] + (y + halo_[1]) * steps[1] + std::size_t(x + halo_[0]);
           if (smooth[at] < race_.floor_hu) continue;
-          // At the rim of the bone the cleft is open to the side: a front that could run along the rim would pass
-          // around it.
+          // At the rim of the bone a cleft is open to the side, so the closing does not find it. A front could then run
+          // along the rim around the cleft.
           const float walls = least[at] < race_.floor_hu ? around[at] : closed[at];
           const double part = std::max(0.f, walls - smooth[at]) / std::max(walls, 1.f) / race_.cleft_part;
           costs[local(x, y, z)] =
@@ -168,7 +169,7 @@ class Costs {
   std::vector<std::vector<std::uint8_t>> costs_;
 };
 
-/// The voxels within two in-plane voxels of a seed: a seed in a pore is in bone all the same.
+/// The voxels within two voxel widths (in the plane) of a seed. So a front also starts from a seed in a pore.
 std::vector<std::array<int, 3>> ball(const Grid& grid, const Eigen::Vector3d& centre) {
   std::vector<std::array<int, 3>> voxels;
   for (int z = -2; z <= 2; ++z)
@@ -192,7 +193,7 @@ std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vect
   };
   const Grid& grid = volume.grid;
   Costs costs(volume, race);
-  // Dijkstra's order by costs of one byte: a ring of lists, one for each time.
+  // Dijkstra's algorithm for costs of one byte: a ring of 256 lists, one for each arrival time.
   std::array<std::vector<Arrival>, 256> due;
   std::vector<std::array<int, 3>> starts;
   for (std::size_t f = 0; f < seeds.size(); ++f)

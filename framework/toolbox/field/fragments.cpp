@@ -14,7 +14,7 @@ using marrow::Grid;
 using marrow::SignedField;
 using marrow::Volume;
 
-/// The box of a fragment's voxels, and a margin. Its size is 0 where there are none.
+/// The box around a fragment's voxels, with a margin. Its size is 0 if there are none.
 Mask box_of(const Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, int margin) {
   std::array<int, 3> low = grid.size, high{-1, -1, -1};
   for (int z = 0; z < grid.size[2]; ++z)

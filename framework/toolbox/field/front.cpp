@@ -9,7 +9,7 @@
 namespace marrow::field {
 namespace {
 
-constexpr int kX = 1, kY = 10, kZ = 100;  // neighbours within a halo
+constexpr int kX = 1, kY = 10, kZ = 100;  // steps to the neighbours within a halo
 
 /// Gradient by central differences, per mm, in the grid's own axes.
 Eigen::Vector3f gradient(const float* v, const Eigen::Vector3f& per_mm) {
@@ -31,7 +31,7 @@ float curvature(const float* v, const Eigen::Vector3f& per_mm, const Eigen::Vect
   return numerator / (squared * std::sqrt(squared));
 }
 
-/// |grad| by Godunov's upwind differences for a front that moves with the sign of `speed`.
+/// |grad| by Godunov's upwind differences. The sign of `speed` says which way the front moves.
 float upwind_gradient(const float* v, const Eigen::Vector3f& per_mm, float speed) {
   float sum = 0;
   const int steps[3] = {kX, kY, kZ};
@@ -113,7 +113,7 @@ Front::Front(const marrow::Grid& grid, double band_mm, const Mask& mask)
               mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
   }
   for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
-  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // the band widens with each step of the front
+  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // later each time step widens the band further
   values_before_ = values_mm_;
 }
 
@@ -140,7 +140,7 @@ void Front::provide(std::size_t tile) {
   shift_mm_.resize(values_mm_.size(), 0.f);
 }
 
-/// The values of a tile and one voxel all around; beyond the grid its border goes on.
+/// Copies a tile's values and one voxel around it. Outside the grid the border's values are repeated.
 void Front::load(std::size_t tile, Halo& halo) const {
   const Extent e = extent(tile);
   const auto t = place_of(tile);
@@ -167,8 +167,8 @@ void Front::load(std::size_t tile, Halo& halo) const {
   }
 }
 
-/// Calls visit(value and its neighbours, x, y, z, place in next_values_, place in the tiles' memory) for each voxel of
-/// an active tile.
+/// Calls visit(pointer to the value in a halo, x, y, z, place in next_values_, place in the tiles' memory) for each
+/// voxel of an active tile.
 template <class Visit>
 void Front::for_voxels(std::size_t position, const Visit& visit) {
   const std::size_t tile = active_[position], slot = std::size_t(slots_[tile]);
@@ -191,7 +191,7 @@ void Front::write_back() {
   });
 }
 
-/// Active are the tiles that are awake and those beside them, which get memory.
+/// The active tiles are those that are awake and their six neighbours. All of them get memory.
 void Front::choose_active() {
   std::vector<std::uint32_t> chosen;
   for (std::size_t slot = 0; slot < is_awake_.size(); ++slot) {
@@ -250,7 +250,7 @@ void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, c
 }
 
 void Front::advance(double step_mm) {
-  // The rest of the band gets its distances from these when they are made again.
+  // Only these voxels move. redistance() computes the rest of the band from them.
   const float moving_mm = std::min(band_mm_, 3 * near_mm_);
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
@@ -259,7 +259,7 @@ void Front::advance(double step_mm) {
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
       if (length < 0.1f) return;
-      // The speed of the band is that of the closest point of the surface.
+      // A voxel of the band has the speed of the closest point of the surface.
       const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
       int nearest[3];
       for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
@@ -282,7 +282,7 @@ void Front::redistance_once(bool rescale) {
       if (beside_surface(v)) {
         const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
         const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
-        next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // no voxel beside it is farther
+        next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // a neighbour of the surface is no farther
       } else if (beyond_band(v, sign * band_mm_)) {
         next_values_[place] = sign * band_mm_;
       } else {
@@ -302,7 +302,7 @@ void Front::finish() {
   active_ = tile_in_slot_;
   std::sort(active_.begin(), active_.end());
   next_values_.resize(active_.size() * kVoxels);
-  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // what moved last has widened its band already
+  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // the parts that moved have widened the band already
 }
 
 std::vector<float> Front::values_mm() const {

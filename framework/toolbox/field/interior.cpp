@@ -54,7 +54,7 @@ struct Planes {
   double slope_u, slope_v;
 
   int shift(int i, int j) const {
-    constexpr int kFar = 1 << 20;  // rounds by cutting off, as rounding functions are slow
+    constexpr int kFar = 1 << 20;  // makes the number positive: then truncation rounds, faster than std::lround
     return int(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) + slope_v * (j - (box.first[v] + box.last[v]) / 2.0) +
                (kFar + 0.5)) -
            kFar;
@@ -67,7 +67,7 @@ struct Planes {
   }
 };
 
-/// Marks in `is_filled` what bone encloses in one plane: all that cannot be reached from the plane's border.
+/// Marks in `is_filled` what bone encloses in one plane: the pixels that a flood from the plane's border cannot reach.
 void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>& is_bone,
                 std::vector<std::uint8_t>& is_filled) {
   const Box& box = planes.box;
@@ -77,7 +77,7 @@ void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>
   thread_local std::vector<std::uint8_t> closed;
   thread_local std::vector<int> stack;
   closed.assign(std::size_t(width) * height, 0);
-  // Where the voxel of a pixel lies; nowhere when the plane has left the box there.
+  // Offset of the voxel at a pixel. False if the plane lies outside the box there.
   const auto source = [&](int i, int j, std::size_t& at) {
     const int a = box.first[planes.u] + i - 1, b = box.first[planes.v] + j - 1, c = plane + planes.shift(a, b);
     at = a * steps[planes.u] + b * steps[planes.v] + c * steps[planes.w];
@@ -121,7 +121,7 @@ bool beside_zero(const Grid& grid, const std::vector<float>& values, int x, int 
 
 enum class State : std::uint8_t { far, given, known };
 
-/// Distance of a voxel by the upwind solution of |grad u| = 1 over the neighbours whose distance is known.
+/// Distance of a voxel: the upwind solution of |grad u| = 1 from the neighbours whose distance is known.
 float distance_from(const Grid& grid, const std::vector<float>& distance, const std::vector<State>& state,
                     const int (&p)[3]) {
   std::array<std::pair<double, double>, 3> terms;  // distance, 1 / spacing^2
@@ -155,7 +155,7 @@ void fill_interior(const Grid& grid, std::vector<std::uint8_t>& is_bone, const s
   std::vector<std::uint8_t> is_filled(grid.count(), 0);
   for (double tilt_u : {0.0, 0.5, -0.5, 1.0, -1.0})
     for (double tilt_v : {0.0, 0.5, -0.5, 1.0, -1.0}) {
-      // At most one voxel along for one across, or the plane would have holes.
+      // At most one voxel along the bone for one voxel across it. A steeper plane would have holes.
       const auto slope = [&](double tilt, int axis) {
         return std::clamp(tilt * grid.spacing_mm[axis] / grid.spacing_mm[w], -1.0, 1.0);
       };

@@ -31,8 +31,8 @@ double distance_to(const Triangle& triangle, const Vector3d& p) {
   return over ? std::abs((p - triangle[0]).dot(normal)) / normal.norm() : std::sqrt(nearest);
 }
 
-/// Where the line through (x, y) along z meets the triangle. A line that only touches an edge is moved aside: each edge
-/// belongs to one side, so that neighbouring triangles count it once.
+/// Where the line through (x, y) along z meets the triangle. A line exactly through an edge does not count as a
+/// crossing: the caller shifts its lines, so that no line meets an edge.
 bool crossing(const Triangle& t, double x, double y, double& z) {
   const auto side = [&](const Vector3d& a, const Vector3d& b) {
     return (b.x() - a.x()) * (y - a.y()) - (b.y() - a.y()) * (x - a.x());
@@ -51,7 +51,7 @@ marrow::SignedField field_of_mesh(const marrow::Grid& grid, const marrow::Mesh& 
   std::vector<float> distance(grid.count(), float(band_mm));
   std::vector<std::vector<float>> crossings(std::size_t(size[0]) * size[1]);
   const double reach_mm = 1.8 * spacing.maxCoeff();
-  const Vector3d aside(1.7e-5, 2.3e-5, 0);  // in voxels: no line meets an edge
+  const Vector3d aside(1.7e-5, 2.3e-5, 0);  // in voxels; so that no line meets an edge
   for (const auto& corners : mesh.triangles) {
     Triangle index, mm;
     for (int k = 0; k < 3; ++k) {

@@ -19,12 +19,12 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
   std::error_code failure;
   if (!fs::is_directory(folder, failure))
     throw Error(path.string() + ": cannot be written, there is no folder " + folder.string());
-  // Hidden, and with the same extension, by which some writers choose the format.
-  // Not by replace_filename(): where memory ends in it, GCC 12 leaves a path that cannot be destroyed.
+  // Hidden, and with the same extension, because some writers choose the format by it.
+  // replace_filename() is avoided: if it runs out of memory, GCC 12 leaves a path that cannot be destroyed.
   const fs::path temporary = folder / (".part" + std::to_string(::getpid()) + "-" + path.filename().string());
   try {
     fill(temporary);
-    // A folder is only replaced by another; rename() needs the old one to be gone.
+    // A folder may only be replaced by a folder. rename() needs the old one to be removed first.
     if (fs::is_directory(temporary) && fs::is_directory(path)) fs::remove_all(path);
     fs::rename(temporary, path);
   } catch (const fs::filesystem_error& error) {
@@ -35,7 +35,7 @@ void write_atomically(const fs::path& path, const std::function<void(const fs::p
     throw Error(path.string() + ": cannot be written (out of memory)");
   } catch (const std::exception& error) {
     fs::remove_all(temporary, failure);
-    // The temporary name would only puzzle.
+    // Users do not know the temporary name.
     std::string text = error.what();
     for (std::size_t at; (at = text.find(temporary.string())) != std::string::npos;)
       text.replace(at, temporary.string().size(), path.string());

@@ -64,7 +64,7 @@ class UnpackedBytes final : public ByteStream {
                   (unpacker_.msg ? " (" + std::string(unpacker_.msg) + ")" : "") + "; copy or export it again");
     }
   }
-  /// A gzip file may be of several parts, one behind the other, as parallel packers write it.
+  /// A gzip file may consist of several members one after the other; parallel compressors write such files.
   bool next_member() {
     if (unpacker_.avail_in == 0) {
       unpacker_.avail_in = unsigned(packed_.take(in_.data(), in_.size()));

@@ -13,7 +13,7 @@
 namespace marrow::files {
 namespace {
 
-/// XMALab's text, line by line.
+/// Reads XMALab's text line by line.
 class XmalabText {
  public:
   explicit XmalabText(const std::filesystem::path& path) : path_(path) {
@@ -32,7 +32,7 @@ class XmalabText {
     if (line != expected) fail("expected '" + expected + "', got '" + line.substr(0, 40) + "'");
   }
 
-  /// Expects that only empty lines are left: what a further block would tell must not be lost.
+  /// Expects that only empty lines are left, so that no further block is ignored silently.
   void end() {
     while (stream_)
       if (const std::string line = next_line(); !line.empty())
@@ -99,7 +99,7 @@ Camera read_xmalab(const std::filesystem::path& path) {
   camera.intrinsics = read_matrix(text);
   text.title("rotation");
   const Eigen::Matrix3d rotation = read_matrix(text);
-  // Printed with 12 digits; a rotation to the last bit is the nearest one.
+  // The file has 12 digits only. The nearest exact rotation is taken.
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const Eigen::Matrix3d nearest_rotation = svd.matrixU() * svd.matrixV().transpose();
   if ((nearest_rotation - rotation).cwiseAbs().maxCoeff() > 1e-4 || nearest_rotation.determinant() < 0)

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Decoders of the compressed pixels that DICOM files hold. Each throws CodecError unless the data are whole and of just
-// this size, with a precision of at least `bits_stored` and at most `bits_allocated`; samples have as many bytes as
-// `bits_allocated` takes.
+// Decoders for the compressed pixels of DICOM files. Each throws CodecError unless the data are complete, have exactly
+// this size, and have a precision between `bits_stored` and `bits_allocated`. Samples have bits_allocated / 8 bytes.
 #include <cstddef>
 #include <stdexcept>
 #include <string>

@@ -22,8 +22,8 @@ struct KnownSyntax {
   bool is_read;
 };
 
-// JPEG 2000 is not read: on damaged data its decoder writes beyond what it has reserved. Of those with loss, only what
-// every decoder has.
+// JPEG 2000 is not read, because its decoder writes beyond its memory if data are damaged. Of the lossy ones only JPEG
+// baseline is read, because every decoder has it.
 constexpr KnownSyntax kSyntaxes[] = {{"1.2.840.10008.1.2", "implicit little endian", true},
                                      {"1.2.840.10008.1.2.1", "explicit little endian", true},
                                      {"1.2.840.10008.1.2.2", "explicit big endian", true},
@@ -73,7 +73,7 @@ bool is_short(const std::string& kind) {
 
 }  // namespace
 
-/// Reads the elements one after the other into a DicomFile.
+/// Reads all elements into a DicomFile.
 class DicomWalk {
  public:
   explicit DicomWalk(DicomFile& into) : into_(into), window_(into.file_), size_(into.file_.size()) {}
@@ -92,7 +92,7 @@ class DicomWalk {
  private:
   struct Next {
     std::uint32_t tag = 0, length = 0;
-    std::string kind;  ///< its value representation; empty where implicit
+    std::string kind;  ///< its value representation; empty if implicit
   };
 
   std::string what() const { return into_.path().string(); }
@@ -164,7 +164,7 @@ class DicomWalk {
                 "), which is not read; convert it: gdcmconv --raw IN OUT");
   }
 
-  /// The elements up to `end` or, where `delimited`, to the delimiter of the item that they are in.
+  /// Reads elements up to `end` or, if `delimited`, up to the delimiter of the item that holds them.
   void elements(const Syntax& syntax, std::uint64_t end, int depth, bool delimited, DicomElements& into) {
     if (depth > kDeepest) damaged("its sequences are nested more than 32 deep");
     while (at_ < end) {
@@ -195,16 +195,17 @@ class DicomWalk {
     if (delimited) damaged("an item has no end");
   }
 
-  /// Of those without a kind (implicit) or of an unknown one (UN) only the tag tells that they are sequences.
+  /// Elements without a value representation (implicit) or with an unknown one (UN) are known as sequences only by
+  /// their tag.
   static bool is_sequence(const Next& element) {
     return element.kind == "SQ" || ((element.kind.empty() || element.kind == "UN") && is_group_of_values(element.tag));
   }
-  /// What is of an unknown kind (UN) is written in implicit little endian, whatever the file is in.
+  /// Inside an element of unknown kind (UN) the syntax is always implicit little endian.
   static Syntax inside(const Next& element, const Syntax& syntax) {
     return element.kind == "UN" ? Syntax{false, false} : syntax;
   }
 
-  /// Whether nothing but zeros follows.
+  /// Whether only zeros follow.
   bool is_filling(std::uint64_t end) {
     if (end - at_ >= 8 && window_.number(at_, 8, false) != 0) return false;
     for (std::uint64_t place = at_; place < end; ++place)

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The elements of a DICOM file, each held against what is left of the file. GDCM reserves as much memory as a damaged
-// length claims, and stops the program at some contradictions, so it is given nothing but compressed pixels.
+// The elements of a DICOM file. Each length is checked against the rest of the file. GDCM is not used: it reserves as
+// much memory as a damaged length claims, and it aborts the program at some contradictions.
 #include <array>
 #include <memory>
 
@@ -17,22 +17,22 @@ struct DicomElement {
   std::uint32_t tag = 0;
   DicomSpan value;
   bool big_endian = false;
-  std::array<char, 2> kind{};  ///< its value representation; zeros where the file does not say (implicit)
+  std::array<char, 2> kind{};  ///< its value representation; zeros if the file does not give it (implicit)
   std::vector<std::vector<DicomElement>> items;  ///< of a sequence
 };
 using DicomElements = std::vector<DicomElement>;
 
-/// Whether the tag is that of a sequence in which values that are read may stand: the functional groups of an enhanced
-/// file, and the sequences in them. Implicit files do not say which of their elements are sequences.
+/// Whether the tag is that of a sequence with values that are read: the functional groups of an enhanced file, and the
+/// sequences in them. The list is needed because implicit files do not say which elements are sequences.
 bool is_group_of_values(std::uint32_t tag);
 
-/// The element of that tag, or nullptr. Throws Error where there are two.
+/// The element with this tag, or nullptr. Throws Error if there are two.
 const DicomElement* find_element(const std::filesystem::path& path, const DicomElements& elements, std::uint32_t tag);
 
 class DicomFile {
  public:
-  /// Throws Error when the file is not DICOM, is of a transfer syntax that is not read, or an element claims more than
-  /// the file holds.
+  /// Throws Error if the file is not DICOM, has a transfer syntax that is not supported, or has an element that claims
+  /// more bytes than the file holds.
   explicit DicomFile(const std::filesystem::path& path);
 
   const InputFile& file() const { return file_; }
@@ -40,12 +40,11 @@ class DicomFile {
   const std::string& transfer_syntax() const { return transfer_syntax_; }
   bool is_big_endian() const { return big_endian_; }
   const DicomElements& elements() const { return elements_; }
-  /// The pixels: one part where they are plain; where they are compressed the parts after the table of offsets, and the
-  /// table's.
   bool has_pixels() const { return has_pixels_; }
   bool is_compressed() const { return is_compressed_; }
-  /// Written as numbers of 2 bytes (OW), also where a pixel has one.
+  /// Whether the pixels are written as numbers of 2 bytes (OW), even if a pixel has only one.
   bool pixels_are_words() const { return pixels_are_words_; }
+  /// Plain pixels have one part. Compressed pixels have one or more parts after the table of offsets.
   const std::vector<DicomSpan>& pixel_parts() const { return pixel_parts_; }
   const DicomSpan& offset_table() const { return offset_table_; }
 

@@ -11,9 +11,9 @@
 namespace marrow::files {
 namespace {
 
-constexpr std::uint64_t kLongestText = 65536;  // angles of each of some thousands of frames
+constexpr std::uint64_t kLongestText = 65536;  // enough for the angles of some thousand frames
 
-/// Most files say themselves how a number is written, and some choose another way than the standard.
+/// Most files say how a number is written. Some write it in another way than the standard, so the file decides.
 DicomTag::Kind kind_of(const DicomElement& element, const DicomTag& tag) {
   const std::string_view kind(element.kind.data(), element.kind.size());
   if (kind == "FL") return DicomTag::Kind::fl;
@@ -29,7 +29,7 @@ std::string without_padding(std::string value) {
   return value;
 }
 
-/// Numbers with backslashes between them; none where anything else stands there.
+/// Numbers separated by backslashes. std::nullopt if the text holds anything else.
 std::optional<std::vector<double>> numbers_in_text(const std::string& value) {
   std::vector<double> numbers;
   const char *at = value.data(), *end = at + value.size();
@@ -73,7 +73,7 @@ std::string DicomTag::text() const {
   return name + std::string(numbers);
 }
 
-/// The element among those of a functional group, or of the sequences in it, the outermost first.
+/// Looks for the element in a functional group, then in the sequences inside it.
 const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std::uint32_t tag) const {
   if (const auto* element = find_element(path(), elements, tag); element && element->value.bytes > 0) return element;
   for (const DicomElement& element : elements) {
@@ -84,7 +84,7 @@ const DicomElement* DicomHeader::find_inside(const DicomElements& elements, std:
   return nullptr;
 }
 
-/// In the frame's own functional group, then in the shared one, then in the data set itself.
+/// Looks in the frame's own functional group, then in the shared one, then in the data set itself.
 const DicomElement* DicomHeader::find(const DicomTag& tag) const {
   for (const std::uint32_t groups : {kFrameGroups, kSharedGroups}) {
     const auto* sequence = find_element(path(), file_.elements(), groups);

@@ -10,15 +10,14 @@
 
 namespace marrow::files {
 
-/// Sequences of what an enhanced file says of all frames, and of each.
+/// The functional group sequences of an enhanced file: for all frames, and for each frame.
 constexpr std::uint32_t kSharedGroups = 0x52009229, kFrameGroups = 0x52009230;
 
 /// A data element as the standard lists it.
 struct DicomTag {
   std::uint16_t group, element;
   const char* name;
-  /// How its values are written: as text, as numbers of 2 bytes without or with a sign, or as floating numbers of 4
-  /// or 8.
+  /// How its values are written: as text, as unsigned or signed numbers of 2 bytes, or as floats of 4 or 8 bytes.
   enum class Kind { text, us, ss, fl, fd } kind = Kind::text;
   std::uint32_t code() const { return std::uint32_t(group) << 16 | element; }
   /// "PixelSpacing (0028,0030)"
@@ -27,17 +26,17 @@ struct DicomTag {
 
 class DicomHeader {
  public:
-  /// `frame` counts from 1 and picks the values that an enhanced multi-frame file gives for each frame.
+  /// `frame` counts from 1. It selects the values of an enhanced multi-frame file that are given for each frame.
   DicomHeader(const DicomFile& file, int frame) : file_(file), frame_(frame) {}
 
   const std::filesystem::path& path() const { return file_.path(); }
-  /// The value as text without padding; none where the element is missing or empty. What the functional groups of an
-  /// enhanced file say of the frame comes before what stands outside of them.
+  /// The value as text without padding. std::nullopt if the element is missing or empty. Values in the functional
+  /// groups of an enhanced file take precedence over values outside of them.
   std::optional<std::string> text(const DicomTag& tag) const;
-  /// The values as numbers. Throws Error where they are none, or where there are not `count` (0: any).
+  /// The values as numbers. Throws Error if they are not numbers, or not `count` of them (0: any number).
   std::optional<std::vector<double>> numbers(const DicomTag& tag, std::size_t count) const;
   std::optional<double> number(const DicomTag& tag) const;
-  /// Whether the file has the element, in whatever form.
+  /// Whether the file has the element and it is not empty.
   bool has(const DicomTag& tag) const { return find(tag) != nullptr; }
 
  private:

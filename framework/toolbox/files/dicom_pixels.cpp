@@ -59,7 +59,7 @@ void read_size(const DicomHeader& header, DicomPixels& pixels) {
                 "; expected MONOCHROME1 or MONOCHROME2, as grey pixels have: copy or export it again");
 }
 
-/// Each frame has its item among the groups of values, or another frame's would be taken.
+/// There must be one item per frame in the functional groups. Otherwise values of another frame would be used.
 void check_groups(const DicomFile& file, const DicomPixels& pixels) {
   const DicomElement* groups = find_element(pixels.path, file.elements(), kFrameGroups);
   if (groups && groups->items.size() != std::size_t(pixels.frames))
@@ -89,7 +89,7 @@ void read_bits(const DicomHeader& header, DicomPixels& pixels) {
   if (pixels.slope == 0) damaged(pixels.path, kSlope.text() + " is 0");
 }
 
-/// What a value of 16 bits stands for where only `bits_stored` of them count; none where it needs more.
+/// The meaning of a value of 16 bits if only `bits_stored` of them count. std::nullopt if it needs more bits.
 std::optional<double> value_of_stored_bits(const DicomPixels& pixels, double value) {
   const int bits = pixels.bits_stored, word = std::uint16_t(int(value));
   if (bits >= 16) return value;
@@ -110,7 +110,7 @@ void read_padding(const DicomHeader& header, DicomPixels& pixels) {
     pixels.padding_beyond_bits = std::uint16_t(int(*value));
 }
 
-/// Without the bits that do not count, such padding would become another value, maybe that of bone.
+/// When the other bits are removed, such padding would become another value, possibly that of bone.
 void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& bytes) {
   if (!pixels.padding_beyond_bits || pixels.bits_allocated != 16) return;
   for (std::size_t at = 0; at < bytes.size(); at += 2) {
@@ -123,7 +123,7 @@ void check_padding(const DicomPixels& pixels, const std::vector<std::byte>& byte
   }
 }
 
-/// Where each part begins, by the table of offsets, which counts from the first part's item.
+/// The first part of each frame by the table of offsets. The offsets count from the first part's item.
 std::vector<std::size_t> parts_by_table(const DicomFile& file, const DicomPixels& pixels) {
   const DicomSpan& table = file.offset_table();
   std::vector<std::size_t> first;
@@ -159,8 +159,8 @@ void find_frames(const DicomFile& file, DicomPixels& pixels) {
             "which of its " + std::to_string(parts) + " parts of compressed pixels make up a frame is not said");
 }
 
-/// Whether what follows the pixels is filling: a byte to make the length even, or zeros to the end of a block. More are
-/// pixels that the header does not tell of.
+/// Whether the bytes after the pixels are only filling: one byte to make the length even, or up to 512 zeros. Anything
+/// else would be pixels that the header does not mention.
 bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
   const DicomSpan& part = file.pixel_parts()[0];
   const std::uint64_t more = part.bytes - pixel_bytes;
@@ -170,7 +170,7 @@ bool is_filled(const DicomFile& file, std::uint64_t pixel_bytes) {
 
 void check_plain(const DicomFile& file, const DicomPixels& pixels) {
   const double held = file.pixel_parts().empty() ? 0 : double(file.pixel_parts()[0].bytes);
-  // Of colours, a third may be left out (YBR_FULL_422).
+  // Colours may be subsampled (YBR_FULL_422), so a third of the bytes is the least that is expected.
   const double expected = double(pixels.rows) * pixels.columns * pixels.channels * pixels.frames *
                           pixels.bits_allocated / 8 * (pixels.channels > 1 ? 1.0 / 3 : 1);
   const bool is_too_much = pixels.channels == 1 && held > expected && !is_filled(file, std::uint64_t(expected));
@@ -208,7 +208,7 @@ std::vector<std::byte> plain_frame(const DicomPixels& pixels, const InputFile& f
   return bytes;
 }
 
-/// Keeps the bits that count: those above may hold overlays.
+/// Keeps only the stored bits. The bits above them may hold overlays.
 template <class T>
 void keep_stored(const DicomPixels& pixels, std::vector<std::byte>& bytes) {
   const T mask = T((std::uint64_t(1) << pixels.bits_stored) - 1),

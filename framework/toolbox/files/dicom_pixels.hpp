@@ -1,44 +1,44 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The pixels of a DICOM file: what its header says of them, and one frame decoded.
+// The pixels of a DICOM file: their description from the header, and single frames decoded.
 #include "dicom_header.hpp"
 #include "samples.hpp"
 
 namespace marrow::files {
 
-/// All that decoding needs, without the file being open: a series has more files than may be open at once.
+/// All that decoding needs, without an open file: a series has more files than may be open at once.
 struct DicomPixels {
   std::filesystem::path path;
   std::uint64_t file_bytes = 0;
   std::string transfer_syntax;
   bool big_endian = false;
   int columns = 0, rows = 0, frames = 1;
-  int channels = 1;  ///< more than one: colours, which are not decoded
+  int channels = 1;  ///< more than one for colours; those are not decoded
   int bits_allocated = 16, bits_stored = 16;
   bool is_signed = false;
   double slope = 1, intercept = 0;
   bool gives_slope = false, gives_intercept = false;
-  /// Stored values, lowest and highest, of pixels that were not measured (PixelPaddingValue).
+  /// Lowest and highest stored value of pixels that were not measured (PixelPaddingValue).
   std::optional<std::array<double, 2>> padding;
-  std::optional<std::uint16_t> padding_beyond_bits;  ///< that value, where the bits that count cannot hold it
-  bool has_table = false;                        ///< values go through a table (ModalityLUTSequence), which is not read
-  std::vector<DicomSpan> frame_parts;            ///< of plain pixels: one part, all frames
-  std::vector<std::size_t> first_part_of_frame;  ///< of compressed ones; one more than there are frames
+  std::optional<std::uint16_t> padding_beyond_bits;  ///< PixelPaddingValue, if the stored bits cannot hold it
+  bool has_table = false;                        ///< values need a table (ModalityLUTSequence), which is not supported
+  std::vector<DicomSpan> frame_parts;            ///< plain pixels: one part with all frames
+  std::vector<std::size_t> first_part_of_frame;  ///< for compressed pixels; has one entry more than there are frames
 };
 
-/// With the values that the header gives for this frame (from 1). Throws Error where the header contradicts itself or
-/// the file.
+/// Takes the values that the header gives for this frame (from 1). Throws Error if the header contradicts itself or the
+/// file.
 DicomPixels read_dicom_pixels(const std::filesystem::path& path, int frame);
 DicomPixels read_dicom_pixels(const DicomFile& file, int frame);
 
-/// One frame (from 1) as unsigned or signed integers, of which only the bits that count are kept. Throws Error.
+/// One frame (from 1) as unsigned or signed integers. Only the stored bits (BitsStored) are kept. Throws Error if the
+/// pixels are damaged or the file has changed.
 Samples read_dicom_frame(const DicomPixels& pixels, int frame);
 
-/// Values of pixels that were not measured are made air's, unless they are that already. `values` come from
-/// scaled_values().
+/// Sets pixels that were not measured to air (-1000 HU), unless they are below it. `values` come from scaled_values().
 void make_padding_air(const DicomPixels& pixels, float* values, std::size_t count);
 
-/// The values that stored ones stand for (RescaleSlope, RescaleIntercept).
+/// The values for the stored numbers (RescaleSlope, RescaleIntercept).
 void scaled_values(const DicomPixels& pixels, const Samples& samples, float* values);
 
 }  // namespace marrow::files

@@ -14,7 +14,7 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-constexpr double kFarthestOff_mm = 0.1;  // of a slice from its place in an even, straight grid
+constexpr double kFarthestOff_mm = 0.1;  // largest distance of a slice from its place in an even, straight grid
 
 constexpr DicomTag kModality{0x0008, 0x0060, "Modality"};
 constexpr DicomTag kPatient{0x0010, 0x0020, "PatientID"};
@@ -39,17 +39,17 @@ Vector normalized(const Vector& a) {
 struct Slice {
   std::string series, description, modality;
   std::string patient, study, frame_of_reference;
-  std::string unit;  ///< of its values: HU, US (unspecified), or empty where the header does not say
+  std::string unit;  ///< of its values: HU, US (unspecified), or empty if the header does not say
   DicomPixels pixels;
   Samples samples;         ///< without bytes
   double position_mm = 0;  ///< along the normal of the slices
-  bool is_placed = false;  ///< says where it lies
+  bool is_placed = false;  ///< the header gives its position and orientation
 
   const std::filesystem::path& path() const { return pixels.path; }
 };
 
-/// Whether a file that is not DICOM is by its name no slice either: a licence, a note, a picture. Of any other, such as
-/// "IM5", it may be what is left of a slice.
+/// Whether the name of a file that is not DICOM shows that it is no slice: a licence, a note, a picture. A file with
+/// any other name, such as "IM5", may be the rest of a damaged slice.
 bool is_no_slice_by_name(const std::filesystem::path& path) {
   static const std::set<std::string> kNames{"authors",  "changelog", "checksums",  "copying", "dicomdir",
                                             "lockfile", "licence",   "license",    "md5sum",  "md5sums",
@@ -74,7 +74,7 @@ bool is_no_slice_by_name(const std::filesystem::path& path) {
               "); if it is a slice, it is damaged at its start: fetch it again; if not, remove it from the folder");
 }
 
-/// Slices of a series lie in one folder: one that lies below would be missed.
+/// Only one folder is read, so slices in folders below it would be missed.
 void check_folder_below(const std::filesystem::path& folder) {
   std::error_code failure, none;
   for (std::filesystem::recursive_directory_iterator entry(folder, failure), end; entry != end && !failure;
@@ -90,7 +90,7 @@ Vector column(const Samples& samples, int k) {
   return {samples.direction[k], samples.direction[3 + k], samples.direction[6 + k]};
 }
 
-/// Origin and axes; these are made orthonormal, as a header gives them with few digits.
+/// Reads origin and axes. The axes are made orthonormal, because headers give them with few digits.
 void place(const DicomHeader& header, Slice& slice) {
   const auto position = header.numbers(kPosition, 3), orientation = header.numbers(kOrientation, 6),
              spacing = header.numbers(kSpacing, 2);
@@ -98,7 +98,7 @@ void place(const DicomHeader& header, Slice& slice) {
   if (!slice.is_placed) return;
   if (!spacing)
     throw Error(slice.path().string() + ": does not say how large its pixels are; " + kSpacing.text() + " is missing");
-  slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // a row's distance is a pixel's height
+  slice.samples.spacing_mm = {(*spacing)[1], (*spacing)[0], 1};  // DICOM gives the distance of rows (y) first
   std::copy(position->begin(), position->end(), slice.samples.origin_mm.begin());
   const Vector row{(*orientation)[0], (*orientation)[1], (*orientation)[2]},
       down{(*orientation)[3], (*orientation)[4], (*orientation)[5]};
@@ -134,7 +134,7 @@ Slice read_slice(const std::filesystem::path& path) {
   return slice;
 }
 
-/// All that lies in a folder, sorted, without what is neither a file nor a folder.
+/// All files and folders in a folder, sorted.
 std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) {
   std::set<std::filesystem::path> paths;
   std::error_code failure, none;
@@ -147,8 +147,9 @@ std::set<std::filesystem::path> entries_of(const std::filesystem::path& folder) 
   return paths;
 }
 
-/// The DICOM files of a folder by series. Other files are passed over only where their names say what they are: a slice
-/// that was cut or emptied is the end of a series as easily as a gap in it, and would not be missed there.
+/// The DICOM files of a folder, by series. Another file is skipped only if its name shows that it is no slice.
+/// Otherwise a slice that was cut off or emptied would go unnoticed if it is the first or last one, where it leaves no
+/// gap.
 std::map<std::string, std::vector<Slice>> read_folder(const std::filesystem::path& folder) {
   std::map<std::string, std::vector<Slice>> series;
   std::error_code none;
@@ -190,7 +191,7 @@ std::string millimetres(double length) {
   return text;
 }
 
-/// Where one slice says how its values become HU and another does not, one of them lost it.
+/// If one slice says how its values become HU and another one does not, the latter is damaged.
 void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
   for (const auto& [name, is_given, first_is_given] :
        {std::tuple{"RescaleSlope", slice.gives_slope, first.gives_slope},
@@ -202,7 +203,7 @@ void check_same_scaling(const DicomPixels& slice, const DicomPixels& first) {
   }
 }
 
-/// A slice that lost what its pixels are, or was replaced, may still read as good numbers.
+/// A slice that was replaced, or has a damaged description of its pixels, may still give plausible numbers.
 void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
   if (slice.is_signed == first.is_signed && slice.bits_stored == first.bits_stored) return;
   const auto kind = [](const DicomPixels& pixels) {
@@ -212,7 +213,7 @@ void check_same_pixels(const DicomPixels& slice, const DicomPixels& first) {
               kind(first) + "; slices of one series have the same: export the series again");
 }
 
-/// Slices of two patients, or of two places of one, lie in no common grid, whatever their positions say.
+/// Slices of two patients, studies or frames of reference have no common grid, even if their positions fit.
 void check_same_patient(const Slice& slice, const Slice& first) {
   const std::tuple<const DicomTag&, const std::string&, const std::string&> all[] = {
       {kPatient, slice.patient, first.patient},
@@ -224,12 +225,12 @@ void check_same_patient(const Slice& slice, const Slice& first) {
                   "; slices of one series have the same: export the series again");
 }
 
-/// The distance between slices of the volume that is made of them.
+/// Mean distance between slices; the spacing of the volume.
 double spacing_of(const std::vector<Slice>& slices) {
   return (slices.back().position_mm - slices.front().position_mm) / double(slices.size() - 1);
 }
 
-/// Steps that are each a little off add up over a long bone.
+/// Checks each slice against its place in the whole grid, because small errors of single steps add up over a long bone.
 void check_places(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
   const Vector normal = column(first.samples, 2);
@@ -251,7 +252,7 @@ void check_places(const std::filesystem::path& folder, const std::vector<Slice>&
                 " would; resample the series to an even grid first");
 }
 
-/// That the slices belong to one grid: same size, same directions, evenly spaced along their normal.
+/// Throws Error unless the slices form one grid: same size, same directions, evenly spaced along their normal.
 void check_slices(const std::filesystem::path& folder, const std::vector<Slice>& slices) {
   const Slice& first = slices[0];
   if (slices.size() < 2) throw Error(folder.string() + ": the series has 1 slice; a volume needs at least 2");

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The text headers of MetaImage and NRRD, read strictly and once: what is checked is what is used.
+// Strict reading of the text headers of MetaImage and NRRD. A header is read only once, so the values that are used are
+// those that were checked.
 #include <map>
 #include <optional>
 #include <string>
@@ -10,7 +11,7 @@
 
 namespace marrow::files {
 
-/// The fields of a header by name, in small letters; a field that is given twice is refused.
+/// The fields of a header by name, in lower case. A field that is given twice is an Error.
 class HeaderFields {
  public:
   explicit HeaderFields(std::filesystem::path path) : path_(std::move(path)) {}
@@ -18,7 +19,7 @@ class HeaderFields {
 
   void add(std::string key, const std::string& value);
   bool has(const std::string& key) const { return values_.count(key) > 0; }
-  /// The value, or `missing` where the field is not there. Those without a default throw Error.
+  /// Getters return the value, or `missing` if there is no such field. Those without a default then throw Error.
   std::string text(const std::string& key) const;
   std::string text_or(const std::string& key, const std::string& missing) const;
   long long whole_number_or(const std::string& key, long long missing) const;
@@ -32,14 +33,14 @@ class HeaderFields {
   std::map<std::string, std::string> values_;
 };
 
-/// The lines at the beginning of a file, one after the other. Throws Error where a line is longer than any header's, or
-/// all are.
+/// The lines at the beginning of a file, one after the other. Throws Error if one line or all lines together are longer
+/// than those of any real header.
 class HeaderLines {
  public:
   explicit HeaderLines(const InputFile& file) : file_(file) {}
-  /// The next line without its end; none at the end of the file.
+  /// The next line without its line end. std::nullopt at the end of the file.
   std::optional<std::string> next();
-  /// Where the next line begins.
+  /// Offset of the next line.
   std::uint64_t at() const { return at_; }
 
  private:
@@ -51,14 +52,14 @@ class HeaderLines {
 std::string trimmed(const std::string& text);
 std::string in_small_letters(std::string text);
 std::vector<std::string> words_of(const std::string& text);
-/// The beginning of a text out of a file, for a message: what cannot be printed becomes '?'.
+/// The beginning of a file's text, for a message. Characters that cannot be printed become '?'.
 std::string shown(const std::string& text);
-/// A number in full, finite; none where the text is none.
+/// The whole text as a finite number. std::nullopt if it is none.
 std::optional<double> number_of(const std::string& text);
 
-/// The file beside a header that it names for its samples. Throws Error where the name is a list, a pattern or a path,
-/// where the option names the header alone instead of the folder that holds both, or where it is a link out of the
-/// folder.
+/// The file with the samples that a header names; it lies in the header's folder. Throws Error if the name is a list, a
+/// pattern or a path, if there is no such file, or if it is a link out of the folder. Also throws if the user named
+/// only the header and not the folder with both files (`folder_is_named`).
 std::filesystem::path file_beside(const std::filesystem::path& header, const std::string& name, bool folder_is_named);
 
 }  // namespace marrow::files

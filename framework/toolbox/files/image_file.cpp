@@ -34,7 +34,7 @@ void check_finite(const Image& image, const fs::path& path) {
     if (!std::isfinite(value)) throw Error(path.string() + ": has pixels that are not finite numbers");
 }
 
-/// One page or frame of samples as an image.
+/// One page or frame of samples (from 1) as an image.
 Image image_of(const Samples& samples, int frame, const fs::path& path) {
   const int type = samples.type == Samples::Type::u8    ? CV_8U
                    : samples.type == Samples::Type::u16 ? CV_16U

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Baseline JPEG through libjpeg. What it would only warn of, as data that end too early, is an error.
+// Baseline JPEG by libjpeg. Its warnings, for example about data that end too early, are treated as errors.
 #include <csetjmp>
 #include <cstdio>
 #include <memory>
@@ -26,7 +26,7 @@ void on_message(j_common_ptr state, int level) {
   if (level < 0) on_error(state);
 }
 
-/// Nothing with a destructor lives between setjmp and the calls that may jump back to it.
+/// No object with a destructor may live between setjmp and the calls that can jump back to it.
 bool decode(jpeg_decompress_struct& state, Failure& failure, const CodedImage& image, std::byte* to) {
   if (setjmp(failure.back)) return false;
   jpeg_mem_src(&state, reinterpret_cast<const unsigned char*>(image.bytes.data()), image.bytes.size());

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lossless JPEG (ITU T.81, process 14), as scanners and archives write it. Strict: whatever does not come out to the
-// last sample and bit is an error, where the usual decoders fill up with grey.
+// Lossless JPEG (ITU T.81, process 14), as scanners and archives write it. Strict: the data must be correct to the last
+// sample and bit. Common decoders fill missing samples with grey instead.
 #include <array>
 #include <cstring>
 #include <memory>
@@ -10,7 +10,7 @@
 namespace marrow::files {
 namespace {
 
-/// Which symbol the next 16 bits begin with, and how many bits it takes; 0: none.
+/// For each value of the next 16 bits: the symbol with which they begin, and its number of bits (0: no symbol).
 struct HuffmanTable {
   std::array<std::uint8_t, 65536> bits{}, symbol{};
 };

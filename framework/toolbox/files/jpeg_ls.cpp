@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Lossless JPEG-LS (ITU T.87), one component; names as in the standard, annex A. Strict, as jpeg_lossless.cpp.
+// Lossless JPEG-LS (ITU T.87) with one component. Names are those of the standard, annex A. As strict as
+// jpeg_lossless.cpp.
 #include <algorithm>
 #include <array>
 #include <cstdlib>
@@ -108,7 +109,7 @@ class Decoder {
     return difference < 0 ? -level : level;
   }
 
-  /// The sample that a prediction and its error come to, which wraps around.
+  /// The sample for a prediction and its error. The sum wraps around.
   int sample(int predicted, int error) const {
     int value = predicted + error;
     if (value < 0) value += max_value_ + 1;
@@ -152,7 +153,7 @@ class Decoder {
     }
   }
 
-  /// How many samples equal the one on the left, of at most `most`.
+  /// Number of samples that equal the one on the left, at most `most`.
   std::size_t run_length(JpegBits<1>& bits, std::size_t most) {
     std::size_t length = 0;
     while (bits.take(1)) {
@@ -190,7 +191,7 @@ class Decoder {
     return are_equal ? sample(left, error) : sample(above, above > left ? error : -error);
   }
 
-  /// Rows have a sample more on both sides, the first standing for what is left of the image.
+  /// Rows have one more sample on both sides, for positions outside the image.
   void decode_row(JpegBits<1>& bits, const std::vector<int>& above, std::vector<int>& row) {
     const std::size_t columns = std::size_t(image_.columns);
     for (std::size_t at = 1; at <= columns;) {

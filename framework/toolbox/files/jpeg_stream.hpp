@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What JPEG (ITU T.81) and JPEG-LS (T.87) have in common: segments behind markers, and bits with stuffing.
+// The common part of JPEG (ITU T.81) and JPEG-LS (T.87): segments with markers, and bits with stuffing.
 #include <cstdint>
 #include <string>
 #include <string_view>
@@ -9,13 +9,13 @@
 
 namespace marrow::files {
 
-/// The segments of a stream, each with its marker, up to the coded samples.
+/// The segments of a stream up to the coded samples.
 class JpegSegments {
  public:
   explicit JpegSegments(std::string_view bytes) : bytes_(bytes) {
     if (bytes.substr(0, 2) != "\xFF\xD8") throw CodecError("the pixels do not begin as JPEG");
   }
-  /// The marker of the next segment, whose content `segment` then is.
+  /// Goes to the next segment and returns its marker. `segment` is then its content.
   int next() {
     while (at_ + 1 < bytes_.size() && bytes_[at_] == '\xFF' && bytes_[at_ + 1] == '\xFF') ++at_;  // filling
     if (at_ + 4 > bytes_.size() || bytes_[at_] != '\xFF')
@@ -41,7 +41,7 @@ class JpegSegments {
   std::size_t at_ = 2;
 };
 
-/// The precision that a frame header gives. Throws CodecError where it contradicts the image.
+/// The precision from a frame header. Throws CodecError if the header contradicts the image.
 inline int frame_precision(const JpegSegments& segments, const CodedImage& image) {
   const int precision = segments.byte(0), rows = segments.word(1), columns = segments.word(3),
             components = segments.byte(5);
@@ -56,14 +56,14 @@ inline int frame_precision(const JpegSegments& segments, const CodedImage& image
   return precision;
 }
 
-/// Bits, the high one first. Behind a byte FF, `kStuffed` bits of the next are filling: the whole byte in JPEG, one bit
+/// Reads bits, the highest first. After a byte FF, the next `kStuffed` bits are stuffing: a whole byte in JPEG, one bit
 /// in JPEG-LS.
 template <int kStuffed>
 class JpegBits {
  public:
   explicit JpegBits(std::string_view bytes) : bytes_(bytes) {}
 
-  /// The next 16 bits, zeros where there are none left; they are not taken yet.
+  /// The next 16 bits without taking them. Zeros after the end of the data.
   unsigned peek16() {
     fill();
     return held_ >= 16 ? unsigned(bits_ >> (held_ - 16)) & 0xFFFF : unsigned(bits_ << (16 - held_)) & 0xFFFF;
@@ -72,14 +72,14 @@ class JpegBits {
     if (count > held_) throw CodecError("the compressed pixels end too early");
     held_ -= count;
   }
-  /// At most 16.
+  /// Takes the next `count` bits, at most 16.
   unsigned take(int count) {
     if (count == 0) return 0;
     const unsigned value = peek16() >> (16 - count);
     skip(count);
     return value;
   }
-  /// Goes behind the bits of the byte that is begun, to the marker that must follow there; its second byte.
+  /// Skips the rest of the current byte and the marker that must follow. Returns the marker's second byte.
   int marker() {
     fill();
     if (held_ >= 8 || at_ + 2 > bytes_.size() || bytes_[at_] != '\xFF')

@@ -77,7 +77,7 @@ Mesh read_stl_text(const std::string& bytes, const std::string& what) {
 }
 
 Mesh read_stl(const std::string& bytes, const std::string& what) {
-  // Some programs begin a binary file with the word solid, so the size decides.
+  // Some programs begin a binary file with the word "solid", so the size decides whether it is binary.
   if (bytes.size() >= 84) {
     std::uint32_t count = 0;
     std::memcpy(&count, bytes.data() + 80, sizeof count);

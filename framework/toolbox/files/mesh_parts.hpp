@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the readers of surfaces have in common.
+// The common part of the readers of surfaces.
 #include <array>
 #include <bit>
 #include <charconv>
@@ -12,7 +12,7 @@
 
 namespace marrow::files {
 
-/// Makes one vertex of all that have the same coordinates: STL repeats a vertex for each of its triangles.
+/// Merges vertices with the same coordinates, because STL repeats a vertex for each of its triangles.
 class MeshBuilder {
  public:
   explicit MeshBuilder(std::size_t triangles) {
@@ -42,18 +42,18 @@ class MeshBuilder {
   std::unordered_map<Key, std::uint32_t, Hash> index_;
 };
 
-/// The words of a text one after the other.
+/// The words of a text, one after the other.
 class Words {
  public:
   explicit Words(std::string_view text) : text_(text) {}
-  /// Empty at the end.
+  /// The next word; empty at the end.
   std::string_view next() {
     skip_space();
     const std::size_t begin = at_;
     while (at_ < text_.size() && !is_space(text_[at_])) ++at_;
     return text_.substr(begin, at_ - begin);
   }
-  /// The next word as a number; none where it is none.
+  /// The next word as a number. std::nullopt if it is none.
   std::optional<double> number() {
     std::string_view word = next();
     if (!word.empty() && word[0] == '+') word.remove_prefix(1);
@@ -77,7 +77,7 @@ class Words {
   std::size_t at_ = 0;
 };
 
-/// A surface from the bytes of a PLY file; `what` names it in messages. Throws Error.
+/// A surface from the bytes of a PLY file. `what` names it in messages. Throws Error if it is damaged or not supported.
 Mesh read_ply(const std::string& bytes, const std::string& what);
 
 }  // namespace marrow::files

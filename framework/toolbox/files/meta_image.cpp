@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// MetaImage (.mha, .mhd): https://itk.org/Wiki/MetaIO/Documentation. MetaIO itself hands on what the memory held where
-// samples are missing, and opens whatever a header names, so its format is read here.
+// MetaImage (.mha, .mhd): https://itk.org/Wiki/MetaIO/Documentation. MetaIO itself returns uninitialised memory for
+// missing samples, and opens any file that a header names. So this file has its own reader.
 #include <algorithm>
 #include <cmath>
 
@@ -13,7 +13,7 @@ namespace {
 
 struct Header {
   HeaderFields fields;
-  std::uint64_t end = 0;  ///< where samples in the same file begin
+  std::uint64_t end = 0;  ///< offset of samples in the same file
 };
 
 Header read_header(const InputFile& file) {
@@ -43,7 +43,7 @@ Samples::Type type_of(const HeaderFields& fields) {
   return found->second;
 }
 
-/// The field that is there, of several names for the same; empty where none is. Throws Error where two are.
+/// Which of several names for the same field the header uses; empty if none. Throws Error if it uses two.
 std::string one_of(const HeaderFields& fields, const std::vector<std::string>& names) {
   std::string there;
   for (const std::string& name : names) {
@@ -55,7 +55,8 @@ std::string one_of(const HeaderFields& fields, const std::vector<std::string>& n
 }
 
 void read_grid(const HeaderFields& fields, std::size_t dimensions, Samples& samples) {
-  // MetaIO, too, takes the size for the spacing where there is no spacing; where there is neither, it takes 1.
+  // As in MetaIO, the element size is the spacing if there is no spacing. If there is neither, MetaIO takes 1; here the
+  // user must give the spacing.
   if (const std::string key = fields.has("elementspacing") ? "elementspacing" : "elementsize"; fields.has(key)) {
     const auto spacing = fields.numbers(key, dimensions);
     std::copy_n(spacing.begin(), std::min<std::size_t>(3, dimensions), samples.spacing_mm.begin());
@@ -67,7 +68,7 @@ void read_grid(const HeaderFields& fields, std::size_t dimensions, Samples& samp
     std::copy_n(origin.begin(), std::min<std::size_t>(3, dimensions), samples.origin_mm.begin());
   }
   if (const std::string key = one_of(fields, {"transformmatrix", "rotation", "orientation"}); !key.empty()) {
-    const auto axes = fields.numbers(key, dimensions * dimensions);  // one axis after the other
+    const auto axes = fields.numbers(key, dimensions * dimensions);  // axis by axis
     for (std::size_t axis = 0; axis < dimensions; ++axis)
       for (std::size_t row = 0; row < dimensions; ++row) {
         const double value = axes[axis * dimensions + row];
@@ -96,7 +97,7 @@ void check_fields(const HeaderFields& fields) {
           key, std::to_string(int(value)) + ": samples that are to be scaled are not read; save the values themselves");
 }
 
-/// Where the samples begin in the file that holds them.
+/// Offset of the samples in the file that holds them.
 std::uint64_t begin_of(const HeaderFields& fields, const InputFile& data, std::uint64_t header_end,
                        std::uint64_t sample_bytes) {
   const long long skipped = fields.whole_number_or("headersize", 0);
@@ -105,7 +106,7 @@ std::uint64_t begin_of(const HeaderFields& fields, const InputFile& data, std::u
   if (skipped > 0) return std::uint64_t(skipped);
   if (skipped == 0) return header_end;
   if (fields.is_true_or("compresseddata", false)) fields.refuse("headersize", "no -1 with compressed samples");
-  return data.size() - std::min(data.size(), sample_bytes);  // the samples are what the file ends with
+  return data.size() - std::min(data.size(), sample_bytes);  // the samples are at the end of the file
 }
 
 VolumeSamples read_samples(const Header& header, const InputFile& data, std::uint64_t header_end) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// NIfTI-1 (.nii, .nii.gz): https://nifti.nimh.nih.gov/nifti-1. The NIfTI library hands on zeros for samples that a file
-// does not hold and takes a header that contradicts itself, so its format is read here.
+// NIfTI-1 (.nii, .nii.gz): https://nifti.nimh.nih.gov/nifti-1. The NIfTI library returns zeros for samples that a file
+// does not hold, and accepts a header that contradicts itself. So this file has its own reader.
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -34,7 +34,7 @@ class Header {
   }
   int dim(int k) const { return at<std::int16_t>(40 + 2 * std::size_t(k)); }
   double pixdim(int k) const { return double(at<float>(76 + 4 * std::size_t(k))); }
-  /// How many mm a length of the header is.
+  /// The header's unit of length in mm.
   double unit_mm() const {
     const int unit = at<std::uint8_t>(123) & 7;
     return unit == 1 ? 1e3 : unit == 3 ? 1e-3 : 1;
@@ -85,8 +85,8 @@ std::array<long long, 3> size_of(const Header& header) {
   return size;
 }
 
-/// A matrix of the header that maps indices to RAS: three columns with the voxels' sizes, then the place of the first
-/// voxel.
+/// A matrix that maps indices to RAS: three columns with the axes times the voxel's size, then the position of the
+/// first voxel.
 using Affine = std::array<std::array<float, 4>, 3>;
 
 bool is_finite(const Affine& affine) {
@@ -102,12 +102,12 @@ double dot(const Affine& affine, std::size_t a, std::size_t b) {
   return sum;
 }
 
-/// Whether it consists of numbers, and no column is zero.
+/// Whether all its values are finite and none of the three axes is zero.
 bool has_lengths(const Affine& affine) {
   return is_finite(affine) && dot(affine, 0, 0) > 0 && dot(affine, 1, 1) > 0 && dot(affine, 2, 2) > 0;
 }
 
-/// Whether its columns are at right angles and none is zero.
+/// Whether its axes are at right angles and none is zero.
 bool is_straight(const Affine& affine) {
   if (!has_lengths(affine)) return false;
   for (const auto& [a, b] : {std::pair<std::size_t, std::size_t>{0, 1}, {0, 2}, {1, 2}})
@@ -123,7 +123,7 @@ Affine sform(const Header& header) {
   return affine;
 }
 
-/// From the quaternion, as nifti1.h says.
+/// The matrix from the quaternion, as defined in nifti1.h.
 Affine qform(const Header& header) {
   double b = header.at<float>(256), c = header.at<float>(260), d = header.at<float>(264),
          a = 1 - (b * b + c * c + d * d);
@@ -146,13 +146,13 @@ Affine qform(const Header& header) {
   return affine;
 }
 
-/// Whether both put every voxel of the volume to the same place, but for the rounding of either.
+/// Whether both put every voxel of the volume at the same position, up to rounding (0.02 mm per axis).
 bool are_near(const Affine& one, const Affine& other, const Header& header) {
   for (std::size_t row = 0; row < 3; ++row) {
     double apart = std::abs(double(one[row][3]) - double(other[row][3]));
     for (std::size_t k = 0; k < 3; ++k)
       apart += std::abs(double(one[row][k]) - double(other[row][k])) * std::max(0, header.dim(int(k) + 1) - 1);
-    if (!(apart * header.unit_mm() < 0.02)) return false;  // not where one is no number, too
+    if (!(apart * header.unit_mm() < 0.02)) return false;  // also for NaN
   }
   return true;
 }
@@ -169,11 +169,11 @@ bool are_near(const Affine& one, const Affine& other, const Header& header) {
               " put the same voxels to different places; set the code of the wrong one to 0, or export it again");
 }
 
-/// Where both are given they must agree, or the sform must be the scanner's own. An sform that leads to another scan is
-/// none of this one, so then the qform stands for the scanner.
+/// If both are given, they must agree, or the sform must be that of the scanner (code 1). An sform that maps to another
+/// scan (code 2) is not used if the qform is that of the scanner.
 Affine affine_of(const Header& header) {
   const int qcode = header.at<std::int16_t>(252), scode = header.at<std::int16_t>(254);
-  if (qcode <= 0 && scode <= 0)  // programs differ in what they take then, and one of them mirrors the bone
+  if (qcode <= 0 && scode <= 0)  // programs then assume different axes, and one of them mirrors the bone
     throw Error(header.what() +
                 ": its header does not say which axis is left or right, front or back, up or down (qform_code and "
                 "sform_code are 0); export it again with one of them, or as MHA");
@@ -199,7 +199,7 @@ void read_grid(const Header& header, Samples& samples) {
     double squares = 0;
     for (const auto& row : affine) squares += double(row[k]) * double(row[k]);
     const double length = std::sqrt(squares), said = header.pixdim(int(k) + 1);
-    if (std::abs(length - said) > 1e-3 * said)  // which of the two is true, no one but its writer knows
+    if (std::abs(length - said) > 1e-3 * said)  // it is not known which of the two is right
       throw Error(header.what() + ": its header says twice how large a voxel is along axis " + std::to_string(k + 1) +
                   ": " + std::to_string(length * unit_mm) + " mm by its sform, " + std::to_string(said * unit_mm) +
                   " mm by its pixdim; set both to the right one, or export it again");
@@ -213,7 +213,7 @@ void read_grid(const Header& header, Samples& samples) {
 
 void read_scaling(const Header& header, StoredSamples& stored) {
   const double slope = header.at<float>(112), intercept = header.at<float>(116);
-  if (slope == 0 || std::isnan(slope)) return;  // none, as nifti1.h has it, or as some programs write that
+  if (slope == 0 || std::isnan(slope)) return;  // no scaling: 0 by nifti1.h, NaN by some programs
   if (!std::isfinite(slope) || !std::isfinite(intercept))
     throw Error(header.what() + ": its header scales samples by a number that is not finite; it is damaged");
   stored.slope = slope;
@@ -232,7 +232,7 @@ VolumeSamples read_nifti(const std::filesystem::path& path) {
   VolumeSamples volume;
   volume.geometry.dimensions = std::min(3, header.dim(0));
   for (std::size_t k = 0; k < 3; ++k) volume.geometry.size[k] = int(size[k]);
-  if (volume.geometry.dimensions < 3) return volume;  // one image, which the caller refuses
+  if (volume.geometry.dimensions < 3) return volume;  // one image; the caller refuses it
   read_grid(header, volume.geometry);
   read_scaling(header, stored);
   const double begin = header.at<float>(108);

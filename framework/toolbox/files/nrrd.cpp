@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // NRRD (.nrrd, .nhdr): https://teem.sourceforge.net/nrrd/format.html. The NRRD library copies fields into buffers of
-// fixed size, and opens whatever a header names, so its format is read here.
+// fixed size, and opens any file that a header names. So this file has its own reader.
 #include <cmath>
 #include <set>
 
@@ -13,7 +13,7 @@ namespace {
 
 struct Header {
   HeaderFields fields;
-  std::uint64_t end = 0;  ///< where samples in the same file begin
+  std::uint64_t end = 0;  ///< offset of samples in the same file
 };
 
 Header read_header(const InputFile& file) {
@@ -62,9 +62,9 @@ Header read_header(const InputFile& file) {
     const auto line = lines.next();
     if (line && !line->empty() && (*line)[0] == '#') continue;
     header.end = lines.at();
-    if (!line || line->empty()) return header;  // at the end of the file, the samples lie in another
+    if (!line || line->empty()) return header;  // if the file ends here, the samples are in another file
     const std::size_t colon = line->find(':');
-    if (colon != std::string::npos && line->compare(colon, 2, ":=") == 0) continue;  // whatever its writer noted
+    if (colon != std::string::npos && line->compare(colon, 2, ":=") == 0) continue;  // a key/value note of its writer
     std::string key = in_small_letters(trimmed(line->substr(0, colon)));
     if (const auto same = kSame.find(key); same != kSame.end()) key = same->second;
     if (colon == std::string::npos || line->find('\0') != std::string::npos || !kKnown.count(key))
@@ -72,7 +72,7 @@ Header read_header(const InputFile& file) {
                   "'; it is damaged: copy or export it again");
     header.fields.add(key, line->substr(colon + 1));
     if (key == "data file" && in_small_letters(header.fields.text(key).substr(0, 4)) == "list")
-      return header;  // names follow
+      return header;  // the following lines are file names
   }
 }
 
@@ -123,7 +123,7 @@ Samples::Type type_of(const HeaderFields& fields) {
   return found->second;
 }
 
-/// One vector "(a,b,c)" for each axis.
+/// `count` vectors "(a,b,c)".
 std::vector<std::array<double, 3>> vectors(const HeaderFields& fields, const std::string& key, std::size_t count) {
   std::string text = fields.text(key);
   std::vector<std::array<double, 3>> vectors;
@@ -147,7 +147,7 @@ std::vector<std::array<double, 3>> vectors(const HeaderFields& fields, const std
   return vectors;
 }
 
-/// What turns the file's space to patient axes LPS: the signs of its first two axes.
+/// Signs that turn the axes of the file's space into patient axes LPS.
 std::array<double, 3> signs_of(const HeaderFields& fields) {
   const std::string space = in_small_letters(fields.text_or("space", "left-posterior-superior"));
   if (fields.whole_number_or("space dimension", 3) != 3) fields.refuse("space dimension", "3");
@@ -166,8 +166,8 @@ void check_units(const HeaderFields& fields, const std::string& key) {
       fields.refuse(key, "mm");
 }
 
-/// Of each axis, whether its ends are those of the first and last voxel's centres (node) instead of their borders
-/// (cell, or not said).
+/// For each axis, whether its ends are the centres of the first and last voxel (node) and not their borders (cell, or
+/// not given).
 std::array<bool, 3> nodes_of(const HeaderFields& fields) {
   std::array<bool, 3> are_nodes{};
   if (!fields.has("centers")) return are_nodes;
@@ -181,7 +181,7 @@ std::array<bool, 3> nodes_of(const HeaderFields& fields) {
   return are_nodes;
 }
 
-/// By the fields of single axes, which are those of the patient then.
+/// Reads the grid from the fields of single axes. The axes are then those of the patient.
 void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
   for (const char* key : {"space", "space dimension", "space origin"})
     if (fields.has(key))
@@ -212,7 +212,7 @@ void read_grid_without_space(const HeaderFields& fields, Samples& samples) {
                                      std::to_string(least[k] + length) + ")");
 }
 
-/// The format allows no 'spacings' beside 'space directions'; those that say the same, or nothing, do no harm.
+/// The format does not allow 'spacings' together with 'space directions'. They are accepted if they agree or are NaN.
 void check_spacings(const HeaderFields& fields, const std::array<double, 3>& lengths_mm) {
   const std::vector<std::string> spacings = words_of(fields.text_or("spacings", ""));
   for (std::size_t k = 0; k < spacings.size(); ++k) {

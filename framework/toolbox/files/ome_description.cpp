@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The description of OME-TIFF, an XML text: https://docs.openmicroscopy.org/ome-model. Of all that it may say, one
-// plain stack of slices is understood; anything else is told as what the pages are instead.
+// The description of OME-TIFF, an XML text: https://docs.openmicroscopy.org/ome-model. Only one plain stack of slices
+// is supported. For anything else, `other_pages` says what the pages are.
 #include <cctype>
 #include <cstdint>
 #include <map>
@@ -18,18 +18,18 @@ struct Tag {
   std::map<std::string, std::string> attributes;
 };
 
-/// The tags that open elements in an XML text, one after the other.
+/// The opening tags of an XML text, one after the other.
 class Tags {
  public:
   explicit Tags(std::string_view text) : text_(text) {}
 
-  /// None at the end, and where the text is none that is understood.
+  /// The next tag. std::nullopt at the end, or if the text is not understood.
   std::optional<Tag> next() {
     while (is_understood_) {
       at_ = text_.find('<', at_);
       if (at_ == text_.npos) return std::nullopt;
       if (passes("<!--", "-->") || passes("<?", "?>") || passes("<![CDATA[", "]]>") || passes("</", ">")) continue;
-      if (text_.substr(at_, 2) == "<!") break;  // a document type may define what names stand for
+      if (text_.substr(at_, 2) == "<!") break;  // a document type could redefine names
       ++at_;
       if (auto tag = read()) return tag;
       break;
@@ -93,7 +93,7 @@ long number_of(const Tag& tag, const char* name, long missing) {
   return std::stol(text);
 }
 
-/// Whether these pages are slices in the order of the pages.
+/// Whether the slices are in the order of the pages.
 bool is_in_order(const Tag& data) {
   const long first = number_of(data, "FirstZ", 0);
   return first >= 0 && number_of(data, "IFD", 0) == first && number_of(data, "FirstC", 0) == 0 &&

@@ -6,8 +6,8 @@
 
 namespace marrow::files {
 
-/// Unpacks runs and literal bytes (PackBits) until `bytes` are there or none are left; how many there are. More than
-/// `bytes`, a run that is cut off, or more than one byte of filling behind: 0.
+/// Unpacks PackBits data until there are `bytes` bytes or no data are left. Returns the number of bytes. Returns 0 if
+/// there are more than `bytes`, if a run is cut off, or if more than one byte of filling follows.
 inline std::size_t unpack_packbits(std::string_view packed, std::byte* to, std::size_t bytes) {
   std::size_t done = 0, at = 0;
   while (done < bytes && at < packed.size()) {

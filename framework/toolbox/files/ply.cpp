@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// PLY, as text or as bytes of either order. All work is bounded by the file's size: each item takes at least one byte
-// of it.
+// PLY as text or binary in either byte order. The file's size bounds all work, because each item takes at least one
+// byte.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -20,7 +20,7 @@ constexpr std::size_t kBytes[] = {1, 1, 2, 2, 4, 4, 4, 8};
 struct Property {
   std::string name;
   Number type = Number::f32;
-  std::optional<Number> count_type;  ///< of a list
+  std::optional<Number> count_type;  ///< only for a list: type of its length
 };
 struct Element {
   std::string name;
@@ -32,7 +32,7 @@ enum class Format { text, little, big };
 struct Header {
   Format format = Format::text;
   std::vector<Element> elements;
-  std::size_t end = 0;  ///< where the body begins
+  std::size_t end = 0;  ///< offset of the body
 };
 
 class HeaderReader {
@@ -117,9 +117,9 @@ class HeaderReader {
     header_.elements.back().properties.push_back(property);
   }
 
-  /// Throws Error where the file has no room for what the element claims.
+  /// Throws Error if the file is too small for the number of items that the element claims.
   void check_claim(const Element& element) const {
-    std::size_t least = 0;  // bytes of an item whose lists are empty
+    std::size_t least = 0;  // bytes of an item with empty lists
     for (const Property& property : element.properties)
       least += header_.format == Format::text ? 1 : kBytes[int(property.count_type.value_or(property.type))];
     if (element.count > 0 && least == 0)
@@ -136,13 +136,13 @@ class HeaderReader {
   bool has_format_ = false;
 };
 
-/// The numbers of a body one after the other.
+/// The numbers of a body, one after the other.
 class Body {
  public:
   Body(Format format, std::string_view bytes, const std::string& what)
       : format_(format), bytes_(bytes), words_(format == Format::text ? bytes : std::string_view()), what_(what) {}
 
-  /// Throws Error where something is left over: then the header claims too little, or of the wrong kind.
+  /// Throws Error if bytes are left: then the header claims too few numbers, or numbers of the wrong type.
   void finish() {
     if (format_ == Format::text && !words_.is_at_end())
       throw Error(what_ + ": has more numbers than its header claims; it is damaged");
@@ -178,7 +178,7 @@ class Body {
     return take<double>();
   }
 
-  /// How many numbers a list has; no more than there can be.
+  /// Length of a list. Throws Error if the file cannot hold so many numbers.
   std::size_t length(const Property& list) {
     const double count = next(*list.count_type);
     if (!(count >= 0) || count != std::floor(count) || count > double(bytes_.size()) ||
@@ -214,7 +214,7 @@ class Body {
 
 std::vector<std::uint32_t> read_vertices(const Element& element, Body& body, MeshBuilder& builder,
                                          const std::string& what) {
-  std::vector<int> axis;  // of each property; -1: none
+  std::vector<int> axis;  // for each property: 0 to 2 for x, y, z; -1: none
   int axes = 0;
   for (const Property& property : element.properties) {
     const bool is_axis = !property.count_type && (property.name == "x" || property.name == "y" || property.name == "z");
@@ -236,10 +236,10 @@ std::vector<std::uint32_t> read_vertices(const Element& element, Body& body, Mes
   return index;
 }
 
-constexpr std::size_t kMostStarts = 64;  // of a fan: no modeller makes faces of more corners that are not convex
+constexpr std::size_t kMostStarts = 64;  // for a fan: no program makes faces of more corners that are not convex
 
-/// Whether the triangles from one corner to all edges cover the face, each once: all look to the same side, and they go
-/// round that corner less than once.
+/// Whether a fan of triangles from one corner covers the face exactly once: all triangles face the same side, and the
+/// fan turns less than once around that corner.
 bool is_covered_from(std::size_t start, const std::vector<Eigen::Vector3d>& corners) {
   const std::size_t count = corners.size();
   Eigen::Vector3d all = Eigen::Vector3d::Zero();
@@ -259,7 +259,8 @@ bool is_covered_from(std::size_t start, const std::vector<Eigen::Vector3d>& corn
   return !(size > 2 * all.norm()) && !(turned > 6.2832);
 }
 
-/// The corner from which a face of more than three corners is cut into triangles. Throws Error where none will do.
+/// The corner from which a face of more than three corners is cut into a fan of triangles. Throws Error if there is
+/// none.
 std::size_t start_of_fan(const std::vector<std::uint32_t>& polygon, const MeshBuilder& builder,
                          const std::string& what) {
   std::vector<Eigen::Vector3d> corners;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG through libpng itself: ITK's reader ends the whole program on a file that is cut off.
+// PNG by libpng directly, because ITK's reader ends the whole program if a file is cut off.
 #include <png.h>
 
 #include <csetjmp>
@@ -44,10 +44,9 @@ struct Reader {
       throw std::bad_alloc();
     }
     png_set_read_fn(png, &source, take);
-    // What is no pixels is passed over: libpng takes the memory that a comment claims, and only warns where that is
-    // much.
+    // Only pixels are read. libpng would reserve the memory that a comment claims, and would only warn if that is much.
     png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
-    // Notes and colour profiles, which are unpacked too, are of no use here: not many, and none that is large.
+    // Text and colour profiles are not needed, but libpng decompresses them. Their number and size are limited.
     png_set_chunk_malloc_max(png, 4 << 20);
     png_set_chunk_cache_max(png, 16);
     png_set_user_limits(png, 100000, 100000);
@@ -57,7 +56,7 @@ struct Reader {
   png_infop info = nullptr;
 };
 
-// In the next two functions nothing with a destructor lives between setjmp and the calls that may jump back to it.
+// In the next two functions no object with a destructor may live between setjmp and the calls that can jump back to it.
 
 bool read_header(Reader& reader) {
   if (setjmp(png_jmpbuf(reader.png))) return false;
@@ -76,7 +75,7 @@ bool read_rows(Reader& reader, png_bytepp rows) {
   return true;
 }
 
-/// The whole number of `width` bytes; 0 behind the end.
+/// The unsigned number of `width` bytes; 0 beyond the end.
 std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t width, bool big_endian) {
   std::uint32_t number = 0;
   for (std::size_t i = 0; at <= bytes.size() && width <= bytes.size() - at && i < width; ++i)
@@ -84,8 +83,7 @@ std::uint32_t number_at(std::string_view bytes, std::size_t at, std::size_t widt
   return number;
 }
 
-/// How an image is to be turned, as the first directory of Exif data says it (1 to 8); 1, not at all, where it does
-/// not.
+/// The Exif orientation (1 to 8) from the first directory of Exif data; 1 (not turned) if there is none.
 std::uint32_t orientation_of(std::string_view exif) {
   const bool big_endian = exif.substr(0, 2) == "MM";
   if (!big_endian && exif.substr(0, 2) != "II") return 1;
@@ -99,11 +97,11 @@ std::uint32_t orientation_of(std::string_view exif) {
   return 1;
 }
 
-/// Programs that show the image would show it turned; the reader does not turn it.
+/// Image viewers would turn such an image, but this reader does not. So it is refused.
 void check_orientation(const std::string& what, std::string_view bytes) {
   for (std::size_t at = 8; at + 12 <= bytes.size();) {
     const std::size_t length = number_at(bytes, at, 4, true);
-    if (length > bytes.size() - at - 12) return;  // cut off, which libpng has found or does not need
+    if (length > bytes.size() - at - 12) return;  // cut off; libpng reports this if it needs the chunk
     if (bytes.substr(at + 4, 4) == "eXIf")
       if (const auto orientation = orientation_of(bytes.substr(at + 8, length)); orientation >= 2 && orientation <= 8)
         throw Error(what + ": is to be shown turned or mirrored (Exif Orientation " + std::to_string(orientation) +

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// PNG through libpng itself, made in memory: ITK's writer ends the whole program when the disk is full.
+// PNG by libpng directly, in memory, because ITK's writer ends the whole program if the disk is full.
 #include <png.h>
 
 #include <bit>
@@ -15,7 +15,7 @@
 namespace marrow::files {
 namespace {
 
-/// What libpng is handed: it is C, so no exception may pass through it.
+/// Given to libpng. libpng is C, so no exception may pass through it.
 struct Target {
   std::string bytes, fault;
 };
@@ -35,7 +35,7 @@ void flush(png_structp) {}
 void on_error(png_structp png, png_const_charp reason) {
   try {
     static_cast<Target*>(png_get_error_ptr(png))->fault = reason;
-  } catch (const std::exception&) {  // then without a reason
+  } catch (const std::exception&) {  // then there is no reason in the message
   }
   png_longjmp(png, 1);
 }
@@ -53,7 +53,7 @@ struct Writer {
   png_infop info;
 };
 
-/// Nothing with a destructor lives between setjmp and the calls that may jump back to it.
+/// No object with a destructor may live between setjmp and the calls that can jump back to it.
 bool write_rows(Writer& writer, int width, int height, int channels, int bits, png_bytepp rows) {
   if (setjmp(png_jmpbuf(writer.png))) return false;
   png_set_IHDR(writer.png, writer.info, png_uint_32(width), png_uint_32(height), bits,
@@ -73,7 +73,7 @@ std::string png_of(int width, int height, int channels, Sample sample, const voi
   const int bits = sample == Sample::u16 ? 16 : 8;
   const std::size_t row_bytes = std::size_t(width) * std::size_t(channels) * std::size_t(bits / 8);
   std::vector<png_bytep> rows;
-  // libpng takes rows that it may write to, but does not.
+  // libpng's interface takes writable rows, but it does not write to them.
   auto* first = static_cast<png_bytep>(const_cast<void*>(pixels));
   for (int v = 0; v < height; ++v) rows.push_back(first + std::size_t(v) * row_bytes);
   Target target;

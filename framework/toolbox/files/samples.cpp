@@ -15,7 +15,7 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "samples are taken as they are where they are little-endian");
 
-/// What fits into 64 MB as float does no harm, however tightly it is packed.
+/// As floats these fit into 64 MB. So few samples are harmless at any compression ratio.
 constexpr double kFewSamples = 1 << 24;
 
 template <class T>
@@ -69,7 +69,7 @@ void convert(const StoredSamples& stored, const std::byte* bytes, std::size_t co
   scale(values, count, stored.slope, stored.intercept);
 }
 
-constexpr std::size_t kPart = 1 << 17;  // samples that are converted at once
+constexpr std::size_t kPart = 1 << 17;  // number of samples that are converted at once
 
 void read_plain(const InputFile& file, const StoredSamples& stored, std::vector<float>& values) {
   const std::size_t width = bytes_each(stored.type);
@@ -98,7 +98,7 @@ void read_packed(const InputFile& file, const StoredSamples& stored, std::vector
     take_all(*stream, file, bytes.data(), count);
     left -= count;
   }
-  // As much as is there, not as much as is claimed.
+  // Memory grows with the data that are there, not with the size that the header claims.
   for (std::size_t first = 0; first < stored.count; first += kPart) {
     const std::size_t count = std::min(kPart, stored.count - first);
     take_all(*stream, file, bytes.data(), count * width);
@@ -106,7 +106,7 @@ void read_packed(const InputFile& file, const StoredSamples& stored, std::vector
       values.resize(first + count < stored.count / 8 ? std::max(first + count, 2 * values.size()) : stored.count);
     convert(stored, bytes.data(), count, values.data() + first);
   }
-  expect_end(*stream, file);  // which verifies the checksum there, too
+  expect_end(*stream, file);  // also verifies the checksum
   if (const std::uint64_t behind = stream->bytes_behind(); behind > 0)
     throw Error(file.path().string() + ": is damaged: " + std::to_string(behind) +
                 " bytes follow the end of its compressed samples, none expected; copy or export it again");

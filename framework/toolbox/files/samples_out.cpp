@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// MHA and TIFF of floats, made in memory: ITK does not say when a disk is full, nor when there was no memory to
-// compress.
+// MHA and TIFF of floats, made in memory. ITK's writers do not report a full disk or a lack of memory for compression.
 #include "marrow/toolbox/files/samples_out.hpp"
 
 #include <zlib.h>
@@ -20,9 +19,9 @@ namespace {
 
 static_assert(std::endian::native == std::endian::little, "both files say that their numbers are little-endian");
 
-constexpr int kLevel = 2;  // a CT of 420 MB in seconds; higher levels take minutes for a few percent
+constexpr int kLevel = 2;  // compresses a CT of 420 MB in seconds; higher levels take minutes to save a few percent
 
-/// Input and output in parts: zlib counts bytes in 32 bits.
+/// Works in parts, because zlib counts bytes in 32 bits.
 std::string deflated(const char* bytes, std::size_t size) {
   z_stream stream{};
   if (deflateInit(&stream, kLevel) != Z_OK) throw std::bad_alloc();
@@ -83,7 +82,7 @@ void write_mha(const std::filesystem::path& path, const GridOut& grid, const flo
 void write_float_tiff(const std::filesystem::path& path, int width, int height, const float* pixels) {
   const std::size_t size = std::size_t(width) * std::size_t(height) * sizeof(float);
   constexpr std::uint32_t kDirectory = 8, kFields = 10,
-                          kPixels = 136;  // header, directory, two bytes of nothing, pixels
+                          kPixels = 136;  // after the header, the directory and two unused bytes
   if (size > std::numeric_limits<std::uint32_t>::max() - kPixels)
     throw Error(path.string() + ": an image of " + std::to_string(width) + " x " + std::to_string(height) +
                 " pixels is larger than a TIFF file can be");
@@ -92,13 +91,13 @@ void write_float_tiff(const std::filesystem::path& path, int width, int height, 
   head += {char(kFields), 0};
   append_field(head, 256, std::uint32_t(width));
   append_field(head, 257, std::uint32_t(height));
-  append_field(head, 258, 32);                     // bits a sample
+  append_field(head, 258, 32);                     // bits per sample
   append_field(head, 259, 1);                      // not compressed
   append_field(head, 262, 1);                      // 0 is black
-  append_field(head, 273, kPixels);                // where the only strip begins
-  append_field(head, 277, 1);                      // samples a pixel
-  append_field(head, 278, std::uint32_t(height));  // rows in the strip
-  append_field(head, 279, std::uint32_t(size));    // its bytes
+  append_field(head, 273, kPixels);                // offset of the only strip
+  append_field(head, 277, 1);                      // samples per pixel
+  append_field(head, 278, std::uint32_t(height));  // rows of the strip
+  append_field(head, 279, std::uint32_t(size));    // bytes of the strip
   append_field(head, 339, 3);                      // floating point
   head.resize(kPixels, '\0');                      // no further directory
   write_plainly(path, {head, {reinterpret_cast<const char*>(pixels), size}});

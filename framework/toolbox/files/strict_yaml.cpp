@@ -98,7 +98,8 @@ void YamlMap::take_keys(Check check) {
     values_.emplace(key.name, key.value);
     check(key.name, key.mark);
   }
-  for (const YamlFault& one : faults) file_.fault(one.mark, one.text + (one.hint.empty() ? "" : "; " + one.hint));
+  for (const YamlFault& one : faults)
+    file_.fault(one.mark, printable(one.text) + (one.hint.empty() ? "" : "; " + one.hint));
 }
 
 bool YamlMap::has(const std::string& key) const { return node(key).IsDefined(); }

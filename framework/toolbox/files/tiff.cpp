@@ -44,7 +44,7 @@ void read_page(const InputFile& file, const TiffPages& tiff, const TiffPage& pag
     read_tiff_strip(file, tiff, page, strip, to + row * row_bytes, std::size_t(rows) * row_bytes);
     row += rows;
   }
-  if (page.orientation == 4)  // from below
+  if (page.orientation == 4)  // the first row is the bottom one
     for (std::uint64_t v = 0; v < page.height / 2; ++v)
       std::swap_ranges(to + v * row_bytes, to + (v + 1) * row_bytes, to + (page.height - 1 - v) * row_bytes);
 }
@@ -59,7 +59,7 @@ void invert_as(std::vector<std::byte>& bytes) {
   }
 }
 
-/// Of an image whose zero is white, so that, as in others, more is brighter.
+/// Inverts an image whose zero is white, so that higher values are brighter, as in other images.
 void invert(const std::string& what, Samples& samples) {
   if (samples.type == Samples::Type::u8) return invert_as<std::uint8_t>(samples.bytes);
   if (samples.type == Samples::Type::u16) return invert_as<std::uint16_t>(samples.bytes);
@@ -68,8 +68,7 @@ void invert(const std::string& what, Samples& samples) {
               "and 16 bits without sign only: save it with zero as black");
 }
 
-/// ImageJ calibrates whole numbers without sign; what it means for others, or for those that are inverted, it does not
-/// say.
+/// ImageJ defines its calibration for unsigned integers only, and not for inverted ones.
 void check_calibration(const std::string& what, const Samples& samples, const TiffPage& page) {
   if (samples.slope == 1 && samples.intercept == 0) return;
   const bool is_plain = samples.type == Samples::Type::u8 || samples.type == Samples::Type::u16;
@@ -93,7 +92,7 @@ Samples read_tiff(const std::filesystem::path& path) {
   samples.intercept = tiff.intercept;
   samples.size = {int(first.width), int(first.height), int(tiff.pages.size())};
   samples.components = int(std::min<std::uint64_t>(first.samples, 1000));
-  if (first.photometric > 1) samples.components = std::max(samples.components, 3);  // a palette
+  if (first.photometric > 1) samples.components = std::max(samples.components, 3);  // colours, possibly by a palette
   if (samples.components != 1) return samples;
   for (const TiffPage& page : tiff.pages) check_kind(what, page);
   samples.type = type_of(what, first);

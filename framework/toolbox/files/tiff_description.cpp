@@ -12,13 +12,13 @@ namespace {
 
 constexpr const char* kShape = "\"shape\": [";
 
-/// The whole number behind `name`, or 1.
+/// The whole number after `name`, or 1.
 long number_behind(const std::string& text, const std::string& name) {
   const std::size_t found = text.find(name);
   return found == std::string::npos ? 1 : std::atol(text.c_str() + found + name.size());
 }
 
-/// The text behind `name` in a line of ImageJ's; none where there is no such line.
+/// The text of ImageJ's line "name=text". std::nullopt if there is no such line.
 std::optional<std::string> line_behind(const std::string& text, const std::string& name) {
   const std::size_t found = ("\n" + text).find("\n" + name + "=");
   if (found == std::string::npos) return std::nullopt;
@@ -26,7 +26,8 @@ std::optional<std::string> line_behind(const std::string& text, const std::strin
   return trimmed(text.substr(begin, text.find_first_of("\r\n", begin) - begin));
 }
 
-/// ImageJ keeps values with a sign, as those of a CT, as whole numbers without, and says so: value = c0 + c1 * number.
+/// ImageJ stores signed values, such as those of a CT, as unsigned numbers with a calibration: value = c0 + c1 *
+/// number.
 void read_calibration(const std::string& text, TiffDescription& description) {
   const auto function = line_behind(text, "cf"), c0 = line_behind(text, "c0"), c1 = line_behind(text, "c1");
   if (!function && !c0 && !c1) return;
@@ -58,7 +59,7 @@ TiffDescription of_imagej(const std::string& text) {
   return description;
 }
 
-/// Whether it is one of OME, whatever its elements' prefix.
+/// Whether it is a description of OME, with any namespace prefix.
 bool is_ome(const std::string& text) {
   return text.find("<OME") != std::string::npos || text.find("openmicroscopy.org") != std::string::npos;
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A stack whose end is cut off looks like one with fewer pages. So the chain of page directories is followed here: a
-// directory, or pixels, behind the end of the file mean that pages are missing. Directories that point at themselves or
-// share their bytes end the walk, whose work the file's size bounds.
+// A stack that is cut off at its end looks like one with fewer pages. So the chain of page directories is followed
+// here. If a directory or pixels lie beyond the end of the file, pages are missing. Directories that form a circle or
+// share their bytes are refused, so the file's size bounds all work.
 #include "tiff_pages.hpp"
 
 #include <algorithm>
@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t kMostPages = 100000;
 constexpr std::uint64_t kLongestDescription = 1 << 20;
 
-/// The widths of places and entries: BigTIFF (43) has 8-byte places and 20-byte entries, TIFF (42) 4 and 12.
+/// Sizes in bytes: BigTIFF (43) has 8-byte offsets and 20-byte entries, TIFF (42) 4 and 12.
 struct Layout {
   int width, count_width;
   std::uint64_t entry_bytes;
@@ -65,7 +65,7 @@ class Walk {
     }
   }
 
-  /// Pages have bytes of their own; where they share them, reading them all could take for ever.
+  /// Refuses pages that share bytes, because reading all of them could take very long.
   void count_bytes(std::uint64_t bytes) {
     bytes_ += bytes;
     if (bytes_ > 4 * file_.size() + 65536)
@@ -73,7 +73,7 @@ class Walk {
   }
 
   void add(TiffPage page) {
-    // Tiles would have to be put together.
+    // Tiles are not supported: they would have to be put together.
     if (page.is_tiled)
       throw Error(what() + ": is stored in tiles; expected strips: save it as a plain TIFF (tiffcp -s does it)");
     if (!tiff_.pages.empty() && !page.is_like(tiff_.pages[0]))
@@ -102,7 +102,7 @@ class Walk {
                       " has no number of a kind that is read; it is "
                       "damaged, or save it anew as a plain TIFF");
         *place = numbers[0];
-        // Samples of a pixel may each have a width and a format of their own.
+        // The samples of a pixel may have different widths and formats. This is not supported: 0 is refused later.
         if (std::any_of(numbers.begin(), numbers.end(), [&](std::uint64_t n) { return n != numbers[0]; })) *place = 0;
       }
     }
@@ -122,7 +122,7 @@ class Walk {
     const std::uint64_t length = std::min(count, kLongestDescription);
     count_bytes(length);
     const std::string text = window_.text(at, length);
-    if (length < count && text.find('<') != std::string::npos)  // what it says of the pages may come behind
+    if (length < count && text.find('<') != std::string::npos)  // its rest may describe the pages
       throw Error(what() + ": its description has " + std::to_string(count) + " bytes, more than the " +
                   std::to_string(kLongestDescription) + " that are read; save it without");
     TiffDescription description = read_tiff_description(text);
@@ -135,7 +135,7 @@ class Walk {
     return description;
   }
 
-  /// All pages go by that of the first.
+  /// The calibration of the first page holds for all pages. Throws Error if another page has a different one.
   void take_calibration(const TiffDescription& description) {
     if (!description.calibration.empty())
       throw Error(what() + ": " + description.calibration + "; save it uncalibrated (in ImageJ: Analyze, Calibrate)");
@@ -146,7 +146,8 @@ class Walk {
     if (tiff_.pages.empty()) tiff_.slope = description.slope, tiff_.intercept = description.intercept;
   }
 
-  /// Descriptions count the pages of a stack. Others than those mean that some are missed, or that they are two stacks.
+  /// Descriptions give the number of pages of a stack. If it differs from the number found, pages are missing, or there
+  /// are several stacks.
   void check_pages_told() {
     std::uint64_t most = 0, different = 0, single = 0;
     for (const TiffPage& page : tiff_.pages) {
@@ -159,7 +160,8 @@ class Walk {
                   "its description tells of " + std::to_string(most) + " pages, but it has " +
                   std::to_string(tiff_.pages.size()) +
                   ": the others have no directory, or are in other files; save it with a directory for each page");
-    if (different > 0 && single != tiff_.pages.size() && tiff_.other_pages.empty())  // else written page by page
+    // If each page describes itself as the only one, the file was written page by page.
+    if (different > 0 && single != tiff_.pages.size() && tiff_.other_pages.empty())
       tiff_.other_pages = "a file of several stacks (its first page tells of " +
                           std::to_string(std::max<std::uint64_t>(1, tiff_.pages[0].told)) + " of the " +
                           std::to_string(tiff_.pages.size()) + " pages)";
@@ -196,7 +198,7 @@ class Walk {
     }
   }
 
-  /// The numbers of an entry, which lie in it or, where they are too many, elsewhere.
+  /// The numbers of an entry. They are in the entry itself or, if there are too many, elsewhere in the file.
   std::vector<std::uint64_t> numbers_of(std::uint64_t entry) {
     const std::uint64_t type = number(entry + 2, 2), count = number(entry + 4, layout_.width);
     const int bytes_each = type == 1 ? 1 : type == 3 ? 2 : type == 4 ? 4 : type == 16 ? 8 : 0;

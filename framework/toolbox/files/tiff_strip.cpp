@@ -12,7 +12,8 @@
 namespace marrow::files {
 namespace {
 
-/// Unpacks LZW: codes of 9 to 12 bits, the high bit first, each the sequence of an earlier code and one byte more.
+/// Unpacks LZW: codes of 9 to 12 bits, the high bit first. Each code stands for the bytes of an earlier code and one
+/// more byte. Returns the number of bytes; 0 if the data are damaged.
 std::size_t unpack_lzw(const std::string& packed, std::byte* to, std::size_t bytes) {
   constexpr unsigned kClear = 256, kEnd = 257, kFirst = 258, kMost = 4096;
   struct Code {
@@ -49,7 +50,7 @@ std::size_t unpack_lzw(const std::string& packed, std::byte* to, std::size_t byt
     for (std::size_t i = length, c = code; i > 0; --i, c = codes[c].before) to[done + i - 1] = std::byte(codes[c].last);
     done += length;
     before = code;
-    if (next + 1 >= (1u << width) && width < 12) ++width;  // one code early, as TIFF has it
+    if (next + 1 >= (1u << width) && width < 12) ++width;  // one code early, as TIFF defines it
   }
 }
 
@@ -85,7 +86,7 @@ void read_tiff_strip(const InputFile& file, const TiffPages& tiff, const TiffPag
     const auto stream = unpacked_bytes(file, strip.begin, strip.begin + strip.bytes);
     got = stream->take(to, bytes);
     std::array<char, 4096> filling;
-    stream->take(filling.data(), filling.size());  // as far as the checksum
+    stream->take(filling.data(), filling.size());  // reads on, so that the checksum is verified
   } else {
     const std::string packed = file.text(strip.begin, std::size_t(strip.bytes));
     got = page.compression == 5 ? unpack_lzw(packed, to, bytes) : unpack_packbits(packed, to, bytes);

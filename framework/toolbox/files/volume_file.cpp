@@ -19,7 +19,7 @@ std::string lower_extension(const fs::path& path) { return in_small_letters(path
 
 bool is_tiff(const std::string& extension) { return extension == ".tif" || extension == ".tiff"; }
 
-/// `folder_is_named`: the option names the folder that the file lies in, so what lies beside it counts too.
+/// `folder_is_named`: the user named the folder of the file, so other files in it are part of the input.
 VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
   const std::string extension = lower_extension(path);
   if (extension == ".mha" || extension == ".mhd") return read_meta_image(path, folder_is_named);
@@ -43,8 +43,8 @@ VolumeSamples read_single(const fs::path& path, bool folder_is_named) {
               "folder of DICOM slices (name the folder)");
 }
 
-/// The header of MHA or NRRD that stands for the folder. Throws Error where slices of DICOM lie beside it: which of the
-/// two is the CT, and which are its labels, no name says.
+/// The MHD or NHDR header in the folder; an empty path if there is none. Throws Error if there are several, or if DICOM
+/// files lie beside it: names do not say which of the two is the CT and which are its labels.
 fs::path detached_header_in(const fs::path& folder) {
   std::vector<fs::path> headers, others;
   std::error_code failure, none;
@@ -100,8 +100,8 @@ void flip(Volume& volume, int axis) {
                                                    axis == 2 ? nz - 1 - z : z)]);
 }
 
-/// A left-handed grid is run through from the other end of its last axis, so that it is right-handed and each voxel
-/// keeps its value and its place.
+/// Reverses the last axis of a left-handed grid. Then it is right-handed, and each voxel keeps its value and its
+/// position.
 void make_right_handed(Volume& volume) {
   Grid& grid = volume.grid;
   if (!(grid.direction.determinant() < 0)) return;

@@ -73,7 +73,7 @@ double source_to_isocentre(const DicomHeader& header, double source_to_detector_
   return 0;
 }
 
-/// Width and height of a pixel on the detector. Both spacings give the distance of rows first, which is a pixel's
+/// Width and height of a pixel on the detector. Both DICOM elements give the distance of rows first, the pixel's
 /// height.
 Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnification, double given_mm, Wanted& wanted,
                                   std::vector<std::string>& warnings) {
@@ -98,7 +98,8 @@ Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnificatio
   return pixel;
 }
 
-/// The direction in patient coordinates that letters such as "L" or "LA" name, the first one first.
+/// The direction in patient coordinates for letters such as "L" or "LA". Each letter has half the weight of the one
+/// before.
 std::optional<Eigen::Vector3d> direction_of(const std::string& letters) {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   double weight = 1;
@@ -113,8 +114,9 @@ std::optional<Eigen::Vector3d> direction_of(const std::string& letters) {
   return direction.normalized();
 }
 
-/// Axes to the right and down of the image as stored, by PatientOrientation: of the eight ways to turn and mirror what
-/// the camera sees, the one that its letters fit best. None where the header does not say.
+/// The axes to the right and down of the stored image, in the world, from PatientOrientation. There are eight ways to
+/// turn and mirror what the camera sees; the one that fits its letters best is taken. std::nullopt if the header does
+/// not give it.
 struct Stored {
   Eigen::Vector3d right, down;
   bool mirrored = false;
@@ -149,7 +151,7 @@ Eigen::Matrix3d carm_axes(double secondary_deg, double primary_deg) {
   return world_from_camera_rotation(radians(secondary_deg), radians(primary_deg));
 }
 
-/// Increments of the angles are none of theirs where they are all 0.
+/// Whether the arm moves during the run. Increments of the angles that are all 0 do not count.
 bool arm_moves(const DicomHeader& header) {
   if (header.text(kPositionerMotion).value_or("") == "DYNAMIC") return true;
   for (const DicomTag& tag : {kPrimaryIncrement, kSecondaryIncrement})
@@ -195,8 +197,8 @@ void check_lengths(const DicomHeader& header, const CArm& arm) {
                 " mm is no detector's; give pixel_mm");
 }
 
-/// Whether higher values, as scaled, stand for less radiation. The sign is that of stored values, which a negative
-/// slope turns round. Without it the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
+/// Whether higher scaled values mean less radiation. The header's sign refers to stored values; a negative slope
+/// reverses it. Without a sign the image is taken as a viewer shows it: MONOCHROME1 shows its lowest value white.
 bool is_inverted(const DicomHeader& header) {
   const auto sign = header.number(kIntensitySign);
   if (!sign) return header.text(kPhotometric).value_or("") == "MONOCHROME1";
@@ -206,7 +208,7 @@ bool is_inverted(const DicomHeader& header) {
   return (*sign < 0) != (header.number(kSlope).value_or(1) < 0);
 }
 
-/// Values must be linear in the radiation: their logarithm is taken later.
+/// Values must be linear in the radiation, because their logarithm is taken later.
 void check_linear(const DicomHeader& header) {
   if (header.text(kIntensity).value_or("") == "LOG")
     throw Error(
@@ -268,7 +270,7 @@ bool are_same(const Camera& a, const Camera& b) {
          a.camera_from_world.translation_mm.isApprox(b.camera_from_world.translation_mm, 1e-9);
 }
 
-/// Without a frame's number there is an answer only where all frames have the same.
+/// If no frame is named, all frames must have the same camera. Throws Error otherwise.
 void check_all_same(const DicomFile& file, int frames, const XrayGeometry& first, const XrayOverrides& overrides) {
   constexpr int kMostCompared = 1000, kMostShown = 8;
   if (frames == 1 || !find_element(file.path(), file.elements(), kFrameGroups)) return;
@@ -292,7 +294,7 @@ void check_all_same(const DicomFile& file, int frames, const XrayGeometry& first
 
 XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, const XrayOverrides& overrides) {
   const DicomFile file(path);
-  const int frames = read_dicom_pixels(file, std::max(1, frame)).frames;  // also whether the header agrees with itself
+  const int frames = read_dicom_pixels(file, std::max(1, frame)).frames;  // this also checks the header
   const DicomHeader header(file, std::max(1, frame));
   check_modality(header);
   check_motion(header, frame, frames);

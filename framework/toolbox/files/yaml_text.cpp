@@ -14,7 +14,7 @@ std::string segment(const LineSegment& line) {
   return "{from_px: " + vector(line.from_px) + ", to_px: " + vector(line.to_px) + "}";
 }
 
-/// Plain where it is a word, else in quotes: a name may be yes, 1, or hold a colon or a line break.
+/// A word is written plainly. Any other name is quoted: it may be "yes" or "1", or hold a colon or a line break.
 std::string name(const std::string& text) {
   const auto is_of_word = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
   static const char* const kNoTexts[] = {"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
@@ -26,7 +26,7 @@ std::string name(const std::string& text) {
   return is_word ? text : quoted(text);
 }
 
-/// Standard deviations as people read them: degrees about and mm along the fragment's axes.
+/// Standard deviations for human readers: degrees about and mm along the fragment's axes.
 std::string deviations(const Matrix6d& covariance) {
   Eigen::Vector3d rotation_deg, translation_mm;
   for (int i = 0; i < 3; ++i) {

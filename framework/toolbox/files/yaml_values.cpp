@@ -143,7 +143,7 @@ Pose read_pose_file(const std::filesystem::path& path) {
   if (const auto transform = transform_from(map, pose.world_from_model)) pose.world_from_model = *transform;
   if (map.has("fragment_frame"))
     if (const auto frame = frame_from(map.node("fragment_frame"), file)) pose.frame = *frame;
-  // predicted_deviation is for people; the covariance says the same in full.
+  // predicted_deviation is only for human readers; the covariance contains it.
   if (map.has("covariance"))
     if (const auto covariance = map.matrix("covariance", 6, 6)) pose.covariance = *covariance;
   pose.warnings = map.texts_or_none("warnings");

@@ -20,7 +20,7 @@ std::vector<std::string> different(const std::vector<Sight>& sights, std::string
   return names;
 }
 
-/// The point nearest to the rays of all views that show it; nothing where these are one, or run nearly side by side.
+/// The point nearest to the rays of all views that show it. std::nullopt for one ray only or nearly parallel rays.
 std::optional<Eigen::Vector3d> triangulated(const std::vector<Sight>& sights, const std::string& name) {
   constexpr double kLeastParallax = 1e-3;  // squared sine of 1.8 degrees
   Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
@@ -32,13 +32,13 @@ std::optional<Eigen::Vector3d> triangulated(const std::vector<Sight>& sights, co
     across += off;
     right += off * source_position_mm(*sight.camera);
   }
-  // Of one ray it is 0, of two twice the squared sine of the angle between them.
+  // The determinant is 0 for one ray. For two rays it is twice the squared sine of the angle between them.
   if (across.determinant() < 2 * kLeastParallax) return std::nullopt;
   return across.inverse() * right;
 }
 
-/// The same view of a plane tilted to the other side: turned about the axis in the image that the plane's normal leans
-/// about.
+/// A plane looks nearly the same when it is tilted to the other side of the beam. This is the pose tilted in this way,
+/// about the axis across the beam and the plane's normal.
 RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::vector<Sight>& sights) {
   std::vector<Eigen::Vector3d> points;
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();
@@ -58,8 +58,8 @@ RigidTransform tilted_back(const RigidTransform& camera_from_model, const std::v
   return tilted;
 }
 
-/// Of three points, all poses that show them exactly there (Ke and Roumeliotis, CVPR 2017); of more, that of least
-/// algebraic error (Terzakis and Lourakis, ECCV 2020); and the same tilted back.
+/// For three points: all poses that project them exactly (Ke and Roumeliotis, CVPR 2017). For more points: the pose of
+/// least algebraic error (Terzakis and Lourakis, ECCV 2020). Each also tilted to the other side.
 std::vector<RigidTransform> starts_of_view(const std::vector<Sight>& sights) {
   std::vector<cv::Point3d> points;
   std::vector<cv::Point2d> directions;
@@ -76,7 +76,7 @@ std::vector<RigidTransform> starts_of_view(const std::vector<Sight>& sights) {
       cv::solvePnPGeneric(points, directions, cv::Matx33d::eye(), cv::noArray(), turns, shifts, false,
                           cv::SOLVEPNP_SQPNP);
   } catch (const cv::Exception&) {
-    return {};  // points on a line: others may serve
+    return {};  // points on a line; other views may still give a start
   }
   std::vector<RigidTransform> starts;
   for (std::size_t i = 0; i < turns.size(); ++i) {

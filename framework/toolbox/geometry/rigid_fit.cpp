@@ -17,7 +17,7 @@ Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& points) {
   return sum / double(points.size());
 }
 
-/// Squared extents of the points, rising, and the directions that they are along.
+/// Squared extents of the points in ascending order (eigenvalues) and their directions (eigenvectors).
 Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Vector3d centre = centre_of(points);
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
@@ -68,7 +68,8 @@ RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std:
   fit.source = "ct";
   fit.rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
   fit.translation_mm = to_centre - fit.rotation * from_centre;
-  if (signs.z() < 0) {  // noise makes reflections too where points lie in one plane, but none that fits so much better
+  if (signs.z() < 0) {
+    // For points near one plane noise alone can give a reflection, but not one that fits so much better.
     const double turned = root_mean_square_mm(fit.rotation, from_mm, to_mm),
                  mirrored = root_mean_square_mm(orthogonal, from_mm, to_mm);
     const double size = root_mean_square_mm(Eigen::Matrix3d::Zero(), from_mm, to_mm);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kBandRows = 64;  // fixed, so that the result does not depend on the number of threads
 constexpr int kBlock = 16;
-constexpr int kMostBlocks = 1024;  // that the noise is measured in
+constexpr int kMostBlocks = 1024;  // about the largest number of blocks in which noise is measured
 
 /// Calls function(first row, end row) for bands of rows, in parallel.
 template <class Function>
@@ -68,7 +68,7 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
   prepared.logarithm = logarithm;
   if (logarithm) {
     if (largest <= 0) throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
-    grey = cv::max(grey, 0.005 * largest);  // what is darker carries no signal, and its logarithm only noise
+    grey = cv::max(grey, 0.005 * largest);  // darker pixels carry no signal; their logarithm would be noise only
     cv::log(grey, grey);
   }
   prepared.values = grey;
@@ -86,7 +86,7 @@ Kernel gaussian_kernel(double sigma_px, double reach) {
     sum += weight;
     slope += i * i * weight;
   }
-  for (float& weight : kernel.smooth) weight /= float(sum);    // a constant stays what it is
+  for (float& weight : kernel.smooth) weight /= float(sum);    // a constant stays the same
   for (float& weight : kernel.derive) weight /= float(slope);  // a ramp of slope 1 gives 1
   return kernel;
 }
@@ -113,7 +113,7 @@ Gradient gradient_of(const cv::Mat& values, const Kernel& kernel) {
   for (cv::Mat* part : {&gradient.du, &gradient.dv, &gradient.magnitude}) part->create(values.size(), CV_32F);
   const cv::Point anchor(int(kernel.smooth.size() - 1) / 2, int(kernel.smooth.size() - 1) / 2);
   for_bands(values.rows, [&](int first, int end) {
-    const cv::Mat band = values.rowRange(first, end);  // the filter reads the rows beside the band, too
+    const cv::Mat band = values.rowRange(first, end);  // OpenCV's filter also reads rows beside the band
     cv::Mat du = gradient.du.rowRange(first, end), dv = gradient.dv.rowRange(first, end);
     cv::Mat magnitude = gradient.magnitude.rowRange(first, end);
     cv::sepFilter2D(band, du, CV_32F, kernel.derive, kernel.smooth, anchor);
@@ -136,7 +136,7 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient) {
     for (int column = 5 * row % step; column < columns; column += step) {
       du.clear(), dv.clear();
       double sum = 0;
-      for (int v = row * kBlock; v < (row + 1) * kBlock; v += 2)  // every other pixel: neighbours share their noise
+      for (int v = row * kBlock; v < (row + 1) * kBlock; v += 2)  // every other pixel: noise of neighbours correlates
         for (int u = column * kBlock; u < (column + 1) * kBlock; u += 2) {
           if (!image.usable.at<uchar>(v, u)) continue;
           du.push_back(gradient.du.at<float>(v, u)), dv.push_back(gradient.dv.at<float>(v, u));
@@ -150,8 +150,8 @@ NoiseLevel::NoiseLevel(const Prepared& image, const Gradient& gradient) {
   std::erase_if(blocks, [](const auto& block) { return block.second < 0; });
   std::sort(blocks.begin(), blocks.end());
 
-  // Rounding to whole grey values has the deviation 1 / sqrt(12). Images of floats get a hundred thousandth of their
-  // range instead.
+  // Rounding to whole grey values has the standard deviation 1 / sqrt(12). For images of floats, 1e-5 of their range is
+  // used instead.
   const double rounding = (image.whole_numbers ? 0.29 : 1e-5 * image.range) * gradient.noise_gain;
   const std::size_t groups = std::clamp<std::size_t>(blocks.size() / 32, 1, 8);
   for (std::size_t group = 0; group < groups && !blocks.empty(); ++group) {

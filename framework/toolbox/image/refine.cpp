@@ -12,7 +12,7 @@ namespace {
 
 struct Found {
   int pixel;       ///< row-major index of the pixel in which the edge lies
-  float distance;  ///< from the pixel at which it was found
+  float distance;  ///< from the pixel at which the edge was found
   EdgePixel edge;
 };
 

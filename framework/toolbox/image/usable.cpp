@@ -14,19 +14,20 @@ namespace marrow::image {
 namespace {
 
 constexpr int kRays = 720, kStepsPerRay = 6, kTrials = 400, kHarmonics = 9;
-constexpr double kDarkCorner = 0.25;  // of the brightest pixel; scatter reaches beyond a collimator
-constexpr double kSupported = 0.5;    // of the rays that cross the field's outline within the image
-// Left out inside the outline, for its blur, and because a collimator's iris may cut a crescent off the intensifier's
-// field.
-constexpr double kRim_px = 3, kRim = 0.02;  // the larger of both, the latter of the radius
+constexpr double kDarkCorner = 0.25;  // part of the brightest pixel; not 0, because scatter reaches behind a collimator
+constexpr double kSupported =
+    0.5;  // least part of the rays crossing the outline within the image that have a step there
+// A rim inside the outline is left out because of its blur, and because a collimator's iris may cut a crescent off the
+// intensifier's field. Its width is the larger of the two; the second is a part of the radius.
+constexpr double kRim_px = 3, kRim = 0.02;
 constexpr double kTolerance_px = 2.5;
 
-/// A place on a ray from the image's middle where brightness drops outwards.
+/// A point on a ray from the image's middle where the brightness drops outwards.
 struct Step {
   cv::Point2d at;
   double drop;  // between 0 and 1, relative to the brightness on both sides
 };
-using Steps = std::vector<std::vector<Step>>;  // by ray, the steepest first
+using Steps = std::vector<std::vector<Step>>;  // for each ray, the steepest first
 
 std::array<cv::Point, 4> corners_of(const cv::Mat& image) {
   return {cv::Point(0, 0), cv::Point(image.cols - 1, 0), cv::Point(0, image.rows - 1),
@@ -38,7 +39,7 @@ std::vector<Step> steps_along(const cv::Mat& grey, const cv::Point2d& from, doub
   const double reach_u = (way.x > 0 ? grey.cols - 1 - from.x : from.x) / std::max(1e-9, std::abs(way.x));
   const double reach_v = (way.y > 0 ? grey.rows - 1 - from.y : from.y) / std::max(1e-9, std::abs(way.y));
   const int length = int(std::min(reach_u, reach_v)), half = std::max(3, std::min(grey.cols, grey.rows) / 250);
-  std::vector<double> sums{0};  // of the brightness so far
+  std::vector<double> sums{0};  // cumulative brightness
   for (int r = 0; r <= length; ++r)
     sums.push_back(sums.back() +
                    grey.at<float>(int(std::lround(from.y + r * way.y)), int(std::lround(from.x + r * way.x))));
@@ -49,7 +50,7 @@ std::vector<Step> steps_along(const cv::Mat& grey, const cv::Point2d& from, doub
   const int first = std::max(half, length / 4) + 1, end = int(sums.size()) - half - 2;
   for (int r = first; r < end; ++r) {
     if (!(drop(r) > 0.05 && drop(r) >= drop(r - 1) && drop(r) > drop(r + 1))) continue;
-    int steepest = r;  // the relative drop is greatest further out
+    int steepest = r;  // the relative drop has its maximum farther outside than the absolute one
     for (int other = std::max(first, r - half); other < r; ++other)
       if (inside(other) - outside(other) > inside(steepest) - outside(steepest)) steepest = other;
     steps.push_back({from + steepest * way, drop(r)});
@@ -73,7 +74,7 @@ Circle through(const cv::Point2d& a, const cv::Point2d& b, const cv::Point2d& c)
   return {{centre.x(), centre.y()}, std::hypot(a.x - centre.x(), a.y - centre.y())};
 }
 
-/// The circle with steps of the most rays within the tolerance, of circles through three of the steepest steps.
+/// RANSAC over circles through the steepest steps of three random rays: the circle that most rays have a step near.
 Circle best_circle(const Steps& steps, double tolerance_px, double largest_radius) {
   std::vector<std::size_t> rays;
   for (std::size_t i = 0; i < steps.size(); ++i)
@@ -106,7 +107,7 @@ Eigen::VectorXd waves(double angle, int count) {
   return values;
 }
 
-/// The steps within the tolerance of the field's outline, at most one a ray.
+/// The steps within the tolerance of the field's outline, at most one per ray.
 std::vector<Step> supporting(const Steps& steps, const Field& field, double tolerance_px) {
   std::vector<Step> found;
   for (const auto& ray : steps)
@@ -119,8 +120,8 @@ std::vector<Step> supporting(const Steps& steps, const Field& field, double tole
   return found;
 }
 
-/// Least squares, with a pull to a circle about the centre that comes out, so that the outline does not bend where
-/// nothing holds it.
+/// Fits outline and centre by least squares. Higher harmonics are damped, so that the outline stays a circle where
+/// there are no steps.
 void fit(const std::vector<Step>& steps, int harmonics, Field& field) {
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(harmonics, harmonics);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(harmonics);
@@ -138,7 +139,7 @@ void fit(const std::vector<Step>& steps, int harmonics, Field& field) {
   field.harmonics[1] = field.harmonics[2] = 0;
 }
 
-/// Directions in which the field's outline lies within the image.
+/// Number of directions in which the field's outline lies within the image.
 int rays_within(const cv::Mat& grey, const Field& field) {
   int count = 0;
   for (int i = 0; i < kRays; ++i) {
@@ -154,7 +155,7 @@ bool is_outside(const Field& field, const cv::Point& pixel) {
   return cv::norm(from) > field.radius(std::atan2(from.y, from.x));
 }
 
-/// Black areas that reach the corners; empty when there are none.
+/// Black areas that reach the corners, if at least three corners are black; else empty.
 cv::Mat black_corners(const cv::Mat& grey, double smallest, double largest) {
   if (smallest > 0.1 * largest) return {};
   const double black = smallest + 0.02 * (largest - smallest);
@@ -227,7 +228,7 @@ cv::Mat usable_pixels(const View& view, const cv::Mat& grey, double smallest, do
     usable &= within(*field, grey.size(), margin_px + std::max(kRim_px, kRim * field->harmonics[0]));
   for (cv::Mat strip : {usable.rowRange(0, margin_px), usable.rowRange(grey.rows - margin_px, grey.rows),
                         usable.colRange(0, margin_px), usable.colRange(grey.cols - margin_px, grey.cols)})
-    strip.setTo(0);  // nothing is made up of reflected pixels
+    strip.setTo(0);  // filters there use pixels mirrored at the border
   return usable;
 }
 

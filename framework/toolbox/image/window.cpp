@@ -12,10 +12,10 @@ namespace marrow::image {
 namespace {
 
 constexpr int kBlock = 16;
-constexpr int kBins = 256;  // of a histogram with 16 bins an octave
+constexpr int kBins = 256;  // of a histogram with 16 bins per octave
 
-/// Histograms of the magnitude in blocks. A bin is made from exponent and leading mantissa bits of the float, so it is
-/// about 5 % wide whatever the size of the values; the range ends at the image's largest magnitude.
+/// Histograms of the magnitude in blocks. A bin is given by the exponent and the leading mantissa bits of the float, so
+/// all bins are about 5 % wide, for values of any size. The range ends at the image's largest magnitude.
 class BlockHistograms {
  public:
   BlockHistograms(const Gradient& gradient, const cv::Mat& usable)
@@ -34,8 +34,8 @@ class BlockHistograms {
     });
   }
 
-  /// Calls function(column, counts) with the counts of a square of blocks about each block of a row, `reach` blocks
-  /// each way. The square moves along: a column of blocks enters it, another one leaves.
+  /// Calls function(column, counts) for each block of a row, with the counts of a square of blocks around it, `reach`
+  /// blocks to each side. The square moves along the row: one column of blocks enters it, another one leaves.
   template <class Function>
   void for_windows(int row, int reach, Function function) const {
     std::vector<std::uint32_t> sums(std::size_t(columns) * kBins, 0), window(kBins, 0);
@@ -50,12 +50,12 @@ class BlockHistograms {
     for (int column = 0; column < reach; ++column) change(column, 1);
     for (int column = 0; column < columns; ++column) {
       change(column + reach, 1);
-      change(column - reach - 1, std::uint32_t(-1));  // modulo 2^32, a subtraction
+      change(column - reach - 1, std::uint32_t(-1));  // a subtraction, modulo 2^32
       function(column, window);
     }
   }
 
-  /// The magnitude below which a part of the counts lies; `sums[i]` is the number of counts in bins 0 to i.
+  /// The magnitude below which this part of the counts lies. sums[i]: number of counts in bins 0 to i.
   float quantile(const std::vector<std::uint32_t>& sums, double part) const {
     if (sums.back() == 0) return 0;
     const double wanted = part * sums.back();

@@ -25,7 +25,7 @@ Cloud::Ptr cloud_of(const std::vector<Eigen::Vector3d>& points) {
 
 Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target,
              const Settings& settings) {
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // what it has to say is in the result
+  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);  // no messages: the result says the same
   pcl::IterativeClosestPoint<pcl::PointXYZ, pcl::PointXYZ, double> icp;
   icp.setInputSource(cloud_of(points));
   icp.setInputTarget(cloud_of(target));

@@ -11,17 +11,18 @@
 namespace marrow::match {
 namespace {
 
-/// The row or the column of an image between two points of an outline that both end the bone outwards.
+/// Marks the pixels of a row or column between an outline point at which the bone begins and one at which it ends.
+/// `ends`: position of each point, and whether the bone ends there.
 void fill_line(std::vector<std::pair<float, bool>>& ends, int size, const std::function<void(int)>& mark) {
   std::sort(ends.begin(), ends.end());
   for (std::size_t i = 0; i + 1 < ends.size(); ++i)
-    if (!ends[i].second && ends[i + 1].second)  // the bone begins here and ends there
+    if (!ends[i].second && ends[i + 1].second)
       for (int at = std::max(0, int(std::ceil(ends[i].first))); at <= std::min(size - 1, int(ends[i + 1].first)); ++at)
         mark(at);
 }
 
-/// Marks what lies inside an outline: in a row or in a column between two of its points. It may be open where the CT
-/// ends.
+/// Marks the pixels inside an outline: those between two of its points in a row or in a column. Both are used because
+/// the outline may be open where the CT ends.
 void fill_outline(const std::vector<OutlinePoint>& outline, cv::Mat& mask) {
   std::vector<std::vector<std::pair<float, bool>>> rows(std::size_t(mask.rows)), columns(std::size_t(mask.cols));
   for (const OutlinePoint& p : outline) {
@@ -51,7 +52,7 @@ void add_shadow(const RadiographProjector& projector, const RigidTransform& worl
         mask.at<std::uint8_t>(int(region.v_px) + row, int(region.u_px) + column) = 1;
 }
 
-/// Marks where the other's shadow falls.
+/// Marks the pixels that show the other fragment.
 void add_shadow(const Other& other, const Camera& camera, cv::Mat& mask) {
   std::visit([&](const auto* projector) { add_shadow(*projector, other.world_from_model, camera, mask); },
              other.projector);
@@ -59,7 +60,7 @@ void add_shadow(const Other& other, const Camera& camera, cv::Mat& mask) {
 
 constexpr const char* kNoPoses = "there are projectors of other fragments, but no poses; wire 'others'";
 
-/// The pose of a fragment in the list that the node's input `port` gives.
+/// The pose of a fragment that the node's input `port` names. Throws Error if there is none.
 const RigidTransform& pose_of(const std::string& fragment, const List<Pose>& poses, const std::string& port) {
   const Pose* pose = poses.find(fragment);
   if (!pose)

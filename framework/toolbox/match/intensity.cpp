@@ -117,7 +117,7 @@ cv::Mat line_integrals(const cv::Mat& image) {
   image.convertTo(values, CV_32F);
   double brightest = 0;
   cv::minMaxLoc(values, nullptr, &brightest);
-  // A step of grey of integer images; of others a hundred-thousandth of the brightest.
+  // One grey step for images of integers; 1e-5 of the brightest value for others.
   const float least = image.depth() == CV_32F ? float(std::max(1e-5 * brightest, 1e-30)) : 1;
   for (int row = 0; row < values.rows; ++row)
     for (int column = 0; column < values.cols; ++column) {
@@ -169,7 +169,7 @@ struct Moments {
 
 Moments moments_of(const std::vector<float>& a, const std::vector<float>& b, const std::vector<char>& counts) {
   Moments m;
-  // About the first value that counts, so that a constant of any size leaves no rounding errors.
+  // Relative to the first value that counts, so that a large constant causes no rounding errors.
   const auto first = std::find(counts.begin(), counts.end(), 1);
   if (first == counts.end()) return m;
   const std::size_t at = std::size_t(first - counts.begin());

@@ -17,7 +17,7 @@ Correlation correlation_in(const Patch& patch, const std::vector<float>& a, cons
   double n = 0, sa = 0, sb = 0, aa = 0, bb = 0, ab = 0;
   for (int row = top; row < top + side; ++row)
     for (std::size_t i = patch.at(left, row); i < patch.at(left, row) + std::size_t(side); ++i) {
-      if (!counts[i]) continue;  // it may not be a number
+      if (!counts[i]) continue;  // its value may be NaN
       const double x = a[i], y = b[i];
       n += 1, sa += x, sb += y, aa += x * x, bb += y * y, ab += x * y;
     }
@@ -33,8 +33,8 @@ double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, c
                               const std::vector<char>& counts, int side) {
   double sum = 0, weights = 0;
   const int step = std::max(1, side / 2);
-  // The squares lie where they lie in the image, wherever the compared part begins: else each pixel that a pose moves
-  // that part by would change them all, and with them the cost.
+  // The squares have fixed positions in the image. If they moved along with the compared region, each pixel of its
+  // motion would change all squares, and the cost would be rough.
   const auto first = [step](int origin) { return (step - origin % step) % step; };
   for (int top = first(patch.top); top + side <= patch.rows; top += step)
     for (int left = first(patch.left); left + side <= patch.columns; left += step) {

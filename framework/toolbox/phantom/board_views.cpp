@@ -15,7 +15,7 @@
 namespace marrow::phantom {
 namespace {
 
-constexpr double kGrey = 40000;  ///< of 65535, in the middle of an image without beads
+constexpr double kGrey = 40000;  ///< grey value (of 65535) in the middle of an image without beads
 constexpr int kSubsamples = 3;   ///< rays per pixel in each direction
 
 Eigen::Vector3d middle_of(const calibration::Board& board) {
@@ -27,8 +27,8 @@ Eigen::Vector3d middle_of(const calibration::Board& board) {
   return 0.5 * (low + high);
 }
 
-/// The ray through a place of the image as taken, at depth 1: the radius that the distortion moves there, by Newton's
-/// method.
+/// The ray through a pixel position of the image as taken, at depth 1. Newton's method inverts the distortion of the
+/// radius.
 Eigen::Vector3d ray_of(const Calibration& device, double u, double v) {
   const Eigen::Vector2d seen((u - device.intrinsics(0, 2)) / device.intrinsics(0, 0),
                              (v - device.intrinsics(1, 2)) / device.intrinsics(1, 1));
@@ -105,7 +105,7 @@ Image expose_board(const calibration::Board& board, const Calibration& device, c
   const int width = device.width_px, height = device.height_px;
   cv::Mat1d signal(height, width, 0.0);
   std::vector<Eigen::Vector3d> centres;
-  std::vector<Eigen::Vector3d> places;  // where each bead is seen, and how far from there it can darken
+  std::vector<Eigen::Vector3d> places;  // for each bead its pixel (u, v), and the distance within which it can darken
   for (const auto& bead : board.beads) {
     centres.push_back(camera_from_board * bead.centre_mm);
     if (!(centres.back().z() > bead.diameter_mm))

@@ -25,7 +25,7 @@ double along(std::span<const Node> nodes, double x) {
   return nodes.back().second;
 }
 
-/// The same with its corners rounded, by averaging over +-0.025.
+/// The same with rounded corners, by averaging over +-0.025.
 double smooth_along(std::span<const Node> nodes, double x) {
   constexpr double kHalfWidth = 0.025;
   double sum = 0;
@@ -57,7 +57,8 @@ double capsule(const Vector3d& p, const Vector3d& a, const Vector3d& b, double r
   return (p - a - t * (b - a)).norm() - (radius_a + t * (radius_b - radius_a));
 }
 
-// Relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured femora, FACTS).
+// Width and depth relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured
+// femora, FACTS).
 constexpr std::array<Node, 13> kWidth{{{0.05, 2.2},
                                        {0.09, 2.05},
                                        {0.13, 1.68},
@@ -83,7 +84,7 @@ constexpr std::array<Node, 12> kDepth{{{0.05, 1.40},
                                        {0.75, 1.033},
                                        {0.83, 1.08},
                                        {0.88, 1.12}}};
-// Height of the linea aspera, relative to its greatest.
+// Height of the linea aspera relative to its largest.
 constexpr std::array<Node, 6> kLinea{{{0.22, 0.0}, {0.32, 0.6}, {0.42, 1.0}, {0.62, 1.0}, {0.72, 0.7}, {0.82, 0.0}}};
 // Half the canal's width relative to the isthmus: canal flare index about 3.7 (Noble et al., CORR 1988).
 constexpr std::array<Node, 9> kCanal{{{0.06, 12.0},
@@ -113,7 +114,8 @@ FemurField::FemurField(const FemurShape& shape) : shape_(shape), scale_(shape.bi
   }
 }
 
-/// How far back the shaft's axis lies: an arc, convex to the front, through x = y = 0 at a fifth of the length.
+/// The y coordinate (towards the back) of the shaft's axis: an arc, convex to the front, with y = 0 at a fifth of the
+/// length.
 double FemurField::bow(double z) const {
   const double middle = 0.52 * shape_.length_mm, reference = 0.2 * shape_.length_mm;
   return ((z - middle) * (z - middle) - (reference - middle) * (reference - middle)) / (2 * shape_.bow_radius_mm);
@@ -140,8 +142,8 @@ double FemurField::distal(const Vector3d& p) const {
   const double s = scale_, half = 0.5 * shape_.bicondylar_width_mm;
   const double axis = bow(0.06 * shape_.length_mm) - 4;
   const Vector3d q(p.x(), p.y() - axis, p.z());
-  // Each condyle is two discs, a small one behind and a large one before it: the radius of curvature grows to the
-  // front.
+  // Each condyle is two discs, a smaller one at the back and a larger one at the front, because its radius of curvature
+  // increases to the front.
   const double medial_x = half - 16 * s, lateral_x = -half + 17 * s;
   const double medial = join(disc(q - Vector3d(medial_x, 17 * s, 21 * s), 20.5 * s, 14 * s, 9 * s),
                              disc(q - Vector3d(medial_x - 2 * s, -2 * s, 26 * s), 26 * s, 14 * s, 10 * s), 8 * s);

@@ -9,7 +9,8 @@ namespace marrow::phantom {
 namespace {
 
 constexpr int kBandRows = 16;
-// 1/4096 of a ray's spacing. With positions held within 2^17 spacings, products of differences fit into 64 bits.
+// Fixed point with steps of 1/4096 of the rays' spacing. Positions are limited to 2^17 spacings, so products of
+// differences fit into 64 bits.
 constexpr std::int64_t kOne = 4096;
 constexpr double kFar = 131072;
 
@@ -17,9 +18,9 @@ std::int64_t fixed_point(double position) {
   return std::int64_t(std::llround(std::clamp(position, -kFar, kFar) * kOne));
 }
 
-/// Whether a point lies left of the edge a -> b, in the sense of a positive area. A point on the edge counts as moved
-/// by an infinitesimal step along u and a still smaller one along v (Edelsbrunner and Muecke, ACM TOG 1990), so of two
-/// triangles that share the edge exactly one has it.
+/// Whether a point lies to the left of the edge a -> b (positive area). A point on the edge counts as moved by an
+/// infinitesimal step along u and an even smaller one along v (Edelsbrunner and Muecke, ACM TOG 1990). So it belongs to
+/// exactly one of the two triangles that share the edge.
 bool is_left(std::int64_t au, std::int64_t av, std::int64_t bu, std::int64_t bv, std::int64_t u, std::int64_t v) {
   const std::int64_t area = (bu - au) * (v - av) - (bv - av) * (u - au);
   if (area != 0) return area > 0;
@@ -51,7 +52,7 @@ int RayBundle::add(const std::vector<RayVertex>& vertices, const std::vector<std
     const std::int64_t area = (triangle.u[1] - triangle.u[0]) * (triangle.v[2] - triangle.v[0]) -
                               (triangle.v[1] - triangle.v[0]) * (triangle.u[2] - triangle.u[0]);
     if (area == 0) continue;
-    // Seen from the source a surface's outside is clockwise where a ray enters: u to the right, v down, depth away.
+    // With u to the right, v down and depth away from the source, a triangle that a ray enters has a negative area.
     triangle.sense = area < 0 ? 1 : -1;
     if (area < 0) {
       std::swap(b, c);
@@ -87,8 +88,8 @@ void RayBundle::draw(const Triangle& t, int first, int last, std::vector<Crossin
       if (!is_left(t.u[0], t.v[0], t.u[1], t.v[1], u, v) || !is_left(t.u[1], t.v[1], t.u[2], t.v[2], u, v) ||
           !is_left(t.u[2], t.v[2], t.u[0], t.v[0], u, v))
         continue;
-      // Rounding to fixed point may place a ray just outside a triangle that is seen edge-on; its depth stays within
-      // it.
+      // After rounding to fixed point a ray may lie just outside a triangle that is seen edge-on. Its depth is clamped
+      // to the triangle's.
       const double depth =
           t.depth + t.depth_per_u * (double(column) - t.origin_u) + t.depth_per_v * (double(row) - t.origin_v);
       crossings.push_back(

@@ -90,7 +90,7 @@ double Fill::integral(double z) const {
 }
 
 double Fill::mean(double from, double to) const {
-  // Below a micrometre the quotient loses its digits, and the share cannot change by as much.
+  // Below a micrometre the quotient loses its precision, but the fraction hardly changes.
   if (std::abs(to - from) < 1e-3) return at(0.5 * (from + to));
   return (integral(to) - integral(from)) / (to - from);
 }

@@ -11,8 +11,8 @@ namespace marrow::phantom {
 namespace {
 
 constexpr int kBlock = 8;
-// The six tetrahedra around the diagonal from corner 0 to corner 7 of a cube (corner bits: x 1, y 2, z 4), all of
-// positive volume: neighbouring cubes cut their common face along the same diagonal.
+// The six tetrahedra around the diagonal from corner 0 to corner 7 of a cube (corner bits: x 1, y 2, z 4). All have
+// positive volume. Neighbouring cubes cut their common face along the same diagonal.
 constexpr int kTetrahedra[6][4] = {{0, 1, 3, 7}, {0, 3, 2, 7}, {0, 2, 6, 7}, {0, 6, 4, 7}, {0, 4, 5, 7}, {0, 5, 1, 7}};
 
 struct Lattice {
@@ -33,7 +33,7 @@ void fill_block(Lattice& lattice, const std::function<double(const Eigen::Vector
   const Eigen::Vector3d middle = lattice.point(lattice.index(from[0], from[1], from[2])) +
                                  Eigen::Vector3d::Constant(0.5 * (kBlock - 1) * lattice.spacing);
   const double at_middle = field(middle);
-  // One more cell than the block, so that cells between two skipped blocks are clear too.
+  // The margin is one cell larger than the block, so that cells between two skipped blocks are clear too.
   const bool clear = std::abs(at_middle) > steepest * 0.5 * (kBlock + 1) * std::sqrt(3.0) * lattice.spacing;
   for (int z = from[2]; z < std::min(from[2] + kBlock, lattice.size[2]); ++z)
     for (int y = from[1]; y < std::min(from[1] + kBlock, lattice.size[1]); ++y)
@@ -43,13 +43,13 @@ void fill_block(Lattice& lattice, const std::function<double(const Eigen::Vector
       }
 }
 
-/// Collects triangles; a vertex on an edge of the lattice is made once.
+/// Collects triangles. A vertex on an edge of the lattice is made only once.
 class Builder {
  public:
   explicit Builder(const Lattice& lattice) : lattice_(lattice) {}
 
   void add(std::array<std::size_t, 4> corner) {
-    // Inside corners first; an odd permutation turns the tetrahedron over, which `flip` remembers.
+    // Sorts the inside corners first. An odd permutation reverses the orientation; `flip` records this.
     bool flip = false;
     for (int i = 0; i < 3; ++i)
       for (int k = 0; k < 3 - i; ++k)
@@ -83,7 +83,7 @@ class Builder {
   }
   std::uint32_t vertex(std::size_t a, std::size_t b) {
     if (a > b) std::swap(a, b);
-    // An edge of a cube's tetrahedra leads to one of 7 neighbours, told by its step in x, y and z.
+    // An edge of a tetrahedron leads to one of 7 neighbours, given by its step in x, y and z.
     const std::size_t nx = std::size_t(lattice_.size[0]), plane = nx * std::size_t(lattice_.size[1]);
     const std::size_t step = b - a;
     const std::size_t z = step >= plane, y = step - z * plane >= nx, x = step - z * plane - y * nx;

@@ -7,7 +7,7 @@
 namespace marrow::phantom {
 namespace {
 
-constexpr int kSurfaces = 3;  // of a fragment: outer, inner, fracture
+constexpr int kSurfaces = 3;  // per fragment: outer, inner, fracture
 
 std::vector<RayVertex> mapped(const Mesh& mesh, const SolidRays::Map& map) {
   std::vector<RayVertex> vertices;

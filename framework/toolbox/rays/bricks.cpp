@@ -11,7 +11,7 @@
 namespace marrow::rays {
 namespace {
 
-constexpr int kSide = 4;  ///< of a brick, in voxels; and so many slices are followed at a time
+constexpr int kSide = 4;  ///< side of a brick in voxels, and number of slices that are handled at a time
 
 // Four numbers that the compiler keeps in one register.
 using Four = float __attribute__((vector_size(16)));
@@ -54,7 +54,7 @@ float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& dir
   const int begin = std::max(int(std::ceil(std::min(entry, exit))), first_[std::size_t(across)]);
   const int end = std::min(int(std::floor(std::max(entry, exit))), last_[std::size_t(across)]);
   const std::uint32_t *slices = offsets(across), *columns = offsets(a), *rows = offsets(b);
-  // Counted from where all positions are positive.
+  // From this origin all positions are positive, so that truncation rounds down.
   const int left = first_[std::size_t(a)] - 3, top = first_[std::size_t(b)] - 3;
   const float x = float(source[a] + slope[a] * (begin - source[across]) - left),
               y = float(source[b] + slope[b] * (begin - source[across]) - top);
@@ -63,13 +63,13 @@ float Bricks::integral(const Eigen::Vector3d& source, const Eigen::Vector3d& dir
   rows += top;
   Four sum{0, 0, 0, 0};
   for (int first = begin; first <= end; first += kSide) {
-    // The brick that the ray enters a little later, and its neighbour: waiting for memory is half of the time
-    // otherwise.
+    // The brick that the ray will enter soon, and its neighbour. Without this, half of the time is spent waiting for
+    // memory.
     const int ahead = std::min(first + 4 * kSide, end), i_ahead = int(x + dx * float(ahead - begin)),
               j_ahead = int(y + dy * float(ahead - begin));
     __builtin_prefetch(values_.data() + slices[ahead] + rows[j_ahead] + columns[i_ahead]);
     __builtin_prefetch(values_.data() + slices[ahead] + rows[j_ahead + 1] + columns[i_ahead + 1]);
-    // Where the ray is in four slices.
+    // Positions of the ray in four slices.
     const float n = float(first - begin);
     const Four steps{n, n + 1, n + 2, n + 3}, px = x + dx * steps, py = y + dy * steps;
     const FourIntegers i = __builtin_convertvector(px, FourIntegers), j = __builtin_convertvector(py, FourIntegers);

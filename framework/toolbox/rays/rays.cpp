@@ -11,7 +11,7 @@ namespace marrow::rays {
 
 namespace {
 
-/// Pixels in the order of tiles of the image: neighbouring rays read the same memory.
+/// Order of the pixels by tiles of the image, because neighbouring rays read the same memory.
 std::vector<std::uint32_t> by_neighbourhood(const std::vector<Eigen::Vector2f>& pixels) {
   constexpr float kTile_px = 16;
   std::vector<std::pair<std::int64_t, std::uint32_t>> keys(pixels.size());

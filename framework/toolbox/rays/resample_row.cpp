@@ -54,7 +54,7 @@ __attribute__((target("avx512f"))) void mix_avx512(const std::int16_t* a, const 
   mix_avx2(a + i, b + i, weight, count - i, mixed + i);
 }
 
-/// Eight positions lie within eight neighbours of the first where |step| is small: they are picked within one register.
+/// If |step| is small, the neighbours of eight positions lie within eight floats. One register holds all of them.
 __attribute__((target("avx2"))) int add_avx2(const float* row, float position, float step, int count, float* sum) {
   const __m256 lanes = _mm256_setr_ps(0, 1, 2, 3, 4, 5, 6, 7), steps = _mm256_set1_ps(step);
   const bool is_near = std::abs(step) <= 0.7f;
@@ -94,7 +94,7 @@ __attribute__((target("avx512f"))) int add_avx512(const float* row, float positi
     const __m512 fraction = _mm512_sub_ps(x, _mm512_cvtepi32_ps(n));
     __m512 low, high;
     if (is_near) {
-      // One voxel early, as the rounding of this sum may differ from that of the lane's own position.
+      // One voxel earlier, because this sum may be rounded differently from the lane's own position.
       const int least = int(position + step * float(i) + back) - 1, base = least > 0 ? least : 0;
       const __m512 first = _mm512_loadu_ps(row + base), second = _mm512_loadu_ps(row + base + 16);
       const __m512i at = _mm512_sub_epi32(n, _mm512_set1_epi32(base));

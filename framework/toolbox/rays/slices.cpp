@@ -12,17 +12,18 @@
 namespace marrow::rays {
 namespace {
 
-constexpr int kSpare = 32;       ///< floats behind a row that the resampling may read
-constexpr int kRowsAtOnce = 8;   ///< rows of the sheared image that one thread sums at a time: they stay in its cache
-constexpr double kFinest = 0.5;  ///< the sheared image needs no finer steps than this, in voxels at the volume's middle
+constexpr int kSpare = 32;       ///< floats after a row that the resampling may read
+constexpr int kRowsAtOnce = 8;   ///< rows of the sheared image that one thread sums at a time: they fit in its cache
+constexpr double kFinest = 0.5;  ///< finest step of the sheared image, in voxels at the volume's middle
 
-/// Slopes (p, q) = (row axis, line axis) per slice, in steps of `step_p` and `step_q`: the image before it is warped.
+/// The image before it is warped, on a grid of slopes. p is the slope along the rows and q that across the rows, both
+/// in voxels per slice.
 struct Sheared {
   double p = 0, q = 0, step_p = 0, step_q = 0;
   int columns = 0, rows = 0;
   std::vector<float> sums;
 
-  /// Bilinear. Nothing lies beyond the first and last columns and rows: the grid has a step to spare all around.
+  /// Bilinear interpolation. 0 outside the grid: the grid is one step larger than needed on each side.
   float at(double column, double row) const {
     if (!(column >= 0 && row >= 0 && column < columns - 1 && row < rows - 1)) return 0;
     const int c = int(column), r = int(row);
@@ -37,7 +38,7 @@ struct Range {
   void add(double value) { low = std::min(low, value), high = std::max(high, value); }
 };
 
-/// Row of coordinates of the direction, in the order of a stack's axes.
+/// Maps (u, v, 1) to a ray's direction in a stack: along a row, from row to row, from slice to slice.
 Eigen::Matrix3d slopes_from_pixel(const Rays& rays, const Slices::Stack& stack) {
   Eigen::Matrix3d slopes;
   slopes << rays.direction_from_pixel.row(stack.axes[0]), rays.direction_from_pixel.row(stack.axes[2]),
@@ -45,7 +46,7 @@ Eigen::Matrix3d slopes_from_pixel(const Rays& rays, const Slices::Stack& stack) 
   return slopes;
 }
 
-/// The sums of one row of the sheared image over all slices.
+/// Adds the slices to a row of the sheared image.
 class RowSum {
  public:
   RowSum(const Slices::Stack& stack, const Eigen::Vector3d& source, const Sheared& image)
@@ -63,7 +64,7 @@ class RowSum {
     if (!is_a && !is_b) return;
     const int first = std::min(is_a ? a.first : b.first, is_b ? b.first : a.first),
               last = std::max(is_a ? a.last : b.last, is_b ? b.last : a.last);
-    // Where on the row, counted from one voxel before the first that attenuates, the columns of the sheared image lie.
+    // Positions of the sheared image's columns on this row. The origin is one voxel before the first that attenuates.
     const double step = image_.step_p * depth, start = source_[stack_.axes[0]] + image_.p * depth - (first - 1),
                  length = last - first + 2;
     double from = -start / step, to = (length - start) / step;
@@ -98,8 +99,8 @@ void sum_slices(const Slices::Stack& stack, const Rays& rays, Sheared& image) {
   });
 }
 
-/// The grid of slopes that the pixels and the volume have in common; nothing where slopes along this stack do not
-/// describe them.
+/// The grid of slopes that both the pixels and the volume cover. std::nullopt if slopes against this stack cannot
+/// describe the rays.
 std::optional<Sheared> sheared_grid(const Slices::Stack& stack, const Attenuation& attenuation, const Rays& rays,
                                     const PixelGrid& grid) {
   const Eigen::Matrix3d slopes = slopes_from_pixel(rays, stack);
@@ -116,7 +117,7 @@ std::optional<Sheared> sheared_grid(const Slices::Stack& stack, const Attenuatio
     if ((d.z() > 0 ? 1 : -1) != sign) return std::nullopt;
     p.add(d.x() / d.z());
     q.add(d.y() / d.z());
-    // How fast the slopes change from pixel to pixel there: the area of a pixel, in slopes.
+    // Derivative of the slopes by the pixel's coordinates. Its determinant is the area of a pixel, in slopes.
     Eigen::Matrix2d change;
     for (int k = 0; k < 2; ++k)
       change.row(k) = (slopes.block<1, 2>(k, 0) - d[k] / d.z() * slopes.block<1, 2>(2, 0)) / d.z();
@@ -162,7 +163,7 @@ std::vector<float> warped(const Sheared& image, const Slices::Stack& stack, cons
       const Eigen::Vector3d d = first + column * change;
       const double nearer = 1 / d.z(), p = d.x() * nearer, q = d.y() * nearer;
       const float sum = image.at((p - image.p) * per_p, (q - image.q) * per_q);
-      // Length of the ray from one slice to the next, in mm, and thousandths.
+      // Times the length of the ray from one slice to the next, in mm; 1e-3 because the sums are thousandths.
       if (sum != 0) out[column] = sum * float(Eigen::Vector3d(p * mm.x(), q * mm.y(), mm.z()).norm() * 1e-3);
     }
   });

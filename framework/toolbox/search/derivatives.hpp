@@ -9,7 +9,7 @@
 
 namespace marrow::search {
 
-/// Derivative of a small rotation that follows R(r), by r: R(r + dr) = R(r) R(derivative * dr).
+/// Right Jacobian J of a rotation vector: R(r + dr) = R(r) R(J dr) for small dr.
 inline Eigen::Matrix3d rotation_derivative(const Eigen::Vector3d& r_rad) {
   const double angle = r_rad.norm();
   Eigen::Matrix3d cross;
@@ -19,8 +19,8 @@ inline Eigen::Matrix3d rotation_derivative(const Eigen::Vector3d& r_rad) {
          (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
 }
 
-/// A cost's expansion about the pose that was moved by `deg_and_mm`, in the coordinates of that motion: degrees and mm
-/// along `axes`. Not a number where the cost has none there.
+/// A cost's expansion about a pose that was moved by `deg_and_mm`, as a function of this motion's coordinates: degrees
+/// and mm along `axes`. If the cost has no expansion there, the value is NaN.
 inline MinimisationProblem::Expansion in_coordinates(const std::optional<Cost::Expansion>& about,
                                                      const Vector6d& deg_and_mm, const std::vector<int>& axes) {
   if (!about) return {std::numeric_limits<double>::quiet_NaN(), {}, {}};

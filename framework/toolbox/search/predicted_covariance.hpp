@@ -10,7 +10,7 @@
 
 namespace marrow::search {
 
-/// Units in which poses are searched: degrees about and millimetres along the axes of the fragment.
+/// Moves a pose in the units of the search: degrees about and millimetres along the fragment's axes.
 inline marrow::RigidTransform moved_by_units(const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame,
                                              const marrow::Vector6d& deg_and_mm) {
   marrow::Vector6d motion = deg_and_mm;
@@ -19,8 +19,8 @@ inline marrow::RigidTransform moved_by_units(const marrow::RigidTransform& pose,
 }
 
 /// The covariance of a minimum, predicted from the curvature of the cost there: the inverse of likelihood_factor *
-/// Hessian. The Hessian is made of central differences, whose step is for each axis the one that raises the cost by a
-/// good part of a pixel, so that the roughness of the cost does not matter and the fits are still near the minimum.
+/// Hessian. The Hessian is made of central differences. Each axis has its own step, which raises the cost by about 0.1
+/// to 0.3 px: large enough that the roughness of the cost does not matter, and still near the minimum.
 class PredictedCovariance {
  public:
   PredictedCovariance(const marrow::Cost& cost, const marrow::RigidTransform& pose, const marrow::FragmentFrame& frame,
@@ -30,7 +30,7 @@ class PredictedCovariance {
     invert(hessian(), likelihood_factor);
   }
 
-  /// Of (r, t) in rad and mm, as in Pose.
+  /// Covariance of (r, t) in rad and mm, as in Pose.
   const marrow::Matrix6d& covariance() const { return covariance_; }
   int evaluations() const { return evaluations_; }
 
@@ -83,8 +83,8 @@ class PredictedCovariance {
     undetermined_[std::size_t(axis)] = height < kLeastRise_px;
   }
 
-  /// In units of the steps. Mixed second derivatives by the mean rise along both diagonal senses, less those of the two
-  /// axes.
+  /// The Hessian in units of the steps. A mixed second derivative is the mean rise along the diagonal of two axes, in
+  /// both senses, minus the rises along the two axes.
   marrow::Matrix6d hessian() {
     std::vector<marrow::RigidTransform> poses;
     for (int i = 0; i < 6; ++i)
@@ -108,7 +108,7 @@ class PredictedCovariance {
   }
 
   void invert(marrow::Matrix6d h, double factor) {
-    constexpr double kMostVariance = 100 * 100;  // in squared steps: stands for a direction that nothing determines
+    constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
     for (int i = 0; i < 6; ++i)
       if (undetermined_[std::size_t(i)]) {
         h.row(i).setZero();

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The poses that a search looks at first.
+// The poses that a search evaluates first.
 #include <array>
 #include <cmath>
 
@@ -10,10 +10,10 @@ namespace marrow::search {
 
 constexpr int kAxialRotation = 2, kAxialTranslation = 5;
 
-/// Motions about the start that are tried first, in degrees and mm, and how far apart two of them count as neighbours.
+/// Motions of the start that are tried first, in degrees and mm, and the reach within which two of them are neighbours.
 struct Scan {
   std::vector<Vector6d> motions;
-  Vector6d reach;  ///< half axes of an ellipsoid; of a grid, half sides of a box
+  Vector6d reach;  ///< for a grid half the sides of a box, else half axes of an ellipsoid
   bool grid = true;
 
   bool near(int a, int b) const {
@@ -22,7 +22,7 @@ struct Scan {
   }
 };
 
-/// A grid of axial rotations and translations, which the first stage leaves open.
+/// A grid of axial rotations and translations, because the first stage does not determine them.
 inline Scan axial_scan(const SearchOptions& options) {
   const auto steps = [](double range, double step) { return int(std::floor(range / step + 1e-9)); };
   const int turns = steps(options.scan_rotation_deg, options.scan_rotation_step_deg);
@@ -41,8 +41,8 @@ inline Scan axial_scan(const SearchOptions& options) {
   return scan;
 }
 
-/// The start, and motions about and along all six axes spread evenly over their ranges (Halton's sequence), for a start
-/// that is wrong in all of them.
+/// The start itself, and motions in all six axes spread evenly over their ranges (Halton's sequence). For a start that
+/// is only approximate in all six axes.
 inline Scan scattered_scan(const SearchOptions& options) {
   Vector6d range;
   range << options.scan_side_deg, options.scan_side_deg, options.scan_rotation_deg, options.scan_side_mm,

@@ -139,7 +139,7 @@ Found Search::best_of(const std::vector<RigidTransform>& candidates, const Level
   return *std::min_element(found.begin(), found.end(), better);
 }
 
-/// Keeps a pose of the way, one in ten evaluations at most.
+/// Keeps a pose on the way, at most one in ten evaluations.
 void Search::note(int evaluations, const RigidTransform& pose) {
   if (path_.empty() || evaluations >= path_.back().first + 10) path_.push_back({evaluations, pose});
 }

@@ -21,7 +21,7 @@ Plane bisecting_plane(const Camera& camera, const LineSegment& left, const LineS
   const Plane one = back_project_line(camera, line_through(left)),
               other = back_project_line(camera, line_through(right));
   Plane plane;
-  plane.normal = (one.normal + other.normal).normalized();  // both borders run the same way, so these normals agree
+  plane.normal = (one.normal + other.normal).normalized();  // borders of the same direction have similar normals
   plane.offset_mm = plane.normal.dot(source_position_mm(camera));
   return plane;
 }
@@ -35,7 +35,7 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   }
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(normals.transpose() * normals);  // ascending
   const double spread = planes.size() < 2 ? 0 : std::sqrt(squares.eigenvalues()(1) / squares.eigenvalues()(2));
-  // Two planes at an angle a have squared singular values 1 +- cos a, of ratio tan(a / 2) squared.
+  // For two planes at an angle a the squared singular values are 1 +- cos a. Their ratio is tan(a / 2)^2.
   const double angle_deg = degrees(2 * std::atan(spread));
   if (angle_deg < 10) {
     char text[20];
@@ -47,7 +47,7 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
   Axis axis;
   axis.direction = squares.eigenvectors().col(0);
   const Eigen::Vector3d right = normals.transpose() * offsets;
-  for (Eigen::Index i = 1; i < 3; ++i)  // the pseudo-inverse of rank two
+  for (Eigen::Index i = 1; i < 3; ++i)  // pseudo-inverse of rank two
     axis.point_mm +=
         squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
   return axis;

@@ -66,7 +66,7 @@ Border refit(const EdgeMap& edges, Border border, const Support& support, const 
     if (count < 10 || !(sum > 0)) return border.pixels = 0, border;
     const Eigen::Vector2d centre = first / sum;
     const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(second / sum - centre * centre.transpose());
-    const Eigen::Vector2d normal = solver.eigenvectors().col(0);  // of least spread
+    const Eigen::Vector2d normal = solver.eigenvectors().col(0);  // the direction of least spread
     border.normal = normal.dot(border.normal) < 0 ? Eigen::Vector2d(-normal) : normal;
     border.rho = border.normal.dot(centre);
     border.spread_px = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));

@@ -11,8 +11,8 @@
 namespace marrow::shaft {
 namespace {
 
-constexpr double kLeastStep = 0.3;            // of that of this image's bone
-constexpr double kAlong_mm = 1, kSmooth = 2;  // steps are measured every mm, over 2 mm to either side
+constexpr double kLeastStep = 0.3;            // part of the step of this image's bone
+constexpr double kAlong_mm = 1, kSmooth = 2;  // steps are measured every mm, as means over 2 mm to either side
 constexpr std::array<double, 4> kAcross_mm{0.7, 1.4, 2.1, 2.8};
 
 std::optional<double> grey_at(const cv::Mat& image, const Eigen::Vector2d& at) {
@@ -33,8 +33,8 @@ struct Sum {
   double mean() const { return count ? grey / count : std::numeric_limits<double>::infinity(); }
 };
 
-/// How much brighter it is outside a border than inside, relative to both, at positions along the stretch: between -1
-/// and 1, for small steps half the step of attenuation. Where the image ends, a step is taken to be there.
+/// The steps (outside - inside) / (outside + inside) of a border at positions along the stretch. They are between -1
+/// and 1; a small step is half the step of attenuation. Beyond the end of the image the step is taken as 1.
 std::vector<double> steps_of(const cv::Mat& image, const Border& border, const Stretch& stretch, double pixel_mm,
                              int count) {
   std::vector<Sum> inside(static_cast<std::size_t>(count)), outside(inside.size());
@@ -105,7 +105,7 @@ Stretch stretch_with_steps(const cv::Mat& image, const Border& left, const Borde
       positions.push_back(stretch.from + (double(i) + 0.5) / count * stretch.length());
   Stretch part = stretch;
   std::tie(part.from, part.to) = longest_run(positions, gap_px + stretch.length() / count);
-  if (part.to > part.from) {  // positions are the middles of pieces
+  if (part.to > part.from) {  // positions are the centres of pieces
     part.from -= 0.5 * stretch.length() / count;
     part.to += 0.5 * stretch.length() / count;
   }

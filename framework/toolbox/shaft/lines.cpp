@@ -29,7 +29,7 @@ void check_inputs(const EdgeMap& edges, const View& view) {
       throw Error(what + "the edge map holds numbers that are not finite (NaN or infinity); look at the edge detector");
 }
 
-/// Whether two borders are the same line, as seen at the middle of the image.
+/// Whether two borders are the same line: similar directions, and close to each other at the middle of the image.
 bool same_line(const Border& one, const Border& other, const Eigen::Vector2d& middle, double tolerance_px) {
   const Eigen::Vector2d direction = along(one);
   const double s = direction.dot(middle);

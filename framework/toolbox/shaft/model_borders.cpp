@@ -15,12 +15,12 @@ constexpr double kStep_px = 2;
 
 /// The outermost point of the model on one side, at one position along the pair.
 struct Extreme {
-  double across = 0;      ///< pixels
+  double across = 0;      ///< position across the pair, in pixels
   Eigen::Vector3d world;  ///< the point of the surface
   bool seen = false;
 };
 
-/// Positions along and across a pair of borders, from the middle between its ends.
+/// Positions along and across a pair of borders. The origin is the midpoint between their first ends.
 struct PairFrame {
   Eigen::Vector2d origin, along, across;
   double length = 0;
@@ -38,7 +38,7 @@ struct PairFrame {
   Eigen::Vector2d pixel(double s, double t) const { return origin + s * along + t * across; }
 };
 
-/// For each side the extremes at positions 0, 2, 4, ... along the pair, where triangle edges cross them.
+/// For each side the extremes at positions 0, 2, 4, ... along the pair, from the triangle edges that cross them.
 std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTransform& world_from_model,
                                                 const Camera& camera, const PairFrame& pair) {
   const std::size_t count = std::size_t(pair.length / kStep_px) + 1;
@@ -67,8 +67,8 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   };
   for (const auto& triangle : model.triangles)
     for (int k = 0; k < 3; ++k)
-      // Each edge belongs to two triangles; the one that runs upwards crosses for both. An open border is crossed
-      // anyway by the other edges of its triangle.
+      // Each edge belongs to two triangles. It is used only where its vertex numbers ascend. An edge at an open border
+      // may be skipped, but other edges of its triangle cross the same positions.
       if (triangle[k] < triangle[(k + 1) % 3]) cross(triangle[k], triangle[(k + 1) % 3]);
   for (auto& side : sides)
     for (Extreme& extreme : side)
@@ -76,8 +76,8 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   return sides;
 }
 
-/// across = at_start + slope * s through the extremes, leaving out those farther than the tolerance from the line
-/// before.
+/// The line across = at_start + slope * s fitted to the extremes. In each round, those farther than the tolerance from
+/// the line of the round before are left out.
 struct Line {
   double at_start = 0, slope = 0;
   double at(double s) const { return at_start + slope * s; }
@@ -101,7 +101,7 @@ Line fitted(const std::vector<Extreme>& side, double tolerance_px) {
   return line;
 }
 
-/// The line of least squares through the middles between the surface points of both sides.
+/// The least-squares line through the midpoints between the surface points of both sides.
 Axis axis_of_middles(const std::array<std::vector<Extreme>, 2>& sides) {
   Eigen::Vector3d first = Eigen::Vector3d::Zero();
   Eigen::Matrix3d second = Eigen::Matrix3d::Zero();

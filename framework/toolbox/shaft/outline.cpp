@@ -9,9 +9,9 @@ namespace marrow::shaft {
 namespace {
 
 constexpr double kStep_px = 0.125;
-constexpr double kReach_mm = 3;                          // of the profile, to either side
-constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // where the outline is sought
-constexpr double kPiece_mm = 4;                          // along the border; a bowed one is followed piece by piece
+constexpr double kReach_mm = 3;                          // length of the profile to either side
+constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // range of positions in which the outline is sought
+constexpr double kPiece_mm = 4;                          // a bowed border is followed in pieces of this length
 constexpr double kLeastBlur_px = 0.3, kMostBlur_px = 5;
 
 std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& at) {
@@ -29,7 +29,7 @@ std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& 
   return std::log(value);
 }
 
-/// Mean distances of the edge pixels from the line, piece by piece; nothing where a piece has too few.
+/// Mean distance of the edge pixels from the line for each piece. std::nullopt for a piece with fewer than three.
 std::vector<std::optional<double>> distances_of(const EdgeMap& edges, const Border& border, const Support& support,
                                                 const Stretch& stretch, int pieces) {
   std::vector<double> sums(static_cast<std::size_t>(pieces));
@@ -48,8 +48,8 @@ std::vector<std::optional<double>> distances_of(const EdgeMap& edges, const Bord
   return distances;
 }
 
-/// Mean attenuation, up to a constant, at distances from the edges of -reach to reach in steps; empty where the image
-/// ends.
+/// Mean attenuation, up to a constant, at distances of -reach to reach steps from the edges. Rows that leave the image
+/// are left out. Empty if fewer than ten rows remain.
 std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const Border& border, const Support& support,
                                const Stretch& stretch, double pixel_mm, int reach) {
   const int pieces = std::max(1, int(stretch.length() * pixel_mm / kPiece_mm));
@@ -73,7 +73,7 @@ std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const
   return rows >= 10 ? sums : std::vector<double>();
 }
 
-/// Chord of a cylinder at a distance from its outline (inside is negative), blurred by a Gaussian.
+/// The chord of a cylinder at a distance from its outline (negative inside), blurred by a Gaussian.
 double blurred_chord(double distance_px, double width_px, double blur_px) {
   constexpr int kHalf = 20;
   double sum = 0, weights = 0;
@@ -86,7 +86,7 @@ double blurred_chord(double distance_px, double width_px, double blur_px) {
   return sum / weights;
 }
 
-/// A profile less its mean and its slope.
+/// A profile minus its mean and its linear trend.
 Eigen::VectorXd without_slope(Eigen::VectorXd profile) {
   const Eigen::VectorXd place = Eigen::VectorXd::LinSpaced(profile.size(), -1, 1);
   profile.array() -= profile.mean();
@@ -108,7 +108,7 @@ std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMa
   double best_gain = 0;
   int best = outwards;
   for (double blur_px = kLeastBlur_px; blur_px < kMostBlur_px; blur_px *= 1.1) {
-    std::vector<double> chords;  // at distances from the outline of -reach - outwards to reach + inwards, in steps
+    std::vector<double> chords;  // at distances of -reach - outwards to reach + inwards steps from the outline
     for (int i = -reach - outwards; i <= reach + inwards; ++i)
       chords.push_back(blurred_chord(i * kStep_px, width_px, blur_px));
     for (int shift = -inwards; shift <= outwards; ++shift) {

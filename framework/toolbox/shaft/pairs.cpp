@@ -15,15 +15,15 @@ namespace marrow::shaft {
 namespace {
 
 constexpr double kEvidencePer_mm = 0.1;  // log-likelihood of a millimetre supported on both sides
-constexpr double kPlainStep = 0.8;       // of brightness, of the largest; fainter pairs are weaker evidence
-constexpr double kRidge_mm = 4;  // how far outside a border the bone's outline may be, at a ridge or another fragment
+constexpr double kPlainStep = 0.8;       // part of the largest step of brightness; fainter pairs are weaker evidence
+constexpr double kRidge_mm = 4;  // largest distance of the outline outside a border, at a ridge or other fragment
 
-/// Two nearly parallel lines of opposite gradient.
+/// Two nearly parallel lines with opposite gradients.
 struct Pair {
-  Border left, right;  // as seen along the stretch
+  Border left, right;  // left and right when looking along the stretch
   Stretch stretch;
   double width_mm = 0, supported_mm = 0;
-  double weight = 1;   // of the evidence: less than one where the borders are faint for bone
+  double weight = 1;   // of the evidence; less than 1 if the borders are faint for bone
   double score = 0;    // log-likelihood of width, taper and evidence
   std::string reason;  // why it is not the shaft; empty for a candidate
 };
@@ -34,7 +34,7 @@ std::string text(const char* format, double a, double b = 0, double c = 0) {
   return buffer;
 }
 
-/// Where the two lines run to: downwards, or to the right when they lie flat.
+/// The common direction of two lines: downwards, or to the right if they are nearly horizontal.
 Eigen::Vector2d direction_of(const Border& one, const Border& other) {
   const Eigen::Vector2d normal = (one.normal - other.normal).normalized();
   const Eigen::Vector2d direction(-normal.y(), normal.x());
@@ -42,23 +42,24 @@ Eigen::Vector2d direction_of(const Border& one, const Border& other) {
   return turn ? Eigen::Vector2d(-direction) : direction;
 }
 
-/// Distance of the two lines, across the middle of their stretch, at the depth of the isocentre.
+/// Distance in mm between the two lines in the middle of their stretch, at the depth of the isocentre.
 double width_of(const Pair& pair, double pixel_mm) {
   const double s = 0.5 * (pair.stretch.from + pair.stretch.to);
   return (point_at(pair.left, pair.stretch.along, s) - point_at(pair.right, pair.stretch.along, s)).norm() * pixel_mm;
 }
 
-/// What pairs are judged by.
+/// All that is needed to judge pairs.
 struct Scene {
   const EdgeMap& edges;
   const cv::Mat& image;
   const Scale& scale;
   const LineOptions& options;
   Widths widths;
-  double bone_step = 0;  // of brightness; the largest that a possible pair shows
+  double bone_step = 0;  // largest step of brightness of a possible pair
 };
 
-/// The fit's part, and that of a depth which is not the isocentre's. Neighbouring edge pixels share their errors.
+/// Standard deviation of the width, from the fit and from the unknown depth. Errors of neighbouring edge pixels are
+/// correlated.
 double width_deviation_of(const Pair& pair, const Scene& scene) {
   constexpr double kSharing_px = 4;
   const auto variance_px = [](const Border& border) {
@@ -75,7 +76,7 @@ void score(const Scene& scene, Pair& pair) {
       kEvidencePer_mm * pair.weight * pair.supported_mm + scene.widths.log_likelihood(pair.width_mm, taper_deg);
 }
 
-/// Why a pair is not the shaft by its edges alone; empty when it may be.
+/// The reason why a pair is not the shaft, from its edges only; empty if it may be the shaft.
 std::string reason_by_edges(const Scene& scene, const Pair& pair, const Eigen::Vector2d& to_left) {
   const double length_mm = pair.stretch.length() * scene.scale.pixel_mm;
   if (length_mm < scene.options.min_length_mm)
@@ -89,13 +90,14 @@ std::string reason_by_edges(const Scene& scene, const Pair& pair, const Eigen::V
          scene.widths.range() + "), as " + (small ? "a cable's or a single cortex' is" : "the limb's is");
 }
 
-/// Shortens a pair, and its evidence with it.
+/// Shortens a pair, and its evidence in proportion.
 void cut(Pair& pair, const Stretch& part) {
   pair.supported_mm *= part.length() / pair.stretch.length();
   pair.stretch = part;
 }
 
-/// Why it is not the shaft by its brightness; cuts the stretch to where both borders are steps of brightness.
+/// The reason why a pair is not the shaft, from its brightness; empty if it may be the shaft. Cuts the stretch to the
+/// part in which both borders are steps of brightness.
 std::string reason_by_image(const Scene& scene, Pair& pair) {
   const double pixel_mm = scene.scale.pixel_mm;
   const Stretch outer = stretch_at_outline(scene.edges, pair.left, pair.right, scene.scale.support, pair.stretch,
@@ -117,7 +119,7 @@ std::string reason_by_image(const Scene& scene, Pair& pair) {
               mean.inside, mean.outside_left, mean.outside_right);
 }
 
-/// Fills stretch, width and score, or the reason why the pair is not the shaft, by its edges.
+/// Sets stretch, width, score and, from the edges, the reason why the pair is not the shaft.
 void judge_edges(const Scene& scene, Pair& pair) {
   const Eigen::Vector2d direction = direction_of(pair.left, pair.right),
                         to_left(direction.y(), -direction.x());  // v runs down
@@ -133,12 +135,12 @@ void judge_edges(const Scene& scene, Pair& pair) {
   pair.reason = reason_by_edges(scene, pair, to_left);
 }
 
-/// The same by the image, for a pair that its edges let pass.
+/// The same from the image, for a pair that passed judge_edges().
 void judge_image(const Scene& scene, Pair& pair) {
   if (!pair.reason.empty()) return;
   Pair part = pair;
   pair.reason = reason_by_image(scene, part);
-  if (!pair.reason.empty()) return;  // and its stretch is shown as the edges have it
+  if (!pair.reason.empty()) return;  // reports show the stretch from the edges
   score(scene, part);
   pair = part;
   if (pair.score < scene.options.least_log_likelihood)
@@ -146,14 +148,14 @@ void judge_image(const Scene& scene, Pair& pair) {
                        scene.options.least_log_likelihood, pair.width_mm);
 }
 
-/// Candidates first, the most likely first.
+/// Sorts pairs: candidates before rejected pairs, each group by falling score.
 void sort_by_score(std::vector<Pair>& pairs) {
   std::stable_sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) {
     return a.reason.empty() != b.reason.empty() ? a.reason.empty() : a.score > b.score;
   });
 }
 
-/// All near-parallel pairs of opposite gradient, judged; candidates first, the most likely first. Sets bone_step.
+/// All nearly parallel pairs with opposite gradients, judged and sorted. Sets bone_step.
 std::vector<Pair> pairs_of(Scene& scene, const std::vector<Border>& borders) {
   std::vector<Pair> pairs;
   const double cosine = std::cos(radians(scene.options.max_angle_deg));
@@ -175,8 +177,7 @@ std::vector<Pair> pairs_of(Scene& scene, const std::vector<Border>& borders) {
   return pairs;
 }
 
-/// Both borders fitted again over the stretch that they share, until that stretch settles, so that both tell of the
-/// same piece of the bone.
+/// Fits both borders again over their common stretch, three times, so that both describe the same piece of the bone.
 Pair settled(const Scene& scene, Pair pair) {
   for (int round = 0; round < 3 && pair.reason.empty(); ++round) {
     pair.left = refit(scene.edges, pair.left, scene.scale.support, pair.stretch, 0);
@@ -189,8 +190,8 @@ Pair settled(const Scene& scene, Pair pair) {
   return pair;
 }
 
-/// Whether both pairs show the same piece of shaft: their middles run close to each other over most of the shorter one.
-/// A curved border has many lines, whose pairs would crowd out the shaft of another fragment.
+/// Whether both pairs show the same piece of shaft: their middles are close to each other over at least half of the
+/// shorter one. A curved border has many lines; their pairs would displace the shaft of another fragment from the list.
 bool same_shaft(const Pair& a, const Pair& b) {
   const auto middle = [](const Pair& pair, const Eigen::Vector2d& along, double s) -> Eigen::Vector2d {
     return 0.5 * (point_at(pair.left, along, s) + point_at(pair.right, along, s));
@@ -205,8 +206,8 @@ bool same_shaft(const Pair& a, const Pair& b) {
   return (middle(a, along, s) - middle(b, along, s)).norm() < 0.05 * width;
 }
 
-/// The borders moved from the edges to the outline. Where only one of them tells how far, both move as far: the blur is
-/// the same.
+/// Moves the borders from the edges to the outline. If the distance is known for only one border, it is used for both,
+/// because the blur is the same.
 void move_to_outline(const Scene& scene, Pair& pair) {
   const auto beyond_px = [&](const Border& border) {
     return outline_beyond_edges_px(scene.image, scene.edges, border, scene.scale.support, pair.stretch,

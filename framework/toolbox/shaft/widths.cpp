@@ -12,12 +12,12 @@
 namespace marrow::shaft {
 namespace {
 
-constexpr double kMost = 3;                                   // deviations
-constexpr double kTaperDeviation_deg = 3, kAnyTaper_deg = 6;  // where the taper is known, and where it is not
+constexpr double kMost = 3;                                   // standard deviations
+constexpr double kTaperDeviation_deg = 3, kAnyTaper_deg = 6;  // for a known taper and for an unknown one
 
-/// Outer diameters of 24 femora, side to side and front to back (with the linea aspera), mean and deviation, from 20 %
-/// to 75 % of the length above the condyles in steps of 5 % of 446 mm. In the middle they agree with those of 170 and
-/// of several hundred femora that were measured elsewhere.
+/// Outer diameters of 24 femora: mean and standard deviation from side to side, then from front to back (with the linea
+/// aspera). Levels from 20 % to 75 % of the length above the condyles, in steps of 5 % of 446 mm. At mid-shaft they
+/// agree with those of 170 and of several hundred femora that were measured elsewhere.
 constexpr double kStep_mm = 0.05 * 446;
 constexpr std::array<std::array<double, 4>, 12> kFemur{{{36.7, 4.0, 32.4, 3.4},
                                                         {33.2, 3.5, 31.3, 3.3},

@@ -12,8 +12,9 @@
 namespace marrow::surface {
 namespace {
 
-/// Cuts polygons into triangles so that no edge belongs to more than two: a polygon into a fan from a corner whose
-/// diagonals join vertices that nothing else joins, or, where there is none, from its middle.
+/// Cuts polygons into triangles so that no edge belongs to more than two triangles. A polygon becomes a fan from a
+/// corner whose diagonals are not edges elsewhere. If there is no such corner, the fan starts from the polygon's
+/// middle.
 class Triangulation {
  public:
   Triangulation(const std::vector<pcl::Vertices>& polygons, Surface& surface) : surface_(surface) {
@@ -73,8 +74,8 @@ Surface reconstruct(const std::vector<OrientedPoint>& points, const Settings& se
   poisson.setMinDepth(std::clamp(settings.depth - 2, 1, 5));
   poisson.setScale(settings.scale);
   poisson.setPointWeight(settings.point_weight);
-  poisson.setOutputPolygons(true);  // its own triangulation never ends where a vertex is not finite
-  poisson.setThreads(1);            // with more, sums are added up in an order that differs from run to run
+  poisson.setOutputPolygons(true);  // PCL's own triangulation does not terminate if a vertex is not finite
+  poisson.setThreads(1);            // with more threads the order of summation differs from run to run
   pcl::PointCloud<pcl::PointNormal> vertices;
   std::vector<pcl::Vertices> polygons;
   {

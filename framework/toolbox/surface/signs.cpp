@@ -9,7 +9,7 @@
 namespace marrow::surface {
 namespace {
 
-/// What a run of samples is, found without a branch so that the compiler makes vectors of it.
+/// The signs of a run of samples. Computed without branches, so that the compiler can vectorise the loop.
 struct Packed {
   Word inside = 0;
   bool finite = true;
@@ -24,7 +24,7 @@ Packed pack(const float* values, int count) {
   }
   Packed packed;
   packed.finite = not_finite == 0;
-  for (int group = 0; group < 8; ++group) {  // the lowest bits of eight bytes, moved together by a multiplication
+  for (int group = 0; group < 8; ++group) {  // one multiplication collects the lowest bits of eight bytes
     Word eight;
     std::memcpy(&eight, flags + 8 * group, 8);
     packed.inside |= (eight * 0x0102040810204080u >> 56) << (8 * group);
@@ -46,7 +46,7 @@ Signs::Signs(const marrow::SignedField& field)
     for (int y = 1; y < size_[1] - 1; ++y) {
       const float* row = field.values_mm.data() + field.grid.offset(0, y - 1, z - 1);
       Word* packed = bits_.data() + (std::size_t(z) * size_[1] + y) * words_;
-      for (int word = 0; word < words_; ++word) {  // bit 0 of the row is padding, so a word begins one sample before
+      for (int word = 0; word < words_; ++word) {  // bit 0 of a row is padding, so words are shifted by one sample
         const int first = std::max(64 * word, 1), last = std::min(64 * word + 64, size_[0] - 1);
         if (first >= last) continue;
         const Packed run = pack(row + first - 1, last - first);

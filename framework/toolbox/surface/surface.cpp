@@ -58,8 +58,8 @@ void check_field(const marrow::SignedField& field) {
 
 namespace {
 
-/// Vertices by component. Each points to one of its component that comes before it, the first to itself; any number of
-/// threads may join, as only a first one is made to point elsewhere, by exchange.
+/// Connected components (union-find). Each vertex points to an earlier vertex of its component, the first vertex to
+/// itself. Several threads may join at once: only a first vertex gets a new target, by compare-exchange.
 class Parts {
  public:
   explicit Parts(const Mesh& mesh) : before_(mesh.vertices_mm.size()) {
@@ -103,7 +103,7 @@ class Parts {
   std::vector<std::uint32_t> before_;
 };
 
-/// Six times the volume that each component encloses, added up in an order that does not depend on the threads.
+/// Six times the volume that each component encloses. The order of summation does not depend on the threads.
 std::vector<double> six_volumes(const Mesh& mesh, const std::vector<std::uint32_t>& part, std::uint32_t count) {
   constexpr std::size_t kChunks = 8;
   const Eigen::Vector3d origin = mesh.vertices_mm[mesh.triangles.front()[0]];
@@ -148,7 +148,7 @@ Mesh largest_component(Mesh mesh) {
 
 void smooth(Mesh& mesh, const Taubin& taubin) {
   const double mu = 1 / (taubin.pass_band - 1 / taubin.lambda);
-  // On a closed surface each edge occurs once in either direction, so each neighbour is met exactly once here.
+  // On a closed surface each edge occurs once in each direction, so each neighbour is counted exactly once here.
   std::vector<std::uint32_t> degree(mesh.vertices_mm.size(), 0);
   for (const auto& t : mesh.triangles)
     for (std::uint32_t v : t) ++degree[v];

@@ -25,7 +25,7 @@ VariantFigure figure_of(const std::vector<double>& values, bool higher_is_better
 
 using Rows = std::vector<const CellRow*>;
 
-/// The rows of each variant, in the experiment's order.
+/// The rows of each variant, in the order of the experiment.
 std::vector<Rows> rows_by_variant(const Experiment& experiment, const std::vector<CellRow>& rows) {
   std::map<std::string, std::size_t> places;
   for (std::size_t v = 0; v < experiment.variants.size(); ++v) places[experiment.variants[v].name] = v;
@@ -60,7 +60,7 @@ VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
   return summary;
 }
 
-/// Errors of the starts by case and start: of a run that failed they are those that another variant began with.
+/// Errors of the starts, by case and start. For a run that failed, another variant with the same start gives its error.
 using StartErrors = std::map<std::pair<std::string, std::string>, double>;
 
 StartErrors start_errors(const std::vector<CellRow>& rows) {
@@ -84,7 +84,7 @@ void add_capture(const Experiment& experiment, const Rows& rows, const StartErro
   summary.capture = compare::capture_range(outcomes);
 }
 
-/// The cells that both variants did, in one figure.
+/// The values of one figure in the cells that both variants completed.
 std::vector<compare::Pair> pairs_of(const Rows& baseline, const Rows& variant, std::size_t metric) {
   std::map<std::pair<std::string, std::string>, double> reference;
   for (const CellRow* row : baseline)
@@ -104,7 +104,7 @@ std::string unit_of(const std::vector<CellRow>& rows, std::size_t metric) {
   return "";
 }
 
-/// A row a bin, a column a variant; at last how far each captures.
+/// A table with one row per bin and one column per variant. The last row is the capture range.
 std::string capture_text(const Experiment& experiment, const Answer& answer) {
   std::vector<compare::CaptureRange::Bin> longest;
   std::size_t unknown = 0;

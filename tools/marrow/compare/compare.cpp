@@ -22,7 +22,7 @@ using compare::CellRow;
 using compare::CellRunner;
 using compare::Experiment;
 
-/// Reads the experiment; prints all its faults where there are any.
+/// Reads the experiment. If it has faults, prints all of them and returns false.
 bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment) {
   Diagnostics diagnostics;
   experiment = compare::read_experiment(request.file, catalogue, diagnostics);
@@ -36,7 +36,8 @@ fs::path folder_of(const CompareRequest& request, const Experiment& experiment) 
   return request.folder.empty() ? fs::path("runs") / "compare" / experiment.name : request.folder;
 }
 
-/// A case counts with all of its files: what is written into it would change it while its cells run.
+/// All files of a case's folder count as its content. A file that is written there would change the case while its
+/// cells run.
 void expect_outside_cases(const Experiment& experiment, const fs::path& folder, bool no_cache) {
   std::vector<fs::path> cases;
   for (const compare::ExperimentCase& one : experiment.cases)
@@ -52,7 +53,7 @@ void expect_outside_cases(const Experiment& experiment, const fs::path& folder, 
     expect("the store of results", store.folder(), "set MARROW_CACHE to another folder, or give --no-cache");
 }
 
-/// The part of a cell's name that is none of the experiment's, and what is near.
+/// A message if a part of a cell's name is unknown to the experiment, with the nearest known name. Otherwise empty.
 template <class Named>
 std::string fault_of_part(const std::string& what, const std::string& part, const std::vector<Named>& all) {
   std::vector<std::string> names;
@@ -110,7 +111,7 @@ int run_cell(const CompareRequest& request, const std::string& id) {
   const long without_process = calls_without_process();
   CellRow row = runner.run(*cell);
   if (!row.failed.empty() && calls_without_process() != without_process)
-    throw Error(row.failed);  // no failure of the cell's
+    throw Error(row.failed);  // the cell itself did not fail
   runner.write(*cell, row);
   std::printf("%s\n", compare::to_json(row).c_str());
   if (!row.failed.empty()) return 1;

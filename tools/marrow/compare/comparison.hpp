@@ -19,8 +19,8 @@ namespace marrow::cli {
 struct CompareRequest {
   std::filesystem::path file;
   std::filesystem::path folder;  ///< empty = runs/compare/NAME
-  int jobs = 0;                  ///< cells at once; 0 = as many as the machine has cores
-  int threads = 1;               ///< of each cell
+  int jobs = 0;                  ///< number of cells at once; 0 = the number of the machine's cores
+  int threads = 1;               ///< threads of each cell
   double time_limit_s = 600;
   double memory_limit_mb = 4000;
   std::size_t shown = 8;  ///< cases and starts with pictures in the report
@@ -28,22 +28,24 @@ struct CompareRequest {
   FileLimits file_limits;
 };
 
-/// What the commands that take an experiment have in common.
+/// Adds the arguments that all commands with an experiment share.
 void add_experiment_arguments(CLI::App* command, CompareRequest& request);
-/// All cells that are not there yet, then times, tables, pictures and the report. The folder is the experiment's own.
+/// Runs all cells that are not done yet, then writes times, tables, pictures and the report. The folder belongs to this
+/// experiment.
 int run_comparison(const CompareRequest& request, const Catalogue& catalogue, const compare::Experiment& experiment,
                    const std::filesystem::path& folder);
 
-/// Cells whose pictures are worth a look, all variants of at most `most` cases and starts: those where a variant was
-/// worst, best or nearest to its median in the first metric, those that failed, then the first.
+/// Cells whose pictures go into the report: all variants of at most `most` pairs of case and start. First come those
+/// where a variant was worst, best or nearest to its median in the first metric, then those that failed, then the first
+/// ones.
 std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experiment,
                                               const std::vector<compare::CellRow>& rows, std::size_t most);
 
-/// Prints what a comparison would do, and calls no node.
+/// Prints what a comparison would do. Calls no node.
 void print_plan(const compare::Experiment& experiment, const Catalogue& catalogue, const Store* store,
                 const std::filesystem::path& folder);
 
-/// A figure of merit of one variant, over its cells that are done.
+/// A figure of merit of one variant, over its completed cells.
 struct VariantFigure {
   std::size_t count = 0;
   compare::Summary summary;
@@ -52,12 +54,12 @@ struct VariantSummary {
   std::size_t runs = 0, failed = 0, successes = 0;
   compare::Interval success;
   std::vector<VariantFigure> figures;  ///< in the order of the experiment's metrics
-  compare::CaptureRange capture;       ///< without bins where the experiment names no initial_error
+  compare::CaptureRange capture;       ///< without bins if the experiment names no initial_error
   std::size_t unknown_starts =
-      0;  ///< runs that failed before any variant knew the error of their start: not in `capture`
+      0;  ///< failed runs whose start has no known error from any variant; they are not in `capture`
   VariantFigure seconds, evaluations;
 };
-/// A variant against the baseline in one figure.
+/// Comparison of a variant with the baseline in one figure.
 struct Finding {
   std::size_t variant = 0, metric = 0;
   compare::Comparison comparison;
@@ -67,17 +69,17 @@ struct Finding {
 struct Answer {
   std::vector<VariantSummary> variants;
   std::vector<Finding> findings;
-  std::vector<std::string> units;  ///< of the metrics; empty where no cell is done
+  std::vector<std::string> units;  ///< units of the metrics; empty if no cell is done
 };
 
-/// `rows` may be of unfinished comparisons. Failed cells have no figures; the pairs of a finding are the cells that
-/// both did.
+/// `rows` may come from an unfinished comparison. Failed cells have no figures. The pairs of a finding are the cells
+/// that both variants completed.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
-/// For the terminal.
+/// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
-/// {experiment, variants, comparisons}: all of the answer.
+/// The complete answer: {experiment, variants, comparisons}.
 nlohmann::json answer_json(const compare::Experiment& experiment, const Answer& answer);
-/// cells.csv, cells.jsonl and comparison.json.
+/// Writes cells.csv, cells.jsonl and comparison.json.
 void write_tables(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const std::filesystem::path& folder);
 

@@ -23,7 +23,7 @@ constexpr const char* kMarker = "marrow-comparison";
 const std::string kHead =
     "This folder is a comparison of marrow, which changes and removes what is in it.\nexperiment: ";
 
-// Bytes of the marker that are locked; cells follow. They need not be there.
+// Offsets of the bytes of the marker that are locked. One byte for each cell follows. Locked bytes need not exist.
 constexpr long kUse = 0, kText = 1, kCells = 2;
 
 [[noreturn]] void refuse_foreign(const fs::path& folder) {
@@ -43,7 +43,7 @@ bool holds_only_the_marker(const fs::path& folder) {
   return !error;
 }
 
-/// What is behind a link is not this comparison's, to change and to remove.
+/// Files behind a link do not belong to this comparison, so it must not change or remove them.
 void refuse_links(const fs::path& folder, const compare::Experiment& experiment) {
   std::error_code ignored;
   const auto check = [&](const fs::path& place) {
@@ -67,7 +67,7 @@ void refuse_links(const fs::path& folder, const compare::Experiment& experiment)
   }
 }
 
-/// Of tables whose writing was ended by force.
+/// Removes unfinished tables. They remain if a process is killed while it writes.
 void remove_parts(const fs::path& folder) {
   std::error_code error, ignored;
   for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
@@ -106,7 +106,7 @@ void ComparisonFolder::take_cell(const std::string& id) {
     throw Error("the cell " + id + " is being run by another process");
 }
 
-/// A new marker is made in an empty folder alone. Several processes may come at once.
+/// Creates a new marker only in an empty folder. Several processes may do this at the same time.
 void ComparisonFolder::open_marker() {
   const fs::path marker = folder_ / kMarker;
   std::error_code error;
@@ -124,7 +124,7 @@ void ComparisonFolder::open_marker() {
       if (errno != EEXIST) refuse_unwritable(folder_, errno);
     } else if (error) {
       refuse_unwritable(folder_, error.value());
-    } else if (is_second_look) {  // at the first, another process may have been making it
+    } else if (is_second_look) {  // at the first look, another process may have been making the marker
       refuse_foreign(folder_);
     }
   }
@@ -132,7 +132,7 @@ void ComparisonFolder::open_marker() {
   if (fstat(marker_, &info) != 0 || !S_ISREG(info.st_mode)) refuse_foreign(folder_);
 }
 
-/// Writes the marker where it is new, or where its maker was ended before it was whole.
+/// Writes the marker if it is new, or if its writer was killed before it was complete.
 void ComparisonFolder::check_marker(const std::string& name) {
   lock(kText, F_WRLCK, true);
   char buffer[1000];
@@ -155,8 +155,8 @@ void ComparisonFolder::check_marker(const std::string& name) {
   lock(kText, F_UNLCK, true);
 }
 
-/// False where another process has it. The lock is of the open file, not of the process: other parts of this process
-/// that open the marker do not end it.
+/// False if another process holds the lock. The lock belongs to the open file, not to the process. So it stays if
+/// another part of this process opens and closes the marker.
 bool ComparisonFolder::lock(long byte, short type, bool wait) {
   struct flock what {};
   what.l_type = type;

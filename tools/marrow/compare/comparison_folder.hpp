@@ -7,19 +7,19 @@
 
 namespace marrow::cli {
 
-/// The folder that a comparison is kept in, new or to be continued. A file in it, the marker, says that it is marrow's
-/// and of which experiment: nothing is written into a folder that holds anything else. Locks on the marker, which end
-/// with the process however that ends, keep others out.
+/// The folder of a comparison, new or to be continued. A file in it, the marker, says that the folder belongs to marrow
+/// and to which experiment. Nothing is written into a folder with other content. Locks on the marker keep other
+/// processes out. They end with the process, even if it crashes.
 class ComparisonFolder {
  public:
-  enum class Use { alone, with_others };  ///< others that run single cells
-  /// Throws Error for a folder that cannot be written to, is not this experiment's, or is in use.
+  enum class Use { alone, with_others };  ///< with_others: together with processes that run single cells
+  /// Throws Error if the folder cannot be written, belongs to something else, or is in use.
   ComparisonFolder(const std::filesystem::path& folder, const compare::Experiment& experiment, Use use);
   ~ComparisonFolder();
   ComparisonFolder(const ComparisonFolder&) = delete;
   ComparisonFolder& operator=(const ComparisonFolder&) = delete;
 
-  /// Throws Error when another process is at the cell.
+  /// Throws Error if another process runs this cell.
   void take_cell(const std::string& id);
 
  private:

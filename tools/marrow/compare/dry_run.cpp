@@ -14,11 +14,10 @@ using compare::CellIndex;
 using compare::CellRunner;
 using compare::Experiment;
 
-/// Reading a cell's pipeline takes some milliseconds: of more cells than these, some are looked at and stand for the
-/// others.
+/// Reading the pipeline of a cell takes some milliseconds. If there are more cells than this, a sample stands for all.
 constexpr std::size_t kMostCells = 1000;
 
-/// Some of a number of things, evenly spread.
+/// An evenly spread sample of `taken` out of `all` things.
 struct Sample {
   std::size_t all = 0, taken = 0;
   std::size_t at(std::size_t i) const { return i * all / taken; }
@@ -36,10 +35,10 @@ std::pair<Sample, Sample> cases_and_starts(const Experiment& experiment) {
   return {cases, starts};
 }
 
-/// How many there are, by the cells that were looked at.
+/// Numbers of evaluations, estimated from the sampled cells.
 struct Counts {
   double all = 0, shared = 0, cached = 0;
-  std::map<std::string, double> to_make;  ///< by what the node uses
+  std::map<std::string, double> to_make;  ///< key: name of the node that is used
 };
 
 bool makes_functions(const PipelineNode& node) {
@@ -110,7 +109,7 @@ class Plan {
   double cases_to_make_ = 0;
 };
 
-/// Mean time of a call of each node in earlier runs.
+/// Mean time of one call of each node in earlier runs.
 std::map<std::string, double> seconds_before(const Store& store) {
   std::map<std::string, std::pair<double, long>> sums;
   for (const Store::Entry& entry : store.entries()) {

@@ -17,9 +17,9 @@
 namespace marrow::cli {
 namespace {
 
-constexpr int kMostRefused = 3;  // times: another program may be about to end
+constexpr int kMostRefused = 3;  // number of tries, because another program may be about to end
 
-/// A worker and the job that it is at.
+/// A worker and its current job.
 struct Member {
   explicit Member(const std::vector<std::string>& command) : worker({command}) {}
   void start(Job next, bool no_other) {
@@ -31,10 +31,10 @@ struct Member {
 
   Worker worker;
   std::optional<Job> job;
-  bool is_alone = false;  ///< no other worker was there while it was at its job
+  bool is_alone = false;  ///< no other worker existed during its job
 };
 
-/// What is still to do, by groups, and who is at it.
+/// The jobs to do, in groups, and the workers that do them.
 class Pool {
  public:
   Pool(std::vector<Job> jobs, const PoolSettings& settings, const std::function<void(const Job&, const JobEnd&)>& ended)
@@ -64,12 +64,12 @@ class Pool {
   }
 
   void give_work() {
-    // What failed by its process is tried again when nothing else runs that could have been the cause, or suffer from
-    // it.
+    // A job whose process failed is tried again while nothing else runs. So no other job can be the cause, or be
+    // disturbed by it.
     const bool alone = waiting_.empty();
     if (alone && is_busy()) return;
     std::deque<Job>& source = alone ? again_ : waiting_;
-    if (alone && members_.size() > 1) members_.resize(1);  // those that do nothing have memory and threads, too
+    if (alone && members_.size() > 1) members_.resize(1);  // idle workers use memory and threads too
     const std::size_t most = alone ? 1 : most_;
     while (!source.empty()) {
       Member* free = nullptr;
@@ -87,7 +87,7 @@ class Pool {
     }
   }
 
-  /// None where the system grants no further process; then those that there are do all.
+  /// nullptr if the system gives no further process. Then the existing workers do all jobs.
   Member* new_member() {
     try {
       members_.push_back(std::make_unique<Member>(settings_.command));
@@ -100,7 +100,7 @@ class Pool {
     }
   }
 
-  /// The job is done again, by fewer workers.
+  /// The system gave the worker no process. The job is done again, with fewer workers.
   void lacks_process(Member& member, Job job, const std::string& why) {
     if (member.is_alone && ++job.refused == kMostRefused) throw NoProcess(why);
     most_ = std::max<std::size_t>(1, members_.size() - 1);
@@ -109,8 +109,9 @@ class Pool {
     waiting_.push_front(std::move(job));
   }
 
-  /// A job of the group that the worker was at; else of one that no other worker is at; else of one whose first job is
-  /// done: until then the others would only make once more what the group has in common.
+  /// The next job for a worker: a job of the worker's last group; else one of a group that no other worker is working
+  /// on; else one of a group whose first job is done. Before the first job of a group is done, a second worker would
+  /// only compute the group's shared results again.
   std::optional<Job> next_for(const Member& member, std::deque<Job>& source) {
     std::string& mine = groups_[&member];
     auto chosen =
@@ -154,8 +155,8 @@ class Pool {
   const std::function<void(const Job&, const JobEnd&)>& ended_;
   std::vector<std::unique_ptr<Member>> members_;
   std::map<const Member*, std::string> groups_;
-  std::size_t most_;             ///< workers at once
-  std::set<std::string> begun_;  ///< groups of which a job has ended
+  std::size_t most_;             ///< largest number of workers at once
+  std::set<std::string> begun_;  ///< groups in which a job has ended
 };
 
 }  // namespace

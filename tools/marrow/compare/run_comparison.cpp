@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A comparison from its start, or from where it was left, to its report.
+// Runs a comparison, or continues an interrupted one, up to its report.
 #include <unistd.h>
 
 #include <charconv>
@@ -49,7 +49,7 @@ class Progress {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now(), last_ = start_;
 };
 
-/// The shortest text that is read back as this number.
+/// The shortest text that gives exactly this number when it is read.
 std::string exact_text(double value) {
   char text[40];
   return {text, std::to_chars(text, text + sizeof text, value).ptr};
@@ -171,7 +171,8 @@ class Comparison {
     });
   }
 
-  /// The same cases and starts for all variants, spread over all that there are, one run at a time on all threads.
+  /// Measures times on the same cases and starts for all variants. They are spread evenly over all cases and starts.
+  /// One run at a time uses all threads.
   bool measure_times(std::vector<CellRow>& rows) {
     const std::size_t variants = experiment_.variants.size(), places = rows.size() / variants,
                       count = std::min(places, experiment_.timed_cells);
@@ -206,7 +207,8 @@ class Comparison {
     });
   }
 
-  /// Where there are none of the cell as it is, the report must not show those of another state of its files.
+  /// Removes old pictures of a cell that has no new ones. They may show an earlier state of its files, so the report
+  /// must not use them.
   void remove_old_pictures(const CellIndex& cell) const {
     try {
       const fs::path folder = runner_.pictures_of(cell);
@@ -220,7 +222,7 @@ class Comparison {
     return (cell.case_index * experiment_.starts.size() + cell.start) * experiment_.variants.size() + cell.variant;
   }
 
-  /// What a worker says counts only as figures of the cell that it was asked for.
+  /// The row from a worker's answer. The answer counts only if it is about the requested cell.
   CellRow row_of(const CellIndex& cell, const JobEnd& end) const {
     if (!end.failed.empty()) return compare::failed_row(experiment_, cell, end.failed, end.tries);
     try {
@@ -263,7 +265,7 @@ class Comparison {
   Store store_;
   std::vector<CellIndex> cells_;
   std::vector<std::optional<CellRow>> rows_;
-  std::vector<std::string> keys_;  ///< of the cells, as they were when the comparison began
+  std::vector<std::string> keys_;  ///< keys of the cells at the beginning of the comparison
   std::map<std::size_t, std::string> case_faults_;
   std::size_t found_ = 0;
   CellRunner runner_;

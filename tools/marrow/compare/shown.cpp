@@ -33,7 +33,7 @@ std::vector<compare::CellIndex> cells_to_show(const compare::Experiment& experim
                                               const std::vector<compare::CellRow>& rows, std::size_t most) {
   const std::size_t variants = experiment.variants.size(), starts = experiment.starts.size();
   const auto place_of = [&](std::size_t row) { return Place{row / variants / starts, row / variants % starts}; };
-  std::vector<std::vector<std::size_t>> by_value(variants);  // rows of each variant that have a value, the best first
+  std::vector<std::vector<std::size_t>> by_value(variants);  // for each variant, its rows with a value, the best first
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (rows[i].failed.empty() && rows[i].values.at(0)) by_value[i % variants].push_back(i);
   for (auto& order : by_value)

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// cells.csv and cells.jsonl (a row a cell), comparison.json (all of the answer).
+// Writes cells.csv and cells.jsonl (one row per cell) and comparison.json (the complete answer).
 #include <charconv>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -22,8 +22,9 @@ bool is_number(const std::string& text) {
   return error == std::errc() && end == text.data() + text.size();
 }
 
-/// RFC 4180: quoted where it has to be. A text that a spreadsheet would compute, as a reason that begins with "=", is
-/// marked as a text. Control characters, which a terminal would obey, are written out; lines stay.
+/// A field of a CSV file (RFC 4180), quoted if necessary. A text that a spreadsheet would take for a formula, such as a
+/// reason that begins with "=", is marked as text. Control characters are written out, because a terminal would execute
+/// them. Line breaks stay.
 std::string field(const std::string& raw) {
   std::string text;
   for (std::size_t begin = 0, end = 0; begin <= raw.size(); begin = end + 1) {
@@ -45,7 +46,7 @@ std::string number_text(const std::optional<double>& value) {
   return text;
 }
 
-/// The options that any variant changes, and what this one makes of them.
+/// The options that any variant changes.
 std::vector<std::string> changed_options(const Experiment& experiment) {
   std::set<std::string> keys;
   for (const compare::Variant& variant : experiment.variants)

@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
               "command again, which runs again what that concerns");
 }
 
-/// The folder, or the seed, of each case by its name.
+/// The folder or the seed of each case, by its name.
 std::map<std::string, std::string> cases_of(const compare::Experiment& experiment) {
   std::map<std::string, std::string> cases;
   for (const compare::ExperimentCase& one : experiment.cases)
@@ -23,7 +23,7 @@ std::map<std::string, std::string> cases_of(const compare::Experiment& experimen
   return cases;
 }
 
-/// The first case that only one of them has.
+/// The first case in which the two experiments differ. Empty if there is none.
 std::string difference(const compare::Experiment& before, const compare::Experiment& now) {
   const auto old_cases = cases_of(before), new_cases = cases_of(now);
   for (const auto& one : old_cases)

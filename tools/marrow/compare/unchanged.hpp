@@ -8,12 +8,13 @@
 
 namespace marrow::cli {
 
-/// Each process of a comparison reads for itself what it needs: where that changes meanwhile, not all go by the same.
+/// Checks that nothing changed while a comparison ran. Each process of a comparison reads the files for itself. If a
+/// file changes meanwhile, the processes do not all use the same content.
 class Unchanged {
  public:
-  /// Reads the files that say what is run.
+  /// Reads the files that define the comparison.
   explicit Unchanged(const compare::Experiment& experiment);
-  /// Throws Error, which names what changed.
+  /// Throws Error if something changed, and names it.
   void check(const compare::Dependencies& dependencies) const;
 
  private:

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A worker process of a comparison: makes cases and runs, times and draws cells.
+// A worker process of a comparison. It makes cases, and it runs, times and draws cells.
 #include <algorithm>
 
 #include "command_options.hpp"
@@ -22,8 +22,9 @@ using nlohmann::json;
   throw Error(what + " changed while the comparison ran; run it again");
 }
 
-/// Between the asking process's look at the experiment and this one's, cases may have come and gone, and files have
-/// changed: the cell is asked for by its name and by the key of all that it depends on.
+/// The requested cell. Cases and files may have changed between the time when the main process read the experiment and
+/// the time when this process read it. So a request has the cell's name and the key of everything that the cell depends
+/// on.
 CellIndex cell_in(CellRunner& runner, const json& asked) {
   const std::string id = asked.at("cell");
   const auto cell = compare::cell_of(runner.experiment(), id);
@@ -41,7 +42,7 @@ void make_case(CellRunner& runner, const json& asked) {
   runner.case_folder(index);
 }
 
-/// Tells where a run is, and when it waits for another one.
+/// Reports the current node of a run, and whether the run waits for another one.
 std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
   return [&reports](const RunEvent& event) {
     const std::string item = event.item.empty() ? "" : " (" + event.item + ")";
@@ -53,7 +54,8 @@ std::function<void(const RunEvent&)> observer_of(WorkerReports& reports) {
   };
 }
 
-/// What a task makes, or why the system granted no process for it, which is no failure of what is compared.
+/// The result of a task. If the system gave it no process, the reason instead, because this is not a failure of the
+/// cell.
 json with_processes(const std::function<json()>& task) {
   const long before = calls_without_process();
   try {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// marrow conformance: runs the suite of a node's kind in a worker, so that a node that crashes or hangs fails that
-// check and no other.
+// marrow conformance: runs the suite of a node's kind in a worker process. So if a node crashes or hangs, only this
+// check fails.
 #include <stdlib.h>
 
 #include <algorithm>
@@ -31,7 +31,7 @@ bool is_in(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
-/// Seconds that one check may take.
+/// Time limit of one check in seconds.
 int time_limit_s() {
   const char* text = std::getenv("MARROW_CHECK_SECONDS");
   const int seconds = text ? std::atoi(text) : 0;
@@ -43,8 +43,8 @@ struct Outcome {
   std::string text;
 };
 
-/// In the worker: the values that other nodes make for inputs that the kind does not have, port by port. Those nodes
-/// are called with the inputs of their own kind's suite, which `kept` keeps alive for what refers to them.
+/// In the worker: values from other nodes for inputs that the kind does not have, by port. These nodes get the inputs
+/// of their own kind's suite. `kept` keeps these inputs alive, because the values may refer to them.
 conformance::Inputs further_inputs(const Catalogue& catalogue, const NodeDefinition& node, const json& makers,
                                    std::vector<conformance::Inputs>& kept) {
   conformance::Inputs further;
@@ -67,7 +67,7 @@ conformance::Inputs further_inputs(const Catalogue& catalogue, const NodeDefinit
   return further;
 }
 
-/// In the worker: the verdict and the text after it.
+/// In the worker: a text that begins with the verdict character.
 std::string measured(const Catalogue& catalogue, const NodeDefinition& node, const json& makers,
                      const OptionValues& options, const Check& check) {
   try {
@@ -85,8 +85,8 @@ std::string measured(const Catalogue& catalogue, const NodeDefinition& node, con
   }
 }
 
-/// For files that checks write. Under a name that nobody could foresee, so that nothing was laid there, and for this
-/// user alone. Removed here and not by a worker, which may crash or be ended.
+/// A folder for files that checks write. Its name is unpredictable, so nobody can have put files there before, and only
+/// this user can access it. It is removed here and not by a worker, because a worker may crash or be killed.
 class FilesFolder {
  public:
   FilesFolder() : path_((std::filesystem::temp_directory_path() / "marrow-conformance-XXXXXX").string()) {
@@ -107,7 +107,7 @@ class FilesFolder {
   std::string path_;
 };
 
-/// The checks of one node, one after the other in a worker.
+/// Runs the checks of one node, one after the other, in a worker.
 class Checks {
  public:
   Checks(std::string node, json makers, const FilesFolder& files, const std::atomic<bool>& stopped)
@@ -116,7 +116,7 @@ class Checks {
   Outcome run(std::size_t number) {
     const bool was_fresh = !worker_;
     WorkerEnd end = ask(number);
-    // What an earlier check did to the process is not this check's failure.
+    // An earlier check may have damaged the process. So this check is tried again in a new process.
     if (end.died && !end.is_late && !was_fresh) end = ask(number);
     if (end.is_late) return {'-', "it took longer than " + std::to_string(time_limit_s()) + " s"};
     if (end.signal) return {'-', std::string("it crashed: ") + strsignal(end.signal)};
@@ -132,19 +132,19 @@ class Checks {
           WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker", files_.path()}});
     worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"check", number}});
     const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
-    if (stopped_.load()) throw Cancelled();  // a terminal's Ctrl-C ends the worker, too
+    if (stopped_.load()) throw Cancelled();  // Ctrl-C in a terminal ends the worker too
     if (end.died) worker_.reset();
     return end;
   }
 
   std::string node_;
-  json makers_;  ///< of inputs that the kind does not have: the names of nodes, by port
+  json makers_;  ///< for inputs that the kind does not have: names of nodes, by port
   const FilesFolder& files_;
   const std::atomic<bool>& stopped_;
   std::unique_ptr<Worker> worker_;
 };
 
-/// The names of the nodes meant by a node's name, a kind or a library's file.
+/// The names of all nodes that are meant by the name of a node, of a kind or of a library's file.
 std::vector<std::string> nodes_of(const Catalogue& catalogue, const std::string& what) {
   const auto is_meant = [&](const LibraryInfo& library) {
     std::error_code error;
@@ -177,8 +177,7 @@ int check_worker(const std::filesystem::path& files_folder) {
                         }}});
 }
 
-/// A library that is named by its file is found wherever it lies, by this process and its workers: its folder is
-/// searched as well.
+/// If a library is named by its file, adds its folder to the folders that this process and its workers search.
 void search_folders_of(const std::vector<std::string>& subjects) {
   for (const std::string& subject : subjects) {
     std::error_code error;
@@ -190,13 +189,13 @@ void search_folders_of(const std::vector<std::string>& subjects) {
   }
 }
 
-/// Of the suite of a node's kind; none where there is no suite.
+/// The checks in the suite of a node's kind. Empty if there is no suite.
 std::vector<CheckInfo> checks_for(const std::string& node, const Catalogue& catalogue) {
   const KindInfo* kind = catalogue.find_kind(catalogue.find(node)->kind());
   return kind ? kind->checks : std::vector<CheckInfo>{};
 }
 
-/// Throws Error for a name that no node's suite has.
+/// Throws Error if a wanted check is in no suite of the nodes.
 void expect_known(const std::vector<std::string>& wanted, const Catalogue& catalogue,
                   const std::vector<std::string>& nodes) {
   std::vector<std::string> known;
@@ -207,7 +206,7 @@ void expect_known(const std::vector<std::string>& wanted, const Catalogue& catal
     if (!is_in(known, name)) throw Error("there is no check '" + name + "'; " + suggestion(name, known));
 }
 
-/// Runs the wanted checks of a node, or all where none are named, and counts their verdicts.
+/// Runs the wanted checks of a node, or all if none are named, and counts their verdicts.
 void check_node(const std::string& node, const std::vector<CheckInfo>& all, const std::vector<std::string>& wanted,
                 Checks& checks, std::map<char, int>& count) {
   std::printf("%s\n", node.c_str());
@@ -224,7 +223,7 @@ void check_node(const std::string& node, const std::vector<CheckInfo>& all, cons
   }
 }
 
-/// {"port": "kind.name"} of port=kind.name. Throws Error for another form.
+/// Converts texts of the form port=kind.name to {"port": "kind.name"}. Throws Error for any other form.
 json makers_of(const std::vector<std::string>& texts) {
   json makers = json::object();
   for (const std::string& text : texts) {

@@ -28,7 +28,7 @@ double percent(std::size_t part, std::size_t all) { return all ? 100.0 * double(
 template <class T>
 void compare(const T& a, const T& b, Amount& amount);
 
-/// A part of a value, under its own name.
+/// Compares a part of a value and adds the result under the part's name.
 template <class T>
 void compare_part(const std::string& name, const T& a, const T& b, Amount& amount) {
   if (hash_of(a) == hash_of(b)) return;
@@ -49,7 +49,7 @@ void compare_lists(const std::string& what, const List<T>& a, const List<T>& b, 
     if (!a.find(name)) amount.lines.push_back(what + " " + name + ": it was not there");
 }
 
-/// Any type, number by number.
+/// Compares values of any type, number by number.
 template <class T>
 void compare_numbers(const T& a, const T& b, Amount& amount) {
   NumberDifference numbers;
@@ -170,7 +170,7 @@ void add_samples(const NumberDifference& numbers, const char* what, const char* 
                               percent(numbers.differ, numbers.count), numbers.largest, unit));
 }
 
-/// Samples on grids; where those differ in size, samples cannot be matched.
+/// Compares samples on grids. If the grids differ in size, the samples cannot be matched.
 void compare_grids(const Grid& a, const Grid& b, const std::vector<float>& values_a, const std::vector<float>& values_b,
                    const char* unit, Amount& amount) {
   amount.facts["size"] = {a.size, b.size};
@@ -208,7 +208,7 @@ void compare_pixels(const cv::Mat& a, const cv::Mat& b, Amount& amount) {
   NumberDifference numbers;
   numbers.add(a, b);
   numbers.count = a.total();
-  numbers.differ = 0;  // pixels, not channels
+  numbers.differ = 0;  // count pixels, not channels
   for (int row = 0; row < a.rows; ++row)
     for (int column = 0; column < a.cols; ++column)
       numbers.differ += std::memcmp(a.ptr(row, column), b.ptr(row, column), a.elemSize()) != 0;
@@ -242,7 +242,7 @@ void compare_edges(const EdgeMap& a, const EdgeMap& b, Amount& amount) {
         text("%zu of the %zu common ones differ, their places by at most %.4g px", changed, common, largest_px));
 }
 
-/// How far the line's ends are from the other line, and the angle between them.
+/// Compares two lines: the largest distance of an end from the other line, and the angle between them.
 void compare_lines(const std::string& name, const LineSegment& a, const LineSegment& b, Amount& amount) {
   const Eigen::Vector2d along = (a.to_px - a.from_px).normalized(), now_along = (b.to_px - b.from_px).normalized();
   const auto cross = [](const Eigen::Vector2d& p, const Eigen::Vector2d& q) { return p.x() * q.y() - p.y() * q.x(); };
@@ -300,7 +300,7 @@ void compare(const T& a, const T& b, Amount& amount) {
   }
 }
 
-/// Compares as the one of the types that the values are of.
+/// Compares two values as the type T that they have.
 template <class... T>
 void compare_as_any_of(const Value& before, const Value& now, Amount& amount) {
   ((before.type == TypeInfo::of<T>() && (compare(before.as<T>(), now.as<T>(), amount), true)) || ...);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// By how much two values differ, in the terms of the field: degrees and mm, figures of merit, samples.
+// The amount by which two values differ, in terms of the field: degrees and mm, figures of merit, samples.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -15,13 +15,12 @@ struct Amount {
   nlohmann::json facts = nlohmann::json::object();  ///< for scripts
 };
 
-/// Of two items of the types that all plugins share. Empty lines where the type is another, or the two are of different
-/// types.
+/// For two items of a type that all plugins share. `lines` is empty if the type is another one, or if the types differ.
 Amount amount_of(const Value& before, const Value& now);
 
-/// Of values of which nothing is known but their bytes: `what` names those.
+/// For values of which only the bytes are known. `what` names the bytes in the text.
 Amount amount_of_bytes(const std::string& before, const std::string& now, const std::string& what);
-/// The same of two files, which may be larger than the memory.
+/// The same for two files, which may be larger than the memory.
 Amount amount_of_files(const std::filesystem::path& before, const std::filesystem::path& now);
 
 }  // namespace marrow::cli

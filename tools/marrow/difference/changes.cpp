@@ -10,7 +10,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A number in the shortest form that means the same; resolved pipelines hold them with 17 digits.
+/// A number in its shortest form with the same value. Resolved pipelines hold numbers with 17 digits.
 std::string shortened(const std::string& text) {
   if (text.starts_with("[") && text.ends_with("]")) {
     std::string result;
@@ -52,7 +52,7 @@ std::string file_or_folder(const std::string& path) {
   return (fs::is_directory(path, error) ? "the folder " : fs::exists(path, error) ? "the file " : "") + path;
 }
 
-constexpr std::size_t kMostFunctions = 1000;  // that a node calls; more would only be in a record that somebody made up
+constexpr std::size_t kMostFunctions = 1000;  // most functions of a node to look at; only a forged record has more
 
 class Comparer {
  public:
@@ -60,7 +60,7 @@ class Comparer {
     for (const RecordedNode& node : before.nodes)
       if (const RecordedNode* other = now.find(node.id); other && came_out_otherwise(node, *other))
         differing_.insert(node.id);
-    for (const RecordedNode& node : now.nodes)  // in an order in which sources come before users
+    for (const RecordedNode& node : now.nodes)  // in an order in which sources come before the nodes that use them
       if (const RecordedNode* old = before.find(node.id); old && takes_differing(*old, node))
         following_.insert(node.id);
   }
@@ -90,19 +90,19 @@ class Comparer {
   }
 
  private:
-  /// Functions have no content that could be compared: what they lead to counts.
+  /// Whether a node has another result. Functions have no content to compare; only their effect on data counts.
   static bool came_out_otherwise(const RecordedNode& before, const RecordedNode& now) {
     if (before.went_well() != now.went_well() || (!now.went_well() && before.status != now.status)) return true;
     if (now.status == "failed" && before.reason != now.reason) return true;
     const auto a = before.data(), b = now.data();
     const bool went_well = before.went_well();
-    if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // whatever their names
+    if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // their names may differ
     return !std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const RecordedOutput* x, const RecordedOutput* y) {
       return x->name == y->name && !is_other(*x, *y, went_well);
     });
   }
 
-  /// Of nodes that failed, or were never run, what they made nevertheless counts.
+  /// Whether an output differs. For nodes that failed or did not run, only the items that exist are compared.
   static bool is_other(const RecordedOutput& before, const RecordedOutput& now, bool went_well) {
     if (went_well || before.key == now.key) return before.key != now.key;
     const auto present = [](const RecordedOutput& output) {
@@ -119,13 +119,13 @@ class Comparer {
                        [](const RecordedOutput& a, const RecordedOutput& b) { return a.key == b.key; });
   }
 
-  /// Whether an input that is wired alike in both runs brought other values.
+  /// Whether an input with the same wire in both runs got another value.
   bool input_differs(const RecordedNode& before, const RecordedNode& now, const std::string& port) const {
     const std::string *a = find_in(before.input_keys, port), *b = find_in(now.input_keys, port);
     return a && b && *a != *b;
   }
 
-  /// Calls visit(port, source before, source now) for each input that is wired alike and brought other values.
+  /// Calls visit(port, source before, source now) for each input with the same wire and another value.
   template <class Visit>
   void for_changed_inputs(const RecordedNode& before, const RecordedNode& now, const Visit& visit) const {
     for (const auto& [port, wire] : now.wires) {
@@ -136,7 +136,7 @@ class Comparer {
     }
   }
 
-  /// Whether data that the node takes, itself or through functions that it calls, differ.
+  /// Whether the node takes data that differ, directly or through functions that it calls.
   bool takes_differing(const RecordedNode& before, const RecordedNode& now) const {
     bool result = false;
     for_changed_inputs(before, now, [&](const std::string&, const RecordedNode&, const RecordedNode& from) {
@@ -153,7 +153,7 @@ class Comparer {
     return why;
   }
 
-  /// `seen` are the functions that were looked at.
+  /// `seen`: the functions that were looked at already.
   void add_reasons(const RecordedNode& before, const RecordedNode& now, const std::string& through,
                    std::set<std::string>& seen, std::vector<Change>& why) const {
     const auto add = [&](Change change) {
@@ -204,7 +204,7 @@ class Comparer {
     return change;
   }
 
-  /// Why an option may make a difference; empty where it does not. Paths count by the content of what they name.
+  /// The change of an option, in words. Empty if it has no effect. A path counts by the content that it names.
   static std::string option_change(const RecordedNode& before, const RecordedNode& now, const std::string& name) {
     const std::string *old_text = find_in(before.options, name), *text = find_in(now.options, name),
                       option = "option '" + name + "'";
@@ -223,7 +223,7 @@ class Comparer {
     return is_was(option, old_text ? &old_short : nullptr, text ? &now_short : nullptr);
   }
 
-  /// Inputs that are wired to something else; with `by_value` only those that brought other values.
+  /// Inputs with another wire. With `by_value`, only those that got another value.
   std::vector<Change> other_wires(const RecordedNode& before, const RecordedNode& now, bool by_value) const {
     std::vector<Change> changes;
     for (const std::string& port : names_in(before.wires, now.wires)) {
@@ -287,8 +287,8 @@ class Comparer {
 
   const RunRecord& before_;
   const RunRecord& now_;
-  std::set<std::string> differing_;  ///< nodes in both runs whose data or fate differ
-  std::set<std::string> following_;  ///< nodes in both runs that take data which differ
+  std::set<std::string> differing_;  ///< nodes in both runs whose data or status differ
+  std::set<std::string> following_;  ///< nodes in both runs that take differing data
 };
 
 }  // namespace

@@ -15,7 +15,7 @@ const T* named(const std::vector<T>& list, const std::string& name) {
   return found == list.end() ? nullptr : &*found;
 }
 
-/// Where the values of a run are to be found.
+/// The files and nodes in which the values of a run can be found.
 class Places {
  public:
   explicit Places(const RunRecord& run) : folder_(run.folder) {
@@ -35,7 +35,7 @@ class Places {
  private:
   fs::path folder_;
   std::map<std::string, std::pair<const RecordedResult*, std::string>>
-      files_;  ///< an output and the place of an item in it
+      files_;  ///< by key: an output, and the place of the item in it
   std::map<std::string, std::string> makers_;
 };
 
@@ -44,7 +44,7 @@ class Finder {
   Finder(const Findings& findings, KnownValues& values)
       : before_(findings.before), now_(findings.now), values_(values) {}
 
-  /// Items that are absent in both runs do not count, nor do outputs that a run does not have at all.
+  /// Compares the items of an output. Items that are absent in both runs do not count.
   OutputDifference compare(const std::string& name, const std::vector<RecordedItem>& before,
                            const std::vector<RecordedItem>& now) {
     OutputDifference difference{name, {}, {}, 0};
@@ -80,14 +80,14 @@ class Finder {
   KnownValues& values_;
 };
 
-/// Why an output could not be written; of one that was not made, the nodes say why.
+/// Whether the text says why an output could not be written. If an output was not made, the nodes say why.
 bool is_fault(const std::string& text) { return !text.empty() && !text.starts_with("not made"); }
 
-/// The node's outputs that differ.
+/// The outputs of a root that differ.
 std::vector<OutputDifference> outputs_of(const Root& root, Finder& finder) {
   std::vector<OutputDifference> differences;
   const auto before = root.before->data(), now = root.now->data();
-  const bool only_ones = before.size() == 1 && now.size() == 1;  // another node may name its only output otherwise
+  const bool only_ones = before.size() == 1 && now.size() == 1;  // another node may name its only output differently
   for (const RecordedOutput* output : now) {
     const auto old = std::find_if(before.begin(), before.end(),
                                   [&](const RecordedOutput* one) { return only_ones || one->name == output->name; });

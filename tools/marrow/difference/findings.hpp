@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// All that is to be said of two runs, for people and for scripts.
+// All differences between two runs, for people and for scripts.
 #include <nlohmann/json.hpp>
 
 #include "difference/changes.hpp"
@@ -11,7 +11,7 @@ namespace marrow::cli {
 inline constexpr const char *kIsNotThere = "it is not there", *kWasNotThere = "it was not there";
 
 struct ItemDifference {
-  std::string place;  ///< along the axes; empty outside lists
+  std::string place;  ///< the item's place along the axes; empty outside lists
   std::string key_before, key_now;
   Amount amount;
 };
@@ -20,18 +20,18 @@ struct ItemDifference {
 struct OutputDifference {
   std::string name;
   std::vector<ItemDifference> items;
-  std::vector<std::string> notes;  ///< it is only in one run, could not be written in one
-  std::size_t same = 0;            ///< items
+  std::vector<std::string> notes;  ///< for example: it could not be written in one run
+  std::size_t same = 0;            ///< number of items that are the same
 
   bool is_none() const { return items.empty() && notes.empty(); }
 };
 
 struct Findings {
   RunRecord before, now;
-  RunDifference difference;               ///< refers to nodes of both
-  std::vector<OutputDifference> first;    ///< outputs of the first root that differ
-  std::vector<OutputDifference> results;  ///< of the run, all of them
-  std::vector<std::string> damaged;       ///< files of either run that are not what it wrote
+  RunDifference difference;               ///< refers to nodes of both runs
+  std::vector<OutputDifference> first;    ///< differing outputs of the first root
+  std::vector<OutputDifference> results;  ///< all outputs of the run
+  std::vector<std::string> damaged;       ///< files of either run that are missing or changed since it wrote them
 
   bool identical() const;
   Findings(RunRecord before, RunRecord now);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What is said of two runs to people.
+// Prints the differences between two runs for people.
 #include <algorithm>
 #include <cstdio>
 #include <set>
@@ -37,7 +37,7 @@ std::string label_of(const OutputDifference& output, const ItemDifference& item)
   return printable(item.place.empty() ? output.name : output.name + " " + item.place);
 }
 
-/// What became of a node, where that is another thing than in the other run.
+/// The status of a node, if it is another one than in the other run. Otherwise "differ".
 std::string fate_of(const Findings& findings, const std::string& id) {
   const RecordedNode &before = *findings.before.find(id), &now = *findings.now.find(id);
   if (!now.went_well() && now.status != before.status) return now.status;
@@ -59,14 +59,14 @@ void print_consequences(const Findings& findings) {
     if (!names.empty()) std::printf("In consequence %s: %s\n", fate.c_str(), joined(names).c_str());
 }
 
-/// Whether all that one run has of it is missing in the other, whose nodes say why.
+/// Whether all items of an output are missing in one of the runs. The nodes of that run say why.
 bool is_only_missing(const OutputDifference& output, const char* text) {
   return !output.same && !output.items.empty() &&
          std::all_of(output.items.begin(), output.items.end(),
                      [&](const ItemDifference& item) { return item.amount.lines == std::vector<std::string>{text}; });
 }
 
-/// Of a node that failed: without the outputs that one run does not have at all.
+/// For a failed node: leaves out the outputs that one run does not have at all.
 std::vector<OutputDifference> partly_there(std::vector<OutputDifference> outputs) {
   std::erase_if(outputs, [](const OutputDifference& output) {
     return is_only_missing(output, kIsNotThere) || is_only_missing(output, kWasNotThere);
@@ -74,7 +74,7 @@ std::vector<OutputDifference> partly_there(std::vector<OutputDifference> outputs
   return outputs;
 }
 
-/// Items whose values were shown already are only named.
+/// Values that were shown already are only named.
 void print_outputs(const std::vector<OutputDifference>& outputs, std::set<std::pair<std::string, std::string>>& shown) {
   std::size_t width = 0;
   for (const OutputDifference& output : outputs)

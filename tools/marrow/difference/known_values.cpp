@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "marrow/domain/yaml.hpp"
 #include "marrow/runtime/types.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/text_file.hpp"
@@ -24,46 +24,24 @@ Metrics metrics_of(const json& file) {
   return metrics;
 }
 
-/// What a pose's file says of its place; not its predicted deviations.
-Pose pose_of(const YAML::Node& file) {
-  Pose pose;
-  pose.world_from_model.target = file["target"].as<std::string>();
-  pose.world_from_model.source = file["source"].as<std::string>();
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) {
-      pose.world_from_model.rotation(row, column) = file["matrix"][row][column].as<double>();
-      pose.frame.axes(row, column) = file["fragment_frame"]["axes"][row][column].as<double>();
-    }
-    pose.world_from_model.translation_mm[row] = file["matrix"][row][3].as<double>();
-    pose.frame.origin_mm[row] = file["fragment_frame"]["origin_mm"][row].as<double>();
-  }
-  pose.cost = file["cost"].as<double>(std::nan(""));
-  pose.evaluations = file["evaluations"].as<int>();
-  for (const YAML::Node& warning : file["warnings"]) pose.warnings.push_back(warning.as<std::string>());
-  return pose;
-}
-
-/// Of 8 bits; nothing for a PNG of 16.
+/// Reads a picture of 8 bits. Nothing for a PNG of 16 bits.
 std::optional<Picture> picture_of(const fs::path& file) {
   RgbPixels pixels = read_png(file);
   if (pixels.is_wide) return std::nullopt;
   return Picture{cv::Mat(pixels.height_px, pixels.width_px, CV_8UC3, pixels.bytes.data()).clone()};
 }
 
-/// The value that a file of outputs/ holds, where this program can read it.
+/// The value in a file of outputs/, if this program can read it.
 std::optional<Value> value_of_file(const fs::path& file) {
   const std::string extension = file.extension().string();
   try {
     if (extension == ".json")
       return Value::of(std::make_shared<const Metrics>(
           metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
-    if (extension == ".yaml") {
-      const YAML::Node yaml = parse_yaml(read_text_file(file, kMostSourceBytes));
-      if (yaml["marrow-pose"]) return Value::of(std::make_shared<const Pose>(pose_of(yaml)));
-    }
+    if (extension == ".yaml") return Value::of(std::make_shared<const Pose>(files::read_pose_file(file)));
     if (extension == ".png")
       if (auto picture = picture_of(file)) return Value::of(std::make_shared<const Picture>(std::move(*picture)));
-  } catch (const std::exception&) {  // of another kind, or damaged: its bytes are compared
+  } catch (const std::exception&) {  // of another kind, or damaged; its bytes are compared instead
   }
   return std::nullopt;
 }
@@ -73,7 +51,7 @@ bool is_file(const fs::path& path) {
   return !path.empty() && fs::is_regular_file(path, error);
 }
 
-/// Takes the items of lists apart.
+/// Calls visit for each single item of a value, also in nested lists.
 template <class Visit>
 void for_items(const Value& value, const Visit& visit) {
   if (!value.is_list()) return visit(value);
@@ -112,7 +90,7 @@ std::optional<Value> KnownValues::find(const std::string& key) {
   return found;
 }
 
-/// The bytes of a value of a plugin's own type, which only that plugin can read.
+/// The bytes of a value whose type belongs to a plugin. Only this plugin can read the value.
 std::optional<std::string> KnownValues::packed(const Value& value, const std::string& uses) {
   if (!catalogue_) catalogue_ = std::make_unique<Catalogue>();
   if (!catalogue_->find(uses)) return std::nullopt;
@@ -135,7 +113,7 @@ std::optional<Amount> KnownValues::amount_of_values(const Value& before, const V
                     {{"types", {before.type.id, now.type.id}}}};
     const auto bytes_before = packed(before, made_before.uses), bytes_now = packed(now, made_now.uses);
     if (bytes_before && bytes_now) return amount_of_bytes(*bytes_before, *bytes_now, "the " + now.type.id);
-  } catch (const Error&) {  // damaged, just removed, or of another layout
+  } catch (const Error&) {  // damaged, removed just now, or with another layout
   }
   return std::nullopt;
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The values that runs came to, as far as they are still to be had.
+// The values that runs computed, as far as they still exist.
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -13,18 +13,18 @@
 
 namespace marrow::cli {
 
-/// One value of one run, and where it may be found.
+/// One value of one run, and where it can be found.
 struct ValueOfRun {
   std::string key;
-  std::filesystem::path file;  ///< below outputs/; empty where the run wrote none
+  std::filesystem::path file;  ///< file below outputs/; empty if the run wrote none
   std::string uses;            ///< the node that made it
 };
 
 class KnownValues {
  public:
-  /// Keeps a value of a run that was made in this process, with all its items.
+  /// Keeps a value that a run in this process computed, with all its items.
   void add(const Value& value);
-  /// By how much two values differ. Says so where it comes from files, and where nothing but the keys is left.
+  /// The amount by which two values differ. The text says if it comes from files, or if only the keys are known.
   Amount amount(const ValueOfRun& before, const ValueOfRun& now);
 
  private:
@@ -35,8 +35,8 @@ class KnownValues {
 
   std::map<std::string, Value> held_;
   Store store_;
-  std::optional<std::map<std::string, Digest>> entries_;  ///< of the store, by the keys of what they hold
-  std::unique_ptr<Catalogue> catalogue_;                  ///< made when a value of a plugin's own type is met
+  std::optional<std::map<std::string, Digest>> entries_;  ///< entries of the store, by the keys of their outputs
+  std::unique_ptr<Catalogue> catalogue_;  ///< made when the first value with a plugin's own type is found
 };
 
 }  // namespace marrow::cli

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Two values of any type that has fields(), compared number by number.
+// Compares two values of any type with fields(), number by number.
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -9,11 +9,11 @@
 namespace marrow::cli {
 
 struct NumberDifference {
-  std::size_t count = 0;  ///< numbers, as long as both have the same shape
+  std::size_t count = 0;  ///< number of numbers, as far as both values have the same shape
   std::size_t differ = 0;
-  double largest = 0;      ///< of the differences; infinite where a number became finite or not
-  std::size_t texts = 0;   ///< that differ
-  bool same_shape = true;  ///< lists, images, optional values are of equal size
+  double largest = 0;      ///< largest difference; infinite if a number is finite in one value only
+  std::size_t texts = 0;   ///< number of texts that differ
+  bool same_shape = true;  ///< lists, images and optional values have the same sizes
 
   template <class T>
   void add(const T& a, const T& b) {

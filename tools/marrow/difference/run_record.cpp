@@ -20,7 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// A scalar as it is written, a list as [a, b].
+/// A scalar as it is written, or a list as [a, b].
 std::string text_of(const YAML::Node& value) {
   if (!value.IsSequence()) return value.IsScalar() ? value.Scalar() : "";
   std::string text;
@@ -40,7 +40,7 @@ RecordedWire wire_of(const YAML::Node& value) {
   return wire;
 }
 
-/// A key, or a content: 32 hexadecimal digits.
+/// A key or the digest of a content: 32 hexadecimal digits.
 std::string digest_of(const json& value) {
   const std::string text = value;
   if (text.size() != 32 || text.find_first_not_of("0123456789abcdef") != std::string::npos)
@@ -48,7 +48,7 @@ std::string digest_of(const json& value) {
   return text;
 }
 
-/// Of a plugin or the framework; empty where a node has none.
+/// Build id of a plugin or of the framework. Empty if there is none.
 std::string build_id_of(const json& object, const char* name) {
   return object.contains(name) ? digest_of(object[name]) : "";
 }
@@ -77,7 +77,7 @@ json map_in(const json& object, const char* name) {
   return map;
 }
 
-/// What reading a file may use; 0 where the run had no such limit.
+/// A limit for reading files. 0 if the run had no such limit.
 double limit_in(const json& record, const char* name) {
   if (!record.contains(name)) return 0;
   const double limit = record[name].is_number() ? record[name].get<double>() : 0;
@@ -113,7 +113,7 @@ void add_record(const json& recorded, RecordedNode& node) {
   throw Error(file.string() + " is not what 'marrow run' wrote: " + why + "; run it again");
 }
 
-/// The resolved pipeline that the run wrote, read with all that could bring a reader down refused.
+/// The resolved pipeline that the run wrote. Anything that could crash the reader is refused.
 YAML::Node pipeline_of(const fs::path& file) {
   Diagnostics faults;
   YAML::Node pipeline;
@@ -128,7 +128,7 @@ YAML::Node pipeline_of(const fs::path& file) {
   return pipeline;
 }
 
-/// The nodes of the resolved pipeline that the run's record speaks of.
+/// Reads the nodes of the resolved pipeline that are in the run's record.
 void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
   std::map<std::string, const json*> recorded;
   if (!record.at("nodes").is_array()) throw Error("its 'nodes' is no list");
@@ -162,7 +162,7 @@ void check_age(const fs::path& folder, const json& record) {
 bool holds(const fs::path& file, const std::string& content) {
   try {
     return content_of(file).hex() == content;
-  } catch (const Error&) {  // it could be read once
+  } catch (const Error&) {  // the file can no longer be read
     return false;
   }
 }
@@ -209,7 +209,7 @@ fs::path RecordedResult::file_of(const fs::path& folder, const std::string& plac
   std::size_t at = 0;
   const std::size_t present = std::size_t(
       std::count_if(items.begin(), items.end(), [](const RecordedItem& item) { return !item.is_absent(); }));
-  if (present != files.size()) return {};  // one of them could not be written
+  if (present != files.size()) return {};  // one of the files could not be written
   for (const RecordedItem& item : items) {
     if (item.is_absent()) continue;
     if (item.place == place) {
@@ -269,7 +269,7 @@ RunRecord read_run(const fs::path& folder) {
     refuse_record(folder, fault.what());
   } catch (const json::exception&) {
     refuse_record(folder, "what it should say is missing in it, or of another type");
-  } catch (const YAML::Exception&) {  // which speaks of its own operators
+  } catch (const YAML::Exception&) {  // its own message would name operators of yaml-cpp
     refuse_pipeline(folder / "pipeline.yaml", "what it should say is missing in it, or of another type");
   }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the folder of a run says of it. Read without any plugin, so that runs of plugins that are gone can be looked at
+// The record of a run, read from its folder. No plugin is needed, so runs of plugins that no longer exist can be read
 // too.
 #include <filesystem>
 #include <map>
@@ -13,8 +13,8 @@
 
 namespace marrow::cli {
 
-/// A single value: its place along the axes ("distal/final"; empty outside lists) and its key, which is zero for an
-/// absent one.
+/// A single value: its place along the axes ("distal/final"; empty outside lists) and its key. The key of an absent
+/// value is zero.
 struct RecordedItem {
   std::string place, key;
   bool is_absent() const { return key.find_first_not_of('0') == std::string::npos; }
@@ -28,7 +28,7 @@ struct RecordedOutput {
 
 struct RecordedWire {
   std::string text;               ///< "case.views", "[a, b]"
-  std::vector<std::string> from;  ///< nodes
+  std::vector<std::string> from;  ///< the nodes that it comes from
 };
 
 struct RecordedNode {
@@ -38,22 +38,22 @@ struct RecordedNode {
   std::map<std::string, RecordedWire> wires;      ///< by port
   std::map<std::string, std::string> input_keys;  ///< by port
   std::map<std::string, std::optional<std::string>>
-      files;  ///< content of what an option of type path names; nothing where it was not there
+      files;  ///< by option of type path: digest of the content that it names; nothing if that did not exist
   std::vector<RecordedOutput> outputs;
 
   bool went_well() const { return status == "done" || status == "not needed"; }
   bool makes_data() const { return !data().empty(); }
-  /// Its outputs that are no functions.
+  /// Its outputs that are not functions.
   std::vector<const RecordedOutput*> data() const;
 };
 
 struct RecordedResult {
   std::string name, fault;
   std::vector<RecordedItem> items;
-  std::vector<std::string> files;     ///< below the folder, in the order of the items that are not absent
-  std::vector<std::string> contents;  ///< of the files when they were written; empty where that is not known
+  std::vector<std::string> files;     ///< paths in the folder, in the order of the items that are not absent
+  std::vector<std::string> contents;  ///< digests of the files when they were written; empty if not known
 
-  /// The file that holds an item; empty where it cannot be told.
+  /// The file of an item. Empty if it is not known.
   std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& place) const;
 };
 
@@ -65,17 +65,17 @@ struct RunRecord {
   FileLimits file_limits;
   PipelineArguments arguments;
   std::map<std::string, std::string> plugins;  ///< file name -> build id
-  std::vector<RecordedNode> nodes;             ///< that took part, in the pipeline's order
-  std::map<std::string, std::size_t> places;   ///< in it, by the nodes' ids
+  std::vector<RecordedNode> nodes;             ///< nodes of the run, in the pipeline's order
+  std::map<std::string, std::size_t> places;   ///< index in `nodes`, by the node's id
   std::vector<RecordedResult> results;
 
   const RecordedNode* find(const std::string& id) const;
 };
 
-/// The files below outputs/ that are not there any more, or not as the run wrote them, each in a sentence.
+/// A sentence for each file below outputs/ that is missing or was changed since the run wrote it.
 std::vector<std::string> damaged_files(const RunRecord& run);
 
-/// Throws Error for a folder that no run has written, or whose files cannot be read.
+/// Throws Error if no run wrote the folder, or if its files cannot be read.
 RunRecord read_run(const std::filesystem::path& folder);
 
 }  // namespace marrow::cli

@@ -18,7 +18,7 @@ std::string text_of_file(const fs::path& file) {
   try {
     return read_text_file(file, kMostSourceBytes);
   } catch (const Error&) {
-    return "";  // the page does without
+    return "";  // the page is written without it
   }
 }
 
@@ -146,7 +146,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
 
   ReportMaterial material;
   const std::size_t starts = experiment.starts.size(), variants = experiment.variants.size();
-  for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of cells: cases, then starts, then variants
+  for (std::size_t i = 0; i < rows.size(); ++i)  // in the order of the cells: by case, by start, by variant
     data["cells"].push_back(
         cell_of_row(experiment, {i % variants, i / variants / starts, i / variants % starts}, rows[i]));
   for (const compare::CellIndex& cell : shown)
@@ -162,7 +162,7 @@ void write_report(const Experiment& experiment, const std::vector<CellRow>& rows
   json record = json::object();
   try {
     if (!shown.empty()) record = read_record(runner.pictures_of(shown.front()));
-  } catch (const Error&) {  // the report does without
+  } catch (const Error&) {  // the report is written without it
   }
   data["marrow"] = record.value("marrow", "");
   data["experiment"]["machine"] = machine_of(record);

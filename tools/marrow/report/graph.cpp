@@ -16,7 +16,7 @@ std::map<std::string, std::string> options_of(const PipelineNode& node) {
   return options;
 }
 
-/// Options that are not at their defaults.
+/// Options whose values are not the defaults.
 json given_options(const PipelineNode& node) {
   json given = json::object();
   for (std::size_t i = 0; i < node.options.size(); ++i) {
@@ -36,7 +36,7 @@ std::string wires_of(const PipelineNode& node) {
   return text;
 }
 
-/// "uses KIND.NAME; high = 80", or nothing where both are the same.
+/// The difference of two nodes, for example "uses KIND.NAME; high = 80". Empty if they are the same.
 std::string difference(const PipelineNode& base, const PipelineNode& other) {
   std::string text;
   const auto add = [&](const std::string& what) { text += (text.empty() ? "" : "; ") + what; };

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the files of a run's folder give a report. Files are told apart by what they say of themselves.
+// Collects the data of a report from the files of a run's folder. The content of a JSON or YAML file tells its kind.
 #include <cstdio>
 #include <fstream>
 #include <sstream>
@@ -27,7 +27,7 @@ std::string id_of(const std::string& content) {
   return hasher.digest().hex().substr(0, 16);
 }
 
-/// The rows "  - [evaluations, cost]" below "convergence:" in a pose's file.
+/// The rows "  - [evaluations, cost]" below "convergence:" in a pose file.
 json convergence_of(const std::string& pose) {
   json steps = json::array();
   std::istringstream lines(pose.substr(std::min(pose.size(), pose.find("\nconvergence:"))));
@@ -68,7 +68,7 @@ void ReportMaterial::add_json(const json& file, json& cell) {
   for (json& view : scene["views"]) {
     const std::string image = view["image"];
     if (!image.starts_with("data:image/"))
-      throw Error("an image of the scene is not in the file itself");  // an address would be fetched
+      throw Error("an image of the scene is not in the file itself");  // a browser would load an address from elsewhere
     view["image"] = id_of(image);
     pictures[id_of(image)] = image;
   }
@@ -103,7 +103,7 @@ void ReportMaterial::add_run(const fs::path& run_folder, json& cell) {
     if (!path) note_if_outside(run_folder, name);
     try {
       if (path) add_file(*path, name, cell);
-    } catch (const std::exception&) {  // a picture of 16 bits as TIFF, a damaged file: the report shows the others
+    } catch (const std::exception&) {  // for example a damaged file; the report shows the others
     }
   }
 }

@@ -2,7 +2,7 @@
 #include "report/report.hpp"
 #include "runtime/text_file.hpp"
 
-// The page without its data, put together by tools/report/assemble.py when marrow is built.
+// The page without its data. tools/report/assemble.py makes it when marrow is built.
 asm(".section .rodata\n"
     ".global marrow_report_page\n"
     ".global marrow_report_page_end\n"
@@ -21,7 +21,7 @@ void write_page(const nlohmann::json& data, const std::filesystem::path& file, K
   const std::string_view page(marrow_report_page, std::size_t(marrow_report_page_end - marrow_report_page));
   const std::size_t at = page.find(kMarker);
   std::string text = data.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
-  // No text among the data may end the script: "<" is written as JSON's escape of it.
+  // No text in the data may end the script, so "<" is written as a JSON escape.
   std::string safe;
   safe.reserve(text.size() + text.size() / 16);
   for (const char c : text) c == '<' ? safe += "\\u003c" : safe += c;

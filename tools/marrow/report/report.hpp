@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// One HTML file that shows a run or a comparison, and needs nothing else. tools/report holds the page, its data.js says
-// what the data are.
+// Writes one HTML file that shows a run or a comparison and needs no other file. The page is in tools/report; data.js
+// there describes the data.
 #include <filesystem>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -12,22 +12,22 @@
 
 namespace marrow::cli {
 
-/// What cells share in a report: pictures, meshes and scenes by the hash of their content.
+/// Data that the cells of a report share: pictures, meshes and scenes, by the hash of their content.
 struct ReportMaterial {
   nlohmann::json pictures = nlohmann::json::object();
   nlohmann::json geometries = nlohmann::json::object();
   nlohmann::json scenes = nlohmann::json::object();
   std::vector<std::string> left_out;  ///< sentences about files that a record names outside its run's folder
-  /// That a file of the run is left out, because its name or a link leads out of the run's folder.
+  /// Adds a sentence to `left_out` if the name of a file, or a link, leads out of the run's folder.
   void note_if_outside(const std::filesystem::path& run_folder, const std::string& name);
   void print_left_out() const;
 
-  /// Adds all that a run's folder holds to look at, and what the run says of it to `cell`. What cannot be read is left
-  /// out.
+  /// Adds all pictures, meshes and scenes in a run's folder, and the data about them to `cell`. Files that cannot be
+  /// read are left out.
   void add_run(const std::filesystem::path& run_folder, nlohmann::json& cell);
-  /// Encoding pictures is what a report takes longest for: keeps what add_run() finds in the folder itself.
+  /// Stores the result of add_run() in the folder itself, because encoding pictures takes most of a report's time.
   static void prepare(const std::filesystem::path& run_folder);
-  /// The same as add_run(), from what prepare() kept where it is there.
+  /// The same as add_run(), but uses the result that prepare() stored, if there is one.
   void add_prepared(const std::filesystem::path& run_folder, nlohmann::json& cell);
 
  private:
@@ -35,24 +35,25 @@ struct ReportMaterial {
   void add_json(const nlohmann::json& file, nlohmann::json& cell);
 };
 
-/// The file as a data URL: a PNG at most `size_px` long, as WebP. Throws Error for a file that is no PNG.
+/// A PNG file as a data URL, converted to WebP with a longer side of at most `size_px`. Throws Error if it is not a
+/// PNG.
 std::string picture_url(const std::filesystem::path& png_file, int size_px);
 
-/// Writes the page with these data in it.
+/// Writes the page with these data.
 void write_page(const nlohmann::json& data, const std::filesystem::path& file, Kinds kinds = Kinds::files);
 
-/// {nodes, edges} of a pipeline, with what each of `variants` makes otherwise.
+/// {nodes, edges} of a pipeline. Each node also has its differences in each of `variants`.
 nlohmann::json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants);
 
-/// What runs say of the machine and the plugins that they used.
+/// Processor and number of cores of this machine, and the processor level from the record of a run.
 nlohmann::json machine_of(const nlohmann::json& run_record);
 
-/// A text as one word of a POSIX shell's command line, whatever is in it.
+/// Any text as one word of a POSIX shell's command line.
 std::string shell_word(const std::string& text);
-/// The same for a path, which is never taken for an option.
+/// The same for a path. It is never taken for an option.
 std::string shell_path(const std::filesystem::path& path);
 
-/// FOLDER/report.html of a comparison; `shown` are the cells whose pictures were made.
+/// Writes FOLDER/report.html of a comparison. `shown`: the cells whose pictures were made.
 void write_report(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows,
                   const Answer& answer, const compare::CellRunner& runner, const std::vector<compare::CellIndex>& shown,
                   const CompareRequest& request, const std::filesystem::path& folder);

@@ -17,7 +17,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-/// The figures of merit in a file; nothing for one of another kind.
+/// The figures of merit in a file. Nothing for files of another kind.
 std::optional<json> metrics_in(const fs::path& folder, const std::string& name) {
   const auto path = file_of_run(folder, name);
   if (!path || path->extension() != ".json") return std::nullopt;
@@ -34,7 +34,7 @@ std::optional<json> metrics_in(const fs::path& folder, const std::string& name) 
   }
 }
 
-/// The figures of merit that the run wrote: a table for each folder of files, a column for each file in it.
+/// The figures of merit that the run wrote: one table for each folder of files, one column for each file in it.
 json figures_of(const fs::path& folder, const json& record) {
   json tables = json::array();
   for (const json& output : record.value("outputs", json::array()))
@@ -66,7 +66,7 @@ json graph_of_run(const fs::path& file) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
   const Pipeline pipeline = read_pipeline(file, {}, catalogue, diagnostics);
-  return diagnostics.empty() ? graph_of(pipeline, {}) : json();  // a plugin that is no longer there
+  return diagnostics.empty() ? graph_of(pipeline, {}) : json();  // for example, a plugin no longer exists
 }
 
 std::string reason_of(const json& record) {
@@ -83,7 +83,7 @@ std::string pipeline_text_of(const fs::path& file) {
   try {
     return read_text_file(file, kMostSourceBytes);
   } catch (const Error&) {
-    return "";  // the page does without
+    return "";  // the page is written without it
   }
 }
 
@@ -131,7 +131,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
   return data;
 }
 
-/// Writes the page of a single run; empty `file` = RUN/report.html.
+/// Writes the page of a single run. An empty `file` means RUN/report.html.
 int show(const fs::path& folder, fs::path file) {
   std::error_code error;
   if (!fs::exists(folder / "run.json", error))

@@ -13,94 +13,96 @@
 
 namespace marrow::compare {
 
-/// What came of one cell.
+/// The result of one cell.
 struct CellRow {
   std::string id, variant, case_name, start;
-  std::string failed;  ///< why; empty for a cell that is done
+  std::string failed;  ///< why it failed; empty for a cell that is done
   int tries = 1;
-  std::vector<std::optional<double>> values;  ///< of the experiment's metrics, in their order
+  std::vector<std::optional<double>> values;  ///< values of the experiment's metrics, in their order
   std::optional<double> initial_error;
-  std::vector<std::string> units;  ///< of the metrics
-  std::optional<double> seconds;   ///< measured with nothing else running; without what all variants share
-  int evaluations = 0;             ///< of the cost, by all poses of the cell
+  std::vector<std::string> units;  ///< units of the metrics
+  std::optional<double> seconds;   ///< measured with nothing else running, without what all variants share
+  int evaluations = 0;             ///< number of cost evaluations, for all poses of the cell
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;
   };
   std::map<std::string, Calls> nodes;  ///< by the node's name in the pipeline
-  std::string key;                     ///< of all that it depends on; another key, and the row is of no use
+  std::string key;  ///< key of everything that the row depends on; a row with another key is of no use
 
   /// Whether it is done and within every limit of the experiment.
   bool is_success(const Experiment& experiment) const;
 };
 
 std::string to_json(const CellRow& row);
-/// A row of the experiment from its text. Throws Error for a text that is none. Which cell it is of is not believed:
-/// call name_row() with the cell that was asked for.
+/// Parses a row of the experiment. Throws Error if the text is not a row. The names of the cell in the text are not
+/// trusted: call name_row() with the cell that was asked for.
 CellRow row_from_json(const std::string& text, const Experiment& experiment);
-/// Says in the row which cell it is of.
+/// Writes the names of the cell into its row.
 void name_row(CellRow& row, const Experiment& experiment, const CellIndex& cell);
-/// The row of a cell that has none, because of `reason`.
+/// The row of a cell that failed because of `reason`.
 CellRow failed_row(const Experiment& experiment, const CellIndex& cell, const std::string& reason, int tries);
 
-/// What each node will come to, as far as that can be said before anything ran: equal for equal nodes of equal
-/// histories. `case_name` stands for all data that paths name and for the seed of what is random.
+/// For each node, a digest of everything that its result depends on, as far as this is known before the run. Nodes with
+/// equal digests give equal results. `case_name` stands for all data that paths name and for the seed of random nodes.
 std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name);
 
-/// Whether a node comes out otherwise for another case, or another start, of the same variant.
+/// Whether the result of a node is different for another case, or for another start, of the same variant.
 struct Dependence {
   bool on_case = false, on_start = false;
 };
 std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& experiment);
 
-/// What cells depend on beside the texts of the experiment and its pipelines, as it was when it was looked at.
+/// What cells depend on besides the texts of the experiment and its pipelines, as it was when it was read.
 struct Dependencies {
-  std::map<std::string, std::string> contents;  ///< of what paths name, by path
-  std::map<std::string, Digest> builds;         ///< of the plugins, by node
+  std::map<std::string, std::string> contents;  ///< digest of what each path names
+  std::map<std::string, Digest> builds;         ///< build ids of the plugins, by node
 };
-/// The first path, or in words the first plugin, that is another one by now; empty where all are the same.
+/// The first plugin (in words) or path that has changed since; empty if nothing has changed.
 std::string first_change(const Dependencies& before, const Catalogue& now);
 
-/// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record) and
-/// FOLDER/cells/ID/cell.json, which is written last and in one go; what there is to look at goes to
-/// FOLDER/pictures/ID/.
+/// Runs cells of one experiment. Results go to FOLDER/cells/ID/ (poses, figures, the run's record). The row,
+/// FOLDER/cells/ID/cell.json, is written last and as a whole. Pictures go to FOLDER/pictures/ID/.
 class CellRunner {
  public:
   CellRunner(const Experiment& experiment, const Catalogue& catalogue, const Store* store, std::filesystem::path folder,
              int threads, const FileLimits& file_limits = {});
 
-  /// The seed of a case's runs.
+  /// The seed of the runs of a case.
   std::uint64_t seed_of(std::size_t case_index) const;
-  /// Where a case lies, or will lie once it was simulated; empty where the pipeline makes its data itself.
+  /// Where a case is, or will be after its simulation. Empty if the pipeline makes its data itself.
   std::filesystem::path case_place(std::size_t case_index) const;
-  /// The folder of a case; a simulated one is made where it is not in the store yet. Throws Error when that fails.
+  /// The folder of a case. A simulated case is made if it is not in the store yet. Throws Error if that fails.
   std::filesystem::path case_folder(std::size_t case_index);
-  /// From now on every path is looked at once: for a process that asks others to run cells, and must tell them all
-  /// the same.
+  /// From now on, each path is read only once. This is for a process that has other processes run the cells and must
+  /// give all of them the same keys.
   void keep_dependencies() { keeps_dependencies_ = true; }
-  /// What was looked at since.
+  /// What was read since keep_dependencies().
   const Dependencies& dependencies() const { return dependencies_; }
-  /// Of all that a run of the cell, and its row, depend on. Empty where that cannot be told; its run says why.
+  /// The key of everything that a run of the cell, and its row, depend on. Empty if it cannot be computed; the run then
+  /// says why.
   std::string key_of(const CellIndex& cell);
-  /// The row that is there already, where it is whole and has this key.
+  /// The existing row of the cell, if it is whole, did not fail and has this key.
   std::optional<CellRow> finished(const CellIndex& cell, const std::string& key) const;
-  /// Never throws for what goes wrong in a node: that is the row's reason.
+  /// Runs the cell. Does not throw if a node fails: the row then has the reason.
   CellRow run(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
-  /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. False
-  /// where they were there already. Throws Error where the folder cannot be written.
+  /// Runs the cell again for its pictures, landscape and scene; its other nodes are read back from the store. Returns
+  /// false if the pictures are there already. Throws Error if a node fails, if a file that the cell needs changes, or
+  /// if the folder cannot be written.
   bool draw(const CellIndex& cell, const std::function<void(const RunEvent&)>& observer = {});
-  /// Seconds that a run of the cell takes when the results that all variants share are read back and all others are
-  /// made anew. Measured once: later runs with as many threads find it in the store. Throws Error where the run fails.
+  /// Seconds that a run of the cell takes if the results that all variants share are read back and all others are made
+  /// anew. It is measured once: later calls with the same number of threads find it in the store. Throws Error if the
+  /// run fails.
   double time(const CellIndex& cell);
   std::filesystem::path pictures_of(const CellIndex& cell) const;
-  /// Writes the row where finished() finds it. Where it cannot be written, the row fails by that: it costs the cell
-  /// alone.
+  /// Writes the row to where finished() finds it. If it cannot be written, the row becomes a failed one, so that only
+  /// this cell is lost.
   void write(const CellIndex& cell, CellRow& row) const;
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
   enum class Depth { figures, pictures };
-  /// The pipeline of a cell, with its poses and the outputs that the experiment's metrics need, and those that are
-  /// looked at.
+  /// The pipeline of a cell. It keeps the outputs that are poses or that the experiment's metrics need; with
+  /// Depth::pictures, also those that people look at.
   Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
 
  private:
@@ -109,8 +111,8 @@ class CellRunner {
   void add_pipeline(Hasher& hasher, const Pipeline& pipeline, const std::filesystem::path& case_folder,
                     Look look) const;
   std::string key_of(const CellIndex& cell, const Pipeline& pipeline);
-  /// What a run depends on, with the times of its files: another one where any was written to, even if it holds the
-  /// same again.
+  /// What a run depends on, and the times of its files. It changes if any file is written to, even if the file has the
+  /// same content again.
   struct Watched {
     Digest states;
     std::string key;
@@ -120,13 +122,13 @@ class CellRunner {
   std::filesystem::path place_of_simulated(std::size_t case_index, Look look) const;
   struct Done {
     RunResult result;
-    std::string fault;  ///< of the first node that failed, or of an output that could not be written
+    std::string fault;  ///< fault of the first node that failed, or of an output that could not be written
   };
   Done run_into(const std::filesystem::path& folder, const Pipeline& pipeline, const CellIndex& cell,
                 const std::function<void(const RunEvent&)>& observer);
   void fill(CellRow& row, const Pipeline& pipeline, const Done& done) const;
   Pipeline simulation_of(std::size_t case_index) const;
-  /// The nodes of the cell that not all variants have in common.
+  /// The nodes of the cell that are not common to all variants. If there is only one variant, all nodes.
   std::set<std::string> own_nodes(const CellIndex& cell, const Pipeline& pipeline);
   void simulate(std::size_t case_index, const std::filesystem::path& folder) const;
 
@@ -138,10 +140,11 @@ class CellRunner {
   FileLimits file_limits_;
   bool keeps_dependencies_ = false;
   mutable Dependencies dependencies_;
-  mutable std::map<std::size_t, std::filesystem::path> places_;  ///< of simulated cases, where dependencies are kept
+  mutable std::map<std::size_t, std::filesystem::path>
+      places_;  ///< places of simulated cases, if dependencies are kept
   struct FoundCase {
     std::filesystem::path outputs;
-    std::shared_ptr<const void> use;  ///< while it lives, no tidying of the store removes the folder
+    std::shared_ptr<const void> use;  ///< as long as it lives, the store does not remove the folder
   };
   std::map<std::size_t, FoundCase> simulated_;
 };

@@ -5,7 +5,7 @@
 
 namespace marrow {
 
-/// Bytes as text (RFC 4648, padded).
+/// Encodes bytes as base64 text (RFC 4648, with padding).
 std::string base64(std::string_view bytes);
 
 }  // namespace marrow

@@ -6,12 +6,12 @@
 
 namespace marrow {
 
-/// Axes of the camera (columns u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs are
-/// those of DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector
-/// towards the patient's left, +alpha (secondary, cranial) towards the head.
+/// The camera's axes as columns (u, v, viewing direction) in world coordinates: W = R_beta R_alpha R_0. The signs
+/// follow DICOM's positioner angles (PS3.3 C.8.7.5): +beta (primary, left anterior oblique) moves the detector towards
+/// the patient's left, +alpha (secondary, cranial) towards the head.
 inline Eigen::Matrix3d world_from_camera_rotation(double alpha_rad, double beta_rad) {
-  // At (0, 0) the detector is in front of the chest: the rays run to -y, the head is up (v to -z), and as the image is
-  // seen from the source, u runs to the patient's right.
+  // At (0, 0) the detector is in front of the chest and the rays run along -y. The head is up in the image, so v runs
+  // along -z. The image is seen from the source, so u runs to the patient's right.
   Eigen::Matrix3d r_0;
   r_0.col(0) = -Eigen::Vector3d::UnitX();
   r_0.col(1) = -Eigen::Vector3d::UnitZ();
@@ -21,7 +21,7 @@ inline Eigen::Matrix3d world_from_camera_rotation(double alpha_rad, double beta_
   return r_beta.toRotationMatrix() * r_alpha.toRotationMatrix() * r_0;
 }
 
-/// Distances and pixels of an isocentric C-arm; the principal point is the middle of the image.
+/// Geometry of an isocentric C-arm. The principal point is the centre of the image.
 struct CArm {
   int width_px = 0, height_px = 0;
   Eigen::Vector2d pixel_mm = Eigen::Vector2d::Zero();  ///< width and height of a pixel on the detector
@@ -34,7 +34,7 @@ inline Camera carm_camera(const CArm& arm, const Eigen::Matrix3d& world_from_cam
   Camera camera;
   camera.width_px = arm.width_px;
   camera.height_px = arm.height_px;
-  // Integer coordinates are pixel centres, so the middle of the detector is half a pixel less than half its width.
+  // Integer coordinates are pixel centres. So the centre of the image is at (width - 1) / 2, not at width / 2.
   camera.intrinsics << arm.source_to_detector_mm / arm.pixel_mm.x(), 0, (arm.width_px - 1) / 2.0, 0,
       arm.source_to_detector_mm / arm.pixel_mm.y(), (arm.height_px - 1) / 2.0, 0, 0, 1;
   const Eigen::Vector3d source_mm = arm.isocentre_mm - arm.source_to_isocentre_mm * world_from_camera.col(2);

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a calibration knows of an imaging device. Nodes only ever see plain pinhole views: the distortion is removed
-// once, when a view is read, so that no projector, cost or edge detector needs to know of it, and none can forget it.
+// What a calibration knows about an imaging device. Nodes only get views of an ideal pinhole: the distortion is removed
+// once, when a view is read. So no projector, cost or edge detector has to handle distortion, and none can forget it.
 #include <Eigen/Core>
 #include <array>
 #include <string>
@@ -11,8 +11,9 @@
 
 namespace marrow {
 
-/// Radial distortion about the principal point, as OpenCV has it: an ideal point x, y (pixels from the principal point
-/// over the focal length) is seen at (1 + k_1 r^2 + k_2 r^4 + k_3 r^6) (x, y). Positive k_1: pincushion.
+/// Radial distortion about the principal point, in OpenCV's model. An ideal point (x, y), in pixels from the principal
+/// point divided by the focal length, is seen at (1 + k_1 r^2 + k_2 r^4 + k_3 r^6) (x, y). A positive k_1 is a
+/// pincushion distortion.
 struct RadialDistortion {
   std::array<double, 3> k{0, 0, 0};
 
@@ -23,14 +24,14 @@ struct RadialDistortion {
   static constexpr auto fields() { return std::make_tuple(&RadialDistortion::k); }
 };
 
-/// The inner parameters of an imaging device, each with one standard deviation where that is known (else 0).
+/// The intrinsic parameters of an imaging device, each with its standard deviation (0 if not known).
 struct Calibration {
   int width_px = 0, height_px = 0;
   Eigen::Matrix3d intrinsics = Eigen::Matrix3d::Identity();
   RadialDistortion distortion;
   Eigen::Vector2d focal_deviation_px = Eigen::Vector2d::Zero(), principal_deviation_px = Eigen::Vector2d::Zero();
   std::array<double, 3> distortion_deviation{0, 0, 0};
-  double residual_px = 0;  ///< standard deviation of what is left, per coordinate; 0: not known
+  double residual_px = 0;  ///< standard deviation of the residuals per coordinate; 0 if not known
 
   static constexpr auto fields() {
     return std::make_tuple(&Calibration::width_px, &Calibration::height_px, &Calibration::intrinsics,
@@ -40,26 +41,28 @@ struct Calibration {
   }
 };
 
-/// A camera as its file gives it: the pinhole, and the distortion that the images still have.
+/// A camera as read from its file: the pinhole model, and the distortion that is still in its images.
 struct DistortedCamera {
   Camera camera;
   RadialDistortion distortion;
 };
 
-/// Where a pixel of the undistorted image lies in the image as it was taken.
+/// Where a pixel of the undistorted image lies in the original image.
 Eigen::Vector2d distorted_pixel(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion,
                                 const Eigen::Vector2d& pixel);
 
-/// Throws Error unless the distortion grows outwards all over the image, so that each pixel was seen at one place.
+/// Throws Error unless the distorted radius grows with the ideal radius everywhere in the image (so that each point is
+/// seen at one place only) and stays below twice the radius of the farthest corner. `what` names the image in the
+/// message.
 void check_distortion(const Eigen::Matrix3d& intrinsics, const RadialDistortion& distortion, int width_px,
                       int height_px, const std::string& what);
 
-/// Resamples image and mask as a pinhole with the same camera matrix would have seen them. Pixels that the image as
-/// taken does not show are masked out.
+/// Resamples image and mask to what a pinhole with the same camera matrix would have seen. Pixels that lie outside the
+/// original image are masked out. Throws Error as check_view() and check_distortion() do.
 void remove_distortion(View& view, const RadialDistortion& distortion);
 
-/// Takes the camera matrix from the calibration and removes its distortion from the view. Throws Error where sizes
-/// disagree.
+/// Sets the view's camera matrix to that of the calibration and removes the calibration's distortion from the view.
+/// Throws Error if the image sizes differ, and as remove_distortion() does.
 void apply_calibration(View& view, const Calibration& calibration);
 
 }  // namespace marrow

@@ -10,10 +10,10 @@
 
 namespace marrow {
 
-/// Pinhole model of an X-ray view (the chapter's Eq 1-3 as corrected in docs/method.md), OpenCV's convention: the
-/// source is the camera's origin, +z runs to the detector, u to the right and v down. pixel = intrinsics *
-/// (camera_from_world * X), divided by the third coordinate; intrinsics = [f/pix_u s u0; 0 f/pix_v v0; 0 0 1] with f =
-/// source-to-detector distance.
+/// Pinhole model of an X-ray view in OpenCV's convention (Eq 1-3 of the chapter, as corrected in docs/method.md). The
+/// X-ray source is the camera's origin, +z points to the detector, u to the right and v down. pixel = intrinsics *
+/// (camera_from_world * X), divided by the third coordinate. intrinsics = [f/pix_u s u0; 0 f/pix_v v0; 0 0 1], where f
+/// is the source-to-detector distance.
 struct Camera {
   int width_px = 0;
   int height_px = 0;
@@ -25,7 +25,8 @@ struct Camera {
   }
 };
 
-/// Pixel of a world point. The point must lie in front of the source (z > 0 in the camera's frame); else NaN.
+/// Pixel onto which a world point projects. NaN unless the point is in front of the source (z > 0 in the camera's
+/// frame).
 Eigen::Vector2d project(const Camera& camera, const Eigen::Vector3d& world_mm);
 
 /// The X-ray source in world coordinates.
@@ -34,21 +35,25 @@ Eigen::Vector3d source_position_mm(const Camera& camera);
 /// Unit direction, in world coordinates, of the ray from the source through a pixel.
 Eigen::Vector3d ray_direction(const Camera& camera, const Eigen::Vector2d& pixel);
 
-/// Plane {X : normal . X = offset_mm} in world coordinates through the source and the image line a u + b v + c = 0: the
-/// exact back-projection M^T l (Hartley and Zisserman 2004, 8.1), where the chapter's Eq 7 uses an orthogonal one.
+/// Plane {X : normal . X = offset_mm} in world coordinates.
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
   double offset_mm = 0;
 };
+/// The plane through the source and the image line a u + b v + c = 0. This is the exact back-projection M^T l (Hartley
+/// and Zisserman 2004, 8.1); Eq 7 of the chapter uses an orthogonal projection instead.
 Plane back_project_line(const Camera& camera, const Eigen::Vector3d& line);
 
-/// mm per pixel at a world point, across the viewing direction: how far a point there moves for one pixel.
+/// Size of a pixel at a world point, in mm: how far the point must move across the viewing direction for its image to
+/// move by one pixel.
 double pixel_size_at_mm(const Camera& camera, const Eigen::Vector3d& world_mm);
 
-/// Throws Error for a non-positive size or focal length, or a rotation that is not one.
+/// Throws Error if the image size is not positive or a side has more than 65536 pixels, if the camera matrix does not
+/// have the form given at Camera or its focal lengths are not positive, and as check_rigid() does. `what` names the
+/// camera in the message.
 void check_camera(const Camera& camera, const std::string& what);
 
-/// One X-ray view: an image and how it was taken. mask: CV_8U, non-zero where the image may be used; empty =
+/// One X-ray view: an image and its camera. `mask` is CV_8U and non-zero where the image may be used; empty means
 /// everywhere.
 struct View {
   std::string name;
@@ -58,8 +63,8 @@ struct View {
   static constexpr auto fields() { return std::make_tuple(&View::name, &View::image, &View::camera, &View::mask); }
 };
 
-/// Throws Error when image, camera and mask sizes disagree, or the image is empty. The message names the view and both
-/// sizes.
+/// Throws Error if the image is empty, if the sizes of image, camera and mask differ, and as check_camera() does. The
+/// message names the view and both sizes.
 void check_view(const View& view);
 
 }  // namespace marrow

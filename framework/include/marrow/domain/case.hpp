@@ -9,14 +9,14 @@
 
 namespace marrow {
 
-/// One patient: a CT with a seed per fragment, the views with their cameras and, where known, poses to start from and
-/// the exact poses. On disk a folder with case.yaml (docs/case.md).
+/// One patient: a CT with seeds for each fragment, the views with their cameras and, if known, start poses and exact
+/// poses. On disk it is a folder with case.yaml (docs/case.md).
 struct Case {
   Volume ct;
   List<Seeds> seeds;  ///< axis fragment
   List<View> views;   ///< axis view
-  List<Pose> start;   ///< axis fragment; empty where the case has none
-  List<Truth> truth;  ///< axis fragment; empty where the case has none
+  List<Pose> start;   ///< axis fragment; empty if the case has none
+  List<Truth> truth;  ///< axis fragment; empty if the case has none
   static constexpr auto fields() {
     return std::make_tuple(&Case::ct, &Case::seeds, &Case::views, &Case::start, &Case::truth);
   }

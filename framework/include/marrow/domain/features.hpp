@@ -7,8 +7,8 @@
 
 namespace marrow {
 
-/// One edge pixel: sub-pixel position, unit direction of the gradient (towards brighter), and its magnitude in grey
-/// values per pixel.
+/// One edge pixel: its sub-pixel position, the unit direction of the gradient (towards brighter pixels), and the
+/// gradient's magnitude in grey values per pixel.
 struct EdgePixel {
   float u_px = 0, v_px = 0;
   float direction_u = 0, direction_v = 0;
@@ -19,7 +19,7 @@ struct EdgePixel {
   }
 };
 
-/// The edges of one image, in row-major order of the pixels that they belong to (round(v), round(u)).
+/// The edge pixels of one image, in row-major order of the pixels (round(v), round(u)) to which they belong.
 struct EdgeMap {
   int width_px = 0;
   int height_px = 0;
@@ -34,17 +34,17 @@ struct LineSegment {
   static constexpr auto fields() { return std::make_tuple(&LineSegment::from_px, &LineSegment::to_px); }
 };
 
-/// The two outer borders of the shaft in one view, running the same way, `left` being on the left when looking from
-/// `from` to `to` with v down.
+/// The two outer borders of the shaft in one view. Both run in the same direction. `left` is on the left when looking
+/// from `from` to `to` in the image (v down).
 struct ShaftLines {
   LineSegment left;
   LineSegment right;
-  /// Outer diameter that the pair stands for, at the depth of the isocentre (world origin), its standard deviation (of
-  /// the fit, and because the shaft may lie nearer or farther), and the pair's score.
+  /// The outer diameter of the shaft, if it lies at the depth of the isocentre (world origin). Then its standard
+  /// deviation, which includes the error of the fit and the unknown depth of the shaft. Then the score of the pair.
   double width_mm = 0;
   double width_deviation_mm = 0;
   double log_likelihood = 0;
-  /// Rejected candidates, each with its reason in words, the best first.
+  /// A rejected pair of borders, with the reason in words. `rejected` has the best ones first.
   struct Rejected {
     LineSegment left, right;
     std::string reason;

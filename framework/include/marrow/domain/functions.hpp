@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Functions that travel along the edges of a pipeline as values: projectors, costs, optimizers. All methods are
-// const and safe to call from several threads at once. A function may refer to the inputs of the node that made it: the
-// runtime keeps those alive as long as the function.
+// Functions that a pipeline passes between nodes as values: projectors, costs, optimizers. All methods are const and
+// safe to call from several threads at once. A function may refer to the inputs of the node that made it: the runtime
+// keeps these inputs alive as long as the function.
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
@@ -15,15 +15,16 @@
 
 namespace marrow {
 
-/// One point of a projected outline: position in the image and the unit normal that points away from the bone, and the
-/// surface point that it is the image of.
+/// One point of a projected outline: its position in the image, the unit normal that points away from the bone, and the
+/// point of the model's surface that it shows.
 struct OutlinePoint {
   float u_px = 0, v_px = 0;
   float normal_u = 0, normal_v = 0;
   Eigen::Vector3f model_mm = Eigen::Vector3f::Zero();
 };
 
-/// Pixels in rows and columns, the first at (u_px, v_px), step_px apart: a region of an image, sub-sampled or not.
+/// A grid of pixels: a region of an image at full resolution or sub-sampled. The first pixel is at (u_px, v_px), and
+/// neighbours are step_px apart.
 struct PixelGrid {
   double u_px = 0, v_px = 0, step_px = 1;
   int columns = 0, rows = 0;
@@ -32,45 +33,45 @@ struct PixelGrid {
   Eigen::Vector2d pixel(int column, int row) const { return {u_px + step_px * column, v_px + step_px * row}; }
 };
 
-/// Draws the outline of a model as a view would see it.
+/// Computes the outline of a model as a view would see it.
 class OutlineProjector {
  public:
   virtual ~OutlineProjector();
-  /// The outline of the model in the camera's image, about one point every `spacing_px`, inside the image only, in a
-  /// fixed order. Parts that are made by the end of the CT volume and not by the bone are left out. May be empty.
+  /// The outline of the model in the camera's image: about one point every `spacing_px`, in a fixed order, inside the
+  /// image only. Leaves out parts that come from the end of the CT volume and not from the bone. May be empty.
   virtual std::vector<OutlinePoint> outline(const Camera& camera, const RigidTransform& world_from_model,
                                             double spacing_px) const = 0;
 };
 
-/// Makes radiographs (DRR) of a model as a view would see it.
+/// Computes digitally reconstructed radiographs (DRRs) of a model as a view would see it.
 class RadiographProjector {
  public:
   virtual ~RadiographProjector();
-  /// Line integrals of the attenuation along the rays through these pixels, row by row, relative to water: millimetres
-  /// of water that attenuate as much. 0 where a ray misses the model. Only what is asked for is computed.
+  /// Line integrals of the attenuation along the rays through these pixels, row by row. The unit is mm of water with
+  /// the same attenuation. 0 for a ray that misses the model. Only these pixels are computed.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                         const PixelGrid& grid) const = 0;
-  /// The same for single pixels (u, v), in their order.
+  /// The same for single pixels (u, v), in the given order.
   virtual std::vector<float> radiograph(const Camera& camera, const RigidTransform& world_from_model,
                                         const std::vector<Eigen::Vector2f>& pixels) const = 0;
-  /// Whole pixels outside of which radiograph() is 0, cut to the image; empty where the model is out of view.
+  /// A region of whole pixels, cut to the image, outside of which radiograph() is 0. Empty if the model is out of view.
   virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const = 0;
 };
 
-/// How finely a cost looks: the spacing of outline points (the chapter's contour sub-sampling) and the distance beyond
-/// which a point counts as unmatched; of grey values, every how many pixels they are compared, 0 = as the cost was
-/// made.
+/// The resolution of a cost. For outlines: the spacing of their points (the chapter's contour sub-sampling) and the
+/// distance beyond which a point counts as unmatched. For grey values: every `pixel_step`-th pixel is compared; 0 means
+/// the step that the cost was made with.
 struct CostLevel {
   double contour_spacing_px = 1;
   double reach_px = 8;
   int pixel_step = 0;
 };
 
-/// How badly a pose explains the images; smaller is better.
+/// How badly a pose explains the images. Smaller is better.
 class Cost {
  public:
-  /// value + gradient . m + m . curvature m / 2 for a small motion m = (r [rad], t [mm]); the curvature has no negative
-  /// eigenvalue (Gauss and Newton's of a sum of squares).
+  /// Quadratic model of the cost for a small motion m = (r [rad], t [mm]): value + gradient . m + m . curvature m / 2.
+  /// The curvature has no negative eigenvalue (Gauss-Newton approximation of a sum of squares).
   struct Expansion {
     double value = 0;
     Vector6d gradient = Vector6d::Zero();
@@ -78,31 +79,32 @@ class Cost {
   };
 
   virtual ~Cost();
-  /// The cost at a pose. Finite for every finite pose: where nothing can be compared it is the worst value.
+  /// The cost at a pose. It is finite for every finite pose: if nothing can be compared, it is the worst value.
   virtual double value(const RigidTransform& world_from_model) const = 0;
-  /// The costs of many poses, in their order; the default evaluates them in parallel.
+  /// The costs of many poses, in their order. The default calls value() in parallel.
   virtual std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const;
   /// The same cost at another resolution.
   virtual std::shared_ptr<const Cost> at_level(const CostLevel& level) const = 0;
-  /// The cost about a pose, for small motions of the fragment about this frame as Pose defines them; for optimizers
-  /// that use derivatives. It takes about as long as one value(). Absent where the cost does not know its derivatives,
-  /// as by default.
+  /// The quadratic model of the cost at a pose, for optimizers that use derivatives. The motion is a small motion in
+  /// `frame` as defined at Pose. The call takes about as long as one value(). Absent if the cost has no derivatives,
+  /// which is the default.
   virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
-  /// Factor that makes value() a negative log-likelihood near this pose: the inverse of (factor * Hessian) then
-  /// predicts the covariance of the minimum. Absent where the cost has no noise model.
+  /// The factor that makes value() a negative log-likelihood near this pose. The inverse of (factor * Hessian) then
+  /// predicts the covariance of the minimum. Absent if the cost has no noise model.
   virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
 };
 
-/// A function R^n -> R to be minimised, knowing nothing of poses.
+/// A function R^n -> R to minimise. It knows nothing about poses.
 struct MinimisationProblem {
   std::function<double(const Eigen::VectorXd&)> function;
-  /// value + gradient . d + d . curvature d / 2 about a point, where the function knows its derivatives; the curvature
-  /// has no negative eigenvalue. May be empty. One call counts as one evaluation.
+  /// Quadratic model about a point: value + gradient . d + d . curvature d / 2. The curvature has no negative
+  /// eigenvalue.
   struct Expansion {
     double value = 0;
     Eigen::VectorXd gradient;
     Eigen::MatrixXd curvature;
   };
+  /// Empty if the function has no derivatives. One call counts as one evaluation.
   std::function<Expansion(const Eigen::VectorXd&)> expansion;
   Eigen::VectorXd start;
   Eigen::VectorXd initial_step;  ///< positive, per coordinate
@@ -121,8 +123,8 @@ struct MinimisationResult {
 class Optimizer {
  public:
   virtual ~Optimizer();
-  /// The best point found. A function value that is not finite counts as the worst; exceptions of the function pass
-  /// through.
+  /// Returns the best point found. A function value that is not finite counts as the worst. Exceptions of the function
+  /// pass through.
   virtual MinimisationResult minimise(const MinimisationProblem& problem) const = 0;
 };
 

@@ -6,9 +6,9 @@
 
 namespace marrow {
 
-/// A fluoroscopic image: one channel, CV_8U, CV_16U or CV_32F; bright = air unless a node says otherwise. Pixel (0, 0)
-/// is the top left one, and integer coordinates are pixel centres (OpenCV's convention). cv::Mat shares its pixels:
-/// whoever receives an Image must not write to it.
+/// A fluoroscopic image with one channel of type CV_8U, CV_16U or CV_32F. Air is bright unless a node says otherwise.
+/// Pixel (0, 0) is at the top left, and integer coordinates are pixel centres (OpenCV's convention). Copies of a
+/// cv::Mat share their pixels, so whoever receives an Image must not write to it.
 struct Image {
   cv::Mat pixels;
 

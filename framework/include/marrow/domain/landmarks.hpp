@@ -7,8 +7,8 @@
 
 namespace marrow {
 
-/// Points of one fragment that can be told apart: anatomical landmarks or implanted markers, by their names. What is
-/// seen or tracked is matched with the model's points by name.
+/// Named points of one fragment: anatomical landmarks or implanted markers. Seen and tracked points are matched with
+/// the model's points by name.
 struct Landmarks {
   /// A point in the frame of the CT.
   struct Point {
@@ -16,13 +16,13 @@ struct Landmarks {
     Eigen::Vector3d model_mm = Eigen::Vector3d::Zero();
     static constexpr auto fields() { return std::make_tuple(&Point::name, &Point::model_mm); }
   };
-  /// Where a view shows a point.
+  /// A point as a view shows it.
   struct Seen {
     std::string name, view;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
     static constexpr auto fields() { return std::make_tuple(&Seen::name, &Seen::view, &Seen::pixel); }
   };
-  /// Where a tracking system found a point, in the world.
+  /// A point as a tracking system measured it, in world coordinates.
   struct Tracked {
     std::string name;
     Eigen::Vector3d world_mm = Eigen::Vector3d::Zero();

@@ -8,9 +8,8 @@
 
 namespace marrow {
 
-/// Named items along one axis ("view", "fragment", ...). The axis itself is declared with the port; a list only knows
-/// the names along it. Items are shared and immutable, so a list is cheap to copy and safe to read from several
-/// threads.
+/// Named items along one axis ("view", "fragment", ...). The port declares the axis; a list only knows the names along
+/// it. Items are shared and immutable, so a list is cheap to copy and safe to read from several threads.
 template <class T>
 class List {
  public:

@@ -4,8 +4,8 @@
 
 namespace marrow {
 
-/// True when a mesh is closed and the triangles about each vertex form a single fan, so that no two sheets touch in a
-/// point.
+/// True if a mesh is closed and the triangles around each vertex form a single fan. Then no two parts of the surface
+/// touch in a single point.
 bool is_manifold(const Mesh& mesh);
 
 }  // namespace marrow

@@ -18,29 +18,33 @@ struct Mesh {
   static constexpr auto fields() { return std::make_tuple(&Mesh::vertices_mm, &Mesh::triangles, &Mesh::frame); }
 };
 
-/// Throws Error for no triangles, an index out of range, or a vertex that is not finite.
+/// Throws Error if there are no triangles, an index is out of range, or a vertex is not finite or has a coordinate of
+/// more than 1 km. `what` names the mesh in the message.
 void check_mesh(const Mesh& mesh, const std::string& what);
 
-/// True when each edge is shared by exactly two triangles that run along it in opposite directions.
+/// True if each edge is shared by exactly two triangles that run along it in opposite directions.
 bool is_closed(const Mesh& mesh);
 
-/// Volume enclosed by a closed surface, positive when normals point outward (divergence theorem).
+/// Volume enclosed by a closed surface (divergence theorem). It is positive if normals point outward.
 double enclosed_volume_mm3(const Mesh& mesh);
 double surface_area_mm2(const Mesh& mesh);
 
-/// `count` points spread evenly over the surface by area, in a fixed (not random) pattern: the points of an mTRE.
+/// `count` points in a fixed pattern (not random), spread evenly by area over the surface. They serve as target points
+/// of an mTRE.
 std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count);
 
-/// The anatomical axes of a long-bone fragment, in the frame of its mesh, as every table of marrow uses them. Origin:
-/// the area-weighted centroid of the surface. Column 2 of `axes`: the long axis, which is the principal axis of the
-/// surface, turned to agree with the frame's +z. Column 0: the frontal axis, the frame's +x made orthogonal to it
-/// (rotation about it is seen in the lateral view). Column 1: the lateral axis, completing a right-handed frame. The
-/// chapter calls rotations about columns 0, 1, 2 Rx, Ry, Rz.
+/// The anatomical axes of a long-bone fragment, in the frame of its mesh. All of marrow's tables use them. Origin: the
+/// area-weighted centroid of the surface. Column 2 of `axes`: the long axis, which is the principal axis of the
+/// surface, with the sign that agrees with the frame's +z. Column 0: the frontal axis, which is the frame's +x made
+/// orthogonal to the long axis (+y if the long axis is close to x). A rotation about it is seen in the lateral view.
+/// Column 1: the lateral axis, which completes a right-handed frame. The chapter calls rotations about columns 0, 1, 2
+/// Rx, Ry, Rz.
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
   static constexpr auto fields() { return std::make_tuple(&FragmentFrame::origin_mm, &FragmentFrame::axes); }
 };
+/// Throws Error as check_mesh() does.
 FragmentFrame fragment_frame(const Mesh& mesh);
 
 }  // namespace marrow

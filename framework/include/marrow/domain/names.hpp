@@ -5,19 +5,19 @@
 
 namespace marrow {
 
-/// What is wrong with a name that people choose for an item: a view, a fragment, a point. "" where it is good. The name
-/// becomes part of file names, logs and tables. Good are 1 to 100 bytes of UTF-8 without control characters. What no
-/// file name may hold is escaped where files are named.
+/// What is wrong with a name that a person chose for an item (a view, a fragment, a point); "" if the name is good. A
+/// good name has 1 to 100 bytes of UTF-8 without control characters. It becomes part of logs, tables and file names.
+/// Characters that a file name cannot have are escaped when the file is named.
 std::string fault_of_item_name(const std::string& name);
 
-/// Throws Error where the name of an item is not good; `what` says whose it is ("view").
+/// Throws Error if fault_of_item_name() finds a fault. `what` says what the name belongs to ("view").
 void check_item_name(const std::string& what, const std::string& name);
 
-/// The name nearest to `wrong` (by edit distance, where it is near enough to be a slip), else an empty string. Names of
-/// more than 100 bytes are near to none.
+/// The known name with the least edit distance to `wrong`, if it is near enough for a typing error; else "". Names of
+/// more than 100 bytes are never near.
 std::string nearest_name(const std::string& wrong, const std::vector<std::string>& known);
 
-/// "did you mean 'x'?" or, when nothing is near, "known: a, b, c".
+/// "did you mean 'x'?" if a known name is near; else "known: a, b, c" with the first 20 names, or "there are none".
 std::string suggestion(const std::string& wrong, const std::vector<std::string>& known);
 
 }  // namespace marrow

@@ -11,25 +11,25 @@
 
 namespace marrow {
 
-/// Where a fragment is: maps the model (CT frame) to the world. `frame` says about which point and axes the covariance
-/// is meant: a small motion is x_model' = o + R(axes * r) (x_model - o) + axes * t, applied before world_from_model,
-/// with r the rotation [rad] and t the translation [mm] about and along the frame's axes.
+/// Where a fragment is: `world_from_model` maps the model (CT frame) to the world. The covariance refers to a small
+/// motion in `frame`: x_model' = o + R(axes * r) (x_model - o) + axes * t, applied before world_from_model. o is the
+/// frame's origin, r the rotation [rad] about its axes, and t the translation [mm] along its axes.
 struct Pose {
   RigidTransform world_from_model{"world", "ct"};
   FragmentFrame frame;
-  /// Predicted covariance of (r, t) in rad and mm; absent where nothing predicted it.
+  /// Predicted covariance of (r, t) in rad and mm; absent if it was not predicted.
   std::optional<Matrix6d> covariance;
-  /// In words: a direction that the images do not determine, a limit that was reached.
+  /// Warnings in words: a direction that the images do not determine, a limit that was reached.
   std::vector<std::string> warnings;
   double cost = 0;
   int evaluations = 0;
-  /// The least cost that the search had come to after so many evaluations, all counted at its last level; may be empty.
+  /// The least cost found after this many evaluations. All costs are those of the search's last level.
   struct Progress {
     int evaluations = 0;
     double cost = 0;
     static constexpr auto fields() { return std::make_tuple(&Progress::evaluations, &Progress::cost); }
   };
-  std::vector<Progress> convergence;
+  std::vector<Progress> convergence;  ///< may be empty
 
   static constexpr auto fields() {
     return std::make_tuple(&Pose::world_from_model, &Pose::frame, &Pose::covariance, &Pose::warnings, &Pose::cost,
@@ -37,14 +37,14 @@ struct Pose {
   }
 };
 
-/// The pose moved by a small motion (r [rad], t [mm]) as defined at Pose.
+/// The pose after a small motion (r [rad], t [mm]) as defined at Pose.
 RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame& frame, const Vector6d& motion);
 
-/// The motion that leads from one pose to another, inverse of moved(): to = moved(from, frame, motion).
+/// The motion that leads from one pose to another. It is the inverse of moved(): to = moved(from, frame, motion).
 Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, const FragmentFrame& frame);
 
-/// The exact pose of a fragment, known for simulated data. A type of its own, so that a pipeline cannot hand it to
-/// anything but `evaluate` and `render`.
+/// The exact pose of a fragment, known for simulated data. It has its own type so that a pipeline can give it only to
+/// nodes of kinds that may see the truth, such as `evaluate` and `render`.
 struct Truth {
   RigidTransform world_from_model{"world", "ct"};
   static constexpr auto fields() { return std::make_tuple(&Truth::world_from_model); }

@@ -6,14 +6,14 @@
 
 namespace marrow {
 
-/// Random numbers that are the same on any machine, which the standard's distributions do not promise: SplitMix64
-/// (Steele, Lea and Flood, OOPSLA 2014, Fig 17).
+/// Random numbers that are the same on every machine; the distributions of the C++ standard do not guarantee that. The
+/// generator is SplitMix64 (Steele, Lea and Flood, OOPSLA 2014, Fig 17).
 class Random {
  public:
   using result_type = std::uint64_t;
   explicit Random(std::uint64_t seed) : state_(seed) {}
-  /// Numbers that depend on (seed, stream) alone. With one stream for each pixel or voxel the noise is the same
-  /// whichever thread draws it.
+  /// Numbers that depend only on (seed, stream). With one stream per pixel or voxel, the noise does not depend on which
+  /// thread draws it.
   Random(std::uint64_t seed, std::uint64_t stream) : state_(mix(seed + kStep) ^ mix(~stream)) {}
 
   static constexpr result_type min() { return 0; }
@@ -29,8 +29,8 @@ class Random {
     const double radius = std::sqrt(-2 * std::log(uniform_above_0()));
     return radius * std::cos(6.283185307179586 * uniform_above_0());
   }
-  /// Uniform in 0 ... count - 1. The upper 32 bits are scaled: the chances differ by less than count / 2^32 of
-  /// themselves.
+  /// Uniform in 0 ... count - 1. The upper 32 bits are scaled, so the probabilities have a relative error below count /
+  /// 2^32.
   std::size_t index(std::size_t count) { return static_cast<std::size_t>((((*this)() >> 32) * count) >> 32); }
 
  private:

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What reports show interactively: models in their poses behind the X-ray views, and the cost about a pose.
+// What reports show interactively: models in their poses together with the X-ray views, and the cost around a pose.
 #include <optional>
 #include <string>
 #include <tuple>
@@ -15,10 +15,10 @@ namespace marrow {
 struct Scene {
   struct Model {
     std::string name;
-    Mesh mesh;  ///< may be coarser than the one that was registered
+    Mesh mesh;  ///< may be coarser than the mesh that was registered
     static constexpr auto fields() { return std::make_tuple(&Model::name, &Model::mesh); }
   };
-  /// "result", "start" or "truth" of a model.
+  /// A pose of a model. `name` is "result", "start" or "truth".
   struct Placement {
     std::string model, name;
     RigidTransform world_from_model{"world", "ct"};
@@ -26,7 +26,7 @@ struct Scene {
       return std::make_tuple(&Placement::model, &Placement::name, &Placement::world_from_model);
     }
   };
-  /// A view's camera and its image as shown: 8 bit, grey, and as large as the camera says.
+  /// A view's camera and its image as it is shown: 8 bit, grey, with the size that the camera gives.
   struct Backdrop {
     std::string name;
     Camera camera;
@@ -39,13 +39,13 @@ struct Scene {
   static constexpr auto fields() { return std::make_tuple(&Scene::models, &Scene::placements, &Scene::views); }
 };
 
-/// The cost about a pose, along each of the six axes of the fragment (the chapter's Fig. 7b).
+/// The cost around a pose, along each of the six axes of the fragment (the chapter's Fig. 7b).
 struct Landscape {
   struct Profile {
     std::string axis;  ///< "rotation about the frontal axis"
-    std::string unit;  ///< of the offsets: "deg" or "mm"
+    std::string unit;  ///< unit of the offsets: "deg" or "mm"
     std::vector<double> offsets, costs;
-    std::optional<double> truth;  ///< where the exact pose lies
+    std::optional<double> truth;  ///< offset of the exact pose along this axis
     static constexpr auto fields() {
       return std::make_tuple(&Profile::axis, &Profile::unit, &Profile::offsets, &Profile::costs, &Profile::truth);
     }

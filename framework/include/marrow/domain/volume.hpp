@@ -9,9 +9,9 @@
 
 namespace marrow {
 
-/// Where the samples of a volume lie: ct point = origin_mm + direction * (index .* spacing_mm), index (0, 0, 0) being
-/// the centre of the first voxel (ITK's convention). Columns of direction are the axes of the grid, orthonormal, in the
-/// frame.
+/// Where the samples of a volume lie: point = origin_mm + direction * (index .* spacing_mm), in the frame named
+/// `frame`. Index (0, 0, 0) is the centre of the first voxel (ITK's convention). The columns of `direction` are the
+/// orthonormal axes of the grid in that frame.
 struct Grid {
   std::array<int, 3> size{0, 0, 0};
   Eigen::Vector3d spacing_mm = Eigen::Vector3d::Ones();
@@ -20,7 +20,7 @@ struct Grid {
   std::string frame = "ct";
 
   std::size_t count() const { return std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]); }
-  /// x runs fastest, then y, then z.
+  /// Index of a voxel in the list of values: x runs fastest, then y, then z.
   std::size_t offset(int x, int y, int z) const { return (std::size_t(z) * size[1] + y) * size[0] + x; }
   bool contains(int x, int y, int z) const {
     return x >= 0 && y >= 0 && z >= 0 && x < size[0] && y < size[1] && z < size[2];
@@ -37,7 +37,7 @@ struct Grid {
   }
 };
 
-/// A CT volume in Hounsfield units. values.size() == grid.count(); NaN is never valid (readers refuse it).
+/// A CT volume in Hounsfield units. values.size() == grid.count(). NaN is never valid: readers refuse it.
 struct Volume {
   Grid grid;
   std::vector<float> values;
@@ -46,7 +46,7 @@ struct Volume {
 };
 
 /// A level set: signed distance in mm to the surface of one fragment, negative inside, sampled on the CT's grid. Away
-/// from the surface the value may be clamped (a narrow band), never of the wrong sign.
+/// from the surface the value may be clamped (narrow band), but its sign is always right.
 struct SignedField {
   Grid grid;
   std::vector<float> values_mm;
@@ -54,18 +54,18 @@ struct SignedField {
   static constexpr auto fields() { return std::make_tuple(&SignedField::grid, &SignedField::values_mm); }
 };
 
-/// Trilinear value at a fractional index, clamped to the border of the grid.
+/// Trilinear interpolation at a fractional index. The index is clamped to the grid.
 float sample_trilinear(const Grid& grid, const std::vector<float>& values, const Eigen::Vector3d& index);
 
-/// Throws Error unless sizes are positive, spacings positive and finite, directions orthonormal, values complete and
-/// finite. `what` names the volume in the message.
+/// Throws Error unless sizes are positive, spacings are 0.001 to 100 mm, coordinates of the origin are at most 1 km,
+/// directions are orthonormal, and values are complete and finite. `what` names the volume in the message.
 void check_volume(const Volume& volume, const std::string& what);
 
-/// Points inside one fragment, from which a segmenter grows it, in the frame of the CT.
+/// Points inside one fragment, in the frame of the CT. A segmenter grows the fragment from them.
 struct Seeds {
   std::string fragment;
   std::vector<Eigen::Vector3d> points_mm;
-  /// False for a fragment that is only to be kept apart from the others: it is segmented but not handed on.
+  /// False for a fragment that is segmented only to separate it from the others. It is not passed on.
   bool wanted = true;
   static constexpr auto fields() { return std::make_tuple(&Seeds::fragment, &Seeds::points_mm, &Seeds::wanted); }
 };

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a plugin library says of itself before anything in it is called. A plugin built with other compiler flags than
-// the program can corrupt memory without a word (Eigen's alignment changes with -mavx, for one), so the two stamps must
-// agree.
+// What a plugin library states about itself before it registers anything. A plugin that was built with other compiler
+// flags than the program can silently corrupt memory: Eigen's alignment, for example, changes with -mavx. So the stamps
+// of both must agree.
 #include <Eigen/Core>
 #include <cstdint>
 #include <opencv2/core/version.hpp>
@@ -11,7 +11,7 @@
 
 #ifndef MARROW_API_MAJOR
 #define MARROW_API_MAJOR 1  ///< raised when plugins must be changed
-#define MARROW_API_MINOR 0  ///< raised when something was added
+#define MARROW_API_MINOR 0  ///< raised when something is added
 #endif
 
 namespace marrow {
@@ -30,7 +30,7 @@ struct AbiStamp {
   std::uint64_t headers;  ///< digest of all headers that plugins of this version are built with
 };
 
-/// The one thing that a plugin exports, by the C function marrow_plugin_entry().
+/// What a plugin exports, through the C function marrow_plugin_entry().
 struct PluginEntry {
   char magic[8];
   std::uint32_t size;

@@ -24,7 +24,7 @@
 namespace marrow {
 namespace detail {
 
-/// Types whose arrays hold no padding, so that long lists of them are read and written in one go.
+/// Types whose arrays have no padding. Long lists of them are read and written in one piece.
 template <class T>
 struct Bulk : std::bool_constant<std::is_arithmetic_v<T> && !std::is_same_v<T, bool>> {};
 template <class S, int R, int C>
@@ -32,7 +32,8 @@ struct Bulk<Eigen::Matrix<S, R, C>> : std::bool_constant<(R > 0 && C > 0 && Bulk
 template <class T, std::size_t N>
 struct Bulk<std::array<T, N>> : Bulk<T> {};
 
-/// An enum travels only with a function `bool is_valid(E)` beside it: a damaged or forged value may be any number.
+/// An enum can be archived only if there is a function `bool is_valid(E)` for it, because a damaged or forged value may
+/// be any number.
 template <class T>
 concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
   { is_valid(value) } -> std::same_as<bool>;
@@ -40,14 +41,15 @@ concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
 
-/// Of memory that is about to be filled: to touch 800 MB for the first time takes half as long in large pages.
+/// Asks the kernel for large pages for memory that is about to be filled. Filling 800 MB for the first time then takes
+/// half as long.
 void use_large_pages(void* data, std::size_t size);
 
 }  // namespace detail
 
-/// Takes the bytes of values: of arithmetic types, enums that have an is_valid(), strings, containers of such, Eigen
-/// matrices, cv::Mat and structs with fields(). Lengths are part of it, so that neighbours cannot run together.
-/// Unpacker reads the same back.
+/// Receives values as bytes. Values may be arithmetic types, enums with is_valid(), strings, containers of these, Eigen
+/// matrices, cv::Mat and structs with fields(). Lengths are included, so that the ends of neighbouring values are
+/// known. Unpacker reads the values back.
 class Archive {
  public:
   virtual ~Archive() = default;
@@ -110,15 +112,16 @@ class Archive {
   }
 };
 
-/// Keeps the bytes.
+/// An archive that keeps the bytes in memory.
 class Packer : public Archive {
  public:
   void bytes(const void* data, std::size_t size) override { packed.append(static_cast<const char*>(data), size); }
   std::string packed;
 };
 
-/// Reads what an Archive took, in the same order and of the same types. Throws Error where the bytes end too early, or
-/// are no value of the type: any bytes may be read, what they claim to be costs no memory until it is there.
+/// Reads the values that were added to an Archive, in the same order and with the same types. Throws Error if the bytes
+/// end too early or are not values of these types. It may read any bytes: it does not reserve memory for a length that
+/// the remaining bytes cannot hold.
 class Unpacker {
  public:
   explicit Unpacker(std::string_view packed) : remaining_(packed.size()), next_(packed.data()) {}
@@ -150,9 +153,9 @@ class Unpacker {
   std::size_t remaining() const { return remaining_; }
 
  protected:
-  /// For bytes that come from elsewhere, by take().
+  /// For a derived class whose take() gets the bytes from elsewhere.
   explicit Unpacker(std::size_t size) : remaining_(size) {}
-  /// Copies the next bytes; never asked for more than remain.
+  /// Copies the next `size` bytes. `size` is never larger than remaining().
   virtual void take(void* data, std::size_t size) {
     std::memcpy(data, next_, size);
     next_ += size;
@@ -168,7 +171,8 @@ class Unpacker {
     if (byte > 1) throw Error("the packed value holds a truth value that is neither 0 nor 1");
     return byte == 1;
   }
-  /// A length that the remaining bytes can hold; a damaged one must not ask for all the memory.
+  /// Reads a length. Throws Error if the remaining bytes cannot hold that many items: a damaged length must not ask for
+  /// all the memory.
   std::size_t length(std::size_t item_size) {
     const auto count = get<std::uint64_t>();
     if (count > remaining_ / item_size) throw Error("the packed value ends too early");
@@ -204,7 +208,8 @@ class Unpacker {
       items.resize(count);
       bytes(items.data(), count * sizeof(T));
     } else {
-      // An item may take fewer bytes here than in memory, so the memory grows with the items that are really there.
+      // An item may take fewer bytes here than in memory. So the vector reserves little and grows with the items that
+      // are really there.
       const std::size_t count = length(1);
       items.clear();
       items.reserve(std::min(count, remaining_ / sizeof(T)));

@@ -10,11 +10,11 @@
 
 namespace marrow {
 
-/// How much a line of the log matters. An error is what a node throws, so a node itself logs none.
+/// How important a line of the log is. Nodes throw errors instead of logging them.
 enum class LogLevel { debug, info, warning, error };
 
-/// What the runtime gives a node beside its inputs: take it as an argument `Context&`. Safe to use from several threads
-/// of the node. A default-made one (in tests) is never cancelled and keeps silent.
+/// What the runtime gives a node besides its inputs. A node takes it as an argument `Context&`. Safe to use from
+/// several threads of the node. A default-constructed one (for tests) is never cancelled and reports nothing.
 class Context {
  public:
   struct Hooks {
@@ -27,24 +27,26 @@ class Context {
   explicit Context(std::uint64_t seed) { hooks_.seed = seed; }
   explicit Context(Hooks hooks) : hooks_(std::move(hooks)) {}
 
-  /// The only source of randomness: made from the run's seed and from all that the node was given, so two nodes with
-  /// the same recipe draw the same numbers. A node that uses it is declared with .random().
+  /// The only source of randomness. It is made from the run's seed and everything that the node was given, so two nodes
+  /// with the same recipe draw the same numbers. A node that uses it is declared with .random().
   std::uint64_t seed() const { return hooks_.seed; }
   /// Throws Cancelled after Ctrl-C. Call it inside long loops.
   void check_cancelled() const {
     if (hooks_.cancelled && hooks_.cancelled->load(std::memory_order_relaxed)) throw Cancelled();
   }
-  /// Tells how far a long node is, 0 to 1.
+  /// Reports how far a long call is, from 0 to 1.
   void progress(double fraction, std::string_view what = {}) const {
     if (hooks_.progress) hooks_.progress(fraction, what);
   }
-  /// A line for the run's log. It names the node and the item; the text need not.
+  /// Writes a line to the run's log. The runtime adds the names of the node and the item, so the text need not contain
+  /// them.
   void log(LogLevel level, std::string_view message) const {
     if (hooks_.log) hooks_.log(message, level);
   }
   void debug(std::string_view message) const { log(LogLevel::debug, message); }
   void info(std::string_view message) const { log(LogLevel::info, message); }
-  /// What a person should know of the result; it is kept with the result and said again when that is read back.
+  /// Reports what a person should know about the result. The warning is kept with the result and repeated when the
+  /// result is read back.
   void warn(std::string_view message) const { log(LogLevel::warning, message); }
 
  private:

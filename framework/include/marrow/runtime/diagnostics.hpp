@@ -8,7 +8,7 @@
 
 namespace marrow {
 
-/// A place in a file: 1-based line and column; line 0 where there is none (a command-line argument).
+/// A place in a file, with 1-based line and column. Line 0 means that there is no line (a command-line argument).
 struct Place {
   std::string file;
   int line = 0;
@@ -17,27 +17,27 @@ struct Place {
 
 struct Diagnostic {
   Place place;
-  std::string message;  ///< what is wrong, with what was got and expected
+  std::string message;  ///< what is wrong, what was found and what was expected
   std::string hint;     ///< what to do; may be empty
 };
 
-/// Collects all faults of a file, so that they are shown together. The first 1000 are kept, the others counted.
+/// Collects all faults of a file, so that they can be shown together. The first 1000 are kept, the others only counted.
 class Diagnostics {
  public:
   void add(Place place, std::string message, std::string hint = {});
-  /// Those of another collection that are not here yet.
+  /// Adds the faults of another collection that are not here yet.
   void add_all(const Diagnostics& other);
   bool empty() const { return items_.empty(); }
-  /// Whether others will only be counted, so that a hint is not worth looking for.
+  /// Whether further faults will only be counted. A hint for them is then not worth computing.
   bool is_full() const;
-  /// All that were found, kept or not.
+  /// The number of faults that were found, kept or not.
   std::size_t size() const { return items_.size() + not_kept_; }
-  /// Those that were kept, by file, line and column.
+  /// The faults that were kept, sorted by file, line and column.
   std::vector<Diagnostic> sorted() const;
-  /// file:line:column: message, the source line with a caret, and the hint, for each of the first 50; control
-  /// characters are written out.
+  /// The first 50 faults as text: for each file:line:column and the message, the source line with a caret, and the
+  /// hint. Control characters are escaped.
   std::string text() const;
-  /// Remembers a file's text, so that its lines can be shown.
+  /// Remembers a file's text, so that text() can show its lines.
   void remember(const std::string& file, const std::string& text) { sources_[file] = text; }
 
  private:

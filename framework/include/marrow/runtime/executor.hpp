@@ -15,57 +15,58 @@
 
 namespace marrow {
 
-/// What a run reports while it goes on. `seconds`: that a call took; of a cached one, when it was made. `item` names
-/// the place along the mapped axes ("lateral", "distal/final"). `waiting`: another run is making the same result, with
-/// a text once that takes seconds; `waited`: that is over, and the call goes on.
+/// What a run reports while it is running. `item` names the place along the mapped axes ("lateral", "distal/final").
+/// `seconds` is the time of a call; for a cached call, the time that it took when its result was made. `waiting`:
+/// another run is making the same result; the event has a text only if the wait is longer than 5 s. `waited`: the wait
+/// is over and the call goes on.
 struct RunEvent {
   enum class Kind { started, progress, finished, failed, skipped, message, warning, cached, waiting, waited };
   Kind kind = Kind::message;
   std::string node, item, text;
   double fraction = 0;
   double seconds = 0;
-  LogLevel level = LogLevel::info;  ///< of a message or a warning
+  LogLevel level = LogLevel::info;  ///< level of a message or a warning
 };
 
-/// What one call that reads a file may use, in its own process. 0 = by the file's size.
+/// Limits of one call that reads files in its own process. 0 means a limit that depends on the size of the files.
 struct FileLimits {
   double memory_mb = 0;
-  double seconds = 0;  ///< of processor time
+  double seconds = 0;  ///< processor time
 };
 
 struct RunSettings {
   std::uint64_t seed = 1;
-  int threads = 0;  ///< 0 = as many as the machine has
+  int threads = 0;  ///< 0 = one per hardware thread
   const std::atomic<bool>* cancelled = nullptr;
   std::function<void(const RunEvent&)> observer;  ///< called by one thread at a time
-  /// Outputs of nodes that are already known, by the node's name: they and what only they need are not run. A program
-  /// that holds the model and the images in memory registers new ones this way.
+  /// Outputs of nodes that are already known, by the name of the node. These nodes are not run, and neither are nodes
+  /// that only they need. A program that has the model and the images in memory passes new ones this way.
   std::map<std::string, std::vector<Value>> given;
-  /// Where results are looked up before a node is called, and kept for later runs. None: nothing is kept.
+  /// Results are looked up here before a node is called, and kept here for later runs. nullptr: nothing is kept.
   const Store* store = nullptr;
-  std::set<std::string> made_anew =
-      {};                ///< nodes that are called although the store may have their results; for measuring time
-  bool remember = true;  ///< what each node came to, so that the next run's plan can say what changed
+  /// Nodes that are called even if the store has their results; for measuring time.
+  std::set<std::string> made_anew = {};
+  bool remember = true;  ///< store what each node's result was made from, so that the next plan can say what changed
   FileLimits file_limits = {};
 };
 
-/// How one node fared.
+/// What happened to one node in a run.
 struct NodeRecord {
   enum class Status { not_needed, done, skipped, failed, not_run, cancelled };
   Status status = Status::not_needed;
-  std::string reason;          ///< of anything but done
-  int stopped = 0;             ///< of one that failed or was cancelled: the nodes that were not run because of it
-  double start_s = 0;          ///< after the run's start
-  double seconds = 0;          ///< of its calls together, wall time
-  int calls = 0;               ///< how often its function was called: once per item, once where recipes are the same
+  std::string reason;          ///< why it is not done
+  int stopped = 0;             ///< if it failed or was cancelled: how many nodes were not run because of it
+  double start_s = 0;          ///< since the start of the run
+  double seconds = 0;          ///< wall time of all its calls together
+  int calls = 0;               ///< how often its function was called: once per item, but only once for equal recipes
   int cached = 0;              ///< calls whose results were read back from the store
-  double cached_seconds = 0;   ///< that those calls took when they were made
-  double peak_memory_mb = 0;   ///< most memory of the whole process while it ran
+  double cached_seconds = 0;   ///< time that the cached calls took when they were made
+  double peak_memory_mb = 0;   ///< largest memory of the whole process while the node ran
   std::vector<Value> outputs;  ///< in the order of the node's outputs
-  std::map<std::string, Digest>
-      files;  ///< content of what its options named when it was read; zero: not there or not to be read
+  /// By option: digest of the content that its paths named when they were read; zero if missing or unreadable.
+  std::map<std::string, Digest> files;
 
-  /// No item of it was begun, because a node before it failed or the run was stopped.
+  /// Whether no item of it was begun because an earlier node failed or the run was stopped.
   bool was_stopped() const;
 };
 const char* status_name(NodeRecord::Status status);
@@ -79,9 +80,9 @@ struct RunResult {
   bool cancelled() const;
 };
 
-/// Evaluates what the pipeline's outputs need, independent nodes in parallel on one pool. A node that fails leaves the
-/// others going; what depends on it is not run. The same pipeline and seed give the same bytes at any number of
-/// threads.
+/// Runs the nodes that the pipeline's outputs need. Independent nodes run in parallel on one thread pool. If a node
+/// fails, the nodes that depend on it are not run, and the others go on. The same pipeline and seed give the same bytes
+/// with any number of threads. Throws Error if no thread can be started.
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
 
 /// What a run would do with one node.
@@ -89,17 +90,17 @@ struct PlannedNode {
   enum class What { not_needed, cached, function, runs, depends };
   What what = What::not_needed;
   int calls = 0, calls_to_make = 0;
-  std::string why;                  ///< it runs
-  std::set<std::string> waits_for;  ///< of `depends`: it runs unless these come out unchanged
-  double seconds = 0;               ///< that the calls to make took the last time; 0 where that is not known
+  std::string why;                  ///< why it runs
+  std::set<std::string> waits_for;  ///< for `depends`: it runs unless the results of these nodes stay the same
+  double seconds = 0;               ///< time that the calls to make took in the last run; 0 if not known
 };
 
 /// What run_pipeline() would do, in the order of Pipeline::nodes. Calls no node. `settings.store` must be given.
 std::vector<PlannedNode> plan_pipeline(const Pipeline& pipeline, const Catalogue& catalogue,
                                        const RunSettings& settings);
 
-/// The value that a reference means in a result; absent where it could not be made. Throws Error for a name that a list
-/// does not have.
+/// The value that a reference names in a result; absent if it could not be made. Throws Error if the reference names an
+/// item that its list does not have.
 Value value_of(const RunResult& result, const Reference& source);
 
 }  // namespace marrow

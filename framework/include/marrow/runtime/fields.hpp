@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The members of a value type, as its fields() lists them. A member that it forgot would be neither hashed nor stored.
+// The members of a value type, as listed by its fields(). The number of members is checked, because a member that
+// fields() forgets would be neither hashed nor stored.
 #include <cstddef>
 #include <tuple>
 #include <type_traits>
@@ -12,8 +13,8 @@ concept HasFields = requires {
   T::fields();
 };
 
-/// Compiles only for a type that has as many members as `Count`, up to 16. Where the compiler says that a structured
-/// binding has too few or too many names, the type's fields() leaves out a member or names one twice.
+/// Compiles only if T has exactly `Count` members, 16 at most. If the compiler says that a structured binding has too
+/// few or too many names, then T::fields() leaves out a member or lists one twice.
 template <std::size_t Count, class T>
 void has_as_many_members([[maybe_unused]] const T& value) {
   static_assert(Count >= 1 && Count <= 16,
@@ -84,8 +85,8 @@ void has_as_many_members([[maybe_unused]] const T& value) {
   }
 }
 
-/// fields() of a type, which must list every member. (A type with constructors or private members cannot be counted,
-/// and is taken at its word.)
+/// fields() of a type, which must list every member. The members of a type with constructors or private members cannot
+/// be counted, so its fields() is not checked.
 template <HasFields T>
 constexpr auto fields_of() {
   if constexpr (std::is_aggregate_v<T>) {

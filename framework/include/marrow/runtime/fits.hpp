@@ -10,16 +10,16 @@
 
 namespace marrow {
 
-/// A node in place of another one of a pipeline.
+/// A node that may replace another one in a pipeline.
 struct Fit {
   std::string node;
-  std::vector<std::string> missing;  ///< what would have to be wired or given, a line each; with it the node fits
+  std::vector<std::string> missing;  ///< what must be wired or given so that the node fits, one line each
   std::vector<std::string> faults;   ///< why it does not fit
 };
 
-/// Every node that could stand in place of node `id`, with the default values of its options: first those of the same
-/// kind, fitting or not; then those of other kinds that fit. Faults of the pipeline as it is, and an unknown id, go to
-/// `diagnostics`, and the result is empty.
+/// The nodes that could replace node `id`, with the default values of their options. First all nodes of the same kind,
+/// even if they do not fit; then the nodes of other kinds that fit. If the pipeline itself has faults or `id` is
+/// unknown, this is reported to `diagnostics` and the result is empty.
 std::vector<Fit> nodes_in_place_of(const std::string& id, const std::filesystem::path& file,
                                    const PipelineArguments& arguments, const Catalogue& catalogue,
                                    Diagnostics& diagnostics);

@@ -7,7 +7,7 @@
 
 namespace marrow {
 
-/// 128-bit digest: the key of a value, the content hash of a value, the identity of a library.
+/// 128-bit digest. It serves as the key of a value, the content hash of a value and the identity of a library.
 struct Digest {
   std::uint64_t low = 0, high = 0;
   auto operator<=>(const Digest&) const = default;
@@ -15,7 +15,7 @@ struct Digest {
   static constexpr auto fields() { return std::make_tuple(&Digest::low, &Digest::high); }
 };
 
-/// Streaming 128-bit hash (XXH3) of what is added. The hash of a value is thus that of its packed bytes.
+/// Streaming 128-bit hash (XXH3) of everything that is added. So the hash of a value is the hash of its packed bytes.
 class Hasher : public Archive {
  public:
   Hasher();
@@ -36,7 +36,7 @@ class Hasher : public Archive {
   void* state_;
 };
 
-/// Of bytes that lie together.
+/// Hash of one contiguous block of bytes.
 Digest hash_of_bytes(const void* data, std::size_t size);
 
 template <class T>

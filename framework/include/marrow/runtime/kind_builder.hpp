@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Declares a kind: what Plugin::kind() returns.
+// Declares a kind. Plugin::kind() returns this builder.
 //
 //   plugin.kind("edges")
 //       .summary("edge pixels of an X-ray view")
@@ -40,7 +40,7 @@ class KindBuilder {
     kind_.info.summary = std::move(text);
     return *this;
   }
-  /// An input that nodes of the kind may have. Where it is named with several types, a node takes one of them.
+  /// An input that nodes of the kind may have. If several types are given, a node takes one of them.
   template <Registered... T>
   KindBuilder& in(std::string name, std::string help, Over axis = {}) {
     kind_.info.inputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
@@ -52,7 +52,7 @@ class KindBuilder {
     kind_.info.outputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
     return *this;
   }
-  /// Something that nodes may declare of themselves with NodeBuilder::trait().
+  /// A property that nodes may declare with NodeBuilder::trait().
   KindBuilder& trait(std::string name, std::string help) {
     kind_.info.traits.push_back({std::move(name), std::move(help)});
     return *this;
@@ -62,12 +62,12 @@ class KindBuilder {
     kind_.info.sees_truth = true;
     return *this;
   }
-  /// Its nodes are called in a process of their own where their options name files.
+  /// Its nodes are called in their own process if their options name files.
   KindBuilder& runs_apart(Apart apart) {
     kind_.info.apart = apart;
     return *this;
   }
-  /// What every node of the kind must do: `marrow conformance` checks it.
+  /// The checks that every node of the kind must pass in `marrow conformance`.
   KindBuilder& suite(conformance::Suite suite) {
     kind_.suite = std::move(suite);
     for (const conformance::Check& check : conformance::checks_of(kind_.suite)) kind_.info.checks.push_back(check);

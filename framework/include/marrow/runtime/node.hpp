@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is known of a node, as plain data: all that listing, checking, inspecting, the JSON Schema and the cache key
-// need.
+// What is known about a node, as plain data. It is all that is needed to list, check and inspect nodes, and to make the
+// JSON Schema and the cache key.
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -19,17 +19,17 @@ struct PortInfo {
   std::string name;
   std::string help;
   TypeInfo type;
-  bool optional = false;  ///< of an input: may be left unwired; of an output: may be absent
-  std::string axis;       ///< of a list port: the axis that it consumes or makes; empty for one item
+  bool optional = false;  ///< an input that may be left unwired, or an output that may be absent
+  std::string axis;       ///< the axis that a list port takes or makes; empty for one item
 };
 
 enum class OptionType { boolean, integer, number, text, path, numbers, texts, paths };
 using OptionVariant =
     std::variant<bool, std::int64_t, double, std::string, std::vector<double>, std::vector<std::string>>;
 
-/// The value of an option: a variant whose copies survive a lack of memory. In libstdc++ 12, where a text or list that
-/// is copied into a new variant gets no memory, the variant destroys what was never made. An assignment copies the text
-/// first.
+/// The value of an option: a variant that can be copied safely when memory runs out. In libstdc++ 12, if there is no
+/// memory to copy a text or list into a new variant, the variant destroys a member that was never constructed. An
+/// assignment copies the text first, so the copy constructor here uses it.
 struct OptionValue : OptionVariant {
   using OptionVariant::OptionVariant;
   using OptionVariant::operator=;
@@ -47,17 +47,17 @@ struct OptionInfo {
   std::string unit;
   OptionType type = OptionType::number;
   OptionValue default_value;
-  bool required = false;  ///< a path or text with no sensible default
+  bool required = false;  ///< a pipeline must give it, because there is no sensible default
   std::optional<double> minimum, maximum;
   std::vector<std::string> choices;
-  std::size_t length = 0;  ///< of numbers: how many there must be; 0 = any
+  std::size_t length = 0;  ///< how many numbers a list must have; 0 = any
 };
 
-/// What options must be to each other.
+/// Conditions between the options of a node.
 enum class RelationType { not_above, below, same_length, as_many_or_none, exactly_one };
 struct RelationInfo {
   RelationType type = RelationType::not_above;
-  std::vector<std::string> names;  ///< of options; exactly_one may name inputs, too: "in.camera"
+  std::vector<std::string> names;  ///< names of options; exactly_one may also name inputs, as "in.camera"
 };
 
 struct NodeInfo {
@@ -66,7 +66,7 @@ struct NodeInfo {
   std::vector<PortInfo> inputs, outputs;
   std::vector<OptionInfo> options;
   std::vector<RelationInfo> relations;
-  std::vector<std::string> traits;  ///< of those that its kind knows
+  std::vector<std::string> traits;  ///< the traits of its kind that it has
   bool random = false;              ///< draws from Context::seed()
 
   std::string kind() const { return name.substr(0, name.find('.')); }
@@ -81,7 +81,7 @@ struct NodeDefinition {
   std::function<std::vector<Value>(const std::vector<Value>& inputs, const void* options, Context&)> call;
 };
 
-/// How values of a type are written to disk when a pipeline names them as outputs.
+/// How values of a type are written to disk if they are outputs of a pipeline.
 struct WriterInfo {
   TypeInfo type;
   std::string extension;  ///< ".mha"; empty for a folder

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Declares a node: what Plugin::node() returns.
+// Declares a node. Plugin::node() returns this builder.
 #include <array>
 #include <functional>
 #include <memory>
@@ -16,9 +16,10 @@
 namespace marrow {
 namespace detail {
 
-/// Unit by the suffix of a name: "sigma_mm" is in mm.
+/// The unit that the suffix of a name gives ("mm" for "sigma_mm"), or "".
 std::string unit_of_name(const std::string& name);
-/// Checks the declaration itself (defaults within their range, names well formed, kind's contract) and fills `faults`.
+/// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
+/// fit) and fills `faults`. It does not check the contract of the kind.
 void check_declaration(NodeDefinition& node);
 
 }  // namespace detail
@@ -50,18 +51,18 @@ class NodeBuilder {
     node_.info.summary = std::move(text);
     return *this;
   }
-  /// The node does what its kind says of this trait.
+  /// The node has this trait of its kind.
   NodeBuilder& trait(std::string name) {
     node_.info.traits.push_back(std::move(name));
     return *this;
   }
-  /// What options must be to each other: not_above, below, same_length, as_many_or_none, exactly_one. A pipeline that
-  /// breaks it is refused with the option's line; the node need not test it.
+  /// A condition between options: not_above, below, same_length, as_many_or_none or exactly_one. A pipeline that breaks
+  /// it is refused with the line of the option, so the node need not check it.
   NodeBuilder& relation(RelationInfo relation) {
     node_.info.relations.push_back(std::move(relation));
     return *this;
   }
-  /// The node draws from Context::seed(); its results then depend on the run's seed.
+  /// The node draws from Context::seed(), so its results depend on the run's seed.
   NodeBuilder& random() {
     node_.info.random = true;
     return *this;
@@ -83,7 +84,7 @@ class NodeBuilder {
     return *this;
   }
 
-  /// The value returned, or the next item of a returned tuple.
+  /// Names the returned value, or the next item of a returned tuple.
   NodeBuilder& out(std::string name, std::string help, Over axis = {}) {
     const std::size_t index = outputs_->size();
     if constexpr (detail::IsTuple<R>::value) {
@@ -98,7 +99,7 @@ class NodeBuilder {
     }
     return *this;
   }
-  /// A member of the struct returned.
+  /// Names a member of the returned struct.
   template <class M, class S>
   NodeBuilder& out(std::string name, M S::*member, std::string help, Over axis = {}) {
     static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
@@ -108,8 +109,8 @@ class NodeBuilder {
                          });
   }
 
-  /// An option, bound to a member of the options struct whose default-made value is the default. Attributes: at_least,
-  /// at_most, one_of, unit, required.
+  /// An option, bound to a member of the options struct. Its default is the value of the member in a
+  /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required.
   template <class M, class O, class... Attributes>
   NodeBuilder& option(std::string name, M O::*member, std::string help, Attributes... attributes) {
     static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");
@@ -141,7 +142,7 @@ class NodeBuilder {
       port.optional = role == detail::Role::optional_input || role == detail::Role::optional_list;
       if constexpr (role == detail::Role::list || role == detail::Role::optional_list) {
         port.type = TypeInfo::of<typename Argument::Plain::value_type>();
-        port.axis.assign(1, '?');  // named by over()
+        port.axis.assign(1, '?');  // a placeholder until over() names the axis
       } else {
         port.type = TypeInfo::of<typename Argument::Plain>();
       }
@@ -189,7 +190,7 @@ class NodeBuilder {
     return count;
   }
 
-  /// Keeps a list built from a value alive during the call.
+  /// Gives one argument to the function. If the argument is a list, keeps the list alive during the call.
   template <class A>
   struct Holder {
     using Argument = detail::Argument<A>;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Members of an options struct as values of options, and back.
+// Converts members of an options struct to option values, and back.
 #include <algorithm>
 #include <filesystem>
 #include <limits>
@@ -80,7 +80,7 @@ constexpr OptionType option_type() {
     return OptionType::numbers;
 }
 
-/// The number of numbers that a fixed-size list option takes; 0 for std::vector.
+/// How many numbers a list option of fixed size takes; 0 for std::vector.
 template <class M>
 constexpr std::size_t option_length() {
   if constexpr (requires { std::tuple_size<M>::value; })
@@ -91,7 +91,7 @@ constexpr std::size_t option_length() {
     return 0;
 }
 
-/// A whole number that the member cannot hold is out of the option's range.
+/// Narrows the range of an integer option to the numbers that the member can hold.
 template <class M>
 void narrow_range(OptionInfo& info) {
   using Limits = std::numeric_limits<M>;

@@ -12,13 +12,13 @@
 
 namespace marrow {
 
-/// node, node.output, node.item or node.output.item, as written in a pipeline.
+/// A reference as written in a pipeline: node, node.output, node.item or node.output.item.
 struct Reference {
   std::string text;
   Place place;
   int node = -1;                   ///< index into Pipeline::nodes
   int output = -1;                 ///< index into the node's outputs
-  std::vector<std::string> items;  ///< picks along the axes, outermost first
+  std::vector<std::string> items;  ///< the items that it picks along the axes, outermost first
 };
 
 /// What one input port is wired to: one reference, or several that make a list.
@@ -48,27 +48,28 @@ struct Pipeline {
   std::string name;
   std::string help;
   std::filesystem::path file;
-  std::vector<PipelineNode> nodes;  ///< in an order in which sources come before users
+  std::vector<PipelineNode> nodes;  ///< sorted so that sources come before users
   std::vector<PipelineOutput> outputs;
-  std::vector<std::string> notes;  ///< things worth knowing that are no faults
+  std::vector<std::string> notes;  ///< remarks for people that are not faults
 
   /// The axes of an output of a node, outermost first.
   std::vector<std::string> axes_of(const Reference& source) const;
-  /// The nodes that must be run for the outputs; `given(id)` tells which ones are known already.
+  /// For each node, whether it must be run for the outputs. given(id) says whether the outputs of a node are already
+  /// known.
   std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
 
 /// A value of one of the pipeline's inputs.
 struct InputValue {
   std::string name, value;
-  Place place =
-      {};  ///< in the file that it was written in, whose folder relative paths start from; none: the command line
+  /// Where the value is written. Relative paths start at the folder of that file. No file means the command line.
+  Place place = {};
 };
 
-/// node.option=value, node.uses=kind.name or node.in.port=reference.
+/// A change of the pipeline: node.option=value, node.uses=kind.name or node.in.port=reference.
 struct Override {
   std::string key, value;
-  Place place = {};  ///< as that of an input's value
+  Place place = {};  ///< as InputValue::place
 };
 
 struct PipelineArguments {
@@ -76,12 +77,12 @@ struct PipelineArguments {
   std::vector<Override> overrides;
 };
 
-/// Reads and checks a pipeline. All faults go to `diagnostics`; the result may be used only when there are none.
-/// `inputs_required` is false for `check`, where values of inputs without a default may be left out.
+/// Reads and checks a pipeline. All faults go to `diagnostics`; the result may be used only if there are none.
+/// `inputs_required` is false for `marrow check`: inputs without a default may then have no value.
 Pipeline read_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                        const Catalogue& catalogue, Diagnostics& diagnostics, bool inputs_required = true);
 
-/// The pipeline as YAML with everything explicit; reading it gives the same pipeline.
+/// The pipeline as YAML, with the values of all options. Reading it gives the same pipeline.
 std::string resolved_yaml(const Pipeline& pipeline);
 
 }  // namespace marrow

@@ -4,8 +4,8 @@
 
 namespace marrow {
 
-/// To be called by whatever parses a file, before it begins: if the process crashes or is ended, the message then names
-/// that file. Does nothing but in a process that was started to read. Safe to use from several threads.
+/// A parser must call this before it begins with a file. If the process then crashes or is killed, the message names
+/// that file. Does nothing except in a process that was started to read files. Safe to use from several threads.
 void now_reading(const std::filesystem::path& file);
 
 }  // namespace marrow

@@ -10,22 +10,22 @@
 
 namespace marrow {
 
-/// The folder that a run leaves behind: pipeline.yaml (resolved), run.json (what ran, with what, how long), log.txt,
-/// and outputs/ in formats that other programs open. Nothing that was there before is overwritten: the folder must be
-/// new or empty. Of several processes that want the same folder, one gets it.
+/// The folder with the results of a run: pipeline.yaml (resolved), run.json (what ran, with which inputs, how long),
+/// log.txt, and outputs/ in formats that other programs can open. Existing files are never overwritten: the folder must
+/// be new or empty. If several processes want the same folder, only one gets it.
 class RunFolder {
  public:
-  /// Throws Error when the folder holds anything, was taken by another run just now, or cannot be written to.
+  /// Throws Error if the folder is not empty, was just taken by another run, or cannot be written to.
   RunFolder(const std::filesystem::path& folder, const Pipeline& pipeline);
-  /// Makes the first of base, base-2, base-3 ... that is not there yet.
+  /// Makes the first of the folders base, base-2, base-3 ... that does not exist yet.
   static RunFolder with_free_name(const std::filesystem::path& base, const Pipeline& pipeline);
 
   struct Written {
     std::string output;
     std::vector<std::string> files;  ///< relative to the folder
-    std::string fault;               ///< why it was not written; empty when it was
+    std::string fault;               ///< why it was not written; empty if it was
   };
-  /// Writes the pipeline's outputs, as far as they were made.
+  /// Writes those outputs of the pipeline that were made.
   std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue);
   RunLog& log() { return *log_; }
   void write_record(const Pipeline& pipeline, const RunResult& result, const RunSettings& settings,
@@ -36,14 +36,14 @@ class RunFolder {
 
  private:
   RunFolder() = default;
-  /// Whether the folder, which is there, became this run's.
+  /// Tries to take the existing folder for this run. Returns false if another run has taken it.
   bool take(const Pipeline& pipeline);
 
   std::filesystem::path folder_;
   std::unique_ptr<RunLog> log_;
 };
 
-/// The widest instruction set that run-time dispatch finds on this machine.
+/// The widest instruction set of this machine that libraries may choose at run time.
 std::string cpu_level();
 
 }  // namespace marrow

@@ -8,26 +8,26 @@
 
 namespace marrow {
 
-/// The lines that a run leaves. Each goes to the run's file, plain, with its time and level; and to the standard error
-/// stream, coloured where that is a terminal. Control characters are written out, and further lines of a text are
-/// indented, so that no text can forge a line. Safe to use from several threads.
+/// The log of a run. Each line goes to the log file, as plain text with time and level, and to the standard error
+/// stream, in colour if that is a terminal. Control characters are escaped, and further lines of a text are indented,
+/// so that no text can forge a line. Safe to use from several threads.
 class RunLog {
  public:
-  /// Lines are added at the end of the file, which is there. Throws Error when it cannot be opened.
+  /// Appends lines to the file. Throws Error if it cannot be opened.
   explicit RunLog(const std::filesystem::path& file);
   ~RunLog();
   RunLog(const RunLog&) = delete;
   RunLog& operator=(const RunLog&) = delete;
 
-  /// The least level that is shown on the standard error stream; the file takes every line. At first: info.
+  /// Sets the lowest level that is shown on the standard error stream; at first it is info. The file gets every line.
   void show_from(LogLevel least);
   bool shows(LogLevel level) const;
-  /// `where` names the node and the item; empty for a line about the run itself.
+  /// `where` names the node and the item. It is empty for a line about the run itself.
   void write(LogLevel level, const std::string& where, const std::string& text);
-  /// For the file alone: what was shown otherwise.
+  /// Writes to the file only. For lines that were shown in another way.
   void keep(LogLevel level, const std::string& where, const std::string& text);
 
-  /// Why lines are missing in the file; empty where none are.
+  /// Why lines are missing in the file; empty if none are missing.
   std::string fault() const;
 
  private:

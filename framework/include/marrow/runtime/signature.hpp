@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What a node's function says of its ports: read off its arguments and off what it returns.
+// Derives the ports of a node from the arguments and the return type of its function.
 #include <memory>
 #include <optional>
 #include <string>
@@ -70,7 +70,7 @@ struct OptionsOf<A, Rest...> {
 
 struct NoOptions {};
 
-/// The item type of something returned: of a list, an optional, a shared function, or itself.
+/// The item type of a returned type: the item of a list, of an optional or of a shared pointer, else the type itself.
 template <class M>
 struct Returned {
   using Optional = typename OptionalItem<M>::type;
@@ -90,7 +90,7 @@ struct Returned {
   }
   using Item = typename decltype(item())::type;
 
-  /// The value in a member of `whole`, which it keeps alive.
+  /// The value of `member`, which is a part of `whole`. The value keeps its data alive.
   template <class Whole>
   static Value value(const std::shared_ptr<const Whole>& whole, const M& member, const std::string& axis) {
     Value none;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The value types that every plugin shares. A plugin's own types are registered in the plugin, from its own namespace.
+// The value types that all plugins share. A plugin registers the types of its own namespace itself.
 #include "marrow/domain/calibration.hpp"
 #include "marrow/domain/case.hpp"
 #include "marrow/domain/features.hpp"

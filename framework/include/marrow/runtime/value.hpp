@@ -17,9 +17,9 @@ concept Registered = requires {
   ValueType<T>::kId;
 };
 
-/// Registers a type as a value. Use at global scope. `id` is the name that pipelines and messages show; raise `version`
-/// whenever the meaning or layout changes. A function (projector, cost, optimizer) has no content, is keyed by its
-/// recipe and never stored.
+/// Registers a type as a value. Use at global scope. `id` is the name that pipelines and messages show. Raise `version`
+/// whenever the meaning or layout of the type changes. A function (projector, cost, optimizer) has no content: its key
+/// is made from its recipe, and it is never stored.
 #define MARROW_VALUE_TYPE(Type, id, version)   \
   template <>                                  \
   struct marrow::ValueType<Type> {             \
@@ -35,15 +35,15 @@ concept Registered = requires {
     static constexpr bool kIsFunction = true;   \
   };
 
-/// How the content of a data type is hashed, written and read. The code lies in the library that knows the type.
+/// How the content of a data type is hashed, written and read. The code is in the library that knows the type.
 struct Content {
   Digest (*hash)(const void*);
   void (*pack)(const void*, Archive&);
   std::shared_ptr<const void> (*unpack)(Unpacker&);
 };
 
-/// The content of a type. Defined once for each of marrow's own types, in its library (types.hpp), so that not every
-/// plugin compiles them all again.
+/// The Content of a type. For marrow's own types it is compiled once, in marrow's library (types.hpp), so that plugins
+/// do not compile it again.
 template <class T>
 __attribute__((visibility("default"))) const Content* content_of() {
   static constexpr Content kContent{
@@ -53,14 +53,14 @@ __attribute__((visibility("default"))) const Content* content_of() {
   return &kContent;
 }
 
-/// What the graph compares: id, version and size. (Never typeid: two plugins with a same-named struct of different
-/// layout would pass for each other.)
+/// A type as the graph compares it: by id, version, size and whether it is a function. typeid is not used, because it
+/// would be equal for two structs of the same name but different layout in two plugins.
 struct TypeInfo {
   std::string id;
   int version = 0;
   std::size_t size = 0;
   bool is_function = false;
-  const Content* content = nullptr;  ///< of a data type; null where the type is only known from a manifest
+  const Content* content = nullptr;  ///< for a data type; null if the type is only known from a manifest
 
   bool operator==(const TypeInfo& other) const {
     return id == other.id && version == other.version && size == other.size && is_function == other.is_function;
@@ -73,29 +73,29 @@ struct TypeInfo {
   }
 };
 
-/// Makes the data of a value when it is first needed: reads it from the store, or calls the node that makes it.
+/// Makes the data of a value when they are first needed: reads them from the store, or calls the node that makes them.
 class Source {
  public:
   virtual ~Source() = default;
-  /// The same pointer each time; safe to call from several threads. `type` must know the content of a data type. Throws
-  /// Error when it cannot be made.
+  /// Returns the same pointer each time. Safe to call from several threads. For a data type, `type` must have its
+  /// Content. Throws Error (inside the runtime also MissingInput) if the data cannot be made.
   virtual std::shared_ptr<const void> data(const TypeInfo& type) = 0;
 };
 
-/// A value on an edge: absent, one item, or items along an axis (each of which may again have an axis). Immutable and
-/// cheap to copy.
+/// A value on an edge of the graph: absent, one item, or a list of items along an axis. The items of a list may be
+/// lists too. Immutable and cheap to copy.
 struct Value {
   TypeInfo type;
-  std::shared_ptr<const void> data;  ///< of one item
-  std::shared_ptr<Source> source;    ///< of one item whose data are not here yet
+  std::shared_ptr<const void> data;  ///< data of one item
+  std::shared_ptr<Source> source;    ///< source of one item whose data are not here yet
 
-  std::string axis;  ///< of a list; empty for one item
+  std::string axis;  ///< axis of a list; empty for one item
   std::vector<std::string> names;
   std::vector<Value> items;
 
-  /// Of an absent item: why it could not be made ("node 'edges' failed"). Empty where there simply is none.
+  /// Why an absent item could not be made ("node 'edges' failed"). Empty if the item simply does not exist.
   std::string missing;
-  /// What identifies the value: the content hash of data, the recipe key of a function. Set by the executor.
+  /// Identifies the value: the content hash of data, or the recipe key of a function. Set by the executor.
   Digest key;
 
   bool is_list() const { return !axis.empty(); }

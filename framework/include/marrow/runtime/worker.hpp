@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Work in another process: what may crash, hang or take all memory does so there, and is one job's failure here.
-// Readers of files, cells of a comparison, checks of conformance and unknown libraries all run in workers.
+// Work in another process. If the work crashes, hangs or takes all memory, only one job fails here. Workers read files,
+// run the cells of a comparison, run the checks of conformance, and load unknown libraries.
 //
-// A worker reads requests and writes reports and answers, one JSON document a line:
+// A worker reads requests and writes reports and answers, one JSON document per line:
 //   {"job": 7, "do": "call", ...}             to the worker: what to do, and the job's number
-//   {"job": 7, "say": "progress", ...}        from it, any number of times, while it is at the job
-//   {"job": 7, "end": ...}                    the answer, or
+//   {"job": 7, "say": "progress", ...}        from the worker: a report, any number of times during the job
+//   {"job": 7, "end": ...}                    from the worker: the answer, or
 //   {"job": 7, "failed": "why", ...}          what went wrong, in words
-// A line that is something else, or of another job, ends the worker: nothing that it wrote is believed.
+// If a worker writes any other line, or a line of another job, it is killed and its job fails.
 #include <sys/types.h>
 
 #include <atomic>
@@ -26,59 +26,62 @@ namespace marrow {
 struct WorkerSettings {
   std::vector<std::string> command;  ///< program and its arguments
   std::vector<int> shared = {};      ///< open files that the worker gets as descriptors 3, 4, ...
-  bool quiet = false;                ///< what it prints on its standard error goes nowhere
-  bool has_large_pages =
-      false;  ///< its memory comes in large pages, which is quicker where it takes hundreds of megabytes
+  bool quiet = false;                ///< discard what it prints on its standard error
+  bool has_large_pages = false;      ///< use large memory pages: faster for jobs that take hundreds of megabytes
 };
 
 /// What one job may use.
 struct WorkerLimits {
-  double seconds = 1e9;  ///< as Worker::seconds() counts
+  double seconds = 1e9;  ///< as counted by Worker::seconds()
   double memory_mb = 1e9;
-  double suspended_seconds = 60;  ///< in a row; counts only where `seconds` is set
+  double suspended_seconds = 60;  ///< without a break; checked only if `seconds` is set
 };
 
 /// How a job ended.
 struct WorkerEnd {
-  nlohmann::json answer;          ///< what followed "end"
-  std::string failed;             ///< why there is no answer; empty where there is one
-  bool died = false;              ///< the process ended or was ended; the worker is of no more use
-  bool is_late = false;           ///< it took longer than it may
-  bool is_out_of_memory = false;  ///< it wanted more memory than it may have
-  int signal = 0;                 ///< that ended it
+  nlohmann::json answer;          ///< the value of "end"
+  std::string failed;             ///< why there is no answer; empty if there is one
+  bool died = false;              ///< the process ended or was killed; the worker cannot be used any more
+  bool is_late = false;           ///< it exceeded its time limit
+  bool is_out_of_memory = false;  ///< it exceeded its memory limit, or there was no memory
+  int signal = 0;                 ///< the signal that ended it, or 0
 };
 
-/// A process that does one job at a time. It does not outlive the thread that made it. For one thread at a time.
+/// A process that does one job at a time. It is killed when the thread that made it ends. Use a Worker from one thread
+/// at a time only.
 class Worker {
  public:
   using Said = std::function<void(const nlohmann::json&)>;
 
-  /// Throws Error where no process can be started.
+  /// Throws Error if no process can be started.
   explicit Worker(const WorkerSettings& settings);
   ~Worker();
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// Gives it a job; the one before must have ended. A worker that is gone shows it at the next take().
+  /// Gives it a job. The job before must have ended. If the process has ended, the next take() reports that.
   void ask(nlohmann::json request);
-  /// Readable when something has come or the process has ended.
+  /// This descriptor becomes readable when a line has come or the process has ended.
   int descriptor() const { return from_; }
-  /// Takes what has come, without waiting: `said` gets each report. The end of the job, once it is there.
+  /// Reads what has come, without waiting, and passes each report to `said`. Returns the end of the job once it has
+  /// come.
   std::optional<WorkerEnd> take(const Said& said);
-  /// Ends the process where the job is beyond its limits; then that is the job's end. To be called every second or
-  /// oftener.
+  /// Kills the process if the job exceeds its limits, and then returns the end of the job. Call it at least once a
+  /// second.
   std::optional<WorkerEnd> check(const WorkerLimits& limits);
-  /// Waits for the end of the job, within its limits. Throws Cancelled, and ends the process, when `cancelled` says so.
+  /// Waits for the end of the job and checks its limits. If `cancelled` becomes true, kills the process and throws
+  /// Cancelled.
   WorkerEnd wait(const WorkerLimits& limits, const std::atomic<bool>* cancelled, const Said& said);
 
-  /// Ends the process, whose job has ended; returns when it is gone.
+  /// Kills the process and returns when it is gone. Call it when the job has ended.
   void close();
   bool is_dead() const { return process_ < 0; }
   pid_t process() const { return process_; }
-  /// That the job has had so far. Not counted: while it waits for another's result, and while it or we were suspended.
+  /// Time that the job has taken so far. Time in which it waits for another process's result, or in which the worker or
+  /// this process is suspended, does not count.
   double seconds();
-  double memory_mb() const;  ///< that it has at present
-  /// Where it last reported to be: "node 'edges' (lateral)". Empty where it did not.
+  double memory_mb() const;  ///< resident memory of the process at present
+  /// The place that it last reported: "node 'edges' (lateral)". Empty if it reported none.
   const std::string& at() const { return at_; }
 
  private:
@@ -96,31 +99,31 @@ class Worker {
   double seconds_ = 0, suspended_seconds_ = 0;
 };
 
-/// What a worker tells while it is at a job. Safe to use from several threads.
+/// Sends reports from the worker during a job. Safe to use from several threads.
 class WorkerReports {
  public:
   virtual ~WorkerReports() = default;
   /// Sends a report: {"say": ..., ...}.
   virtual void say(nlohmann::json report) = 0;
-  /// Where it is, for the message if it dies.
+  /// Reports where the job is, for the message if the process dies.
   void at(const std::string& place) { say({{"say", "at"}, {"place", place}}); }
-  /// Waiting for another process's result begins or ends; that time is not the job's.
+  /// Reports that the job begins or ends to wait for another process's result. This time does not count.
   void waiting(bool waits) { say({{"say", waits ? "waiting" : "goes on"}}); }
 };
 
 using WorkerTask = std::function<nlohmann::json(const nlohmann::json& request, WorkerReports& reports)>;
 
-/// The worker's side: does what it is asked, until its standard input ends. What an Error says is the job's failure.
-/// The standard output is redirected to the standard error first, so that what a library prints cannot pass for an
-/// answer.
+/// The worker's side: does the tasks that are requested until its standard input ends. If a task throws, the job fails
+/// with the text of the exception. The standard output is redirected to the standard error first, so that what a
+/// library prints cannot be taken for an answer.
 int serve_worker(const std::map<std::string, WorkerTask>& tasks);
 
-/// The program marrow-worker, which lies beside the framework's library.
+/// The program marrow-worker, in the folder `marrow` next to the framework's library.
 std::filesystem::path worker_program();
 
-/// A text of any bytes as JSON: a string, or {"bytes": ...} where it is not UTF-8.
+/// A text of any bytes as JSON: a string, or {"bytes": ...} if it is not UTF-8.
 nlohmann::json json_of_bytes(const std::string& text);
-/// The way back. Throws Error for anything else.
+/// The inverse of json_of_bytes(). Throws Error for any other JSON.
 std::string bytes_of_json(const nlohmann::json& json);
 
 }  // namespace marrow

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A body of ellipsoids that do not touch, known exactly as a volume, a field, a surface, an outline and a radiograph.
+// A body made of ellipsoids that do not touch. Its volume, field, surface, outline and radiograph are known
+// analytically.
 #include <vector>
 
 #include "marrow/domain/functions.hpp"
@@ -9,32 +10,35 @@
 
 namespace marrow::analytic {
 
+/// Columns of `axes` are the directions of the three radii.
 struct Ellipsoid {
   Eigen::Vector3d centre_mm, radii_mm;
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 };
 using Body = std::vector<Ellipsoid>;
 
-/// Length of a ray inside, in front of its start. The direction is a unit vector.
+/// Length in mm of the part of a ray that is inside the body and in front of its start. `direction`: a unit vector.
 double chord_mm(const Body& body, const Eigen::Vector3d& start_mm, const Eigen::Vector3d& direction);
-/// Distance to the surface, negative inside, clamped to +-band.
+/// Distance to the surface, negative inside, clamped to +-band_mm.
 double signed_distance_mm(const Body& body, const Eigen::Vector3d& point_mm, double band_mm);
 
-/// A grid whose middle is the origin.
+/// A grid in frame "ct" whose middle is the origin.
 Grid grid_of(const std::array<int, 3>& size, const Eigen::Vector3d& spacing_mm,
              const Eigen::Matrix3d& direction = Eigen::Matrix3d::Identity());
-/// `inside_hu` within, `outside_hu` around, in between by the part of a voxel that lies inside.
+/// `inside_hu` inside and `outside_hu` outside. A voxel at the surface is a mix, by the part of it that lies inside.
 Volume volume_of(const Body& body, const Grid& grid, double inside_hu, double outside_hu);
-/// The signed distance in each voxel.
+/// The signed distance of each voxel, clamped to +-band_mm.
 SignedField field_of(const Body& body, const Grid& grid, double band_mm);
-/// A closed surface per ellipsoid, its normals outward.
+/// A closed surface for each ellipsoid. Normals point outward.
 Mesh mesh_of(const Body& body);
 
-/// A C-arm's view: 1000 mm from source to detector, 600 to the world's origin, turned about the patient's long axis.
+/// A C-arm's view: 1000 mm from the source to the detector, 600 mm from the source to the world's origin, turned about
+/// the patient's long axis.
 Camera c_arm(double angle_deg, int width_px, int height_px, double pixel_mm);
+/// world_from_ct with this rotation vector and translation.
 RigidTransform moved_by(const Eigen::Vector3d& turn_rad, const Eigen::Vector3d& shift_mm);
 
-/// Draws the body exactly: the outer outline, and mm of its chords times a density.
+/// Draws the body exactly: the outer outline, and radiographs whose values are chord lengths in mm times a density.
 class BodyProjector : public OutlineProjector, public RadiographProjector {
  public:
   explicit BodyProjector(Body body, double density = 1) : body_(std::move(body)), density_(density) {}

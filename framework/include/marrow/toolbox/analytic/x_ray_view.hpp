@@ -9,17 +9,16 @@ namespace marrow::analytic {
 
 struct XRay {
   Camera camera;
-  double gain = 1, offset = 0;  ///< of the line integrals
-  double noise = 1;             ///< 1: half a percent of the brightest
+  double gain = 1, offset = 0;  ///< applied to the line integrals
+  double noise = 1;             ///< standard deviation, in half percents of the brightest value; 0: none
   std::uint32_t seed = 0;
 };
 
-/// The body in soft tissue as a 16-bit image, or of floating point where there is no noise: exp of minus the line
-/// integrals, blurred by the device.
+/// An image of the body in soft tissue: exp(-line integral), with the blur of a device. 16 bit; without noise CV_32F.
 View x_ray_view(const XRay& x_ray, const std::string& name, const RadiographProjector& body,
                 const RigidTransform& world_from_model);
 
-/// Ridges of the gradient of the logarithm, smoothed as edge detectors do.
+/// Edges: ridges of the gradient of the image's logarithm, after the smoothing that edge detectors use.
 EdgeMap edges_of(const View& view);
 
 }  // namespace marrow::analytic

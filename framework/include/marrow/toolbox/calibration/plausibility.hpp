@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What is wrong with a camera, in words: from its numbers alone, and from points that it should show.
+// Explains in words what is wrong with a camera: from its numbers alone, and from points that it should show.
 #include <optional>
 #include <string>
 #include <vector>
@@ -9,36 +9,38 @@
 
 namespace marrow::calibration {
 
-/// What is known of the device; 0 = not known.
+/// What is known about the device; 0: not known.
 struct Device {
   double source_to_detector_mm = 0, pixel_mm = 0, detector_mm = 0;
 };
 
-/// Points in world coordinates and where a view shows them.
+/// Points in world coordinates and their pixels in a view, in the same order.
 struct SeenPoints {
   std::vector<Eigen::Vector3d> world_mm;
   std::vector<Eigen::Vector2d> pixels;
 };
 
 /// Sentences about numbers that no X-ray device has: a wrong unit, a camera matrix of another image, a detector smaller
-/// than the image says. `object_mm` are points of what should be seen, or none.
+/// than the image. `object_mm`: points of the object that should be seen, in world coordinates; may be empty.
 std::vector<std::string> implausible_numbers(const Camera& camera, const Device& device,
                                              const std::vector<Eigen::Vector3d>& object_mm);
 
-/// Root mean square of the distances between where points should be seen and where they are. Infinite where one lies
-/// behind the source.
+/// Root mean square distance between the pixels at which points should be seen and those at which they are seen.
+/// Infinite if a point lies behind the source.
 double reprojection_error_px(const Camera& camera, const SeenPoints& points);
 
-/// The sentence about the one mistake (mirrored image, flipped axis, wrong unit, pose the other way round ...) that
-/// explains the points at least five times better than the camera as it is. None where the camera is right or no single
-/// mistake does.
+/// A sentence about the single mistake (mirrored image, flipped axis, wrong unit, inverted pose ...) that explains the
+/// points best. Undoing it must reduce the error to a fifth and to less than 2 % of the image's width. std::nullopt if
+/// there is no such mistake, the error is below 1 % of the width, or there are fewer than four points.
 std::optional<std::string> explanation(const Camera& camera, const SeenPoints& points);
 
-/// The pose that the points would have, and how far it is from the camera's; needs six points that are not all in one
-/// line.
+/// Result of refit_pose(): the error that remains, and how far the new pose is from the camera's: angle, and
+/// displacement of the points' centre.
 struct Refit {
   double error_px = 0, turn_deg = 0, shift_mm = 0;
 };
+/// Fits only the pose to the points, from the camera's pose. std::nullopt if there are fewer than six points, if they
+/// do not determine a pose, or if no better pose is found.
 std::optional<Refit> refit_pose(const Camera& camera, const SeenPoints& points);
 
 }  // namespace marrow::calibration

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A small line plot: axes with round ticks, one curve, vertical marks.
+// A small line plot: axes with ticks at round numbers, one curve, vertical marks.
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -16,15 +16,15 @@ struct PlotMark {
 
 struct Plot {
   std::string title, x_label, y_label;
-  std::vector<double> x, y;  ///< x increasing; y values that are not finite leave a gap
+  std::vector<double> x, y;  ///< of equal size; x increases; values of y that are not finite leave a gap
   std::vector<PlotMark> marks;
-  std::optional<cv::Point2d> dot;  ///< a point of the curve that stands out
+  std::optional<cv::Point2d> dot;  ///< a point of the curve to highlight
 };
 
-/// Draws the plot inside `area` of a CV_8UC3 canvas on white. Marks outside the range of x are not drawn.
+/// Draws the plot on white into `area` of a CV_8UC3 canvas. Marks outside the range of x are not drawn.
 void draw_plot(cv::Mat& canvas, const cv::Rect& area, const Plot& plot);
 
-/// Round numbers (1, 2 or 5 times a power of ten apart), about `count` of them, inside [low, high].
+/// About `count` round numbers inside [low, high]. Their distance is 1, 2 or 5 times a power of ten.
 std::vector<double> round_ticks(double low, double high, int count);
 
 }  // namespace marrow::draw

@@ -10,7 +10,8 @@
 
 namespace marrow::field {
 
-/// Trilinear value at a fractional index, clamped to the border.
+/// Trilinear value at a fractional index, clamped to the border. The volume must have at least two voxels along each
+/// axis.
 inline float sample(const marrow::Volume& volume, float x, float y, float z) {
   const auto& size = volume.grid.size;
   x = std::clamp(x, 0.f, float(size[0] - 1));
@@ -32,14 +33,14 @@ inline float sample(const marrow::Volume& volume, float x, float y, float z) {
 /// What the CT shows along a normal.
 struct Edge {
   double mean_hu = 0;    ///< smoothed value at the point
-  double drop_hu = 0;    ///< height of a step from bright inside to dark outside; negative for the opposite
-  double offset_mm = 0;  ///< how far outside the steepest descent the point lies; only where drop_hu > 0
+  double drop_hu = 0;    ///< height of a step from bright inside to dark outside; negative for the opposite step
+  double offset_mm = 0;  ///< distance of the point outside the steepest descent; 0 if there is no descent
 };
 
 class EdgeProfile {
  public:
-  /// `sigma_mm` of the Gaussian derivative; `blur_mm`: width (standard deviation) of an ideal edge in the CT itself;
-  /// `cortex_hu` of a cortex too thin to be seen as such.
+  /// `sigma_mm`: standard deviation of the Gaussian derivative. `blur_mm`: standard deviation of the CT's own blur of
+  /// an ideal edge. `cortex_hu`: value assumed for a cortex that is too thin for the CT to show its true value.
   EdgeProfile(double sigma_mm, double blur_mm, double cortex_hu)
       : step_mm_(kStep * sigma_mm), variance_mm2_(sigma_mm * sigma_mm + blur_mm * blur_mm), cortex_hu_(cortex_hu) {
     double sum = 0, second_sum = 0, half = 0;
@@ -61,7 +62,7 @@ class EdgeProfile {
     drop_per_slope_mm_ = 1 / half;
   }
 
-  /// `index`: the point; `normal_index`: 1 mm along the outward normal, in voxels.
+  /// `index`: the point, as a fractional index. `normal_index`: 1 mm along the outward normal, in voxels.
   Edge at(const marrow::Volume& volume, const Eigen::Vector3f& index, const Eigen::Vector3f& normal_index) const {
     double mean = 0, slope = 0, bend = 0;
     const Eigen::Vector3f step = normal_index * float(step_mm_);
@@ -73,13 +74,16 @@ class EdgeProfile {
       bend += w[2] * value;
       p += step;
     }
-    // Across a blurred step of width S the second derivative over the (negative) slope is the offset over S^2.
+    // For a step with blur S: second derivative / -(first derivative) = offset / S^2. `slope` is the negated first
+    // derivative.
     return {mean, slope * drop_per_slope_mm_, slope > 1e-3 ? variance_mm2_ * bend / slope : 0};
   }
 
-  /// How far inside the edge at() sees the surface of a thin cortex, whose light is blurred outwards. The cortex's
-  /// thickness follows from how much more the CT shows than a step from spongy bone to tissue would, given the cortex's
-  /// density (after Treece, Gee, Mayhew and Poole, Med. Image Anal. 2010). `index` is on the surface.
+  /// Distance in mm from the true surface of a thin cortex to the edge that at() sees. Blur moves this edge outwards. A
+  /// point on the true surface has offset_mm = -shift. 0 where the cortex is thick enough or not found.
+  /// The CT shows more than a step from spongy bone to tissue would. This excess and the cortex's density give the
+  /// cortex's thickness (after Treece, Gee, Mayhew and Poole, Med. Image Anal. 2010).
+  /// `index`: a point on the surface; `normal_index` as in at().
   double thin_cortex_shift_mm(const marrow::Volume& volume, const Eigen::Vector3f& index,
                               const Eigen::Vector3f& normal_index) const {
     constexpr double kStep_mm = 0.5;
@@ -98,10 +102,9 @@ class EdgeProfile {
     const double is_thin =
         std::clamp(((brightest - spongy) / std::max(brightest - tissue, 1.0) - 0.15) / 0.15, 0.0, 1.0);
     if (is_thin == 0 || light <= 0 || spongy - tissue < 50 || cortex - spongy < 100) return 0;
-    // Seen with blur s, a cortex of thickness k s between tissue outside and spongy bone inside has on its surface the
-    // slope
-    // -((cortex - tissue) - (cortex - spongy) e) / s and the second derivative -(cortex - spongy) k e / s^2, e =
-    // exp(-k^2/2), both over sqrt(2 pi): at() takes that for a point so far inside the edge.
+    // A cortex of thickness k s lies between tissue outside and spongy bone inside. With blur s and e = exp(-k^2 / 2),
+    // its surface has the slope -((cortex - tissue) - (cortex - spongy) e) / s and the second derivative
+    // -(cortex - spongy) k e / s^2, both divided by sqrt(2 pi). at() computes the offset from these two.
     const double s = std::sqrt(variance_mm2_), k = light / (cortex - spongy) / s,
                  part = (cortex - spongy) / (cortex - tissue);
     const double e = std::exp(-0.5 * k * k);

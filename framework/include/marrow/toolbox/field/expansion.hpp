@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The fast way from the seeds to the walls: fronts that race through the bone (fast marching before the level set:
-// Malladi and Sethian, A real-time algorithm for medical shape recovery, ICCV 1998). Their speed is g of the chapter's
-// Eq 6, but of what lies between two bright things, as that is what a fracture is: dark clefts slow a front, so that
-// fronts meet in the cleft and not beyond it. What the front meets outside bone stops it. Who comes first is found by
-// Dijkstra's order over neighbouring voxels, which needs no arrival times to be kept; where the surface lies exactly is
-// the business of what follows.
+// Fast expansion from the seeds to the walls of the bone: one front per fragment, all at once (fast marching before the
+// level set: Malladi and Sethian, A real-time algorithm for medical shape recovery, ICCV 1998). A front's speed follows
+// g of the chapter's Eq 6, but g falls with the depth of a dark cleft between two bright walls, because a fracture
+// looks like this. Clefts slow the fronts, so that fronts meet in the cleft and not beyond it. A front stops where
+// there is no bone. Dijkstra's algorithm over the six neighbours of each voxel finds the front that arrives first. It
+// needs no array of arrival times. Later steps find the exact position of the surface.
 #include <cstdint>
 #include <vector>
 
@@ -14,14 +14,14 @@
 namespace marrow::field {
 
 struct Race {
-  double sigma_mm = 0.7;    ///< of the Gaussian that takes the noise away
-  double cleft_mm = 3.2;    ///< widest dark cleft that is one (of a wider one the middle is dark by itself)
-  double cleft_part = 0.1;  ///< a cleft darker than its walls by this part of them slows a front e times
-  double floor_hu = 150;    ///< where the smoothed CT is darker there is no bone
+  double sigma_mm = 0.7;    ///< standard deviation of the Gaussian that removes noise
+  double cleft_mm = 3.2;    ///< widest dark gap that counts as a cleft (the middle of a wider gap is dark anyway)
+  double cleft_part = 0.1;  ///< a cleft darker than its walls by this fraction of their value slows a front e times
+  double floor_hu = 150;    ///< there is no bone where the smoothed CT is below this
 };
 
-/// For each voxel the fragment whose front came first, or kNobody. `seeds`: fractional indices of each
-/// fragment.
+/// For each voxel the fragment whose front arrived first, as an index into `seeds`, or kNobody. `seeds`: for each
+/// fragment its points, as fractional indices.
 std::vector<std::uint8_t> race(const marrow::Volume& volume, const std::vector<std::vector<Eigen::Vector3d>>& seeds,
                                const Race& race);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Between who owns which voxel and a signed field of each fragment.
+// Makes a signed field of each fragment from a map that says which fragment owns each voxel.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -12,7 +12,7 @@ namespace marrow::field {
 
 constexpr std::uint8_t kNobody = 255;
 
-/// A box of a grid and a byte for each of its voxels; nothing is inside beyond it.
+/// A box of voxels in a grid, with one byte for each voxel. A voxel beyond the box is outside.
 struct Mask {
   std::array<int, 3> first{}, size{};
   std::vector<std::uint8_t> is_inside;
@@ -28,11 +28,11 @@ struct Mask {
   bool at(int x, int y, int z) const { return contains(x, y, z) && is_inside[offset(x, y, z)]; }
 };
 
-/// What a fragment owns, with what it encloses (see fill_interior); the box leaves `margin` voxels around it where the
-/// grid has them. Empty for a fragment that owns nothing.
+/// The voxels that a fragment owns and those that it encloses (see fill_interior). The box has `margin` more voxels on
+/// each side, as far as the grid goes. The mask is empty if the fragment owns nothing.
 Mask solid(const marrow::Grid& grid, const std::vector<std::uint8_t>& owner, std::uint8_t fragment, int margin = 0);
 
-/// Voxels that leave `band_mm` in any direction.
+/// Margin in voxels that contains a band of `band_mm` in every direction.
 inline int margin(const marrow::Grid& grid, double band_mm) { return int(band_mm / grid.spacing_mm.minCoeff()) + 2; }
 
 /// The grid of a mask's box.
@@ -41,18 +41,18 @@ marrow::Grid grid_of(const marrow::Grid& grid, const Mask& mask);
 /// A copy of the values in the mask's box.
 std::vector<float> cut_out(const marrow::Volume& volume, const Mask& mask);
 
-/// The field whose values in the mask's box are these, and `outside_mm` elsewhere.
+/// The field on the whole grid with these values in the mask's box and `outside_mm` elsewhere.
 marrow::SignedField paste(const marrow::Grid& grid, const Mask& mask, const std::vector<float>& values_mm,
                           float outside_mm);
 
-/// Signed distances up to `band_mm` to a mask's surface where the CT shows it at `surface_hu`: between voxels that the
-/// threshold tells apart, it is where the CT, interpolated, crosses it; elsewhere (against another fragment, across a
-/// canal's mouth) halfway between the voxels.
+/// Signed distances in mm, up to `band_mm`, to the surface of a mask. A voxel beside the surface gets its distance from
+/// the CT's value and gradient if the threshold `surface_hu` puts it on the same side as the mask. Otherwise (against
+/// another fragment, across the mouth of a canal) the surface lies half a voxel away.
 marrow::SignedField field_at_threshold(const marrow::Volume& volume, const Mask& mask, double surface_hu,
                                        double band_mm);
 
-/// The fields of the wanted fragments, which come in the seeds' order; where two overlap each gives up half. Throws
-/// Error for none.
+/// Names the fields by their fragments. `fields`: one for each wanted fragment, in the order of the seeds, all on one
+/// grid. Where two fragments overlap, each gives up half of the overlap. Throws Error if there are no fields.
 marrow::List<marrow::SignedField> list_of(const marrow::List<marrow::Seeds>& seeds,
                                           std::vector<marrow::SignedField> fields);
 

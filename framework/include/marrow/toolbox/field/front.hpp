@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A moving surface: a signed distance, kept in a narrow band around its zero level only (Adalsteinsson and Sethian, A
-// fast level set method for propagating interfaces, J. Comput. Phys. 1995). The grid is divided in tiles of 8 x 8 x 8
-// voxels; only tiles near the surface have memory, and only those near a part of it that still moves are visited:
-// memory grows with the surface, the time of a step with what moves.
+// A moving surface: a signed distance that is kept only in a narrow band around its zero level (Adalsteinsson and
+// Sethian, A fast level set method for propagating interfaces, J. Comput. Phys. 1995). The grid is divided into tiles
+// of 8 x 8 x 8 voxels. Only tiles near the surface have memory. Only tiles near a moving part of the surface are
+// visited. So memory grows with the area of the surface, and the time of a step with the area that moves.
 #include <array>
 #include <cstdint>
 #include <vector>
@@ -13,40 +13,44 @@
 
 namespace marrow::field {
 
-/// F = advection g + edge (1 - g) - curvature kappa: Eq 6 of the chapter in its corrected reading, with the image force
-/// also drawing the front back to the edge, which keeps it from leaking through where g is small but never zero.
+/// Speed along the outward normal: F = advection g + edge (1 - g) - curvature kappa. This follows the chapter's Eq 6 as
+/// corrected in docs/method.md, with two changes. The curvature term is not multiplied by g. The term `edge` draws the
+/// front back to the edge in the image: without it the front would leak through, because g is small there but never 0.
 struct Force {
-  double advection = 1;       ///< F0, positive expands
+  double advection = 1;       ///< F0; a positive value expands the surface
   double curvature_mm = 0.1;  ///< epsilon
   double edge_hu = 150;       ///< K in g = 1 / (1 + (drop / K)^2)
-  double floor_hu = 150;      ///< leak guard: the advection turns around where the CT is below it
+  double floor_hu = 150;      ///< against leaks: the advection changes its sign where the CT is below this
 };
 
 class Front {
  public:
-  /// The surface of a mask.
+  /// Starts at the surface of a mask.
   Front(const marrow::Grid& grid, double band_mm, const Mask& mask);
 
-  /// What thin cortex does to the edges near the surface, for the steps that follow.
+  /// Finds by how much a thin cortex shifts the edges near the surface. Later calls of evaluate() use this.
   void find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile);
-  /// One time step in two halves, so that fronts can be kept apart between steps.
+  /// First half of a time step: computes the speed of the surface.
   void evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force);
+  /// Second half of a time step: moves the surface by speed * `step_mm`.
   void advance(double step_mm);
-  /// Makes the values distances again around what moves, and lets the band follow the front.
+  /// Turns the values near moving parts into distances again, and moves the band along with the front.
   void redistance();
-  /// The stop rule: what moved less on average, per tile and since the last call, goes to sleep, and what borders on
-  /// something that moves wakes up. True when all is at rest.
+  /// The stop rule, tile by tile. A tile goes to sleep if its surface moved by at most `least_motion_mm` on average
+  /// since the last call. The neighbours of a tile that still moves are visited again. True if no tile moves.
   bool rest(double least_motion_mm);
-  /// Distances in the whole band; the surface stays where it is.
+  /// Computes the distances in the whole band. The surface does not move.
   void finish();
   /// The field on the whole grid.
   std::vector<float> values_mm() const;
 
+  /// Where two fronts on the same grid overlap, each gives up half of the overlap. For use between time steps.
   static void keep_apart(Front& a, Front& b);
 
-  /// Of the moving parts of the surface, between the last two calls of rest().
+  /// Mean motion of the visited parts of the surface between the last two calls of rest().
   double mean_motion_mm() const { return mean_motion_mm_; }
   std::size_t band_voxels() const { return band_voxels_; }
+  /// Whether no voxel is inside any more.
   bool has_vanished() const;
 
  private:
@@ -75,7 +79,7 @@ class Front {
   float band_mm_, near_mm_;
   Eigen::Vector3f voxels_per_mm_;
   std::array<int, 3> tiles_;
-  std::vector<std::int32_t> slots_;  // of each tile: where its voxels lie in the arrays below, or what the tile is
+  std::vector<std::int32_t> slots_;  // for each tile: its place in the arrays below, or kOutside or kInside
   std::vector<std::uint32_t> tile_in_slot_;
   std::vector<float> values_mm_, values_before_, speed_, shift_mm_;
   std::vector<std::uint8_t> is_awake_;  // of each slot

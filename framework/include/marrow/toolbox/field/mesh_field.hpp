@@ -5,8 +5,8 @@
 
 namespace marrow::field {
 
-/// Signed distance up to `band_mm` to a closed surface given in the grid's frame. Beside the surface the distances are
-/// exact; inside is what an odd number of crossings along z separates from the outside.
+/// Signed distance in mm, up to `band_mm`, to a closed surface in the grid's frame. Distances beside the surface are
+/// exact. A voxel is inside if a line from it along the grid's z axis crosses the surface an odd number of times.
 marrow::SignedField field_of_mesh(const marrow::Grid& grid, const marrow::Mesh& mesh, double band_mm);
 
 }  // namespace marrow::field

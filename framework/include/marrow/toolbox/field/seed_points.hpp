@@ -12,8 +12,9 @@ namespace marrow::field {
 
 constexpr std::size_t kMostFragments = 253;  // one byte says who owns a voxel
 
-/// The seeds of each fragment as fractional indices. Throws Error for no seeds, a fragment without any, or a seed that
-/// lies outside the volume or where the CT, averaged over 3 x 3 x 3 voxels, is below `least_hu`.
+/// The seeds of each fragment as fractional indices. Throws Error if there are no fragments or more than
+/// kMostFragments, if a fragment has no seed, if a seed lies outside the volume, or if the mean of the 3 x 3 x 3 voxels
+/// around a seed is below `least_hu`.
 inline std::vector<std::vector<Eigen::Vector3d>> seed_indices(const marrow::Volume& volume,
                                                               const marrow::List<marrow::Seeds>& seeds,
                                                               double least_hu) {

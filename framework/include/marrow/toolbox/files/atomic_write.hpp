@@ -8,14 +8,15 @@
 
 namespace marrow::files {
 
-/// Calls `fill` with a temporary name beside `path` that ends in the same extension, then renames what it made to
-/// `path`. On any failure the temporary file or folder is removed, `path` is as it was before, and Error names it.
+/// Calls `fill` with a temporary path beside `path` that has the same extension. Then renames the file or folder that
+/// `fill` made to `path`. On any failure the temporary file or folder is removed, `path` is as before, and an Error
+/// that names it is thrown.
 void write_atomically(const std::filesystem::path& path, const std::function<void(const std::filesystem::path&)>& fill);
 
-/// Writes text in this way.
+/// Writes text atomically, as above.
 void write_text(const std::filesystem::path& path, const std::string& text);
 
-/// Writes parts one after the other under this very name; throws Error when not all of it could be written.
+/// Writes the parts one after the other directly to `path`, not atomically. Throws Error if not all could be written.
 void write_plainly(const std::filesystem::path& path, std::initializer_list<std::string_view> parts);
 
 }  // namespace marrow::files

@@ -6,7 +6,8 @@
 
 namespace marrow::files {
 
-/// A calibration file, as the writer of calibrations makes it. Throws Error.
+/// Reads a calibration file in the format that marrow writes. Throws Error if it cannot be read, or for missing or
+/// wrong values.
 Calibration read_calibration_file(const std::filesystem::path& path);
 
 }  // namespace marrow::files

@@ -7,9 +7,10 @@
 
 namespace marrow::files {
 
-/// A camera from marrow's YAML (.yaml, .yml) or from XMALab's text (any other extension): four blocks "image size",
-/// "camera matrix", "rotation" and "translation", numbers by commas; x_camera = R x_world + t in mm, OpenCV's pixel
-/// convention; only the YAML can hold a distortion. Throws Error.
+/// Reads a camera from marrow's YAML (.yaml, .yml) or from XMALab's text (any other extension). The text has four
+/// blocks "image size", "camera matrix", "rotation" and "translation", with numbers separated by commas. x_camera = R
+/// x_world + t in mm, in OpenCV's pixel convention. Only the YAML can hold a distortion. Throws Error if the file
+/// cannot be read, or for missing or wrong values.
 DistortedCamera read_camera_file(const std::filesystem::path& path);
 
 }  // namespace marrow::files

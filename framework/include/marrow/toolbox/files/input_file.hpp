@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The one place where the readers open a file.
+// All readers open their files here.
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -8,12 +8,12 @@
 
 namespace marrow::files {
 
-/// A regular file that is open for reading. A part that is no longer there, as another program made the file shorter
-/// meanwhile, is an Error, not a signal.
+/// A regular file that is open for reading. If another program shortens the file meanwhile, read() throws Error; no
+/// signal is raised, as it would be with a mapped file. Several threads may read at once.
 class InputFile {
  public:
-  /// Throws Error unless `path` is a regular file, and one with something in it unless it `may_be_empty`. A pipe is not
-  /// waited for, a device not read.
+  /// Throws Error unless `path` is a regular file that can be read. It must not be empty unless `may_be_empty`. Pipes
+  /// and devices are refused at once, without waiting for data.
   explicit InputFile(std::filesystem::path path, bool may_be_empty = false);
   ~InputFile();
   InputFile(const InputFile&) = delete;
@@ -21,9 +21,9 @@ class InputFile {
 
   const std::filesystem::path& path() const { return path_; }
   std::uint64_t size() const { return size_; }
-  /// Exactly `count` bytes from the place `at`. Throws Error where they are not there.
+  /// Copies exactly `count` bytes from offset `at`. Throws Error if the file does not hold them.
   void read(std::uint64_t at, void* to, std::size_t count) const;
-  /// The same as text.
+  /// The same bytes as a string.
   std::string text(std::uint64_t at, std::size_t count) const;
 
  private:
@@ -32,16 +32,18 @@ class InputFile {
   std::uint64_t size_ = 0;
 };
 
-/// All bytes of a file. Throws Error, also where there are more than `most`.
+/// All bytes of a file. Throws Error as InputFile does, or if there are more than `most` bytes.
 std::string read_bytes(const std::filesystem::path& path, std::uint64_t most, bool may_be_empty = false);
 
-/// Numbers and texts out of a file place by place, whose neighbours are read at once.
+/// Reads single numbers and texts at any offset of a file. It reads a larger part at once, so that neighbours need no
+/// further access. For use in one thread. The file must outlive it.
 class FileWindow {
  public:
   explicit FileWindow(const InputFile& file) : file_(file) {}
-  /// Whether `count` bytes lie in the file at this place.
+  /// Whether the file holds `count` bytes at offset `at`.
   bool holds(std::uint64_t at, std::uint64_t count) const { return at <= file_.size() && count <= file_.size() - at; }
-  /// The unsigned number of `width` bytes, or the bytes themselves. Throw std::out_of_range behind the file's end.
+  /// The unsigned number of `width` bytes at an offset, and `count` bytes as a string. Both throw std::out_of_range if
+  /// the bytes lie beyond the end of the file.
   std::uint64_t number(std::uint64_t at, int width, bool big_endian);
   std::string text(std::uint64_t at, std::size_t count);
 
@@ -52,8 +54,8 @@ class FileWindow {
   std::uint64_t begin_ = 0;
 };
 
-/// Throws Error where `file` is a link that leads out of `folder`, or nowhere: a folder counts by the content of what
-/// lies in it, so what lies elsewhere would be missed when it changes.
+/// Throws Error if `file` is a link that leads out of `folder` or nowhere. Inputs that are folders are compared by the
+/// content of the files in them, so a change of a file outside would not be noticed.
 void check_stays_inside(const std::filesystem::path& folder, const std::filesystem::path& file);
 
 }  // namespace marrow::files

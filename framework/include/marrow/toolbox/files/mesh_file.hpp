@@ -6,8 +6,9 @@
 
 namespace marrow::files {
 
-/// A triangle surface from STL (text or binary) or PLY (text or binary of either byte order). Equal vertices become
-/// one, and triangles that have no area for it are left out. Coordinates are multiplied by `scale`. Throws Error.
+/// Reads a triangle surface from STL (text or binary) or PLY (text or binary in either byte order). Vertices with equal
+/// coordinates are merged. Triangles with two equal corners are left out. Coordinates are multiplied by `scale`, which
+/// must make them mm. Throws Error for another extension, a damaged file, or a mesh that check_mesh() refuses.
 Mesh read_mesh_file(const std::filesystem::path& path, double scale);
 
 }  // namespace marrow::files

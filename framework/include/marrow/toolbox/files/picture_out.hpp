@@ -7,10 +7,12 @@
 
 namespace marrow::files {
 
-/// One- or three-channel pixels as they are: PNG of 8 or 16 bits, TIFF for float. Throws Error.
+/// Writes pixels unchanged: one or three channels (RGB) of 8 or 16 bits as PNG, one channel of float as TIFF. The
+/// extension of `path` is not looked at. Throws Error for an empty image, other pixels, or if it cannot be written.
 void write_pixels(const std::filesystem::path& path, const cv::Mat& pixels);
 
-/// A volume's or field's samples as compressed MHA. Throws Error.
+/// Writes the samples of a volume or field as compressed MHA, x fastest, then y, then z. Throws Error if the grid is
+/// empty, if the number of values differs from its size, or if the file cannot be written.
 void write_grid(const std::filesystem::path& path, const Grid& grid, const std::vector<float>& values);
 
 }  // namespace marrow::files

@@ -9,25 +9,27 @@
 
 namespace marrow::files {
 
-/// What a file does not say of itself.
+/// Information that replaces or completes what a file says.
 struct VolumeReading {
-  std::vector<double> voxel_size_mm;  ///< 3 numbers, or none: as the file says
+  std::vector<double> voxel_size_mm;  ///< 3 numbers; empty: as the file says
   std::vector<std::string> flip;      ///< axes of the grid (x, y, z) along which the samples are reversed
   double value_offset_hu = 0;         ///< added to every sample
-  std::string series_uid;             ///< of DICOM; empty: the only one
+  std::string series_uid;             ///< of a DICOM series; empty: there must be only one
 };
 
-/// A CT volume from MHA, NRRD, NIfTI, multi-page TIFF, or a folder: a DICOM series, or an MHD or NHDR header with the
-/// file that it names. Patient axes are LPS. Throws Error.
+/// Reads a CT volume from MHA, NRRD, NIfTI, multi-page TIFF, or a folder. A folder holds a DICOM series, or an MHD or
+/// NHDR header with the file that it names. Patient axes are LPS. A left-handed grid is made right-handed; each voxel
+/// keeps its value and its position. Throws Error if the file is damaged or not supported, if its voxel size is
+/// unknown, or if check_volume() refuses the volume.
 Volume read_volume_file(const std::filesystem::path& path, const VolumeReading& reading);
 
-/// One grey image from PNG or TIFF, with 8 or 16 bits or float, or from DICOM. That of an X-ray file (XA, RF) is turned
-/// to what the camera of its header sees: mirrored where it is stored as one facing the patient sees it, and bright =
-/// air. `frame` counts from 1; 0 = there must be only one. Throws Error.
+/// Reads one grey image from PNG, TIFF (8 or 16 bits, or float) or DICOM. An X-ray image (XA, RF) is returned as the
+/// camera of its header sees it: it is mirrored back if it was stored as an observer facing the patient sees it, and
+/// inverted if air is dark in it. `frame` counts from 1; 0: there must be only one. Throws Error if the file is damaged
+/// or not supported, has no such frame, or has more than one channel.
 Image read_image_file(const std::filesystem::path& path, int frame = 0);
 
-/// Whether read_image_file() mirrors this image, so that what was drawn on the file as it is stored must be mirrored
-/// along.
+/// Whether read_image_file() mirrors this image. If so, drawings made on the stored file must be mirrored too.
 bool is_mirrored_as_read(const std::filesystem::path& path, int frame = 0);
 
 }  // namespace marrow::files

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The values that marrow keeps in YAML files: transforms, poses, cameras and seeds (docs/case.md).
+// Reads values that marrow keeps in YAML files: transforms, poses, cameras and seeds (docs/case.md).
 #include "marrow/domain/calibration.hpp"
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/list.hpp"
@@ -10,14 +10,14 @@
 
 namespace marrow::files {
 
-/// A transform from `target`, `source` and either `rotation` with `translation_mm` or one 4x4 `matrix`. `expected`
-/// holds the frames that it must name. Faults are noted in the map's file.
+/// A transform from the keys `target`, `source` and either `rotation` with `translation_mm` or one 4x4 `matrix`. Its
+/// frames must be those of `expected`. Faults are noted in the map's file.
 std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTransform& expected);
-/// The keys that transform_from reads.
+/// The keys that transform_from() reads.
 const std::vector<std::string>& transform_keys();
 
-/// A camera from the keys width_px, height_px, intrinsics, camera_from_world and, where its images are distorted,
-/// radial_distortion.
+/// A camera from the keys width_px, height_px, intrinsics, camera_from_world and, for distorted images,
+/// radial_distortion. Faults are noted in `file`.
 std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.
@@ -26,9 +26,9 @@ Seeds seeds_from(const YamlMap& map, const std::string& fragment);
 /// Notes a fault unless the map has `key: 1`.
 void check_version(const YamlMap& map, const std::string& key);
 
-/// A pose file, as the writer of poses makes it. Throws Error.
+/// Reads a pose file in the format that marrow writes. Throws Error with all faults.
 Pose read_pose_file(const std::filesystem::path& path);
-/// A file of seeds. Throws Error.
+/// Reads a file of seeds. Throws Error with all faults.
 List<Seeds> read_seeds_file(const std::filesystem::path& path);
 
 }  // namespace marrow::files

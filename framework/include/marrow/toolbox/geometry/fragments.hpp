@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Two fragments of one bone: where one has moved against the other.
+// Two fragments of one bone: how one has moved relative to the other.
 #include <string>
 
 #include "marrow/domain/error.hpp"
@@ -15,8 +15,8 @@ struct FragmentPair {
   std::string reference = "proximal";
 };
 
-/// The pose of that name. Throws Error where there is none, or the poses do not take points in the same frame to the
-/// world.
+/// The pose of this name. Throws Error if there is none, or if a pose before it is not rigid or is between other frames
+/// than the first one.
 inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {
   std::string known;
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -32,8 +32,9 @@ inline const Pose& pose_of(const List<Pose>& poses, const std::string& name) {
               "; name both fragments with moved and reference, and register both");
 }
 
-/// The small motion that has displaced the moved fragment from where it belongs, about its own axes: it belongs where
-/// the CT shows it beside the other one.
+/// The small motion (r [rad], t [mm], see motion_between()) of the moved fragment about its own axes, relative to the
+/// reference fragment: zero if both lie beside each other as in the CT. Throws Error as pose_of() does, or if both
+/// names are the same.
 inline Vector6d displacement(const List<Pose>& poses, const FragmentPair& pair) {
   if (pair.moved == pair.reference)
     throw Error("moved and reference both name '" + pair.moved + "'; they must be two fragments");

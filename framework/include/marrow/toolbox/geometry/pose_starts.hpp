@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// First poses from landmarks in views, in closed form; each is near a minimum of the reprojection error, or of no use.
+// Start poses from landmarks in views, in closed form. Some are near a minimum of the reprojection error, others are
+// useless: refine all of them and compare.
 #include <Eigen/Core>
 #include <marrow/domain/camera.hpp>
 #include <string>
@@ -8,7 +9,7 @@
 
 namespace marrow::geometry {
 
-/// A landmark in a view.
+/// A landmark seen in a view. The camera is that of the view and must not be null.
 struct Sight {
   std::string name, view;
   Eigen::Vector3d model_mm;
@@ -16,9 +17,9 @@ struct Sight {
   const Camera* camera;
 };
 
-/// Poses world_from_model: from the landmarks that two views or more show, whose places follow from the rays; and from
-/// each view that shows three or more. May be empty. Throws Error where landmarks are the mirror image of those in the
-/// CT.
+/// Poses world_from_ct: one from the landmarks that two or more views show, triangulated from their rays, and several
+/// from each view that shows three or more landmarks. May be empty. Throws Error if the triangulated landmarks are the
+/// mirror image of those in the CT.
 std::vector<RigidTransform> pose_starts(const std::vector<Sight>& sights);
 
 }  // namespace marrow::geometry

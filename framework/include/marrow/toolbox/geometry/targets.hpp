@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the figures about a pose and its truth share: whether the two may be compared, and the points at which they are.
+// The common part of measures that compare a pose with the truth: whether the two can be compared, and at which points.
 #include <marrow/domain/landmarks.hpp>
 #include <marrow/domain/mesh.hpp>
 #include <marrow/domain/pose.hpp>
@@ -8,24 +8,26 @@
 
 namespace marrow::geometry {
 
-/// Throws Error unless both are rigid and between the same two frames; `other` is what it calls the second.
+/// Throws Error unless both are rigid and between the same two frames. `other` names the second one in the message.
 void check_poses(const RigidTransform& pose, const RigidTransform& truth, const std::string& other = "truth");
 
-/// Throws Error unless the model is in the frame that the pose takes points in.
+/// Throws Error unless the model is in the pose's source frame.
 void check_model(const RigidTransform& pose, const Mesh& model);
 
-/// The targets in the frame of the CT: the landmarks' points where there are landmarks, else so many points spread over
-/// the model's surface. Throws Error where both are missing, or where they do not go with the pose.
+/// The targets in the frame of the CT: the points of the landmarks if there are landmarks, else `points` points spread
+/// over the model's surface. Model and landmarks may be null. Throws Error if both are, if the landmarks have no
+/// points, or if check_mesh() or check_model() refuses the model.
 std::vector<Eigen::Vector3d> targets_mm(const RigidTransform& pose, const Mesh* model, const Landmarks* landmarks,
                                         int points);
 
-/// How far the pose takes each target from where the truth does.
+/// For each target the distance between its positions under the pose and under the truth.
 std::vector<double> target_errors_mm(const RigidTransform& pose, const RigidTransform& truth,
                                      const std::vector<Eigen::Vector3d>& targets_mm);
 
+/// These three need at least one value.
 double mean(const std::vector<double>& values);
 double root_mean_square(const std::vector<double>& values);
-/// Quantile with linear interpolation between order statistics.
+/// Quantile, with linear interpolation between the sorted values. `fraction` is between 0 and 1.
 double quantile(std::vector<double> values, double fraction);
 
 }  // namespace marrow::geometry

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the edge detectors share: the image made ready, its gradient, and the noise in that gradient.
+// The common part of all edge detectors: the prepared image, its gradient, and the noise of this gradient.
 #include <cmath>
 #include <marrow/domain/camera.hpp>
 #include <opencv2/core.hpp>
@@ -9,44 +9,48 @@
 
 namespace marrow::image {
 
-/// The values whose edges are sought. With `logarithm` they are ln(grey value), so that edges are steps of attenuation,
-/// equally high under a bright and a dark part of the exposure.
+/// The values whose edges are sought. With `logarithm` they are ln(grey value). Edges are then steps of attenuation,
+/// equally high in bright and dark parts of the image.
 struct Prepared {
   cv::Mat values;  ///< CV_32F
   cv::Mat usable;  ///< CV_8U, non-zero where edges may be reported
   bool logarithm = false;
-  bool whole_numbers = false;  ///< the image has whole grey values, and so at least their rounding noise
-  float range = 0;             ///< largest less smallest grey value
+  bool whole_numbers = false;  ///< grey values are integers, so there is at least rounding noise
+  float range = 0;             ///< largest minus smallest grey value
 
-  /// Change of the value for one grey value.
+  /// By how much `value` changes for one grey value.
   float slope(float value) const { return logarithm ? std::exp(-value) : 1.0f; }
 };
 
-/// Checks the view and prepares it; usable.hpp says which pixels are usable. Throws Error for an image that is
-/// constant, holds NaN or infinity, or has no usable pixel.
+/// Checks the view and prepares its image. Not usable are pixels that View::mask excludes, pixels outside a round
+/// collimator's field, black areas that reach three corners, and the image's border; around all of them also a margin
+/// of 3 sigma. Throws Error if check_view() refuses the view, or for an image that is not CV_8UC1, CV_16UC1 or
+/// CV_32FC1, is constant, holds NaN or infinity, has no usable pixel, or has no positive value for the logarithm.
 Prepared prepare(const View& view, double sigma_px, bool logarithm);
 
-/// A separable derivative: along one axis it derives, along the other it smooths. Both have the same number of weights;
-/// of an even number the derivative lies half a pixel right of and below its pixel.
+/// A separable filter for a derivative: `derive` along its axis, `smooth` along the other. Both have the same number of
+/// weights. If this is even, the derivative lies half a pixel to the right of and half a pixel below its pixel's
+/// centre.
 struct Kernel {
   std::vector<float> smooth, derive;
 };
-Kernel gaussian_kernel(double sigma_px, double reach = 3);  // ends at so many sigma
-/// A mask of few pixels on the image smoothed by a Gaussian; sigma 0: the mask itself.
+/// Derivative of a Gaussian, cut off at `reach` times sigma.
+Kernel gaussian_kernel(double sigma_px, double reach = 3);
+/// A small mask convolved with a Gaussian. With sigma 0 it is the mask itself.
 Kernel smoothed_mask(const Kernel& mask, double sigma_px);
 
 /// Derivatives of the image, per pixel; CV_32F.
 struct Gradient {
   cv::Mat du, dv, magnitude;
-  double noise_gain = 1;  ///< deviation of a component for white noise of deviation 1 in the image
-  float offset_px = 0;    ///< from a pixel's centre to where its derivative lies, both ways
+  double noise_gain = 1;  ///< standard deviation of du and dv for white noise of standard deviation 1 in the image
+  float offset_px = 0;    ///< from a pixel's centre to the position of its derivative, in u and in v
 };
 Gradient gradient_of(const cv::Mat& values, const Kernel& kernel);
 Gradient gaussian_gradient(const cv::Mat& values, double sigma_px);
 
-/// The standard deviation that noise alone gives to a component of the gradient, as a function of the value: X-ray
-/// noise depends on brightness. Measured as the median absolute deviation in blocks of 16 x 16 pixels, of which those
-/// of equal brightness that vary least are believed.
+/// Standard deviation of a component of the gradient that is due to noise alone. It is a function of the image's value,
+/// because X-ray noise depends on brightness. It comes from the median absolute deviation in blocks of 16 x 16 pixels.
+/// Among blocks of similar brightness those with little variation count, because structures in the image add to it.
 class NoiseLevel {
  public:
   NoiseLevel(const Prepared& image, const Gradient& gradient);

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// PCL's iterative closest points behind plain numbers, so that its headers are parsed in one file.
+// PCL's iterative closest point (ICP) with a plain interface, so that only one file includes PCL's headers.
 #include <Eigen/Core>
 #include <vector>
 
@@ -8,17 +8,17 @@ namespace marrow::match {
 
 struct Settings {
   int max_iterations = 100;
-  double reach = 10;  ///< pairs further apart do not count
+  double reach = 10;  ///< pairs farther apart do not count, in the unit of the points
 };
 
 struct Result {
   Eigen::Matrix4d motion = Eigen::Matrix4d::Identity();  ///< moves the points onto the target
-  bool converged = false;
-  std::size_t paired = 0;  ///< points that have one of the target in reach, at the end
-  double rms = 0;          ///< distance of these pairs
+  bool converged = false;                                ///< false also if max_iterations was reached
+  std::size_t paired = 0;  ///< number of points that have a target point within reach after the motion
+  double rms = 0;          ///< root mean square distance of these pairs
 };
 
-/// Points and target in the same frame, both near the origin: PCL keeps them in single precision.
+/// Aligns points to a target by ICP. Both are in the same frame and near the origin, because PCL uses single precision.
 Result align(const std::vector<Eigen::Vector3d>& points, const std::vector<Eigen::Vector3d>& target,
              const Settings& settings);
 

@@ -4,14 +4,15 @@
 
 namespace marrow::match {
 
-/// sqrt(s^2 + d^2) - s: quadratic near zero, then the distance itself as in the chapter, and no more than at the reach.
+/// Loss of a distance d: sqrt(s^2 + d^2) - s with s = `scale`. Quadratic near zero, then nearly the distance itself, as
+/// in the chapter. Constant from `reach` on. All functions take d^2.
 class EdgeLoss {
  public:
   EdgeLoss(double scale, double reach)
       : scale2_(scale * scale), scale_(scale), reach2_(reach * reach), worst_(raw(reach2_)) {}
   double worst() const { return worst_; }
   double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
-  /// Derivative by the distance, divided by it.
+  /// Derivative by the distance, divided by the distance.
   double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
   double second_derivative(double distance2) const {
     return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0;

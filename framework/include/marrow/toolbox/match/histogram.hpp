@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Which of so many bins of equal width a value falls into.
+// Bins of equal width for histograms.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -13,10 +13,11 @@ struct Bins {
   double low = 0, per_unit = 0;
   int count = 1;
 
+  /// The bin of a value. Values out of range go to the first or last bin.
   int of(double value) const { return std::clamp(int((value - low) * per_unit), 0, count - 1); }
 };
 
-/// From the least to the greatest value that counts; all values in the first bin where they are the same.
+/// Bins from the smallest to the largest value that counts. If all are equal, they fall into the first bin.
 inline Bins bins_of(const std::vector<float>& values, const std::vector<char>& counts, int bins) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -24,7 +25,7 @@ inline Bins bins_of(const std::vector<float>& values, const std::vector<char>& c
   return {low, high > low ? bins / (high - low) : 0, bins};
 }
 
-/// -sum p log p, in natural units.
+/// Entropy -sum p log p with p = count / total and the natural logarithm.
 inline double entropy(const std::vector<double>& counts, double total) {
   double sum = 0;
   for (const double count : counts)

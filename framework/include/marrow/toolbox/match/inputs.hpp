@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What costs are given: views, their edges and weights, and other fragments that the same images show.
+// Inputs of costs: views, their edges and weights, and other fragments that the same images show.
 #include <string>
 #include <type_traits>
 #include <variant>
@@ -10,25 +10,26 @@
 
 namespace marrow::match {
 
-/// Throws Error for no views, or one of which image and camera are none or do not suit each other.
+/// Throws Error if there are no views, or if check_view() or check_camera() refuses one.
 void check_views(const List<View>& views);
-/// Throws Error unless there are none, or one for each view, not below 0 and not all 0.
+/// Throws Error unless there are no weights, or one for each view. Weights must be at least 0, and not all 0.
 void check_weights(const std::vector<double>& weights, std::size_t views);
-/// Throws Error unless there are edges of each view, as large as its camera says.
+/// Throws Error unless there is at least one view, and for each view a valid camera and an edge map that is not empty
+/// and has the camera's size.
 void check_edges(const List<View>& views, const List<EdgeMap>& edges);
 
-/// The mean over views by their weights; without weights, of all the same.
+/// The weighted mean over the views. Without weights all views count equally.
 double weighted_mean(const std::vector<double>& of_view, const std::vector<double>& weights);
 inline double weight_of(const std::vector<double>& weights, std::size_t view) {
   return weights.empty() ? 1 : weights[view];
 }
 
-/// Another fragment where it is known to be, drawn in one way or the other.
+/// Another fragment in its known pose, with the projector that draws it. The projector must outlive this.
 struct Other {
   std::variant<const OutlineProjector*, const RadiographProjector*> projector;
   RigidTransform world_from_model;
 };
-/// The same, drawn as an outline.
+/// The same for outlines only.
 struct OtherOutline {
   const OutlineProjector* projector;
   RigidTransform world_from_model;
@@ -36,20 +37,24 @@ struct OtherOutline {
 template <class Projector>
 using OtherDrawnBy = std::conditional_t<std::is_same_v<Projector, OutlineProjector>, OtherOutline, Other>;
 
-/// Of lists over the fragments, all but the one that `own` draws: it is the same object. Throws Error for a fragment
-/// without a pose, and for others without `own`, which is the node's input `own_port`.
+/// All fragments of the lists except the one that `own` draws. That one is recognised because it is the same object.
+/// Poses and projectors are matched by name. Lists may be null. Throws Error for poses without projectors or projectors
+/// without poses, for a fragment without a pose, or if there are others but `own` is null. `own_port` names the node's
+/// input for `own` in the message.
 template <class Projector>
 std::vector<OtherDrawnBy<Projector>> others_of(const Projector* own, const List<Pose>* poses,
                                                const List<Projector>* projectors,
                                                const std::string& own_port = "projector");
-/// The same, and the fragments that `outlines` draw; none of these is this one.
+/// The same, and in addition the bodies that `outlines` draw. None of these may be the fragment itself.
 std::vector<Other> shadows_of(const RadiographProjector* own, const List<Pose>* poses,
                               const List<RadiographProjector>* projectors, const List<OutlineProjector>* outlines);
 
-/// The views with masks that leave the others out: where their radiographs are above 0, or inside their outlines.
+/// The views with masks that also exclude the others: pixels where their radiographs are above 0, or inside their
+/// outlines.
 List<View> without_shadows(const List<View>& views, const std::vector<Other>& others);
-constexpr double kOthersReach_px = 3;  ///< edges as near as this to another fragment's outline are its own
-/// The edges but for those within `reach_px` of another's outline that have its direction, up to the tolerance.
+constexpr double kOthersReach_px = 3;  ///< edges nearer than this to another fragment's outline belong to that fragment
+/// The edges without those that lie within `reach_px` of another fragment's outline and have its direction, up to
+/// `tolerance_deg`.
 List<EdgeMap> without_outlines(const List<View>& views, const List<EdgeMap>& edges,
                                const std::vector<OtherOutline>& others, double reach_px, double tolerance_deg);
 

@@ -14,13 +14,13 @@
 
 namespace marrow::match {
 
-/// For any pixel and direction the nearest edge whose gradient points about that way. Directions fall into 16 sectors,
-/// and for each a label image (an exact distance transform: Felzenszwalb and Huttenlocher, Theory of Computing 2012)
-/// names the nearest edge of each cell of 2 x 2 pixels.
+/// For any pixel and direction, the nearest edge whose gradient has about this direction. Directions are divided into
+/// 16 sectors. For each sector a label image names the nearest edge of each cell of 2 x 2 pixels (by an exact distance
+/// transform: Felzenszwalb and Huttenlocher, Theory of Computing 2012).
 class NearestEdges {
  public:
-  /// Edges are used inside the mask (empty: everywhere), for directions that differ by at most `tolerance_rad` from
-  /// theirs.
+  /// Uses the edges inside the mask (CV_8U; empty: all). An edge belongs to all sectors whose middle differs from its
+  /// direction by at most `tolerance_rad`.
   NearestEdges(const EdgeMap& edges, const cv::Mat& mask, double tolerance_rad)
       : columns_((edges.width_px + kCell_px - 1) / kCell_px), rows_((edges.height_px + kCell_px - 1) / kCell_px) {
     for (const EdgePixel& edge : edges.pixels) {
@@ -34,10 +34,10 @@ class NearestEdges {
   }
 
   bool empty() const { return edges_.empty(); }
-  /// Those that are used, where they were moved to.
+  /// The edges that are used, at their smoothed positions.
   const std::vector<EdgePixel>& all() const { return edges_; }
 
-  /// The nearest edge, or nullptr when there is none in that direction. The pixel must lie inside the image.
+  /// The nearest edge, or nullptr if there is none with this direction. The pixel must lie inside the image.
   const EdgePixel* find(float u, float v, float direction_u, float direction_v) const {
     const int column = int(u + 0.5f) / kCell_px, row = int(v + 0.5f) / kCell_px;
     const std::int32_t label =
@@ -51,7 +51,7 @@ class NearestEdges {
   static constexpr int kCell_px = 2;
   static constexpr int kSectors = 16;
 
-  /// Sector of a direction, cheaper than by its angle: u and v of a point on the diamond |u| + |v| = 1.
+  /// Sector of a direction. A position on the diamond |u| + |v| = 1 is faster to compute than an angle.
   static int sector_of(float u, float v) {
     const float along = u / (std::abs(u) + std::abs(v) + 1e-30f);
     const float around = v >= 0 ? 1 - along : 3 + along;  // 0 to 4, rising with the angle
@@ -63,8 +63,8 @@ class NearestEdges {
     return std::atan2((1 - std::abs(along)) * (around < 2 ? 1 : -1), along);
   }
 
-  /// Moves each edge along its direction to the mean of its neighbours on the same border, because one cell keeps one
-  /// edge only, and one edge pixel is noisier than a few.
+  /// Moves each edge along its direction to the mean of its neighbours on the same border. A cell keeps only one edge,
+  /// and a single edge pixel is noisier than a mean of several.
   void smooth(int width, int height) {
     constexpr int kReach_px = 3;
     constexpr float kSameBorder_px = 1.2f, kSameDirection = 0.8f;
@@ -111,7 +111,7 @@ class NearestEdges {
     for (int row = 0; row < rows_; ++row) nearest_in_row(labels + std::size_t(row) * std::size_t(columns_), row);
   }
 
-  // The cell of an edge; of one that smoothing moved out of the image, the cell at the border.
+  // The cell of an edge. If smoothing has moved the edge out of the image, it is the cell at the border.
   int column_of(const EdgePixel& edge) const { return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1); }
   int row_of(const EdgePixel& edge) const { return std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1); }
   int row_of(std::int32_t label) const { return row_of(edges_[std::size_t(label)]); }

@@ -8,10 +8,11 @@
 
 namespace marrow::match {
 
-/// For any edge pixel the nearest point of an outline that has about its direction, up to a distance: points are kept
-/// by the square cell of that width in which they lie.
+/// For any edge pixel, the nearest outline point with about the same direction, up to a distance. Points are sorted
+/// into square cells of this width.
 class NearestOutline {
  public:
+  /// `reach_px`: the largest distance for find(). `points` must outlive this object.
   NearestOutline(const std::vector<OutlinePoint>& points, int width_px, int height_px, double reach_px)
       : points_(points),
         cell_px_(float(std::max(reach_px, 1.0))),
@@ -27,7 +28,8 @@ class NearestOutline {
     for (std::size_t i = 0; i < cells.size(); ++i) order_[next[cells[i]]++] = std::uint32_t(i);
   }
 
-  /// Its index, or -1 where there is none within reach_px.
+  /// Index of the nearest point, or -1 if there is none within `reach_px`, which must not exceed that of the
+  /// constructor. `least_cosine`: of the angle between the edge's direction and the point's normal.
   int find(const EdgePixel& edge, double reach_px, float least_cosine) const {
     int nearest = -1;
     float least = float(reach_px * reach_px);

@@ -6,7 +6,7 @@
 
 namespace marrow::phantom {
 
-/// What a femur is made from. Defaults: the means of the literature.
+/// Parameters of a femur. Defaults are means from the literature.
 struct FemurShape {
   double length_mm = 446;
   double head_diameter_mm = 46.6;
@@ -20,20 +20,21 @@ struct FemurShape {
   double canal_mm = 12.3;
   double linea_aspera_mm = 3.5;
   double shell_mm = 1.6;  ///< thickness of the cortex at both ends
-  double medial_x = -1;   ///< -1: a left femur, whose head points to the patient's right; +1: a right one
+  double medial_x = -1;   ///< -1: a left femur (its head points to the patient's right); +1: a right femur
   double ripple_mm = 0;   ///< amplitude of smooth irregularities of the surface
   std::uint64_t seed = 1;
 };
 
-/// The femur as two continuous fields, negative inside; about the distance in mm near the surface. Frame "bone" with
-/// the distal end at z = 0 and the shaft's axis near x = y = 0.
+/// The femur as two continuous fields, negative inside. Near the surface they are about the distance in mm. Points are
+/// in frame "bone", with the distal end at z = 0 and the shaft's axis near x = y = 0. Safe to use from several threads.
 class FemurField {
  public:
   explicit FemurField(const FemurShape& shape);
   double outer(const Eigen::Vector3d& point_mm) const;
-  /// The endosteal surface: a shell's thickness inside the outer one at the ends, a narrow canal along the shaft.
+  /// The endosteal surface: a narrow canal along the shaft, and shell_mm inside the outer surface at the ends.
   double inner(const Eigen::Vector3d& point_mm) const;
 
+  /// Corners of a box that contains the femur.
   Eigen::Vector3d low_mm() const;
   Eigen::Vector3d high_mm() const;
 
@@ -50,7 +51,7 @@ class FemurField {
   double bow(double z) const;
 
   FemurShape shape_;
-  double scale_;  ///< of the ends, by the bicondylar width and the head
+  double scale_;  ///< of the distal end, from the bicondylar width
   Eigen::Vector3d head_, neck_base_;
   std::array<Wave, 12> waves_;
 };

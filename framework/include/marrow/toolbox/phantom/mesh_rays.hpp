@@ -7,13 +7,14 @@
 
 namespace marrow::phantom {
 
-/// A vertex as a bundle of rays sees it: rays stand at whole (u, v), and along a ray `depth` grows. (u, v, depth) must
-/// be right-handed and map planes to planes: (y, z, x) for rays along x, or (u, v, -1/z) for a pinhole camera.
+/// A vertex in the coordinates of a bundle of rays. Rays are at integer (u, v), and `depth` increases along a ray. The
+/// map to (u, v, depth) must be right-handed and map planes to planes, for example (y, z, x) for rays along x, or (u,
+/// v, -1/z) for a pinhole camera.
 struct RayVertex {
   double u, v, depth;
 };
 
-/// Where a ray passes through a surface. sense: +1 into it, -1 out of it.
+/// A ray's passage through a surface. sense: +1 into it, -1 out of it.
 struct Crossing {
   std::uint32_t column;
   std::uint32_t row;
@@ -22,16 +23,17 @@ struct Crossing {
   double depth;
 };
 
-/// A grid of rays through closed surfaces. Each ray meets each closed surface an even number of times: coverage is
-/// decided in integers, and a ray through an edge or a corner belongs to exactly one of the triangles there.
+/// A grid of rays through closed surfaces. Each ray meets each closed surface an even number of times, because the
+/// tests use integers, and a ray through an edge or a corner belongs to exactly one of the triangles there.
 class RayBundle {
  public:
   RayBundle(int columns, int rows);
-  /// Returns the surface's number, counted from 0.
+  /// Adds a surface and returns its number, counted from 0.
   int add(const std::vector<RayVertex>& vertices, const std::vector<std::array<std::uint32_t, 3>>& triangles);
   int columns() const { return columns_; }
   int rows() const { return rows_; }
-  /// All crossings in rows first to last - 1, ordered by row, column and depth.
+  /// All crossings in rows first to last - 1, ordered by row, column and depth. Safe to call from several threads at
+  /// once.
   std::vector<Crossing> crossings(int first, int last) const;
 
  private:
@@ -44,10 +46,10 @@ class RayBundle {
 
   int columns_, rows_, surfaces_ = 0;
   std::vector<Triangle> triangles_;
-  std::vector<std::vector<std::uint32_t>> bands_;  // the triangles that reach into each band of rows
+  std::vector<std::vector<std::uint32_t>> bands_;  // for each band of rows the triangles in it
 };
 
-/// Splits ordered crossings into the runs of single rays and calls visit(std::span<const Crossing>) for each.
+/// Splits ordered crossings into those of single rays and calls visit(std::span<const Crossing>) for each ray.
 template <class Visit>
 void for_each_ray(std::span<const Crossing> crossings, Visit&& visit) {
   for (std::size_t first = 0, last; first < crossings.size(); first = last) {

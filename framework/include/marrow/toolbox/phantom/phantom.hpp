@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the simulation nodes hand to each other: a bone as closed surfaces and the fragments that a fracture makes of
-// it.
+// Values that the simulation nodes exchange: a bone as closed surfaces, and the fragments that a fracture makes of it.
 #include <Eigen/Core>
 #include <string>
 #include <tuple>
@@ -14,15 +13,15 @@
 namespace marrow::phantom {
 
 /// A bone in its own frame "bone": +x to the patient's left, +y to the back, +z to the head, the long axis along z with
-/// the distal end low. Cortical bone lies between the two closed surfaces; inside the inner one, bone and marrow are
-/// mixed.
+/// the distal end at low z. Cortical bone lies between the two closed surfaces. Inside the inner one, bone and marrow
+/// are mixed.
 struct Bone {
   Mesh outer;
   Mesh inner;  ///< endosteal surface; without triangles, the bone is solid cortical bone
-  /// Bone's share of the volume inside the inner surface, piecewise linear over z and constant beyond the ends.
+  /// Volume fraction of bone inside the inner surface, piecewise linear over z and constant beyond the ends.
   std::vector<double> fill_z_mm{0};
   std::vector<double> fill_fraction{0};
-  /// The thigh: a cylinder along z of muscle in a layer of fat; radius 0 = no soft tissue.
+  /// The thigh: a cylinder of muscle along z with a layer of fat around it; radius 0: no soft tissue.
   Eigen::Vector2d thigh_centre_mm = Eigen::Vector2d::Zero();
   double thigh_radius_mm = 0;
   double fat_mm = 0;
@@ -33,16 +32,16 @@ struct Bone {
   }
 };
 
-/// One piece of a bone, and where it is in the CT and in the images. The world frame of the soft tissue is the bone's
-/// own.
+/// One piece of a bone, and its poses in the CT and in the images. The soft tissue keeps its place: its world frame is
+/// the bone's own frame.
 struct Fragment {
   std::string name;
-  int side = 0;  ///< -1: inside Phantom::fracture (distal), +1: outside it (proximal), 0: the whole bone
+  int side = 0;  ///< -1: inside Phantom::fracture (distal); +1: outside it (proximal); 0: the whole bone
   RigidTransform ct_from_bone{"ct", "bone"};
   RigidTransform world_from_ct{"world", "ct"};  ///< the exact truth
   FragmentFrame frame;                          ///< the axes of its motion, in CT coordinates
   std::vector<Eigen::Vector3d> seeds_mm;        ///< points inside its bone, in CT coordinates
-  Mesh outer;  ///< its part of the bone's outer surface, in CT coordinates; open where it broke
+  Mesh outer;  ///< its part of the bone's outer surface, in CT coordinates; open at the fracture
 
   RigidTransform world_from_bone() const { return world_from_ct * ct_from_bone; }
   static constexpr auto fields() {
@@ -53,20 +52,21 @@ struct Fragment {
 
 struct Phantom {
   Bone bone;
-  Mesh fracture;  ///< closed, encloses the distal side; without triangles where the bone is whole
+  Mesh fracture;  ///< closed surface around the distal side, in frame "bone"; without triangles if the bone is whole
   std::vector<Fragment> fragments;
   static constexpr auto fields() { return std::make_tuple(&Phantom::bone, &Phantom::fracture, &Phantom::fragments); }
 };
 
-/// Throws Error, naming `what`, unless the surfaces are closed, oriented outward and the rest is finite and consistent.
+/// Throw Error, naming `what`, unless the surfaces are closed and oriented outward and the other values are finite and
+/// consistent.
 void check_bone(const Bone& bone, const std::string& what);
 void check_phantom(const Phantom& phantom, const std::string& what);
 
-/// Moves all surfaces and the fill so that the lowest point lies `depth_mm` below the origin, and the middle of the
-/// bone's lowest 100 mm on the z axis: the origin is the isocentre of the views.
+/// Moves the surfaces, the thigh and the fill. Then the lowest point lies `depth_mm` below the origin, and the middle
+/// of the bone's lowest 100 mm lies on the z axis. The origin is the isocentre of the views.
 void place_distal_end(Bone& bone, double depth_mm);
 
-/// Bone's share at positions along z, with its exact mean along straight lines.
+/// The volume fraction of bone at positions along z, and its exact mean along straight lines.
 class Fill {
  public:
   explicit Fill(const Bone& bone);
@@ -75,7 +75,7 @@ class Fill {
   double mean(double from_z_mm, double to_z_mm) const;
 
  private:
-  double integral(double z_mm) const;  ///< from the first node
+  double integral(double z_mm) const;  ///< from the first position
   std::vector<double> z_, fraction_, integral_;
 };
 

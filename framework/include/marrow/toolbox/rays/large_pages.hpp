@@ -10,8 +10,8 @@
 
 namespace marrow::rays {
 
-/// Memory in pages of 2 MiB where the system gives them: rays jump through volumes of tens of megabytes, and with pages
-/// of 4 KiB most of their time goes into finding the page.
+/// Allocator for memory in pages of 2 MiB, if the system supports them. Rays jump through volumes of tens of megabytes.
+/// With pages of 4 KiB most of the time would go into address translation. Throws std::bad_alloc.
 template <class T>
 struct LargePages {
   using value_type = T;
@@ -26,7 +26,7 @@ struct LargePages {
     void* memory = std::aligned_alloc(kPage, bytes);
     if (!memory) throw std::bad_alloc();
 #if defined(__linux__)
-    madvise(memory, bytes, MADV_HUGEPAGE);  // a wish: without it all works, more slowly
+    madvise(memory, bytes, MADV_HUGEPAGE);  // only a hint: if it has no effect, all is slower but correct
 #endif
     return static_cast<T*>(memory);
   }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A whole radiograph at once, slice by slice: the factorisation of Lacroute and Levoy (SIGGRAPH 1994), for rays from a
-// point, which turns Joseph's sums (IEEE Transactions on Medical Imaging 1982) into runs along rows of voxels.
+// Computes a whole radiograph slice by slice, for all rays from one point. The factorisation of Lacroute and Levoy
+// (SIGGRAPH 1994) turns Joseph's sums (IEEE Transactions on Medical Imaging 1982) into runs along rows of voxels.
 #include <optional>
 #include <vector>
 
@@ -9,26 +9,27 @@
 
 namespace marrow::rays {
 
-/// A volume laid out for sums over slices along either axis.
+/// A volume laid out for sums over slices across each of its axes. Refers to `attenuation`, which must outlive it. Safe
+/// to use from several threads at once.
 class Slices {
  public:
   explicit Slices(const Attenuation& attenuation);
 
-  /// The radiograph at a grid of pixels, in mm of water. Nothing where the rays differ too much in direction, or begin
-  /// within the volume: such a view has to be followed ray by ray.
+  /// The radiograph at a grid of pixels, in mm of water, row by row. std::nullopt if the directions of the rays differ
+  /// too much or the source lies within the volume's slices. Such a view must be computed ray by ray (see Bricks).
   std::optional<std::vector<float>> radiograph(const Rays& rays, const PixelGrid& grid) const;
 
-  /// What attenuates in one row of voxels: from `first` to `last`; none where last < first.
+  /// The first and last voxel of a row that attenuate. None does if last < first.
   struct Extent {
     std::int16_t first = 0, last = -1;
   };
-  /// The volume with slices along one axis. Rows run along another, `rows` of them in a slice.
+  /// The volume as slices across one axis. A slice has `rows` rows of `length` voxels.
   struct Stack {
-    std::array<int, 3> axes;  ///< along the rows, across the slices, across the rows within a slice
+    std::array<int, 3> axes;  ///< axes of the grid: along a row, from slice to slice, from row to row
     const std::int16_t* values = nullptr;
     int length = 0, slices = 0, rows = 0;
     std::size_t slice_stride = 0, row_stride = 0;
-    std::vector<Extent> extents;  ///< slice by slice
+    std::vector<Extent> extents;  ///< of each row, slice by slice
     int first_slice = 0, last_slice = -1;
 
     const Extent& extent(int slice, int row) const {
@@ -42,7 +43,7 @@ class Slices {
  private:
   const Attenuation& attenuation_;
   std::vector<std::int16_t, LargePages<std::int16_t>> turned_;  ///< y fastest, then x, then z
-  std::array<Stack, 3> stacks_;                                 ///< by the axis across the slices
+  std::array<Stack, 3> stacks_;                                 ///< one for each axis from slice to slice
 };
 
 }  // namespace marrow::rays

@@ -7,8 +7,9 @@
 
 namespace marrow::rays {
 
-/// For each vertex of a mesh whether it lies within `voxels` of the faces of the CT volume: there the surface ends
-/// because the scan does, and not because the bone does. All false without a volume.
+/// For each vertex of a mesh: whether it lies within `voxels` voxels of the faces of the CT volume, or outside. There
+/// the surface ends because the scan ends, not the bone. All false if `volume` is null. Throws Error if mesh and volume
+/// have different frames.
 inline std::vector<char> vertices_at_volume_border(const Mesh& mesh, const Volume* volume, double voxels) {
   std::vector<char> at_border(mesh.vertices_mm.size(), 0);
   if (!volume) return at_border;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What every optimizer does alike: checks the problem, counts evaluations, keeps the best point, spends no more than
-// its budget.
+// The common part of all optimizers: it checks the problem, counts evaluations, keeps the best point and stays within
+// the budget.
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -12,7 +12,8 @@
 
 namespace marrow::search {
 
-/// Throws Error for a problem that cannot be minimised.
+/// Throws Error unless start and steps are finite, steps are positive and as many as coordinates, bounds are empty or
+/// complete, the start lies within them, and max_evaluations is at least 1.
 inline void check_problem(const MinimisationProblem& problem) {
   const auto n = problem.start.size();
   if (problem.initial_step.size() != n || !(problem.initial_step.array() > 0).all() ||
@@ -30,11 +31,13 @@ inline void check_problem(const MinimisationProblem& problem) {
                 std::to_string(problem.max_evaluations));
 }
 
-/// Evaluations of a problem in units of its initial step about its start: y = (x - start) / initial_step.
+/// Evaluates a problem in scaled coordinates y = (x - start) / initial_step. Refers to the problem, which must outlive
+/// it. For use in one thread.
 class Evaluations {
  public:
-  struct Spent {};  ///< thrown instead of one evaluation too many
+  struct Spent {};  ///< thrown when the budget of evaluations is spent
 
+  /// Throws Error as check_problem() does.
   explicit Evaluations(const MinimisationProblem& problem) : problem_(problem) {
     check_problem(problem);
     result_.x = problem.start;
@@ -47,20 +50,21 @@ class Evaluations {
 
   /// The nearest point within the bounds.
   Eigen::VectorXd within(const Eigen::VectorXd& y) const { return in_steps(point(y)); }
-  /// x as y.
+  /// Turns coordinates x of the problem into scaled coordinates y.
   Eigen::VectorXd in_steps(const Eigen::VectorXd& x) const {
     return (x - problem_.start).cwiseQuotient(problem_.initial_step);
   }
 
-  /// The value at a point within the bounds; what is not finite counts as worse than all that was seen. Throws Spent.
+  /// The value at y, moved into the bounds. Instead of a value that is not finite, returns one that is worse than all
+  /// finite values so far. Throws Spent.
   double operator()(const Eigen::VectorXd& y) {
     const Eigen::VectorXd x = next(y);
     return noted(x, problem_.function(x));
   }
 
   bool has_derivatives() const { return bool(problem_.expansion); }
-  /// The function about a point within the bounds, in steps; absent where it is not finite. One evaluation. Throws
-  /// Spent.
+  /// The quadratic expansion of the function about y, moved into the bounds, in scaled coordinates. std::nullopt if it
+  /// is not finite. Counts as one evaluation. Throws Spent.
   std::optional<MinimisationProblem::Expansion> expansion(const Eigen::VectorXd& y) {
     const Eigen::VectorXd x = next(y);
     MinimisationProblem::Expansion about = problem_.expansion(x);
@@ -72,7 +76,7 @@ class Evaluations {
     return about;
   }
 
-  /// Runs an algorithm that returns why it stopped.
+  /// Calls algorithm(*this), which returns the reason why it stopped, and returns the best point found. Catches Spent.
   template <class Algorithm>
   MinimisationResult run(const Algorithm& algorithm) {
     try {
@@ -91,7 +95,7 @@ class Evaluations {
   double noted(const Eigen::VectorXd& x, double value) {
     ++result_.evaluations;
     if (problem_.observer) problem_.observer(result_.evaluations, x, value);
-    // A finite number, because the models that some algorithms fit would turn infinity into NaN.
+    // The returned number is finite, because models fitted by some algorithms would turn infinity into NaN.
     if (!std::isfinite(value)) return worst_ + std::abs(worst_) + 1;
     worst_ = std::max(worst_, value);
     if (value < result_.value) {

@@ -8,8 +8,9 @@
 
 namespace marrow::search {
 
-/// Runs one of NLopt's algorithms without derivatives on a problem. The algorithm works in units of the initial step,
-/// so that coordinates of different scale are alike to it.
+/// Runs one of NLopt's derivative-free algorithms on a problem. The algorithm works in units of the initial step, so
+/// that all coordinates have the same scale. Throws Error as check_problem() does. Exceptions of the function pass
+/// through.
 class NloptRun {
  public:
   NloptRun(nlopt::algorithm algorithm, const MinimisationProblem& problem)
@@ -31,7 +32,7 @@ class NloptRun {
       } catch (const nlopt::roundoff_limited&) {
         return "rounding errors hide any further progress";
       } catch (const nlopt::forced_stop&) {
-        // NLopt replaces what the function throws by its own exceptions, so the original is kept here.
+        // NLopt replaces the function's exceptions by its own, so evaluate() has kept the original one.
         if (thrown_) std::rethrow_exception(thrown_);
         throw;
       }
@@ -48,7 +49,7 @@ class NloptRun {
     NloptRun& run = *static_cast<NloptRun*>(self);
     try {
       return run.evaluate_(Eigen::VectorXd::Map(y.data(), Eigen::Index(y.size())));
-    } catch (...) {  // of the function; or Spent, as not all of NLopt's algorithms keep to their budget
+    } catch (...) {  // thrown by the function; or Spent, because some of NLopt's algorithms exceed their budget
       run.thrown_ = std::current_exception();
       run.optimizer_.force_stop();
       return 0;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The search for the pose of least cost, coarse to fine, that the nodes of this kind share.
+// Search for the pose of least cost, from coarse to fine. Several nodes use it.
 #include <memory>
 #include <utility>
 #include <vector>
@@ -9,6 +9,7 @@
 
 namespace marrow::search {
 
+/// See the help texts in declare(). Vectors hold one number for each level, the coarsest first.
 struct SearchOptions {
   double scan_rotation_deg = 15;
   double scan_rotation_step_deg = 3;
@@ -17,7 +18,7 @@ struct SearchOptions {
   int scan_poses = 0;
   double scan_side_deg = 3;
   double scan_side_mm = 3;
-  double scan_reach = 0.5;  ///< of the ranges of scan_poses: within it, two poses are neighbours
+  double scan_reach = 0.5;  ///< two of the scan_poses are neighbours within this part of the scan's ranges
   int candidates = 3;
   int finalists = 1;
   std::vector<double> contour_spacing_px{8, 4, 2};
@@ -32,26 +33,29 @@ struct SearchOptions {
   double warn_above_mm = 5;
 };
 
-/// Throws Error unless all options that say something per level say it in positive numbers.
+/// Throws Error unless all lists with a number per level pass check_level_list(). pixel_step may be empty.
 void check_options(const SearchOptions& options);
-/// Throws Error unless the list has a number, and all are positive.
+/// Throws Error unless the list holds at least one number and all are positive. The message begins with `name`.
 void check_level_list(const std::vector<double>& values, const std::string& name);
 
+/// The cost at each level, the coarsest first.
 using Levels = std::vector<std::shared_ptr<const Cost>>;
 Levels levels_of(const Cost& cost, const SearchOptions& options);
 
-/// Where a candidate came to: cost, and poses after the axial and after the last search.
+/// Result for one candidate: its cost, and its poses after the axial search and after the last search.
 struct Found {
   double value = 0;
   RigidTransform axial, pose;
 };
 
-/// How long the first steps of a search are, and when it ends.
+/// First steps of a search: of the rotations about the frontal and lateral axes, of the axial rotation, and of the
+/// translations. The search ends when steps fall below `tolerance` times the first ones.
 struct Steps {
   double deg = 1, axial_deg = 1, mm = 1, tolerance = 0.1;
 };
 
-/// The search: the pose found so far, moved about the fragment's own axes.
+/// A search in progress. It keeps the best pose so far and moves it about the fragment's own axes. Refers to all
+/// arguments of the constructor, which must outlive it.
 class Search {
  public:
   Search(const Optimizer& optimizer, const Pose& initial, const SearchOptions& options, Context& context);
@@ -60,25 +64,27 @@ class Search {
   void go_to(const RigidTransform& pose) { pose_ = pose; }
   int evaluations() const { return evaluations_; }
 
-  /// The least cost on the way so far; costs of different levels do not compare, so this asks one for all.
+  /// How the least cost fell during the search. All poses are evaluated by the same `cost`, because costs of different
+  /// levels cannot be compared.
   std::vector<Pose::Progress> convergence(const Cost& cost) const;
 
-  /// Looks at poses about the one found so far, follows the best up, and returns where the best of them came to, at the
-  /// last level.
+  /// Scans poses around the current one, refines the best candidates through the levels, and returns the best result at
+  /// the last level.
   Found find(const Levels& levels) { return best_of(scan(*levels.front()), levels); }
 
-  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the pose found so far, goes there and
-  /// returns the cost. `done` and `share` are for the progress.
+  /// Minimises over the given axes (0 to 2 rotations, 3 to 5 translations) from the current pose. Goes to the result
+  /// and returns its cost. For the progress: `done` is the part of the whole search before this call, `share` that of
+  /// this call. Throws when the context is cancelled.
   double refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share);
 
  private:
-  /// Tries poses about the one found so far and returns the best that are no neighbours of a better one: the cost has
-  /// other minima within their range.
+  /// Evaluates poses around the current one and returns the best. None of them is a neighbour of a better one, because
+  /// the cost may have several minima in this range.
   std::vector<RigidTransform> scan(const Cost& cost);
 
-  /// Follows the candidates up. Each is judged after all six axes had their turn, because the start's errors in the
-  /// other four hide which of them is right; the finalists are judged at the last level, because a coarse cost hardly
-  /// tells a good pose from one whose outline lies on other things in the image.
+  /// Refines the candidates. They are compared only after a search over all six axes, because errors of the start in
+  /// the four other axes hide which candidate is right. The finalists are compared at the last level: a coarse cost
+  /// hardly distinguishes a good pose from one whose outline lies on other structures in the image.
   Found best_of(const std::vector<RigidTransform>& candidates, const Levels& levels);
 
   void note(int evaluations, const RigidTransform& pose);
@@ -90,12 +96,13 @@ class Search {
   const SearchOptions& options_;
   Context& context_;
   int evaluations_ = 0;
-  std::vector<std::pair<int, RigidTransform>> path_;  ///< after so many evaluations
+  std::vector<std::pair<int, RigidTransform>> path_;  ///< poses on the way, each after this number of evaluations
 };
 
-/// The search's pose with its cost, and, where the cost has a noise model, its predicted covariance and warnings of
-/// what the images do not determine.
+/// The search's pose with its cost and number of evaluations, without covariance. The rest is that of `initial`.
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
+/// The same with the convergence. If the cost has a noise model, also with the predicted covariance and with warnings
+/// about axes that the images hardly determine.
 Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
                    Context& context);
 
@@ -107,37 +114,40 @@ Node& declare(Node& node) {
   return node
       .option("scan_rotation_deg", &Options::scan_rotation_deg, "axial rotations tried, to either side",
               marrow::at_least(0), marrow::at_most(180))
-      .option("scan_rotation_step_deg", &Options::scan_rotation_step_deg, "distance between these",
+      .option("scan_rotation_step_deg", &Options::scan_rotation_step_deg, "step between these rotations",
               marrow::at_least(0.01))
       .option("scan_translation_mm", &Options::scan_translation_mm, "axial translations tried, to either side",
               marrow::at_least(0))
-      .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "distance between these",
+      .option("scan_translation_step_mm", &Options::scan_translation_step_mm, "step between these translations",
               marrow::at_least(0.01))
-      .option("scan_poses", &Options::scan_poses,
-              "instead of this grid, so many poses spread over all six axes: for a start that is approximate in all",
-              marrow::at_least(0))
+      .option(
+          "scan_poses", &Options::scan_poses,
+          "number of poses spread over all six axes, tried instead of this grid, for a start that is approximate in "
+          "all axes; 0: the grid",
+          marrow::at_least(0))
       .option("scan_side_deg", &Options::scan_side_deg,
-              "of these, rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
+              "with scan_poses: rotations about the frontal and lateral axes, to either side", marrow::at_least(0),
               marrow::at_most(180))
-      .option("scan_side_mm", &Options::scan_side_mm, "of these, translations along the same axes, to either side",
+      .option("scan_side_mm", &Options::scan_side_mm, "with scan_poses: translations along these axes, to either side",
               marrow::at_least(0))
-      .option("candidates", &Options::candidates, "best places of this scan that are followed up", marrow::at_least(1))
+      .option("candidates", &Options::candidates, "number of best poses of the scan that are refined",
+              marrow::at_least(1))
       .option("finalists", &Options::finalists,
-              "best of these after the first level that go through all levels; the last level chooses",
+              "number of best candidates after the first level that go through all levels; the last level chooses",
               marrow::at_least(1))
       .option("contour_spacing_px", &Options::contour_spacing_px, "per level: distance between points of the outline")
-      .option("reach_px", &Options::reach_px, "per level: distance from which on a point counts as unmatched")
+      .option("reach_px", &Options::reach_px, "per level: distance beyond which a point counts as unmatched")
       .option("pixel_step", &Options::pixel_step,
-              "per level, of grey values: every how many pixels are compared; none: as the cost says")
+              "per level, for grey values: compare every n-th pixel; none: as the cost says")
       .option("step_deg", &Options::step_deg,
               "per level: first step of the rotations about the frontal and lateral axes")
       .option("step_axial_deg", &Options::step_axial_deg,
               "per level: first step of the axial rotation, which moves the outline less")
       .option("step_mm", &Options::step_mm, "per level: first step of the translations")
-      .option("max_evaluations", &Options::max_evaluations, "most evaluations of the cost per level",
+      .option("max_evaluations", &Options::max_evaluations, "largest number of evaluations of the cost per level",
               marrow::at_least(1))
       .option("step_tolerance", &Options::step_tolerance,
-              "per level: it ends when steps fall below this part of its first step")
+              "per level: the search ends when steps fall below this part of the first step")
       .relation(marrow::same_length(
           {"contour_spacing_px", "reach_px", "step_deg", "step_axial_deg", "step_mm", "step_tolerance"}))
       .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The geometry of the chapter's first stage: planes from image lines, the axis in which they meet (Eq 7), and the
-// motion that brings one axis onto another (Eq 8), in the corrected forms of docs/method.md.
+// The geometry of the chapter's first stage, as corrected in docs/method.md: planes from image lines, the axis in which
+// they meet (Eq 7), and the motion that takes one axis to another (Eq 8).
 #include <Eigen/Core>
 #include <marrow/domain/camera.hpp>
 #include <marrow/domain/features.hpp>
@@ -9,6 +9,7 @@
 
 namespace marrow::shaft {
 
+/// A straight line: a point and a unit direction.
 struct Axis {
   Eigen::Vector3d point_mm = Eigen::Vector3d::Zero();
   Eigen::Vector3d direction = Eigen::Vector3d::UnitZ();
@@ -18,18 +19,19 @@ struct Axis {
   }
 };
 
-/// The plane that bisects the two planes through the source and a border each (back-projected exactly, M^T l). It
-/// contains the axis of a circular cylinder with these borders; the mean of the two image lines is not the image of
-/// that axis. The borders must run the same way.
+/// The bisector, in world coordinates, of two planes: each goes through the source and one border (exact
+/// back-projection M^T l). It contains the axis of a circular cylinder with these borders. (The mean of the two image
+/// lines is not the image of that axis.) Both borders must run in the same direction.
 Plane bisecting_plane(const Camera& camera, const LineSegment& left, const LineSegment& right);
 
-/// Eq 7: the axis that lies in all planes, in the sense of least squares; point_mm is the one nearest to the origin.
-/// Throws Error when the planes meet at less than 10 degrees.
+/// Eq 7: the axis that lies in all planes, by least squares. point_mm is its point nearest to the origin. Throws Error
+/// if the planes meet at less than 10 degrees, or if there are fewer than two.
 Axis axis_of_planes(const std::vector<Plane>& planes);
 
-/// Eq 8 as corrected: T_move = global_T_target (global_T_model)^-1, both frames with z along the axis, their origins at
-/// the model axis' point nearest to `anchor` and at the target axis' point nearest to that. The frames' x axes are
-/// chosen so that nothing turns about the axis or slides along it. The directions' senses are matched first.
+/// Eq 8 as corrected: T_move = global_T_target (global_T_model)^-1, a motion in world coordinates. Both frames have z
+/// along their axis. The model frame's origin is the point of the model's axis nearest to `anchor`; the target frame's
+/// origin is the point of the target axis nearest to that. If the two directions are opposite, the target's is reversed
+/// first. The x axes are chosen so that the model does not rotate about its axis or slide along it.
 RigidTransform world_from_world_move(const Axis& model, const Axis& target, const Eigen::Vector3d& anchor);
 
 }  // namespace marrow::shaft

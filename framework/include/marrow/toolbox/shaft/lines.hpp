@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the shaft nodes have in common before borders are paired: their options, and lines that edge pixels support.
+// The common part of the shaft nodes before borders are paired: options, and lines that edge pixels support.
 #include <marrow/domain/camera.hpp>
 #include <vector>
 
@@ -8,6 +8,7 @@
 
 namespace marrow::shaft {
 
+/// See the help texts in declare_line_options().
 struct LineOptions {
   std::vector<double> width_mm, width_deviation_mm;
   double magnification_tolerance = 0.05;
@@ -20,18 +21,19 @@ struct LineOptions {
   bool outline = true;
 };
 
-/// The options' lengths in pixels of a view, at the depth of the isocentre (the world's origin).
+/// The lengths of the options in pixels of a view, at the depth of the isocentre (the world's origin).
 struct Scale {
-  double pixel_mm = 1;
+  double pixel_mm = 1;  ///< mm per pixel at that depth
   double min_length_px = 0, gap_px = 0;
   Support support;
 };
 
-/// Throws Error where edges and view do not go together, there is no edge, or the isocentre lies behind the source.
+/// Throws Error if the view or its image type is not valid, if edge map and view have different sizes, if the edge map
+/// is empty or holds NaN or infinity, or if the isocentre does not lie in front of the source.
 Scale checked_scale(const EdgeMap& edges, const View& view, const LineOptions& options);
 
-/// Candidates fitted to the edge pixels that support them and cut to the longest run of these; those that the pixels do
-/// not support, or that repeat an earlier one, are left out. At most options.lines.
+/// Fits the candidates to the longest run of edge pixels that support them. Candidates without enough support and those
+/// that repeat an earlier one are left out. At most options.lines.
 std::vector<Border> supported_lines(const EdgeMap& edges, const std::vector<Border>& candidates, const Scale& scale,
                                     const LineOptions& options);
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// How wide shafts are, and how they taper: what a pair of borders is judged by.
+// Widths and tapers of shafts, by which a pair of borders is judged.
 #include <string>
 #include <vector>
 
@@ -9,26 +9,28 @@ namespace marrow::shaft {
 /// The outer diameter of a shaft at one level, seen from one side, over many people.
 struct Width {
   double mean_mm = 0, deviation_mm = 0;
-  double taper_deg = 0;  ///< angle between its borders there; negative: not known
+  double taper_deg = 0;  ///< angle between the borders at this level; negative: not known
 };
 
 class Widths {
  public:
-  /// Of femora, by level; or, where `mean_mm` is not empty, of another bone: a mean and a deviation for each direction
-  /// from which it may be seen. The magnification at the shaft's depth is known to a deviation of so many parts of one.
-  /// Throws Error unless all are positive.
+  /// Widths of femora by level if `mean_mm` is empty. Otherwise of another bone: a mean and a standard deviation for
+  /// each direction from which it may be seen (lists of equal length). `magnification_tolerance`: relative standard
+  /// deviation of the magnification at the shaft's depth. Throws Error unless all means and deviations are positive.
   Widths(const std::vector<double>& mean_mm, const std::vector<double>& deviation_mm, double magnification_tolerance);
 
-  /// Log-likelihood of a pair of borders, relative to the likeliest one, for the level and direction that fit it best.
+  /// Log-likelihood of a pair of borders for the level and direction that fit it best. 0 for the most likely pair, else
+  /// negative.
   double log_likelihood(double width_mm, double taper_deg) const;
-  /// Whether the width is within three deviations at some level.
+  /// Whether the width is within three standard deviations of the mean at some level.
   bool is_possible(double width_mm) const;
+  /// The smallest possible width.
   double least_mm() const;
-  /// "18.6 to 48.7 mm"
+  /// The range of possible widths: "18.6 to 48.7 mm".
   std::string range() const;
 
  private:
-  double deviation_mm(const Width& width) const;  ///< with that of the magnification
+  double deviation_mm(const Width& width) const;  ///< includes that of the magnification
 
   std::vector<Width> widths_;
   double magnification_tolerance_;

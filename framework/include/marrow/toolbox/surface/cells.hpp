@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The triangles of each of the 256 sign patterns of a cell, derived rather than typed in (Lorensen and Cline, Marching
-// cubes, SIGGRAPH 1987, whose own table leaves holes where two neighbours treat an ambiguous face differently).
+// The triangles for each of the 256 sign patterns of a cell (Lorensen and Cline, Marching cubes, SIGGRAPH 1987). They
+// are computed and not copied from that paper: its table leaves holes where two neighbours treat an ambiguous face
+// differently.
 //
-// On each face the surface runs as directed segments, from the edge where a walk around the face enters the inside to
-// the edge where it leaves it, so inside corners on a face's diagonal stay apart. That depends on the face's four signs
-// only, hence both cells that share the face agree, and the segments of all faces close to loops. A loop is cut into
-// triangles without a diagonal that lies in a face, as the neighbour could have the same one. The surface is therefore
-// a closed manifold for every field.
+// On each face the surface consists of directed segments. A segment goes from the edge where a walk around the face
+// enters the inside to the edge where it leaves the inside. So two inside corners on a face's diagonal stay apart. This
+// depends only on the four signs of the face, so both cells at the face agree, and the segments of all faces form
+// closed loops. A loop is cut into triangles. No diagonal may lie in a face, because the neighbour could have the same
+// one. The surface is therefore a closed manifold for every field.
 #include <array>
 #include <cstdint>
 #include <utility>
@@ -26,10 +27,10 @@ constexpr int edge_between(int corner, int other) {
   return -1;
 }
 
-// The corners of each face, counter-clockwise seen from outside the cell: -x, +x, -y, +y, -z, +z.
+// The corners of each face, counter-clockwise seen from outside the cell. Faces: -x, +x, -y, +y, -z, +z.
 constexpr int kFaces[6][4] = {{0, 4, 6, 2}, {1, 3, 7, 5}, {0, 1, 5, 4}, {2, 6, 7, 3}, {0, 2, 3, 1}, {4, 5, 7, 6}};
 
-/// True when both edges bound one face of the cell.
+/// Whether both edges belong to one face of the cell.
 constexpr bool share_face(int edge, int other) {
   for (const auto& face : kFaces) {
     bool has_edge = false, has_other = false;
@@ -43,9 +44,10 @@ constexpr bool share_face(int edge, int other) {
   return false;
 }
 
-using Triangle = std::array<std::uint8_t, 3>;  // edges of the cell
+using Triangle = std::array<std::uint8_t, 3>;  // the three edges of the cell with its corners
 
-/// Cuts loop[first..last] into triangles on the base first-last, no diagonal in a face. False when that cannot be done.
+/// Cuts the part loop[first..last], closed by the base first-last, into triangles without a diagonal in a face. False
+/// if this is not possible.
 inline bool cut(const std::vector<int>& loop, std::size_t first, std::size_t last, std::vector<Triangle>& triangles) {
   if (last - first < 2) return true;
   for (std::size_t apex = first + 1; apex < last; ++apex) {
@@ -59,8 +61,8 @@ inline bool cut(const std::vector<int>& loop, std::size_t first, std::size_t las
   return false;
 }
 
-/// The loops in which the surface crosses the edges of a cell, in the pattern in which corner c is inside when bit c is
-/// set. Counter-clockwise seen from outside.
+/// The loops of edges that the surface crosses in a cell, counter-clockwise seen from outside the surface. Bit c of
+/// `inside` is set if corner c is inside.
 inline std::vector<std::vector<int>> cell_loops(unsigned inside) {
   std::array<int, 12> next;
   next.fill(-1);

@@ -10,9 +10,9 @@
 
 namespace marrow::surface {
 
-/// A surface with about an eighth of the triangles, for outlines that are asked for coarsely: the vertices within each
-/// cube of three edge lengths become one (Rossignac and Borrel 1993). `at_border` says of each vertex whether the
-/// surface ends there; a cube's does where one of its vertices does.
+/// A surface with about an eighth of the triangles, for coarse outlines. All vertices within a cube of three edge
+/// lengths become one (Rossignac and Borrel 1993). `at_border`: for each vertex whether the surface ends there because
+/// the CT ends. A merged vertex is at the border if one of its vertices is.
 struct CoarseSurface {
   Mesh mesh;
   std::vector<char> at_border;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The signs of a field, packed, which is all that decides where triangles lie: 64 samples fit into a word, so what the
-// surface does not cross is passed over quickly.
+// The signs of a field, packed to 64 samples per word. Only the signs decide which cells have triangles. Cells that the
+// surface does not cross are skipped quickly.
 #include <array>
 #include <bit>
 #include <cstdint>
@@ -13,29 +13,30 @@ namespace marrow::surface {
 
 using Word = std::uint64_t;
 
-/// One bit a sample, set where it is inside, with one layer of outside around the grid so that the surface closes at
-/// the border. Points are counted in the padded grid: (1, 1, 1) is the field's first sample.
+/// One bit per sample, set if it is inside. One layer outside is added around the grid, so that the surface is closed
+/// at the border. Coordinates refer to the padded grid: (1, 1, 1) is the field's first sample. Refers to the field,
+/// which must outlive it. Safe to use from several threads.
 class Signs {
  public:
-  /// Throws Error for a field that check_field refuses.
+  /// Throws Error for a field that check_field() refuses.
   explicit Signs(const marrow::SignedField& field);
 
   const std::array<int, 3>& size() const { return size_; }
   int words() const { return words_; }
 
   Word bits(int word, int y, int z) const { return bits_[(std::size_t(z) * size_[1] + y) * words_ + word]; }
-  /// The bits of the points one further in +x.
+  /// The bits of the next points in +x.
   Word shifted(int word, int y, int z) const {
     return bits(word, y, z) >> 1 | (word + 1 < words_ ? bits(word + 1, y, z) << 63 : 0);
   }
-  /// Set where the surface crosses the edge of the grid that leaves the point in +axis.
+  /// Bits of the points from which the surface crosses the edge of the grid in +axis.
   Word edges(int axis, int word, int y, int z) const {
     if (axis == 0) return bits(word, y, z) ^ shifted(word, y, z);
     if (axis == 1) return y + 1 < size_[1] ? bits(word, y, z) ^ bits(word, y + 1, z) : 0;
     return z + 1 < size_[2] ? bits(word, y, z) ^ bits(word, y, z + 1) : 0;
   }
 
-  /// Bit c: corner c of the cell, which lies at (c & 1, c >> 1 & 1, c >> 2) from its first point, is inside.
+  /// Sign pattern of the cell with first point (x, y, z). Bit c: the corner at (c & 1, c >> 1 & 1, c >> 2) is inside.
   unsigned pattern(int x, int y, int z) const {
     unsigned pattern = 0;
     for (int c = 0; c < 8; ++c) {
@@ -44,7 +45,7 @@ class Signs {
     }
     return pattern;
   }
-  /// Calls visit(x, pattern) for each cell of the row that the surface crosses, x rising.
+  /// Calls visit(x, pattern) for each cell of a row that the surface crosses, with ascending x.
   template <class Visit>
   void for_cells(int y, int z, const Visit& visit) const {
     for (int word = 0; word < words_; ++word) {
@@ -76,12 +77,12 @@ class Signs {
               visit(axis, 64 * word + std::countr_zero(left), y, z);
   }
 
-  /// Where the surface crosses the edge in +axis of a point, in samples of the field.
+  /// The point where the surface crosses the edge from a point in +axis, as a fractional index of the field.
   Eigen::Vector3d crossing(int axis, int x, int y, int z) const {
     const double from = padded_(x - 1, y - 1, z - 1);
     const double to = padded_(x - 1 + (axis == 0), y - 1 + (axis == 1), z - 1 + (axis == 2));
     Eigen::Vector3d index(x - 1, y - 1, z - 1);
-    // Kept off the grid points, where several vertices would fall together and triangles lose their normal.
+    // Not exactly on a grid point: there several vertices would coincide, and triangles would have no normal.
     index[axis] += std::clamp(from / (from - to), 1e-4, 1 - 1e-4);
     return index;
   }

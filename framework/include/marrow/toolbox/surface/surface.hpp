@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// What the nodes of this kind share: what they ask of a field, and what they do with a surface once it is there.
+// The common part of the meshers: checks of the field, and the last steps on the surface.
 #include <algorithm>
 #include <cmath>
 
@@ -9,16 +9,18 @@
 
 namespace marrow::surface {
 
-/// Throws Error for an empty field, missing or non-finite values, or a field with no surface.
+/// Throws Error for an empty field, missing or non-finite values, a grid that is not rigid, or a field without a
+/// surface.
 void check_field(const marrow::SignedField& field);
-/// The two halves of check_field, for those who look at all values anyway.
+/// The two parts of check_field(), for code that visits all values anyway.
 void check_grid(const marrow::SignedField& field);
 void check_values(bool all_finite, bool any_inside, bool any_outside);
 /// Throws Error for more vertices than a mesh can index.
 void check_vertex_count(std::size_t count);
 
-/// A field beyond whose border lies its mirror image, outside: a surface that reaches the border closes half a sample
-/// beyond it. Indices may lie off the grid.
+/// A field that continues beyond its grid. There it has the absolute value at the nearest border sample, so it is
+/// outside. A surface that reaches the border is closed half a sample beyond it. Refers to the field, which must
+/// outlive it.
 class Padded {
  public:
   explicit Padded(const marrow::SignedField& field) : field_(field) {}
@@ -33,11 +35,11 @@ class Padded {
   const marrow::SignedField& field_;
 };
 
-/// The component that encloses the largest volume (an inner wall encloses a negative one), its vertices in their old
+/// The component that encloses the largest volume. (An inner wall encloses a negative volume.) Its vertices keep their
 /// order.
 marrow::Mesh largest_component(marrow::Mesh mesh);
 
-/// Smooths without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing
+/// Smoothing without shrinking: `iterations` pairs of a smoothing and an inflating step (Taubin, A signal processing
 /// approach to fair surface design, SIGGRAPH 1995). Shapes longer than about 2 pi / sqrt(pass_band) edges keep their
 /// size. The surface must be closed.
 struct Taubin {
@@ -46,7 +48,7 @@ struct Taubin {
 };
 void smooth(marrow::Mesh& mesh, const Taubin& taubin);
 
-/// What each mesher does with its surface at last.
+/// The last steps of each mesher: keep only the largest component, then smooth.
 struct Finish {
   bool largest_only = true;
   int smoothing = 0;

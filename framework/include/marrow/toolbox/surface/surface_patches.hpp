@@ -11,24 +11,24 @@
 #include <numeric>
 #include <vector>
 
-/// A surface cut into patches of some 32 neighbouring triangles of like normal, so that a whole patch can be passed
-/// over when none of its normals can be perpendicular to the line of sight. Vertices are stored once per patch, one
-/// array a coordinate.
+/// A surface cut into patches of up to 32 neighbouring triangles with similar normals. A whole patch can be skipped if
+/// none of its normals can be perpendicular to the line of sight. Vertices are stored once per patch, with one array
+/// per coordinate.
 struct SurfacePatches {
   struct Patch {
     std::uint32_t first_vertex, vertex_count, first_triangle, triangle_count, first_rim, rim_count;
   };
-  /// Of each patch: the sphere around its vertices and the cone around their normals.
+  /// For each patch the sphere around its vertices and the cone around their normals.
   struct Bounds {
     std::vector<float> x, y, z, radius, axis_x, axis_y, axis_z;
-    std::vector<float> cone_sine;  ///< of the cone's half opening angle; 1 from a right angle on
+    std::vector<float> cone_sine;  ///< sine of the cone's half opening angle; 1 for angles from 90 degrees on
   };
   std::vector<Patch> patches;
   Bounds bounds;
-  std::vector<float> x, y, z, nx, ny, nz;  ///< relative to origin_mm; unit normals
-  std::vector<char> at_border;
+  std::vector<float> x, y, z, nx, ny, nz;  ///< of each vertex: position relative to origin_mm [mm], unit normal
+  std::vector<char> at_border;             ///< of each vertex: the surface ends there because the CT ends
   std::vector<std::array<std::uint8_t, 3>> triangles;  ///< indices within the patch
-  std::vector<std::array<std::uint8_t, 2>> rims;       ///< edges of one triangle only, in its sense: an open surface
+  std::vector<std::array<std::uint8_t, 2>> rims;  ///< edges with one triangle only (open surface), in its direction
   Eigen::Vector3d origin_mm;
 };
 
@@ -37,7 +37,7 @@ namespace marrow::surface {
 using Triangle = std::array<std::uint32_t, 3>;
 using Feature = Eigen::Matrix<float, 6, 1>;
 
-/// Triangles whose corners at the same place are the same vertex: a surface read from STL may repeat them.
+/// The triangles with equal vertices merged, because a surface from STL may repeat vertices.
 inline std::vector<Triangle> weld(const marrow::Mesh& mesh) {
   std::vector<std::uint32_t> order(mesh.vertices_mm.size()), kept(order.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -58,7 +58,7 @@ inline std::vector<Triangle> weld(const marrow::Mesh& mesh) {
   return triangles;
 }
 
-/// Unit normals of the vertices, the mean of their triangles' weighted by area.
+/// Unit normals of the vertices: the mean of their triangles' normals, weighted by area.
 inline std::vector<Eigen::Vector3d> vertex_normals(const marrow::Mesh& mesh, const std::vector<Triangle>& triangles) {
   std::vector<Eigen::Vector3d> normals(mesh.vertices_mm.size(), Eigen::Vector3d::Zero());
   for (const Triangle& t : triangles) {
@@ -70,7 +70,8 @@ inline std::vector<Eigen::Vector3d> vertex_normals(const marrow::Mesh& mesh, con
   return normals;
 }
 
-/// Sorts triangles[first, last) into groups of at most `most` by halving along the feature that spreads most.
+/// Sorts order[first, last) into groups of at most `most` triangles, by repeated halving along the feature with the
+/// largest range.
 inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>& features, std::size_t first,
                   std::size_t last, std::size_t most) {
   if (last - first <= most) return;
@@ -96,15 +97,15 @@ inline void split(std::vector<std::uint32_t>& order, const std::vector<Feature>&
     left(), right();
 }
 
-/// Where the groups that split() makes end.
+/// The ends of the groups that split() makes.
 inline void find_ends(std::size_t first, std::size_t last, std::size_t most, std::vector<std::size_t>& ends) {
   if (last - first <= most) return ends.push_back(last);
   find_ends(first, (first + last) / 2, most, ends);
   find_ends((first + last) / 2, last, most, ends);
 }
 
-/// For each triangle a bit per edge k -> k+1 that no other triangle shares. Edges are sorted into bins by their lower
-/// vertex.
+/// For each triangle, bit k is set if no other triangle shares its edge k -> k+1. Edges are sorted into bins by their
+/// lower vertex.
 inline std::vector<std::uint8_t> rim_edges(const std::vector<Triangle>& triangles, std::size_t vertices) {
   struct Edge {
     std::uint32_t higher, at;  ///< vertex; 3 * triangle + k
@@ -152,14 +153,15 @@ inline void bound(SurfacePatches& s, const SurfacePatches::Patch& patch) {
 
 }  // namespace marrow::surface
 
+/// Cuts a surface into patches. `at_border`: one value per vertex of the mesh (see vertices_at_volume_border()).
 inline SurfacePatches make_surface_patches(const marrow::Mesh& mesh, const std::vector<char>& at_border) {
   using namespace marrow::surface;
   constexpr std::size_t kTriangles = 32;
-  constexpr float kNormalScale_mm = 15;  // a normal turned by 1 rad counts like this distance
+  constexpr float kNormalScale_mm = 15;  // normals that differ by 1 rad count like this distance
   std::vector<Triangle> triangles = mesh.triangles;
   std::vector<std::uint8_t> rims = rim_edges(triangles, mesh.vertices_mm.size());
-  if (std::any_of(rims.begin(), rims.end(),
-                  [](std::uint8_t bits) { return bits; })) {  // a closed surface repeats no vertices
+  // A closed surface repeats no vertices, so only an open one is welded.
+  if (std::any_of(rims.begin(), rims.end(), [](std::uint8_t bits) { return bits; })) {
     triangles = weld(mesh);
     rims = rim_edges(triangles, mesh.vertices_mm.size());
   }

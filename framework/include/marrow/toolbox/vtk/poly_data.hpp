@@ -10,7 +10,7 @@
 
 namespace marrow::vtk {
 
-/// The same surface for VTK's filters.
+/// Copies a surface for VTK's filters. Coordinates stay in mm, as doubles.
 inline vtkSmartPointer<vtkPolyData> poly_data(const Mesh& mesh) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();

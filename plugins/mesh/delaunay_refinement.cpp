@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// CGAL's surface mesher is under the GPL, version 3 or later, and so is what is linked to it: this file, its header and
-// delaunay.cpp. They make a library of their own, which the rest of marrow only loads.
-#include "marrow/toolbox/surface/delaunay_refinement.hpp"
+// CGAL's surface mesher is under the GPL, version 3 or later. So is the code that is linked to it: this file, its
+// header and the plugin plugins/mesh/delaunay.cpp. The rest of marrow only loads this plugin.
+#include "delaunay_refinement.hpp"
 
 #include <CGAL/Complex_2_in_triangulation_3.h>
 #include <CGAL/Delaunay_triangulation_3.h>
@@ -16,11 +16,11 @@
 
 #include <map>
 
-namespace marrow::surface {
+namespace marrow::delaunay {
 namespace {
 
-/// Numbers vertices and cells as they are made. Without it CGAL sorts them by address, and the same field gives another
-/// mesh where memory is laid out otherwise.
+/// Numbers vertices and cells in the order of their creation. Otherwise CGAL sorts them by address, and the same field
+/// could give different meshes in different runs.
 template <class Base>
 class Numbered : public Base {
  public:
@@ -37,7 +37,7 @@ class Numbered : public Base {
   std::size_t stamp_ = std::size_t(-1);
 };
 
-// As CGAL::Surface_mesh_default_triangulation_3, but numbered.
+// Like CGAL::Surface_mesh_default_triangulation_3, but numbered.
 using Kernel = CGAL::Robust_circumcenter_traits_3<CGAL::Exact_predicates_inexact_constructions_kernel>;
 using Vertex = Numbered<CGAL::Surface_mesh_vertex_base_3<Kernel>>;
 using Cell = Numbered<
@@ -51,8 +51,8 @@ using Limits = CGAL::Surface_mesh_default_criteria_3<Triangulation>;
 using Mesher = CGAL::Surface_mesher_generator<Complex, Traits, Limits, CGAL::Manifold_tag,
                                               CGAL::Surface_mesher::NOT_VERBOSE>::type;
 
-/// The facets of the complex. The line between the centres of a facet's two cells crosses the level set, so one centre
-/// lies inside; seen from the other cell, a facet's corners are counter-clockwise.
+/// The facets of the complex as triangles. The line between the circumcentres of a facet's two cells crosses the level
+/// set, so one of them lies inside. Seen from the other cell, the facet's corners are counter-clockwise.
 Surface facets_of(const Complex& complex, const Implicit& implicit) {
   const Triangulation& triangulation = complex.triangulation();
   Surface surface;
@@ -80,7 +80,7 @@ Surface facets_of(const Complex& complex, const Implicit& implicit) {
 
 Surface mesh(const LevelSet& level_set, const Criteria& criteria, const std::function<void()>& step) {
   const auto value = [&](const Point& p) { return level_set.value({p.x(), p.y(), p.z()}); };
-  constexpr double kRelativeError = 1e-7;  // of points on the level set, relative to the ball's radius
+  constexpr double kRelativeError = 1e-7;  // position error of points on the level set, relative to the ball's radius
   const Implicit implicit(value, Kernel::Sphere_3(CGAL::ORIGIN, level_set.radius_mm * level_set.radius_mm),
                           kRelativeError);
   Triangulation triangulation;
@@ -103,4 +103,4 @@ Surface mesh(const LevelSet& level_set, const Criteria& criteria, const std::fun
   return surface;
 }
 
-}  // namespace marrow::surface
+}  // namespace marrow::delaunay
