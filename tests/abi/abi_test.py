@@ -52,6 +52,7 @@ def types_of(headers, folder):
         + ["--drop-private-types", "--out-file", str(description), str(library)],
         check=True,
     )
+    description.write_text(description.read_text().replace(str(SOURCE) + "/", ""))
     return description
 
 
