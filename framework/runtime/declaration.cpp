@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/diagnostics.hpp"
 
@@ -76,19 +77,21 @@ void check_option(const OptionInfo& option, std::vector<std::string>& faults) {
     faults.push_back(name + ": its default '" + *text + "' is not one of its choices");
 }
 
-void check_ports(const std::vector<PortInfo>& ports, const char* what, std::vector<std::string>& faults) {
+std::vector<TypeInfo> types_of(const PortInfo& port) { return {port.type}; }
+const std::vector<TypeInfo>& types_of(const KindPort& port) { return port.types; }
+
+template <class Port>
+void check_ports(const std::vector<Port>& ports, const char* what, std::vector<std::string>& faults) {
   for (std::size_t i = 0; i < ports.size(); ++i) {
     const std::string port = std::string(what) + " '" + ports[i].name + "'";
     if (!is_name(ports[i].name)) faults.push_back(port + ": names are lower_case");
-    check_texts(port, {ports[i].help, ports[i].axis, ports[i].type.id}, faults);
+    std::vector<std::string> texts{ports[i].help, ports[i].axis};
+    for (const TypeInfo& type : types_of(ports[i])) texts.push_back(type.id);
+    if (texts.size() == 2) faults.push_back(port + ": has no type");
+    check_texts(port, texts, faults);
     for (std::size_t j = 0; j < i; ++j)
       if (ports[j].name == ports[i].name) faults.push_back(port + " is named twice");
   }
-}
-
-const char* name_of(RelationType type) {
-  static constexpr const char* kNames[] = {"not_above", "below", "same_length", "as_many_or_none", "exactly_one"};
-  return kNames[int(type)];
 }
 
 /// What is wrong with a name in a relation; empty if nothing is.
@@ -118,25 +121,13 @@ std::string fault_in_relation(const NodeInfo& node, RelationType type, const std
 }
 
 void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vector<std::string>& faults) {
-  const std::string what = std::string("relation ") + name_of(relation.type) + ": ";
+  const std::string what = std::string("relation ") + relation_type_name(relation.type) + ": ";
   const bool is_of_many = relation.type == RelationType::same_length || relation.type == RelationType::exactly_one;
   if (relation.names.size() < 2 || (!is_of_many && relation.names.size() > 2))
     faults.push_back(what + (is_of_many ? "it needs two names or more" : "it needs two names"));
   for (const std::string& name : relation.names)
     if (const std::string fault = fault_in_relation(node, relation.type, name); !fault.empty())
       faults.push_back(what + fault);
-}
-
-void check_kind_ports(const std::vector<KindPort>& ports, const char* what, std::vector<std::string>& faults) {
-  for (std::size_t i = 0; i < ports.size(); ++i) {
-    const std::string port = std::string(what) + " '" + ports[i].name + "'";
-    if (!is_name(ports[i].name)) faults.push_back(port + ": names are lower_case");
-    if (ports[i].types.empty()) faults.push_back(port + ": has no type");
-    check_texts(port, {ports[i].help, ports[i].axis}, faults);
-    for (const TypeInfo& type : ports[i].types) check_texts(port, {type.id}, faults);
-    for (std::size_t j = 0; j < i; ++j)
-      if (ports[j].name == ports[i].name) faults.push_back(port + " is named twice");
-  }
 }
 
 /// Checks names of traits or checks: none may occur twice.
@@ -187,8 +178,8 @@ void check_declaration(KindDefinition& kind) {
   if (!is_name(info.name)) faults.push_back("a kind's name is lower_case, without a dot");
   if (info.summary.empty()) faults.push_back("has no summary");
   check_texts("summary", {info.summary}, faults);
-  check_kind_ports(info.inputs, "input", faults);
-  check_kind_ports(info.outputs, "output", faults);
+  check_ports(info.inputs, "input", faults);
+  check_ports(info.outputs, "output", faults);
   std::vector<std::string> traits, checks;
   for (const TraitInfo& trait : info.traits) {
     traits.push_back(trait.name);

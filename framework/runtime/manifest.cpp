@@ -303,7 +303,7 @@ std::string difference(const json& described, const json& registered, const std:
 
 }  // namespace
 
-const char* option_type_name(OptionType type) { return kOptionTypes[int(type)]; }
+const char* relation_type_name(RelationType type) { return kRelationTypes[int(type)]; }
 
 json json_of(const OptionValue& value) {
   return std::visit([](const auto& v) { return json(v); }, value);
@@ -316,7 +316,7 @@ json json_of(const NodeInfo& node) {
   for (const PortInfo& port : node.outputs) j["outputs"].push_back(json_of(port));
   for (const OptionInfo& option : node.options) j["options"].push_back(json_of(option));
   for (const RelationInfo& relation : node.relations)
-    j["relations"].push_back({{"type", kRelationTypes[int(relation.type)]}, {"names", relation.names}});
+    j["relations"].push_back({{"type", relation_type_name(relation.type)}, {"names", relation.names}});
   j["traits"] = node.traits;
   return j;
 }

@@ -19,6 +19,7 @@ LibraryInfo manifest_from_text(const std::string& text);
 /// The files of the library, and of those that it links, are not compared.
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered);
 
-const char* option_type_name(OptionType type);
+/// "not_above".
+const char* relation_type_name(RelationType type);
 
 }  // namespace marrow

@@ -4,6 +4,8 @@
 #include <cstdio>
 #include <vector>
 
+#include "marrow/domain/printable.hpp"
+
 namespace marrow {
 namespace {
 
@@ -35,8 +37,6 @@ std::string listed(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string quoted(const std::string& name) { return "'" + name + "'"; }
-
 }  // namespace
 
 std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::string& node,
@@ -47,23 +47,23 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::st
     const double low = number_of(*value(names[0])), high = number_of(*value(names[1]));
     const bool allows_equal = relation.type == RelationType::not_above;
     if (low < high || (allows_equal && low == high)) return std::nullopt;
-    return BrokenRelation{"option " + quoted(names[0]) + " of " + node + " is " + number_text(low) +
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " is " + number_text(low) +
                               (allows_equal ? ", which is above" : ", which is not below") + " option " +
-                              quoted(names[1]) + " (" + number_text(high) + ")",
+                              in_quotes(names[1]) + " (" + number_text(high) + ")",
                           ""};
   }
   if (relation.type == RelationType::as_many_or_none) {
     const std::size_t count = length_of(*value(names[0])), like = length_of(*value(names[1]));
     if (count == 0 || count == like) return std::nullopt;
-    return BrokenRelation{"option " + quoted(names[0]) + " of " + node + " has " + std::to_string(count) + " item" +
-                              (count == 1 ? "" : "s") + ", but " + quoted(names[1]) + " has " + std::to_string(like),
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " has " + std::to_string(count) + " item" +
+                              (count == 1 ? "" : "s") + ", but " + in_quotes(names[1]) + " has " + std::to_string(like),
                           "give one for each, or none"};
   }
   if (relation.type == RelationType::same_length) {
     std::vector<std::string> parts;
     bool is_same = true;
     for (const std::string& name : names) {
-      parts.push_back(quoted(name) + " (" + std::to_string(length_of(*value(name))) + ")");
+      parts.push_back(in_quotes(name) + " (" + std::to_string(length_of(*value(name))) + ")");
       is_same = is_same && length_of(*value(name)) == length_of(*value(names[0]));
     }
     if (is_same) return std::nullopt;
@@ -71,8 +71,8 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::st
   }
   std::vector<std::string> all, given;
   for (const std::string& name : names) {
-    all.push_back(quoted(name));
-    if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(*value(name))) given.push_back(quoted(name));
+    all.push_back(in_quotes(name));
+    if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(*value(name))) given.push_back(in_quotes(name));
   }
   if (given.size() == 1) return std::nullopt;
   const std::string got = given.empty() ? "none" : names.size() == 2 ? "both" : listed(given);

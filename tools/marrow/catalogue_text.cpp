@@ -6,6 +6,8 @@
 #include <optional>
 #include <sstream>
 
+#include "runtime/contract.hpp"
+
 namespace marrow::cli {
 namespace {
 
@@ -59,15 +61,8 @@ json node_json(const NodeInfo& node) {
   return j;
 }
 
-std::string port_text(const PortInfo& port) {
-  return port_text(KindPort{port.name, port.help, {port.type}, port.axis});
-}
-
-std::string port_text(const KindPort& port) {
-  std::string types;
-  for (const TypeInfo& type : port.types) types += (types.empty() ? "" : " or ") + type.id;
-  return port.axis.empty() ? types : "list of " + types + " over " + port.axis;
-}
+std::string port_text(const PortInfo& port) { return types_text({port.type}, port.axis); }
+std::string port_text(const KindPort& port) { return types_text(port.types, port.axis); }
 
 std::string yaml_text(const OptionValue& value) {
   return std::visit(

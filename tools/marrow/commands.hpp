@@ -66,6 +66,11 @@ void add_describe(CLI::App& app, int& code);
 
 /// Whether results can be kept in the store. If not, prints why, unless `quiet`.
 bool can_keep_results(const std::string& fault_of_store, bool quiet);
+/// Splits texts of the form name=value. Throws Error for one without '=' or without a name; `form` says what is
+/// expected.
+std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts, const char* form);
+/// Prints all faults and their number to the standard error stream.
+void print_faults(const Diagnostics& diagnostics);
 /// Splits texts of the form name=value. Throws Error for a text without '='.
 PipelineArguments arguments_of(const PipelineRequest& request);
 /// Reads the pipeline. If it has faults, prints all of them and returns false.

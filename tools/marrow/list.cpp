@@ -88,8 +88,7 @@ int list_fits(const ListRequest& request) {
   const std::vector<Fit> fits =
       nodes_in_place_of(id, file, arguments_of({file, {}, request.overrides}), catalogue, diagnostics);
   if (!diagnostics.empty()) {
-    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
-                 diagnostics.size() == 1 ? "" : "s");
+    print_faults(diagnostics);
     return 2;
   }
   if (request.as_json) {

@@ -10,16 +10,6 @@
 namespace marrow::cli {
 namespace {
 
-std::vector<std::pair<std::string, std::string>> pairs(const std::vector<std::string>& texts, const char* form) {
-  std::vector<std::pair<std::string, std::string>> result;
-  for (const std::string& text : texts) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos || equals == 0) throw Error("'" + text + "' is not of the form " + form);
-    result.emplace_back(text.substr(0, equals), text.substr(equals + 1));
-  }
-  return result;
-}
-
 void print_json(const Diagnostics& diagnostics) {
   nlohmann::json list = nlohmann::json::array();
   for (const Diagnostic& item : diagnostics.sorted())
@@ -33,11 +23,27 @@ void print_json(const Diagnostics& diagnostics) {
 
 }  // namespace
 
+std::vector<std::pair<std::string, std::string>> pairs_of(const std::vector<std::string>& texts, const char* form) {
+  std::vector<std::pair<std::string, std::string>> result;
+  for (const std::string& text : texts) {
+    const std::size_t equals = text.find('=');
+    if (equals == std::string::npos || equals == 0) throw Error("'" + text + "' is not of the form " + form);
+    result.emplace_back(text.substr(0, equals), text.substr(equals + 1));
+  }
+  return result;
+}
+
 PipelineArguments arguments_of(const PipelineRequest& request) {
   PipelineArguments arguments;
-  for (auto& [name, value] : pairs(request.inputs, "name=value")) arguments.inputs.push_back({name, value});
-  for (auto& [key, value] : pairs(request.overrides, "node.option=value")) arguments.overrides.push_back({key, value});
+  for (auto& [name, value] : pairs_of(request.inputs, "name=value")) arguments.inputs.push_back({name, value});
+  for (auto& [key, value] : pairs_of(request.overrides, "node.option=value"))
+    arguments.overrides.push_back({key, value});
   return arguments;
+}
+
+void print_faults(const Diagnostics& diagnostics) {
+  std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
+               diagnostics.size() == 1 ? "" : "s");
 }
 
 bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& pipeline, bool inputs_required,
@@ -46,9 +52,7 @@ bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& 
   pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
   if (json) print_json(diagnostics);
   if (diagnostics.empty()) return true;
-  if (!json)
-    std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
-                 diagnostics.size() == 1 ? "" : "s");
+  if (!json) print_faults(diagnostics);
   return false;
 }
 

@@ -27,8 +27,7 @@ bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment&
   Diagnostics diagnostics;
   experiment = compare::read_experiment(request.file, catalogue, diagnostics);
   if (diagnostics.empty()) return true;
-  std::fprintf(stderr, "%s%zu error%s\n", diagnostics.text().c_str(), diagnostics.size(),
-               diagnostics.size() == 1 ? "" : "s");
+  print_faults(diagnostics);
   return false;
 }
 

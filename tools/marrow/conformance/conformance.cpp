@@ -223,24 +223,14 @@ void check_node(const std::string& node, const std::vector<CheckInfo>& all, cons
   }
 }
 
-/// Converts texts of the form port=kind.name to {"port": "kind.name"}. Throws Error for any other form.
-json makers_of(const std::vector<std::string>& texts) {
-  json makers = json::object();
-  for (const std::string& text : texts) {
-    const std::size_t equals = text.find('=');
-    if (equals == std::string::npos || equals == 0) throw Error("'" + text + "' is not of the form port=kind.name");
-    makers[text.substr(0, equals)] = text.substr(equals + 1);
-  }
-  return makers;
-}
-
 struct ConformanceRequest {
   std::vector<std::string> subjects, checks, inputs;
 };
 
 int run_conformance(const ConformanceRequest& request) try {
   const std::vector<std::string>&subjects = request.subjects, &wanted = request.checks;
-  const json makers = makers_of(request.inputs);
+  json makers = json::object();  // of inputs that the kind does not have: the names of nodes, by port
+  for (const auto& [port, node] : pairs_of(request.inputs, "port=kind.name")) makers[port] = node;
   search_folders_of(subjects);
   const Catalogue catalogue;
   const std::atomic<bool>& stopped = stop_on_signals();
