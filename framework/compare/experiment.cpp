@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/compare/experiment.hpp"
 
+#include <yaml-cpp/emitter.h>
+
 #include <algorithm>
 
 #include "draw.hpp"
@@ -12,7 +14,11 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string list_text(const std::array<double, 3>& values) {
-  return "[" + number_text(values[0]) + ", " + number_text(values[1]) + ", " + number_text(values[2]) + "]";
+  YAML::Emitter out;
+  out << YAML::Flow << YAML::BeginSeq;
+  for (const double value : values) out << number_text(value);
+  out << YAML::EndSeq;
+  return out.c_str();
 }
 
 template <class Named>

@@ -96,7 +96,8 @@ void check_ports(const std::vector<Port>& ports, const char* what, std::vector<s
 
 /// What is wrong with a name in a relation; empty if nothing is.
 std::string fault_in_relation(const NodeInfo& node, RelationType type, const std::string& name) {
-  if (type == RelationType::exactly_one && name.starts_with("in.")) {
+  const bool is_about_given = type == RelationType::exactly_one || type == RelationType::at_least_one;
+  if (is_about_given && name.starts_with("in.")) {
     for (const PortInfo& port : node.inputs)
       if (port.name == name.substr(3)) return port.optional ? "" : "input '" + port.name + "' is always wired";
     return "there is no input '" + name.substr(3) + "'";
@@ -113,18 +114,26 @@ std::string fault_in_relation(const NodeInfo& node, RelationType type, const std
   const bool is_list = is == OptionType::numbers || is == OptionType::texts || is == OptionType::paths;
   if ((type == RelationType::not_above || type == RelationType::below) && !is_number)
     return "option '" + name + "' is no number";
-  if ((type == RelationType::same_length || type == RelationType::as_many_or_none) && !is_list)
+  if (!is_about_given && type != RelationType::not_above && type != RelationType::below && !is_list)
     return "option '" + name + "' is no list";
-  if (type == RelationType::exactly_one && (is_number || is == OptionType::boolean))
+  if (is_about_given && (is_number || is == OptionType::boolean))
     return "option '" + name + "' is never empty, so it is always given";
   return "";
 }
 
 void check_relation(const NodeInfo& node, const RelationInfo& relation, std::vector<std::string>& faults) {
   const std::string what = std::string("relation ") + relation_type_name(relation.type) + ": ";
-  const bool is_of_many = relation.type == RelationType::same_length || relation.type == RelationType::exactly_one;
-  if (relation.names.size() < 2 || (!is_of_many && relation.names.size() > 2))
-    faults.push_back(what + (is_of_many ? "it needs two names or more" : "it needs two names"));
+  const RelationType type = relation.type;
+  const std::size_t count = relation.names.size();
+  if (type == RelationType::distinct) {
+    if (count != 1) faults.push_back(what + "it needs one name");
+  } else if (type == RelationType::at_least_one) {
+    if (count == 0) faults.push_back(what + "it needs a name");
+  } else if (type == RelationType::same_length || type == RelationType::exactly_one) {
+    if (count < 2) faults.push_back(what + "it needs two names or more");
+  } else if (count != 2) {
+    faults.push_back(what + "it needs two names");
+  }
   for (const std::string& name : relation.names)
     if (const std::string fault = fault_in_relation(node, relation.type, name); !fault.empty())
       faults.push_back(what + fault);

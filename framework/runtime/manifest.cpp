@@ -18,7 +18,8 @@ namespace {
 using nlohmann::json;
 constexpr int kManifestVersion = 3;  // 3: with kinds, traits and relations of options
 constexpr const char* kOptionTypes[] = {"boolean", "integer", "number", "text", "path", "numbers", "texts", "paths"};
-constexpr const char* kRelationTypes[] = {"not_above", "below", "same_length", "as_many_or_none", "exactly_one"};
+constexpr const char* kRelationTypes[] = {"not_above",   "below",        "same_length", "as_many_or_none",
+                                          "exactly_one", "at_least_one", "distinct"};
 constexpr const char* kApart[] = {"no", "parses", "computes"};
 constexpr std::int64_t kMostBytes_of_value = 1 << 30;
 constexpr std::size_t kMostLinked = 1000;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "relations.hpp"
 
+#include <algorithm>
 #include <cstdio>
 #include <vector>
 
@@ -28,6 +29,18 @@ std::size_t length_of(const OptionValue& value) {
 bool is_empty(const OptionValue& value) {
   if (const auto* text = std::get_if<std::string>(&value)) return text->empty();
   return length_of(value) == 0;
+}
+
+/// An item that occurs twice, as text.
+std::optional<std::string> twice(const OptionValue& value) {
+  std::vector<std::string> items;
+  if (const auto* numbers = std::get_if<std::vector<double>>(&value))
+    for (const double number : *numbers) items.push_back(number_text(number));
+  else
+    items = std::get<std::vector<std::string>>(value);
+  std::sort(items.begin(), items.end());
+  const auto found = std::adjacent_find(items.begin(), items.end());
+  return found == items.end() ? std::nullopt : std::optional(*found);
 }
 
 std::string listed(const std::vector<std::string>& parts) {
@@ -69,10 +82,21 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::st
     if (is_same) return std::nullopt;
     return BrokenRelation{"options " + listed(parts) + " of " + node + " must have the same length", ""};
   }
+  if (relation.type == RelationType::distinct) {
+    const std::optional<std::string> item = twice(*value(names[0]));
+    if (!item) return std::nullopt;
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " has " + in_quotes(*item) + " twice",
+                          "give each item once"};
+  }
   std::vector<std::string> all, given;
   for (const std::string& name : names) {
     all.push_back(in_quotes(name));
     if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(*value(name))) given.push_back(in_quotes(name));
+  }
+  if (relation.type == RelationType::at_least_one) {
+    if (!given.empty()) return std::nullopt;
+    if (names.size() > 1) return BrokenRelation{node + " needs at least one of " + listed(all) + ", got none", ""};
+    return BrokenRelation{"option " + all[0] + " of " + node + " is empty", "give one item or more"};
   }
   if (given.size() == 1) return std::nullopt;
   const std::string got = given.empty() ? "none" : names.size() == 2 ? "both" : listed(given);

@@ -184,20 +184,26 @@ BeadBoardResult bead_board(const List<Image>& images, const BeadBoardOptions& op
   return result;
 }
 
-std::string list_of(const std::array<double, 3>& values) {
-  return files::vector(Eigen::Vector3d(values[0], values[1], values[2]));
+void put_terms(YAML::Emitter& out, const std::array<double, 3>& values) {
+  files::put_vector(out << YAML::Key << "radial_distortion" << YAML::Value,
+                    Eigen::Map<const Eigen::Vector3d>(values.data()));
 }
 
 void write_calibration(const Calibration& c, const std::string& path) {
-  files::write_text(
-      path,
-      "marrow-calibration: 1\nwidth_px: " + std::to_string(c.width_px) + "\nheight_px: " + std::to_string(c.height_px) +
-          "\nintrinsics:\n" + files::matrix(c.intrinsics, "  ") + "radial_distortion: " + list_of(c.distortion.k) +
-          "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
-          "deviation:  # one standard deviation\n  focal_px: " +
-          files::vector(c.focal_deviation_px) + "\n  principal_px: " + files::vector(c.principal_deviation_px) +
-          "\n  radial_distortion: " + list_of(c.distortion_deviation) +
-          "\nresidual_px: " + files::number(c.residual_px) + "\n");
+  using YAML::Key, YAML::Value;
+  YAML::Emitter out;
+  out << YAML::BeginMap << Key << "marrow-calibration" << Value << 1;
+  out << Key << "width_px" << Value << c.width_px << Key << "height_px" << Value << c.height_px;
+  files::put_matrix(out << Key << "intrinsics" << Value, c.intrinsics);
+  put_terms(out, c.distortion.k);
+  out << YAML::Comment(
+      "seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length");
+  out << Key << "deviation" << Value << YAML::Comment("one standard deviation") << YAML::BeginMap;
+  files::put_vector(out << Key << "focal_px" << Value, c.focal_deviation_px);
+  files::put_vector(out << Key << "principal_px" << Value, c.principal_deviation_px);
+  put_terms(out, c.distortion_deviation);
+  out << YAML::EndMap << Key << "residual_px" << Value << files::number(c.residual_px) << YAML::EndMap;
+  files::write_text(path, files::text_of(out));
 }
 
 }  // namespace

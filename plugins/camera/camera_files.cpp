@@ -2,13 +2,22 @@
 #include "camera_files.hpp"
 
 #include <random>
-#include <sstream>
 
 #include "marrow/conformance.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::conformance {
 namespace {
+
+using YAML::BeginMap, YAML::EndMap, YAML::BeginSeq, YAML::EndSeq, YAML::Key, YAML::Value;
+
+/// A place in one line, each number with 12 digits.
+void put_place(YAML::Emitter& out, const Eigen::Ref<const Eigen::VectorXd>& place) {
+  out << YAML::Flow << BeginSeq;
+  for (const double coordinate : place) out << YAML::DoublePrecision(12) << coordinate;
+  out << EndSeq;
+}
 
 std::filesystem::path written(const std::string& name, const std::string& text) {
   const std::filesystem::path path = files_folder() / name;
@@ -50,38 +59,40 @@ const std::vector<Bead>& board_beads() {
 }
 
 std::filesystem::path board_file() {
-  std::ostringstream text;
-  text << "marrow-bead-board: 1\nsides:\n";
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-bead-board" << Value << 1 << Key << "sides" << Value << BeginMap;
   for (const auto& [side, z] : {std::pair<std::string, double>{"lower", 0}, {"upper", 80}}) {
-    text << "  " << side << ":\n";
+    out << Key << side << Value << BeginMap;
     for (const auto& [key, diameter] : {std::pair<std::string, double>{"landmarks", 3}, {"beads", 1.5}}) {
-      text << "    " << key << ":\n      diameter_mm: " << diameter << "\n      at_mm:\n";
-      text.precision(12);
+      out << Key << key << Value << BeginMap << Key << "diameter_mm" << Value << diameter;
+      out << Key << "at_mm" << Value << BeginSeq;
       for (const Bead& bead : board_beads())
-        if (bead.diameter_mm == diameter && bead.centre_mm.z() == z)
-          text << "        - [" << bead.centre_mm.x() << ", " << bead.centre_mm.y() << ", " << z << "]\n";
+        if (bead.diameter_mm == diameter && bead.centre_mm.z() == z) put_place(out, bead.centre_mm);
+      out << EndSeq << EndMap;
     }
+    out << EndMap;
   }
-  return written("board.yaml", text.str());
+  out << EndMap << EndMap;
+  return written("board.yaml", files::text_of(out));
 }
 
 std::filesystem::path points_file(const Camera& a, const Camera& b, bool mirrored) {
-  std::ostringstream text;
-  text.precision(12);
-  text << "marrow-points: 1\npoints:\n";
-  const auto place = [&](const Camera& camera, const Eigen::Vector3d& point) {
-    const Eigen::Vector2d pixel = project(camera, point);
-    text << "[" << (mirrored ? camera.width_px - 1 - pixel.x() : pixel.x()) << ", " << pixel.y() << "]";
+  const auto seen = [&](const Camera& camera, const Bead& bead) {
+    Eigen::Vector2d pixel = project(camera, bead.centre_mm);
+    if (mirrored) pixel.x() = camera.width_px - 1 - pixel.x();
+    return pixel;
   };
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-points" << Value << 1 << Key << "points" << Value << BeginSeq;
   for (const Bead& bead : board_beads()) {
-    text << "  - {at_mm: [" << bead.centre_mm.x() << ", " << bead.centre_mm.y() << ", " << bead.centre_mm.z()
-         << "], seen_px: {a: ";
-    place(a, bead.centre_mm);
-    text << ", b: ";
-    place(b, bead.centre_mm);
-    text << "}}\n";
+    put_place(out << YAML::Flow << BeginMap << Key << "at_mm" << Value, bead.centre_mm);
+    out << Key << "seen_px" << Value << BeginMap;
+    put_place(out << Key << "a" << Value, seen(a, bead));
+    put_place(out << Key << "b" << Value, seen(b, bead));
+    out << EndMap << EndMap;
   }
-  return written(mirrored ? "mirrored.yaml" : "points.yaml", text.str());
+  out << EndSeq << EndMap;
+  return written(mirrored ? "mirrored.yaml" : "points.yaml", files::text_of(out));
 }
 
 std::filesystem::path xray_file(const std::string& name, double primary_deg, double secondary_deg) {

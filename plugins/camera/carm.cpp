@@ -3,7 +3,6 @@
 // give the identity for two equal positions of the arm. The corrected form is the absolute pose W_i = R_beta R_alpha
 // R_0 of each view. The relative motion of two views is R_21 = W_2^T W_1.
 #include <marrow/plugin.hpp>
-#include <set>
 
 #include "marrow/domain/c_arm.hpp"
 
@@ -32,14 +31,7 @@ marrow::Camera camera_at(const Options& options, double alpha_deg, double beta_d
                              marrow::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
 }
 
-void check_names(const std::vector<std::string>& names) {
-  if (names.empty()) throw marrow::Error("names: no view is named; name at least one");
-  if (std::set<std::string>(names.begin(), names.end()).size() != names.size())
-    throw marrow::Error("names: two views have the same name");
-}
-
 marrow::List<marrow::Camera> carm(const Options& options) {
-  check_names(options.names);
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
     marrow::Camera camera = camera_at(options, options.alpha_deg.at(i), options.beta_deg.at(i));
@@ -58,6 +50,8 @@ MARROW_PLUGIN(plugin) {
           "positioner angles")
       .out("camera", "camera of each view", marrow::over("view"))
       .option("names", &Options::names, "one name per view")
+      .relation(marrow::at_least_one({"names"}))
+      .relation(marrow::distinct("names"))
       .option("alpha_deg", &Options::alpha_deg,
               "cranio-caudal angle of each view, positive if the detector is towards the head", marrow::at_least(-90),
               marrow::at_most(90))

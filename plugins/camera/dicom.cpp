@@ -17,7 +17,6 @@ struct Options {
 };
 
 marrow::List<marrow::Camera> dicom(const Options& options, marrow::Context& context) {
-  if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
   marrow::List<marrow::Camera> cameras;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
@@ -41,6 +40,7 @@ MARROW_PLUGIN(plugin) {
            marrow::over("view"))
       .option("paths", &Options::paths, "DICOM files, the same files that read.views reads as images",
               marrow::required())
+      .relation(marrow::at_least_one({"paths"}))
       .option("names", &Options::names, "one name per view; if empty, the file names without extension")
       .relation(marrow::as_many_or_none("names", "paths"))
       .option("frame", &Options::frame,

@@ -90,6 +90,7 @@ MARROW_PLUGIN(plugin) {
       .in("truth", "exact pose")
       .in("model", "surface of the fragment; the targets are spread over it")
       .in("landmarks", "landmarks to use as targets instead")
+      .relation(at_least_one({"in.model", "in.landmarks"}))
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("metrics",
            "for all views together and for each view: mPD in pixels, in mm at the target's depth (divided by the "

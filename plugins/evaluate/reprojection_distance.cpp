@@ -63,6 +63,7 @@ MARROW_PLUGIN(plugin) {
       .in("truth", "exact pose")
       .in("model", "surface of the fragment; the targets are spread over it")
       .in("landmarks", "landmarks to use as targets instead")
+      .relation(at_least_one({"in.model", "in.landmarks"}))
       .in("views", "X-ray views; only their cameras are used", over("view"))
       .out("metrics", "mRPD for all views together and for each view; an error along the beam of a view does not count")
       .option("points", &Options::points, "number of targets spread over the surface", at_least(1), at_most(1e6));

@@ -13,7 +13,6 @@ struct Options {
 };
 
 marrow::List<marrow::Image> images(const Options& options) {
-  if (options.paths.empty()) throw marrow::Error("paths: no image is named; name at least one");
   marrow::List<marrow::Image> images;
   for (std::size_t i = 0; i < options.paths.size(); ++i) {
     const std::string name = options.names.empty() ? options.paths[i].stem().string() : options.names.at(i);
@@ -31,6 +30,7 @@ MARROW_PLUGIN(plugin) {
       .summary("Reads grey images without cameras, as a calibration needs them")
       .out("images", "grey values, as from read.image", marrow::over("view"))
       .option("paths", &Options::paths, "image files (PNG, TIFF, DICOM)", marrow::required())
+      .relation(marrow::at_least_one({"paths"}))
       .option("names", &Options::names, "one name per image; if empty, the file names without extension")
       .relation(marrow::as_many_or_none("names", "paths"))
       .option("frame", &Options::frame, "frame of a multi-frame file, counted from 1; 0: the file has only one frame",

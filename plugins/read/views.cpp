@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <algorithm>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/view_file.hpp"
@@ -14,13 +13,6 @@ struct Options {
   int frame = 0;
 };
 
-void check_names(const std::vector<std::string>& names) {
-  if (names.empty()) throw marrow::Error("names: no view is named; name at least one");
-  for (const std::string& name : names)
-    if (std::count(names.begin(), names.end(), name) > 1)
-      throw marrow::Error("names: two views are named '" + name + "'");
-}
-
 const marrow::Camera& camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
   if (const marrow::Camera* camera = cameras.find(name)) return *camera;
   std::string known;
@@ -29,7 +21,6 @@ const marrow::Camera& camera_of(const std::string& name, const marrow::List<marr
 }
 
 marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
-  check_names(options.names);
   if (!cameras && options.cameras.empty()) throw marrow::Error("the node that is wired to 'camera' gave none");
   marrow::List<marrow::View> views;
   for (std::size_t i = 0; i < options.names.size(); ++i) {
@@ -50,6 +41,8 @@ MARROW_PLUGIN(plugin) {
       .in("camera", "one camera per view, with the view's name, if no camera files are given", marrow::over("view"))
       .out("views", "the views", marrow::over("view"))
       .option("names", &Options::names, "one name per view", marrow::required())
+      .relation(marrow::at_least_one({"names"}))
+      .relation(marrow::distinct("names"))
       .option("images", &Options::images, "one image file (PNG, TIFF, DICOM) per view", marrow::required())
       .relation(marrow::same_length({"names", "images"}))
       .option("cameras", &Options::cameras, "one camera file (XMALab's text or marrow's YAML) per view")

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/shaft/pairs.hpp"
 
 namespace {
@@ -22,7 +23,7 @@ constexpr double kSurroundings_mm = 15;
 // The shortest segment, as a fraction of the length that borders must share. Noise cuts lines into pieces.
 constexpr double kShortest = 0.15;
 
-/// The logarithm of the image minus its local mean, as 8 bits. In it, steps of attenuation have the same height
+/// The line integrals minus their local mean, times -1, as 8 bits. In it, steps of attenuation have the same height
 /// everywhere. The slope of the limb is removed; its direction is that of the bone's border and would disturb the
 /// search.
 cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
@@ -35,8 +36,7 @@ cv::Mat eight_bits(const marrow::View& view, double pixel_mm) {
   if (!(largest > 0))
     throw marrow::Error("view '" + view.name +
                         "': the image has no positive grey value, so its logarithm cannot be taken");
-  grey = cv::max(grey, 0.005 * largest);
-  cv::log(grey, grey);
+  grey = -marrow::image::line_integrals(grey);
   const int side = 2 * int(std::lround(0.5 * kSurroundings_mm / pixel_mm)) + 1;
   cv::Mat mean, scaled;
   cv::blur(grey, mean, {side, side});

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
 #include "marrow/toolbox/match/intensity.hpp"
 
 namespace {
@@ -73,7 +74,7 @@ std::vector<SurfacePoint> points_of(const marrow::Volume& volume, const marrow::
 
 GradientImage gradients_of(const marrow::View& view, double blur_px) {
   GradientImage image;
-  cv::Mat smooth = marrow::match::line_integrals(view.image.pixels);
+  cv::Mat smooth = marrow::image::line_integrals(view.image.pixels);
   image.counts = view.mask.empty() ? cv::Mat(smooth.size(), CV_8U, cv::Scalar(1)) : cv::Mat((view.mask != 0) & 1);
   image.counts.setTo(0, smooth != smooth);
   // Near the border of the mask, a gradient depends on pixels outside the mask.

@@ -4,6 +4,7 @@
 #include <cctype>
 #include <map>
 #include <marrow/domain/names.hpp>
+#include <marrow/domain/printable.hpp>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/files/atomic_write.hpp"
@@ -13,7 +14,7 @@
 namespace {
 
 namespace fs = std::filesystem;
-using marrow::files::quoted;
+using YAML::BeginMap, YAML::EndMap, YAML::BeginSeq, YAML::EndSeq, YAML::Key, YAML::Value;
 
 /// PNG for images of 8 and 16 bits, TIFF for float images.
 std::string image_name(const marrow::Image& image) { return image.pixels.depth() == CV_32F ? ".tif" : ".png"; }
@@ -68,29 +69,37 @@ std::vector<std::string> file_stems(const std::vector<std::string>& names) {
   return stems;
 }
 
-std::string views_text(const marrow::Case& value, const fs::path& folder) {
-  std::string text = "views:\n";
+/// Writes the files of the views and puts their list.
+void put_views(YAML::Emitter& out, const marrow::Case& value, const fs::path& folder) {
+  out << Key << "views" << Value << BeginSeq;
   const std::vector<std::string> stems = file_stems(value.views.names());
   for (std::size_t i = 0; i < value.views.size(); ++i) {
     const ViewFiles files = write_view_files(value.views[i], folder, stems[i]);
-    text += "  - name: " + quoted(value.views.name(i)) + "\n    image: " + files.image +
-            "\n    camera: " + files.camera + "\n";
-    if (!files.mask.empty()) text += "    mask: " + files.mask + "\n";
+    out << BeginMap << Key << "name" << Value << YAML::DoubleQuoted << value.views.name(i);
+    out << Key << "image" << Value << files.image << Key << "camera" << Value << files.camera;
+    if (!files.mask.empty()) out << Key << "mask" << Value << files.mask;
+    out << EndMap;
   }
-  return text;
+  out << EndSeq;
 }
 
-std::string fragments_text(const marrow::Case& value) {
-  std::string text = "fragments:\n";
+void put_placement(YAML::Emitter& out, const std::string& key, const marrow::RigidTransform& world_from_model) {
+  out << Key << key << Value << BeginMap;
+  marrow::files::put_transform(out, world_from_model);
+  out << EndMap;
+}
+
+void put_fragments(YAML::Emitter& out, const marrow::Case& value) {
+  out << Key << "fragments" << Value << BeginMap;
   for (std::size_t i = 0; i < value.seeds.size(); ++i) {
     const std::string& name = value.seeds.name(i);
-    text += "  " + quoted(name) + ":\n" + marrow::files::seeds(value.seeds[i], "    ");
-    if (const marrow::Pose* start = value.start.find(name))
-      text += "    start:\n" + marrow::files::transform(start->world_from_model, "      ");
-    if (const marrow::Truth* truth = value.truth.find(name))
-      text += "    truth:\n" + marrow::files::transform(truth->world_from_model, "      ");
+    out << Key << YAML::DoubleQuoted << name << Value << BeginMap;
+    marrow::files::put_seeds(out, value.seeds[i]);
+    if (const marrow::Pose* start = value.start.find(name)) put_placement(out, "start", start->world_from_model);
+    if (const marrow::Truth* truth = value.truth.find(name)) put_placement(out, "truth", truth->world_from_model);
+    out << EndMap;
   }
-  return text;
+  out << EndMap;
 }
 
 /// Throws Error if read.case would refuse the written case.
@@ -100,7 +109,8 @@ void check_case(const marrow::Case& value, const std::string& path) {
   const auto check_names = [&](const std::vector<std::string>& names, const std::string& what) {
     for (const std::string& name : names)
       if (const std::string fault = marrow::fault_of_item_name(name); !fault.empty())
-        throw marrow::Error(path + ": the name " + quoted(name) + " of a " + what + " " + fault + "; choose another");
+        throw marrow::Error(path + ": the name " + marrow::in_quotes(marrow::printable(name)) + " of a " + what + " " +
+                            fault + "; choose another");
     for (std::size_t i = 0; i < names.size(); ++i)
       if (std::find(names.begin(), names.begin() + std::ptrdiff_t(i), names[i]) != names.begin() + std::ptrdiff_t(i))
         throw marrow::Error(path + ": two " + what + "s are named '" + names[i] + "'");
@@ -126,8 +136,12 @@ void write_case(const marrow::Case& value, const std::string& path) {
   marrow::files::write_atomically(path, [&](const fs::path& folder) {
     fs::create_directory(folder);
     marrow::files::write_grid(folder / "ct.mha", value.ct.grid, value.ct.values);
-    marrow::files::write_plainly(folder / "case.yaml",
-                                 {"marrow-case: 1\nct: ct.mha\n", views_text(value, folder), fragments_text(value)});
+    YAML::Emitter out;
+    out << BeginMap << Key << "marrow-case" << Value << 1 << Key << "ct" << Value << "ct.mha";
+    put_views(out, value, folder);
+    put_fragments(out, value);
+    out << EndMap;
+    marrow::files::write_plainly(folder / "case.yaml", {marrow::files::text_of(out)});
   });
 }
 

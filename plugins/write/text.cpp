@@ -19,10 +19,7 @@ void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
   write_text(path, marrow::files::shaft_lines(lines));
 }
 
-void seeds(const marrow::Seeds& seeds, const std::string& path) {
-  write_text(path, "marrow-seeds: 1\nfragments:\n  " + marrow::files::quoted(seeds.fragment) + ":\n" +
-                       marrow::files::seeds(seeds, "    "));
-}
+void seeds(const marrow::Seeds& seeds, const std::string& path) { write_text(path, marrow::files::seeds(seeds)); }
 
 void metrics(const marrow::Metrics& metrics, const std::string& path) {
   nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};

@@ -222,6 +222,26 @@ TEST(BeadBoard, WritesWhatReadCalibrationReads) {
   EXPECT_EQ(back.residual_px, calibration.residual_px);
 }
 
+TEST(BeadBoard, TextOfTheCalibration) {
+  const TemporaryFolder folder;
+  Calibration calibration;
+  calibration.width_px = 640;
+  calibration.height_px = 480;
+  calibration.intrinsics << 1000.5, 0, 320, 0, 1000, 240, 0, 0, 1;
+  calibration.distortion.k = {-0.1, 1e-9, 0};
+  calibration.focal_deviation_px = {1.5, 1.25};
+  calibration.principal_deviation_px = {0.1, 0.2};
+  calibration.distortion_deviation = {0.01, 0.02, 0};
+  calibration.residual_px = 0.21;
+  write_calibration(calibration, folder / "c.yaml");
+  EXPECT_EQ(test::bytes_of(folder / "c.yaml"),
+            "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics:\n  - [1000.5, 0, 320]\n"
+            "  - [0, 1000, 240]\n  - [0, 0, 1]\nradial_distortion: [-0.1, 1e-09, 0]"
+            "  # seen = (1 + k1 r^2 + k2 r^4 + k3 r^6) ideal, pixels from the principal point over the focal length\n"
+            "deviation:  # one standard deviation\n  focal_px: [1.5, 1.25]\n  principal_px: [0.1, 0.2]\n"
+            "  radial_distortion: [0.01, 0.02, 0]\nresidual_px: 0.21\n");
+}
+
 const std::string kPlain = R"(marrow-bead-board: 1
 sides:
   a:

@@ -119,6 +119,23 @@ TEST_F(RelationsTest, ExactlyOne) {
                 "test.one_of_three needs exactly one of 'in.number', 'file' and 'words', got 'in.number' and 'words'");
 }
 
+TEST_F(RelationsTest, AtLeastOne) {
+  expect_kept("{uses: test.one_or_both, with: {file: a}}");
+  expect_kept("{uses: test.one_or_both, in: {number: one}, with: {file: a}}");
+  expect_broken("{uses: test.one_or_both}",
+                "n:", "test.one_or_both needs at least one of 'in.number' and 'file', got none");
+  expect_broken("{uses: test.each_once, with: {words: []}}", "words", "option 'words' of test.each_once is empty",
+                "give one item or more");
+}
+
+TEST_F(RelationsTest, Distinct) {
+  expect_kept("{uses: test.each_once, with: {words: [a, A, b], sizes: [1, 2, 1.5]}}");
+  expect_broken("{uses: test.each_once, with: {words: [b, a, b]}}", "words",
+                "option 'words' of test.each_once has 'b' twice", "give each item once");
+  expect_broken("{uses: test.each_once, with: {sizes: [2, 1, 2.0]}}", "sizes",
+                "option 'sizes' of test.each_once has '2' twice", "give each item once");
+}
+
 TEST_F(RelationsTest, OverridesBreakAndMend) {
   expect_broken_by("{uses: test.limits}", {"n.low", "90"},
                    "option 'low' of test.limits is 90, which is above option 'high' (75)");
@@ -211,6 +228,14 @@ TEST(RelationDeclaration, NumbersHaveNoLength) {
 }
 TEST(RelationDeclaration, OneNameAlone) {
   EXPECT_EQ(faults_of(marrow::exactly_one({"name"})), "relation exactly_one: it needs two names or more\n");
+  EXPECT_EQ(faults_of(marrow::at_least_one({"name"})), "");
+}
+TEST(RelationDeclaration, TooFewOrTooManyNames) {
+  EXPECT_EQ(faults_of(marrow::at_least_one({})), "relation at_least_one: it needs a name\n");
+  EXPECT_EQ(faults_of({marrow::RelationType::distinct, {"list", "list"}}), "relation distinct: it needs one name\n");
+  EXPECT_EQ(faults_of(marrow::distinct("name")), "relation distinct: option 'name' is no list\n");
+  EXPECT_EQ(faults_of(marrow::at_least_one({"low"})),
+            "relation at_least_one: option 'low' is never empty, so it is always given\n");
 }
 
 }  // namespace

@@ -65,18 +65,6 @@ TEST(Gradients, ScaleLeavesOutWhatDoesNotCount) {
   EXPECT_EQ(marrow::match::scale_of(gradients), 0);
 }
 
-TEST(LineIntegrals, AreLogarithmsOfWhatIsLeft) {
-  const cv::Mat grey = (cv::Mat_<std::uint16_t>(1, 3) << 1000, 500, 0);
-  const cv::Mat of_grey = marrow::match::line_integrals(grey);
-  EXPECT_EQ(of_grey.at<float>(0), 0);
-  EXPECT_FLOAT_EQ(of_grey.at<float>(1), std::log(2.0f));
-  EXPECT_FLOAT_EQ(of_grey.at<float>(2), std::log(1000.0f)) << "0 is one step of grey";
-  const cv::Mat real = (cv::Mat_<float>(1, 3) << 0.5f, 0.25f, -1.0f);
-  const cv::Mat of_real = marrow::match::line_integrals(real);
-  EXPECT_FLOAT_EQ(of_real.at<float>(1), std::log(2.0f));
-  EXPECT_FLOAT_EQ(of_real.at<float>(2), std::log(1e5f)) << "a hundred-thousandth of the brightest";
-}
-
 TEST(Moments, OfTheValuesThatCount) {
   // 0 to 15, and a last one that does not count.
   std::vector<float> a, b, odd;

@@ -17,7 +17,14 @@ LAYERS = {
     "plugins": {"domain", "runtime", "toolbox"},
     "tools": {"domain", "runtime", "compare", "toolbox", "tools"},
 }
-TOPICS = {"calibration": {"files"}, "phantom": {"calibration", "files"}}
+TOPICS = {
+    "analytic": {"image"},
+    "calibration": {"files"},
+    "draw": {"image"},
+    "match": {"image"},
+    "phantom": {"calibration", "files"},
+    "shaft": {"image"},
+}
 
 
 def folder_of(path):

@@ -91,6 +91,59 @@ TEST(WriteCase, EachViewHasFilesOfItsOwn) {
   EXPECT_EQ(marrow::hash_of(read_back(folder / "case").views), marrow::hash_of(written.views));
 }
 
+TEST(WriteCase, TextOfTheCase) {
+  const TemporaryFolder folder;
+  marrow::Case value = example_case();
+  value.seeds = {};
+  value.seeds.add("null", {"null", {{1, 2, 3}}, false});
+  value.seeds.add("a: \"b\"", {"a: \"b\"", {{0.1, 0.2, 0.3}, {1e-9, -1, 4}}, true});
+  value.start = {};
+  value.start.add("a: \"b\"", marrow::Pose{});
+  value.truth = {};
+  value.truth.add("a: \"b\"", {{"world", "ct", Eigen::Matrix3d::Identity(), {1, 2, 3}}});
+  write_case(value, (folder / "case").string());
+  EXPECT_EQ(marrow::test::bytes_of(folder / "case/case.yaml"), R"(marrow-case: 1
+ct: ct.mha
+views:
+  - name: "frontal"
+    image: frontal.png
+    camera: frontal.camera.yaml
+  - name: "lateral"
+    image: lateral.png
+    camera: lateral.camera.yaml
+  - name: "60 degrees / oblique"
+    image: view-3.tif
+    camera: view-3.camera.yaml
+    mask: view-3.mask.png
+fragments:
+  "null":
+    seeds:  # mm, in CT coordinates
+      - [1, 2, 3]
+    register: false
+  "a: \"b\"":
+    seeds:  # mm, in CT coordinates
+      - [0.1, 0.2, 0.3]
+      - [1e-09, -1, 4]
+    register: true
+    start:
+      target: world
+      source: ct
+      matrix:  # world_from_ct, mm
+        - [1, 0, 0, 0]
+        - [0, 1, 0, 0]
+        - [0, 0, 1, 0]
+        - [0, 0, 0, 1]
+    truth:
+      target: world
+      source: ct
+      matrix:  # world_from_ct, mm
+        - [1, 0, 0, 1]
+        - [0, 1, 0, 2]
+        - [0, 0, 1, 3]
+        - [0, 0, 0, 1]
+)");
+}
+
 TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   const TemporaryFolder folder;
   const std::string path = (folder / "case").string();
@@ -114,10 +167,10 @@ TEST(WriteCase, DiagnosesWhatReadCaseWouldNotTake) {
   value = example_case();
   value.views.add("a\nb", example_view("a\nb", CV_8U, 0));
   EXPECT_SAYS((write_case(value, path), 0),
-              "case: the name \"a\\x0Ab\" of a view holds a character that cannot be printed; choose another");
+              "case: the name 'a\\x0ab' of a view holds a character that cannot be printed; choose another");
   value = example_case();
   value.seeds.add("", {"", {{1, 2, 3}}, false});
-  EXPECT_SAYS((write_case(value, path), 0), "case: the name \"\" of a fragment is empty; choose another");
+  EXPECT_SAYS((write_case(value, path), 0), "case: the name '' of a fragment is empty; choose another");
   value = example_case();
   value.ct.values.pop_back();
   EXPECT_SAYS((write_case(value, path), 0), "ct.mha: 24 samples expected from the grid's size, got 23");

@@ -40,17 +40,6 @@ TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
   EXPECT_NE(text.find(", 0.35"), std::string::npos) << "degrees about the long axis\n" << text;
 }
 
-TEST(WriteText, FramesOfAnyNameReadBack) {
-  marrow::Truth value;
-  for (const char* name : {"yes", "1", "a: b", "# no comment", "line\nbreak: 1", "", "~"}) {
-    value.world_from_model.source = name;
-    const YAML::Node read = YAML::Load(marrow::files::truth(value));
-    EXPECT_EQ(read["source"].Scalar(), name);
-    EXPECT_EQ(read["source"].Tag(), "!") << "a text, whatever it looks like";
-    EXPECT_EQ(read.size(), 4u) << marrow::files::truth(value);
-  }
-}
-
 TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
   const TemporaryFolder folder;
   marrow::Pose value = example_pose();

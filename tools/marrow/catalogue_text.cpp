@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "catalogue_text.hpp"
 
+#include <yaml-cpp/emitter.h>
+
 #include <limits>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -19,16 +21,34 @@ const char* type_name(OptionType type) {
   return kNames[int(type)];
 }
 
+constexpr int kDigits = 10;
+
 std::string number_text(double value) {
   std::ostringstream out;
-  out.precision(10);
+  out.precision(kDigits);
   out << value;
   return out.str();
 }
 
+/// A text with one of these characters is shown in quotes, also where YAML needs none.
 bool plain_scalar(const std::string& text) {
   return !text.empty() && text.find_first_of(":#{}[]&*!|>'\"%@`,$ ") == std::string::npos && text != "true" &&
          text != "false";
+}
+
+template <class Scalar>
+void put(YAML::Emitter& out, const Scalar& value) {
+  out << value;
+}
+void put(YAML::Emitter& out, const std::string& text) {
+  if (!plain_scalar(text)) out << YAML::DoubleQuoted;
+  out << text;
+}
+template <class Item>
+void put(YAML::Emitter& out, const std::vector<Item>& items) {
+  out << YAML::Flow << YAML::BeginSeq;
+  for (const Item& item : items) put(out, item);
+  out << YAML::EndSeq;
 }
 
 json option_json(const OptionInfo& option) {
@@ -65,24 +85,10 @@ std::string port_text(const PortInfo& port) { return types_text({port.type}, por
 std::string port_text(const KindPort& port) { return types_text(port.types, port.axis); }
 
 std::string yaml_text(const OptionValue& value) {
-  return std::visit(
-      [](const auto& v) -> std::string {
-        using T = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<T, bool>)
-          return v ? "true" : "false";
-        else if constexpr (std::is_same_v<T, std::int64_t>)
-          return std::to_string(v);
-        else if constexpr (std::is_same_v<T, double>)
-          return number_text(v);
-        else if constexpr (std::is_same_v<T, std::string>)
-          return plain_scalar(v) ? v : "\"" + v + "\"";
-        else {
-          std::string text;
-          for (const auto& item : v) text += (text.empty() ? "" : ", ") + yaml_text(OptionValue(item));
-          return "[" + text + "]";
-        }
-      },
-      value);
+  YAML::Emitter out;
+  out.SetDoublePrecision(kDigits);
+  std::visit([&](const auto& held) { put(out, held); }, value);
+  return {out.c_str(), out.size()};
 }
 
 /// A bound of an option's range. Nothing if the bound is only the limit of the type int.

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <random>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
+
 namespace marrow::analytic {
 namespace {
 
@@ -69,10 +71,7 @@ View x_ray_view(const XRay& x_ray, const std::string& name, const RadiographProj
 EdgeMap edges_of(const View& view) {
   constexpr double kSigma_px = 1.4;
   constexpr float kThreshold = 0.1f;  // as a fraction of the steepest gradient
-  cv::Mat values;
-  view.image.pixels.convertTo(values, CV_32F);
-  for (auto at = values.begin<float>(); at != values.end<float>(); ++at) *at = std::log(std::max(*at, 1.0f));
-  values = smoothed(values, kSigma_px);
+  const cv::Mat values = smoothed(-image::line_integrals(view.image.pixels), kSigma_px);
   cv::Mat du(values.size(), CV_32F, cv::Scalar(0)), dv = du.clone(), magnitude = du.clone();
   float steepest = 0;
   for (int v = 1; v + 1 < values.rows; ++v)

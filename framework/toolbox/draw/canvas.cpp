@@ -6,6 +6,8 @@
 #include <marrow/domain/error.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
+
 namespace marrow::draw {
 namespace {
 
@@ -24,22 +26,14 @@ float percentile(std::vector<float> values, double fraction) {
   return *at;
 }
 
-/// Detector values fall exponentially with the thickness of tissue. Their logarithm shows bone equally well under thick
-/// and thin tissue. The lower limit keeps dead pixels from taking up the whole range.
-void take_logarithm(cv::Mat& values) {
-  double largest = 0;
-  cv::minMaxLoc(values, nullptr, &largest);
-  if (!(largest > 0)) return;
-  cv::max(values, largest * 1e-3, values);
-  cv::log(values, values);
-}
-
 cv::Mat stretched(const cv::Mat& image, const cv::Mat& mask, Contrast contrast) {
   cv::Mat values;
   image.convertTo(values, CV_32F);
   const cv::Mat finite = cv::abs(values) <= 1e30f;  // false for NaN and infinities
   values.setTo(0, ~finite);
-  if (contrast != Contrast::linear) take_logarithm(values);
+  // Detector values fall exponentially with the thickness of tissue. Line integrals show bone equally well under thick
+  // and thin tissue.
+  if (contrast != Contrast::linear) values = -image::line_integrals(values);
   std::vector<float> used;
   for (int v = 0; v < values.rows; ++v)
     for (int u = 0; u < values.cols; ++u)

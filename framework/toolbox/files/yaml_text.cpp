@@ -5,37 +5,83 @@
 #include <cctype>
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 
 namespace marrow::files {
 namespace {
 
-std::string segment(const LineSegment& line) {
-  return "{from_px: " + vector(line.from_px) + ", to_px: " + vector(line.to_px) + "}";
-}
+using YAML::BeginMap, YAML::EndMap, YAML::BeginSeq, YAML::EndSeq, YAML::Flow, YAML::Key, YAML::Value;
+using YAML::Comment, YAML::DoubleQuoted;
 
 /// A word is written plainly. Any other name is quoted: it may be "yes" or "1", or hold a colon or a line break.
-std::string name(const std::string& text) {
+bool is_word(const std::string& text) {
   const auto is_of_word = [](unsigned char c) { return std::isalnum(c) || c == '_' || c == '-'; };
   static const char* const kNoTexts[] = {"true", "false", "yes", "no", "on", "off", "null", "y", "n"};
   std::string small = text;
   for (char& c : small) c = char(std::tolower(static_cast<unsigned char>(c)));
-  const bool is_word = !text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) &&
-                       std::all_of(text.begin(), text.end(), is_of_word) &&
-                       std::find(std::begin(kNoTexts), std::end(kNoTexts), small) == std::end(kNoTexts);
-  return is_word ? text : quoted(text);
+  return !text.empty() && std::isalpha(static_cast<unsigned char>(text[0])) &&
+         std::all_of(text.begin(), text.end(), is_of_word) &&
+         std::find(std::begin(kNoTexts), std::end(kNoTexts), small) == std::end(kNoTexts);
+}
+
+void put_name(YAML::Emitter& out, const std::string& name) {
+  if (!is_word(name)) out << DoubleQuoted;
+  out << name;
+}
+
+/// The name as put_name() writes it, in one line.
+std::string written(const std::string& name) {
+  YAML::Emitter out;
+  put_name(out, name);
+  return out.c_str();
+}
+
+/// Begins a list of lines. The emitter would put an empty one into a line below its key.
+void begin_list(YAML::Emitter& out, bool is_empty) {
+  if (is_empty) out << Flow;
+  out << BeginSeq;
+}
+
+void put_segment(YAML::Emitter& out, const LineSegment& line) {
+  out << Flow << BeginMap;
+  put_vector(out << Key << "from_px" << Value, line.from_px);
+  put_vector(out << Key << "to_px" << Value, line.to_px);
+  out << EndMap;
+}
+
+/// The keys `left` and `right`.
+template <class Pair>
+void put_borders(YAML::Emitter& out, const Pair& pair) {
+  put_segment(out << Key << "left" << Value, pair.left);
+  put_segment(out << Key << "right" << Value, pair.right);
 }
 
 /// Standard deviations for human readers: degrees about and mm along the fragment's axes.
-std::string deviations(const Matrix6d& covariance) {
+void put_deviations(YAML::Emitter& out, const Matrix6d& covariance) {
   Eigen::Vector3d rotation_deg, translation_mm;
   for (int i = 0; i < 3; ++i) {
     rotation_deg[i] = degrees(std::sqrt(covariance(i, i)));
     translation_mm[i] = std::sqrt(covariance(3 + i, 3 + i));
   }
-  return "predicted_deviation:  # one standard deviation about and along the fragment's frontal, lateral and long "
-         "axes\n  rotation_deg: " +
-         vector(rotation_deg) + "\n  translation_mm: " + vector(translation_mm) + "\n";
+  out << Key << "predicted_deviation" << Value
+      << Comment("one standard deviation about and along the fragment's frontal, lateral and long axes") << BeginMap;
+  put_vector(out << Key << "rotation_deg" << Value, rotation_deg);
+  put_vector(out << Key << "translation_mm" << Value, translation_mm);
+  out << EndMap;
+}
+
+void put_frame(YAML::Emitter& out, const FragmentFrame& frame) {
+  out << Key << "fragment_frame" << Value
+      << Comment("the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long")
+      << BeginMap;
+  put_vector(out << Key << "origin_mm" << Value, frame.origin_mm);
+  put_matrix(out << Key << "axes" << Value, frame.axes);
+  out << EndMap;
+}
+
+void put_convergence(YAML::Emitter& out, const std::vector<Pose::Progress>& steps) {
+  out << Key << "convergence" << Value << Comment("evaluations, and the least cost after them") << BeginSeq;
+  for (const Pose::Progress& step : steps) out << Flow << BeginSeq << step.evaluations << number(step.cost) << EndSeq;
+  out << EndSeq;
 }
 
 }  // namespace
@@ -47,85 +93,101 @@ std::string number(double value) {
   return std::string(text, std::to_chars(text, text + sizeof text, value).ptr);
 }
 
-std::string quoted(const std::string& text) {
-  std::string result = "\"";
-  for (const unsigned char c : text) {
-    char escape[8];
-    if (c == '"' || c == '\\')
-      result += std::string("\\") + char(c);
-    else if (c < 0x20)
-      result += (std::snprintf(escape, sizeof escape, "\\x%02X", c), escape);
-    else
-      result += char(c);
-  }
-  return result + "\"";
+void put_vector(YAML::Emitter& out, const Eigen::Ref<const Eigen::VectorXd>& values) {
+  out << Flow << BeginSeq;
+  for (const double value : values) out << number(value);
+  out << EndSeq;
 }
 
-std::string vector(const Eigen::Ref<const Eigen::VectorXd>& values) {
-  std::string text = "[";
-  for (Eigen::Index i = 0; i < values.size(); ++i) text += (i ? ", " : "") + number(values[i]);
-  return text + "]";
+void put_matrix(YAML::Emitter& out, const Eigen::Ref<const Eigen::MatrixXd>& values) {
+  out << BeginSeq;
+  for (Eigen::Index r = 0; r < values.rows(); ++r) put_vector(out, values.row(r).transpose());
+  out << EndSeq;
 }
 
-std::string matrix(const Eigen::Ref<const Eigen::MatrixXd>& values, const std::string& indent) {
-  std::string text;
-  for (Eigen::Index r = 0; r < values.rows(); ++r) text += indent + "- " + vector(values.row(r).transpose()) + "\n";
-  return text;
-}
-
-std::string transform(const RigidTransform& t, const std::string& indent) {
+void put_transform(YAML::Emitter& out, const RigidTransform& t) {
   Eigen::Matrix4d whole = Eigen::Matrix4d::Identity();
   whole.topLeftCorner<3, 3>() = t.rotation;
   whole.topRightCorner<3, 1>() = t.translation_mm;
-  const std::string target = name(t.target), source = name(t.source);
-  return indent + "target: " + target + "\n" + indent + "source: " + source + "\n" + indent + "matrix:  # " + target +
-         "_from_" + source + ", mm\n" + matrix(whole, indent + "  ");
+  put_name(out << Key << "target" << Value, t.target);
+  put_name(out << Key << "source" << Value, t.source);
+  out << Key << "matrix" << Value << Comment(written(t.target) + "_from_" + written(t.source) + ", mm");
+  put_matrix(out, whole);
 }
+
+void put_seeds(YAML::Emitter& out, const Seeds& seeds) {
+  out << Key << "seeds" << Value << Comment("mm, in CT coordinates") << BeginSeq;
+  for (const Eigen::Vector3d& point : seeds.points_mm) put_vector(out, point);
+  out << EndSeq << Key << "register" << Value << seeds.wanted;
+}
+
+std::string text_of(const YAML::Emitter& out) { return std::string(out.c_str(), out.size()) + "\n"; }
 
 std::string camera(const Camera& camera) {
-  return "marrow-camera: 1\nwidth_px: " + std::to_string(camera.width_px) +
-         "\nheight_px: " + std::to_string(camera.height_px) +
-         "\nintrinsics:  # pixel = intrinsics * camera point, divided by the third coordinate\n" +
-         matrix(camera.intrinsics, "  ") + "camera_from_world:\n" + transform(camera.camera_from_world, "  ");
-}
-
-std::string seeds(const Seeds& seeds, const std::string& indent) {
-  std::string text = indent + "seeds:  # mm, in CT coordinates\n";
-  for (const Eigen::Vector3d& point : seeds.points_mm) text += indent + "  - " + vector(point) + "\n";
-  return text + indent + "register: " + (seeds.wanted ? "true" : "false") + "\n";
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-camera" << Value << 1;
+  out << Key << "width_px" << Value << camera.width_px << Key << "height_px" << Value << camera.height_px;
+  out << Key << "intrinsics" << Value << Comment("pixel = intrinsics * camera point, divided by the third coordinate");
+  put_matrix(out, camera.intrinsics);
+  out << Key << "camera_from_world" << Value << BeginMap;
+  put_transform(out, camera.camera_from_world);
+  out << EndMap << EndMap;
+  return text_of(out);
 }
 
 std::string pose(const Pose& pose) {
-  std::string text = "marrow-pose: 1\n" + transform(pose.world_from_model, "");
-  if (pose.covariance) text += deviations(*pose.covariance);
-  text += "warnings:" + std::string(pose.warnings.empty() ? " []" : "") + "\n";
-  for (const std::string& warning : pose.warnings) text += "  - " + quoted(warning) + "\n";
-  if (std::isfinite(pose.cost)) text += "cost: " + number(pose.cost) + "\n";
-  text += "evaluations: " + std::to_string(pose.evaluations) + "\n";
-  text +=
-      "fragment_frame:  # the axes that the deviations are about, in CT coordinates; columns: frontal, lateral, long\n";
-  text += "  origin_mm: " + vector(pose.frame.origin_mm) + "\n  axes:\n" + matrix(pose.frame.axes, "    ");
-  if (pose.covariance && pose.covariance->allFinite())
-    text += "covariance:  # of rotation [rad] and translation [mm] about and along these axes\n" +
-            matrix(*pose.covariance, "  ");
-  if (!pose.convergence.empty()) text += "convergence:  # evaluations, and the least cost after them\n";
-  for (const Pose::Progress& step : pose.convergence)
-    text += "  - [" + std::to_string(step.evaluations) + ", " + number(step.cost) + "]\n";
-  return text;
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-pose" << Value << 1;
+  put_transform(out, pose.world_from_model);
+  if (pose.covariance) put_deviations(out, *pose.covariance);
+  out << Key << "warnings" << Value;
+  begin_list(out, pose.warnings.empty());
+  for (const std::string& warning : pose.warnings) out << DoubleQuoted << warning;
+  out << EndSeq;
+  if (std::isfinite(pose.cost)) out << Key << "cost" << Value << number(pose.cost);
+  out << Key << "evaluations" << Value << pose.evaluations;
+  put_frame(out, pose.frame);
+  if (pose.covariance && pose.covariance->allFinite()) {
+    out << Key << "covariance" << Value << Comment("of rotation [rad] and translation [mm] about and along these axes");
+    put_matrix(out, *pose.covariance);
+  }
+  if (!pose.convergence.empty()) put_convergence(out, pose.convergence);
+  out << EndMap;
+  return text_of(out);
 }
 
-std::string truth(const Truth& truth) { return "marrow-truth: 1\n" + transform(truth.world_from_model, ""); }
+std::string truth(const Truth& truth) {
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-truth" << Value << 1;
+  put_transform(out, truth.world_from_model);
+  out << EndMap;
+  return text_of(out);
+}
 
 std::string shaft_lines(const ShaftLines& lines) {
-  std::string text = "marrow-shaft-lines: 1\nleft: " + segment(lines.left) + "\nright: " + segment(lines.right) +
-                     "\nwidth_mm: " + number(lines.width_mm) +
-                     "\nwidth_deviation_mm: " + number(lines.width_deviation_mm) +
-                     "\nlog_likelihood: " + number(lines.log_likelihood) +
-                     "\nrejected:" + (lines.rejected.empty() ? " []" : "") + "\n";
-  for (const ShaftLines::Rejected& pair : lines.rejected)
-    text += "  - left: " + segment(pair.left) + "\n    right: " + segment(pair.right) +
-            "\n    reason: " + quoted(pair.reason) + "\n";
-  return text;
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-shaft-lines" << Value << 1;
+  put_borders(out, lines);
+  out << Key << "width_mm" << Value << number(lines.width_mm);
+  out << Key << "width_deviation_mm" << Value << number(lines.width_deviation_mm);
+  out << Key << "log_likelihood" << Value << number(lines.log_likelihood);
+  out << Key << "rejected" << Value;
+  begin_list(out, lines.rejected.empty());
+  for (const ShaftLines::Rejected& pair : lines.rejected) {
+    put_borders(out << BeginMap, pair);
+    out << Key << "reason" << Value << DoubleQuoted << pair.reason << EndMap;
+  }
+  out << EndSeq << EndMap;
+  return text_of(out);
+}
+
+std::string seeds(const Seeds& seeds) {
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-seeds" << Value << 1;
+  out << Key << "fragments" << Value << BeginMap << Key << DoubleQuoted << seeds.fragment << Value << BeginMap;
+  put_seeds(out, seeds);
+  out << EndMap << EndMap << EndMap;
+  return text_of(out);
 }
 
 }  // namespace marrow::files

@@ -10,6 +10,7 @@
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
 #include "usable.hpp"
 
 namespace marrow::image {
@@ -58,6 +59,8 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
     text << what << ": all pixels have the same value " << smallest << ", so there is no edge; check the image file";
     throw Error(text.str());
   }
+  if (logarithm && largest <= 0)
+    throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
   Prepared prepared;
   prepared.usable = usable_pixels(view, grey, smallest, largest, int(std::ceil(3 * sigma_px)));
   if (cv::countNonZero(prepared.usable) == 0)
@@ -66,12 +69,8 @@ Prepared prepare(const View& view, double sigma_px, bool logarithm) {
   prepared.whole_numbers = type != CV_32FC1;
   prepared.range = float(largest - smallest);
   prepared.logarithm = logarithm;
-  if (logarithm) {
-    if (largest <= 0) throw Error(what + ": the image has no positive grey value, so its logarithm cannot be taken");
-    grey = cv::max(grey, 0.005 * largest);  // darker pixels carry no signal; their logarithm would be noise only
-    cv::log(grey, grey);
-  }
-  prepared.values = grey;
+  prepared.brightest = float(largest);
+  prepared.values = logarithm ? cv::Mat(-line_integrals(grey)) : grey;
   return prepared;
 }
 

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace marrow::image {
 namespace {
@@ -41,11 +40,12 @@ Found refine(const Prepared& image, const Gradient& gradient, int u, int v, floa
 std::optional<float> way_to_ridge(const Gradient& gradient, int u, int v) {
   const float du = gradient.du.at<float>(v, u), dv = gradient.dv.at<float>(v, u), length = std::hypot(du, dv);
   if (!(length > 0)) return std::nullopt;
+  // Where the image is constant, the logarithm has no limit: the foot of an edge would look like a ridge.
+  const float least = 0.01f * length;
   float z[3][3];
   for (int row = -1; row <= 1; ++row)
     for (int column = -1; column <= 1; ++column)
-      z[row + 1][column + 1] =
-          std::log(std::max(gradient.magnitude.at<float>(v + row, u + column), std::numeric_limits<float>::min()));
+      z[row + 1][column + 1] = std::log(std::max(gradient.magnitude.at<float>(v + row, u + column), least));
   const auto column_sum = [&](int column) { return z[0][column] + z[1][column] + z[2][column]; };
   const auto row_sum = [&](int row) { return z[row][0] + z[row][1] + z[row][2]; };
   const float z_u = (column_sum(2) - column_sum(0)) / 6, z_v = (row_sum(2) - row_sum(0)) / 6;

@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/toolbox/image/line_integrals.hpp"
 
 namespace marrow::match {
 namespace {
@@ -43,7 +44,7 @@ class IntensityCost : public Cost {
   /// Every step-th pixel of a view's smoothed line integrals.
   Patch image_of(const View& view) const {
     const int step = options_.pixel_step;
-    cv::Mat smooth = line_integrals(view.image.pixels);
+    cv::Mat smooth = image::line_integrals(view.image.pixels);
     if (const double sigma = options_.blur_px * step; sigma > 0.1)
       cv::GaussianBlur(smooth, smooth, {}, sigma, sigma, cv::BORDER_REPLICATE);
     Patch image{(smooth.cols + step - 1) / step, (smooth.rows + step - 1) / step, 0, 0, {}, {}, {}};
@@ -110,21 +111,6 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
                                            const IntensityOptions& options, double worst, Measure measure) {
   return intensity_cost(projector, views, others, other_projectors, other_outlines, options, worst,
                         [measure = std::move(measure)](const Patch&) { return measure; });
-}
-
-cv::Mat line_integrals(const cv::Mat& image) {
-  cv::Mat values;
-  image.convertTo(values, CV_32F);
-  double brightest = 0;
-  cv::minMaxLoc(values, nullptr, &brightest);
-  // One grey step for images of integers; 1e-5 of the brightest value for others.
-  const float least = image.depth() == CV_32F ? float(std::max(1e-5 * brightest, 1e-30)) : 1;
-  for (int row = 0; row < values.rows; ++row)
-    for (int column = 0; column < values.cols; ++column) {
-      float& value = values.at<float>(row, column);
-      value = -std::log(std::max(value, least) / std::max(float(brightest), least));
-    }
-  return values;
 }
 
 Gradients gradients_of(const Patch& patch) {

@@ -5,6 +5,8 @@
 #include <cmath>
 #include <optional>
 
+#include "marrow/toolbox/image/line_integrals.hpp"
+
 namespace marrow::shaft {
 namespace {
 
@@ -14,7 +16,8 @@ constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // range of positions i
 constexpr double kPiece_mm = 4;                          // a bowed border is followed in pieces of this length
 constexpr double kLeastBlur_px = 0.3, kMostBlur_px = 5;
 
-std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& at) {
+/// std::nullopt outside the image, and at dead pixels.
+std::optional<double> line_integral_at(const cv::Mat& image, const image::GreyScale& scale, const Eigen::Vector2d& at) {
   const int u = int(std::floor(at.x())), v = int(std::floor(at.y()));
   if (u < 0 || v < 0 || u + 1 >= image.cols || v + 1 >= image.rows) return std::nullopt;
   const auto grey = [&](int row, int column) -> double {
@@ -26,7 +29,7 @@ std::optional<double> logarithm_at(const cv::Mat& image, const Eigen::Vector2d& 
   const double value =
       (1 - b) * ((1 - a) * grey(v, u) + a * grey(v, u + 1)) + b * ((1 - a) * grey(v + 1, u) + a * grey(v + 1, u + 1));
   if (!(value > 0)) return std::nullopt;
-  return std::log(value);
+  return scale.line_integral(value);
 }
 
 /// Mean distance of the edge pixels from the line for each piece. std::nullopt for a piece with fewer than three.
@@ -48,12 +51,13 @@ std::vector<std::optional<double>> distances_of(const EdgeMap& edges, const Bord
   return distances;
 }
 
-/// Mean attenuation, up to a constant, at distances of -reach to reach steps from the edges. Rows that leave the image
+/// Mean line integral at distances of -reach to reach steps from the edges. Rows that leave the image
 /// are left out. Empty if fewer than ten rows remain.
 std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const Border& border, const Support& support,
                                const Stretch& stretch, double pixel_mm, int reach) {
   const int pieces = std::max(1, int(stretch.length() * pixel_mm / kPiece_mm));
   const auto distances = distances_of(edges, border, support, stretch, pieces);
+  const image::GreyScale scale(image);
   std::vector<double> sums(std::size_t(2 * reach + 1), 0.0);
   int rows = 0;
   for (double s = stretch.from; s < stretch.to; s += 1) {
@@ -63,8 +67,8 @@ std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const
     const Eigen::Vector2d on_line = point_at(border, stretch.along, s);
     std::vector<double> row;
     for (int i = -reach; i <= reach; ++i)
-      if (const auto value = logarithm_at(image, on_line + (*distance + i * kStep_px) * border.normal))
-        row.push_back(-*value);
+      if (const auto value = line_integral_at(image, scale, on_line + (*distance + i * kStep_px) * border.normal))
+        row.push_back(*value);
     if (row.size() != sums.size()) continue;
     for (std::size_t i = 0; i < row.size(); ++i) sums[i] += row[i];
     ++rows;

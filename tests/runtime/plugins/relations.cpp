@@ -29,6 +29,13 @@ struct Sources {
 };
 Metrics one_of_two(const Metrics*, const Sources&) { return number(); }
 Metrics one_of_three(const Metrics*, const Sources&) { return number(); }
+Metrics one_or_both(const Metrics*, const Sources&) { return number(); }
+
+struct Words {
+  std::vector<std::string> words{"one"};
+  std::vector<double> sizes;
+};
+Metrics each_once(const Words&) { return number(); }
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
@@ -71,4 +78,18 @@ MARROW_PLUGIN(plugin) {
       .option("file", &Sources::file, "a file")
       .option("words", &Sources::words, "words")
       .relation(marrow::exactly_one({"in.number", "file", "words"}));
+  plugin.node("test.one_or_both", one_or_both)
+      .summary("An input, an option, or both")
+      .in("number", "a number")
+      .out("number", "1")
+      .option("file", &Sources::file, "a file")
+      .relation(marrow::at_least_one({"in.number", "file"}));
+  plugin.node("test.each_once", each_once)
+      .summary("Words, each once")
+      .out("number", "1")
+      .option("words", &Words::words, "words")
+      .relation(marrow::at_least_one({"words"}))
+      .relation(marrow::distinct("words"))
+      .option("sizes", &Words::sizes, "sizes")
+      .relation(marrow::distinct("sizes"));
 }

@@ -58,5 +58,11 @@ inline RelationInfo as_many_or_none(std::string list, std::string like) {
 inline RelationInfo exactly_one(std::vector<std::string> names) {
   return {RelationType::exactly_one, std::move(names)};
 }
+/// At least one of these must be given. The names are as those of exactly_one. With one name, it must not be empty.
+inline RelationInfo at_least_one(std::vector<std::string> names) {
+  return {RelationType::at_least_one, std::move(names)};
+}
+/// No item of this list may occur twice.
+inline RelationInfo distinct(std::string list) { return {RelationType::distinct, {std::move(list)}}; }
 
 }  // namespace marrow

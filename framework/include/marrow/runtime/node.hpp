@@ -54,10 +54,10 @@ struct OptionInfo {
 };
 
 /// Conditions between the options of a node.
-enum class RelationType { not_above, below, same_length, as_many_or_none, exactly_one };
+enum class RelationType { not_above, below, same_length, as_many_or_none, exactly_one, at_least_one, distinct };
 struct RelationInfo {
   RelationType type = RelationType::not_above;
-  std::vector<std::string> names;  ///< names of options; exactly_one may also name inputs, as "in.camera"
+  std::vector<std::string> names;  ///< names of options; exactly_one and at_least_one may name inputs, as "in.camera"
 };
 
 struct NodeInfo {

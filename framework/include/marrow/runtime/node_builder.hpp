@@ -56,8 +56,8 @@ class NodeBuilder {
     node_.info.traits.push_back(std::move(name));
     return *this;
   }
-  /// A condition between options: not_above, below, same_length, as_many_or_none or exactly_one. A pipeline that breaks
-  /// it is refused with the line of the option, so the node need not check it.
+  /// A condition on options: not_above, below, same_length, as_many_or_none, exactly_one, at_least_one or distinct. A
+  /// pipeline that breaks it is refused with the line of the option, so the node need not check it.
   NodeBuilder& relation(RelationInfo relation) {
     node_.info.relations.push_back(std::move(relation));
     return *this;

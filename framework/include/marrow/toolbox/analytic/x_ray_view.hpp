@@ -18,7 +18,7 @@ struct XRay {
 View x_ray_view(const XRay& x_ray, const std::string& name, const RadiographProjector& body,
                 const RigidTransform& world_from_model);
 
-/// Edges: ridges of the gradient of the image's logarithm, after the smoothing that edge detectors use.
+/// Edges: ridges of the gradient of the line integrals, after the smoothing that edge detectors use.
 EdgeMap edges_of(const View& view);
 
 }  // namespace marrow::analytic

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// marrow's values as YAML text. Numbers are written in the shortest form that reads as the same double, so plugins/read
-// gets back exactly the same values.
+// marrow's values as YAML. Numbers are written in the shortest form that reads as the same double, so plugins/read gets
+// back exactly the same values.
+#include <yaml-cpp/emitter.h>
+
 #include <string>
 
 #include "marrow/domain/camera.hpp"
@@ -12,23 +14,26 @@
 
 namespace marrow::files {
 
+/// The shortest text that reads as the same double. YAML's words .nan, .inf and -.inf for what is not finite.
 std::string number(double value);
-/// Text in double quotes, with escapes.
-std::string quoted(const std::string& text);
-/// [x, y, z]
-std::string vector(const Eigen::Ref<const Eigen::VectorXd>& values);
-/// One line for each row, as a list of flow lists, each line indented.
-std::string matrix(const Eigen::Ref<const Eigen::MatrixXd>& values, const std::string& indent);
 
-/// The keys of a transform (target, source, matrix), each line indented.
-std::string transform(const RigidTransform& target_from_source, const std::string& indent);
-/// A whole camera file.
-std::string camera(const Camera& camera);
-/// The keys `seeds` and `register` of a fragment, each line indented.
-std::string seeds(const Seeds& seeds, const std::string& indent);
+/// Puts the value [x, y, z] in one line.
+void put_vector(YAML::Emitter& out, const Eigen::Ref<const Eigen::VectorXd>& values);
+/// Puts a list of rows, each in a line of its own.
+void put_matrix(YAML::Emitter& out, const Eigen::Ref<const Eigen::MatrixXd>& values);
+/// Puts the keys `target`, `source` and `matrix` into the map that was begun.
+void put_transform(YAML::Emitter& out, const RigidTransform& target_from_source);
+/// Puts the keys `seeds` and `register` of one fragment into the map that was begun.
+void put_seeds(YAML::Emitter& out, const Seeds& seeds);
+
+/// What was put, with a line break at its end, as files have it.
+std::string text_of(const YAML::Emitter& out);
+
 /// Whole files.
+std::string camera(const Camera& camera);
 std::string pose(const Pose& pose);
 std::string truth(const Truth& truth);
 std::string shaft_lines(const ShaftLines& lines);
+std::string seeds(const Seeds& seeds);
 
 }  // namespace marrow::files

@@ -9,17 +9,18 @@
 
 namespace marrow::image {
 
-/// The values whose edges are sought. With `logarithm` they are ln(grey value). Edges are then steps of attenuation,
-/// equally high in bright and dark parts of the image.
+/// The values whose edges are sought: grey values or, with `logarithm`, line integrals times -1 (line_integrals.hpp).
+/// Edges are then steps of attenuation, equally high in bright and dark parts of the image.
 struct Prepared {
   cv::Mat values;  ///< CV_32F
   cv::Mat usable;  ///< CV_8U, non-zero where edges may be reported
   bool logarithm = false;
   bool whole_numbers = false;  ///< grey values are integers, so there is at least rounding noise
   float range = 0;             ///< largest minus smallest grey value
+  float brightest = 0;         ///< largest grey value
 
   /// By how much `value` changes for one grey value.
-  float slope(float value) const { return logarithm ? std::exp(-value) : 1.0f; }
+  float slope(float value) const { return logarithm ? std::exp(-value) / brightest : 1.0f; }
 };
 
 /// Checks the view and prepares its image. Not usable are pixels that View::mask excludes, pixels outside a round

@@ -67,10 +67,6 @@ std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector,
   return intensity_cost(projector, views, others, other_projectors, other_outlines, options, kWorst, measure);
 }
 
-/// Line integrals -log(grey value / brightest) as CV_32F, in arbitrary units. Bright = air. Lower values count as one
-/// grey step, in images of floats as 1e-5 of the brightest.
-cv::Mat line_integrals(const cv::Mat& image);
-
 /// Gradients per pixel by Sobel's operator divided by 8; 0 at the border. A gradient counts if all nine pixels do.
 struct Gradients {
   std::vector<float> rendered_u, rendered_v, seen_u, seen_v;
