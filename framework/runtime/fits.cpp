@@ -5,6 +5,7 @@
 
 #include "contract.hpp"
 #include "marrow/domain/printable.hpp"
+#include "marrow/runtime/run_folder.hpp"
 
 namespace marrow {
 namespace {
@@ -35,6 +36,7 @@ Fit fit_of(const std::string& name, const std::string& id, const std::filesystem
   changed.overrides.push_back({id + ".uses", name});
   Diagnostics faults;
   const Pipeline pipeline = read_pipeline(file, changed, catalogue, faults, false);
+  check_writers(pipeline, catalogue, faults);
   Fit fit{name, {}, {}};
   for (const PipelineNode& node : pipeline.nodes)
     if (node.id == id) fit.missing = missing_for(node, arguments);
@@ -50,6 +52,7 @@ std::vector<Fit> nodes_in_place_of(const std::string& id, const std::filesystem:
                                    const PipelineArguments& arguments, const Catalogue& catalogue,
                                    Diagnostics& diagnostics) {
   const Pipeline pipeline = read_pipeline(file, arguments, catalogue, diagnostics, false);
+  check_writers(pipeline, catalogue, diagnostics);
   if (!diagnostics.empty()) return {};
   const auto node =
       std::find_if(pipeline.nodes.begin(), pipeline.nodes.end(), [&](const PipelineNode& one) { return one.id == id; });

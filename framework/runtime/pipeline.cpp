@@ -88,6 +88,31 @@ class Resolver {
     return found != ports_.end() ? found->second : ports_.emplace(kind, catalogue_.ports_of_kind(kind)).first->second;
   }
 
+  /// Looks up a reference. node.word never picks the item `word` if that is an output of other nodes of the kind: the
+  /// word would name an output or an item, depending on which node of the kind is there.
+  Reference resolve(const std::string& text, const Place& place, const std::vector<TypeInfo>* types) {
+    Reference source = resolve_reference(text, place, types, pipeline_.nodes, ids_, diagnostics_);
+    if (source.node < 0 || source.items.empty()) return source;
+    const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
+    const std::string items = joined(source.items, ".");
+    if (text != from.id + "." + items || !outputs_of_kind(from.info.kind()).contains(source.items[0])) return source;
+    diagnostics_.add(place, "node " + in_quotes(from.id) + " has no output " + in_quotes(source.items[0]),
+                     "other nodes of the kind " + from.info.kind() + " have one; an item of that name is " + from.id +
+                         "." + from.info.outputs[std::size_t(source.output)].name + "." + items);
+    source.node = -1;
+    return source;
+  }
+
+  const std::set<std::string>& outputs_of_kind(const std::string& kind) {
+    const auto found = outputs_.find(kind);
+    if (found != outputs_.end()) return found->second;
+    std::set<std::string>& outputs = outputs_[kind];
+    for (const std::string& name : node_names())
+      if (const NodeInfo* node = catalogue_.find(name); node->kind() == kind)
+        for (const PortInfo& output : node->outputs) outputs.insert(output.name);
+    return outputs;
+  }
+
   void resolve_wires(std::size_t index) {
     const WrittenNode& written = written_.nodes[index];
     PipelineNode& node = pipeline_.nodes[index];
@@ -129,7 +154,7 @@ class Resolver {
                          "write it as  " + port.name + ": node  or  node.output");
         return;
       }
-      Reference source = resolve_reference(text.Scalar(), place, &port.types, pipeline_.nodes, ids_, diagnostics_);
+      Reference source = resolve(text.Scalar(), place, &port.types);
       check_type(source, port, index);
       wire.sources.push_back(std::move(source));
     };
@@ -214,8 +239,7 @@ class Resolver {
       diagnostics_.add(value.place, "output " + in_quotes(name) + " must name a node or one of its outputs");
       return;
     }
-    pipeline_.outputs.push_back(
-        {name, resolve_reference(value.value.Scalar(), value.place, nullptr, pipeline_.nodes, ids_, diagnostics_)});
+    pipeline_.outputs.push_back({name, resolve(value.value.Scalar(), value.place, nullptr)});
   }
 
   /// If a name is unknown, the typing error may be at its definition. So this points at the nearest defined name, if
@@ -247,7 +271,8 @@ class Resolver {
   Pipeline pipeline_;
   NodeIds ids_;
   std::vector<std::string> node_names_;
-  std::map<std::string, std::vector<KindPort>> ports_;
+  std::map<std::string, std::vector<KindPort>> ports_;    ///< by the name of the kind
+  std::map<std::string, std::set<std::string>> outputs_;  ///< by the name of the kind
   UnknownValues unknown_values_;
   std::map<std::size_t, std::vector<std::string>> fitting_;  ///< by the index of the node
   InputTexts input_texts_;

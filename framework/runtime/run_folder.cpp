@@ -36,6 +36,8 @@ constexpr const char* kAdvice = "; choose another with --out";
   throw Error("the output folder " + folder.string() + " is already there and not empty" + kAdvice + ", or remove it");
 }
 
+std::string no_writer(const TypeInfo& type) { return "no plugin writes values of type '" + type.id + "'"; }
+
 void write_value(const Value& value, const fs::path& stem, const fs::path& root, const Catalogue& catalogue,
                  RunFolder::Written& written) {
   if (value.is_list()) {
@@ -50,7 +52,7 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
   }
   const WriterInfo* writer = catalogue.find_writer(value.type);
   if (!writer) {
-    written.fault = "no plugin writes values of type '" + value.type.id + "'";
+    written.fault = no_writer(value.type);
     return;
   }
   const fs::path file = stem.string() + writer->extension;
@@ -188,6 +190,17 @@ std::string cpu_level() {
 #else
   return "arm64";
 #endif
+}
+
+void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics) {
+  for (const PipelineOutput& output : pipeline.outputs) {
+    if (output.source.node < 0) continue;  // it names nothing that is there; this was already reported
+    const PipelineNode& node = pipeline.nodes[std::size_t(output.source.node)];
+    const TypeInfo& type = node.info.outputs[std::size_t(output.source.output)].type;
+    if (!catalogue.find_writer(type))
+      diagnostics.add(output.source.place, "output '" + output.name + "': " + no_writer(type),
+                      "leave it out, or name a result of another type");
+  }
 }
 
 RunFolder::RunFolder(const fs::path& folder, const Pipeline& pipeline) : folder_(folder) {

@@ -76,6 +76,22 @@ class Fits(Case):
         self.assertIn("input 'views' of project.lightfield is not wired", checked.stderr)
         self.assertIn("or use project.joseph, project.ray_casting, project.siddon_jacobs", checked.stderr)
 
+    def test_a_result_that_nothing_writes(self):
+        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate.yaml", "case")}
+        fault = "output 'case': no plugin writes values of type 'landmarks'"
+        self.assertEqual(fits["simulate.landmarks"]["faults"], [fault])
+        checked = check(SOURCE / "pipelines" / "simulate.yaml", "case", "simulate.landmarks")
+        self.assertEqual(checked.returncode, 2)
+        self.assertIn(fault, checked.stderr)
+        self.assertIn("leave it out, or name a result of another type", checked.stderr)
+
+    def test_an_output_that_only_the_replaced_node_has(self):
+        fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "wrist-cameras.yaml", "check")}
+        self.assertEqual(
+            fits["camera.carm"]["faults"],
+            ["node 'check' has no output 'metrics'", "node 'check' has no output 'picture'"],
+        )
+
     def test_in_words(self):
         listed = marrow("list", "--fits", INTENSITY, "drr").stdout
         self.assertTrue(listed.startswith("In place of 'drr' in "))

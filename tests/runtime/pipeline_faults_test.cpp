@@ -139,6 +139,15 @@ TEST_F(PipelineTest, UnknownSource) {
 TEST_F(PipelineTest, UnknownOutput) {
   expect_node_fault("{uses: test.add, in: {a: s.lefft}}", 28, "node 's' has no output 'lefft'", "did you mean 'left'?");
 }
+TEST_F(PipelineTest, OutputOfAnotherNodeOfTheKindIsNoItem) {
+  const std::string before = "marrow: 1\nnodes:\n  l: {uses: test.letters}\n  n: {uses: test.add, in: {a: ";
+  expect_fault(before + "l.left}}\noutputs: {o: n}\n", 4, 28, "node 'l' has no output 'left'",
+               "other nodes of the kind test have one; an item of that name is l.letters.left");
+  for (const char* item : {"l.letters.left", "l.far_left"}) {
+    read(before + item + "}}\noutputs: {o: n}\n");
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+  }
+}
 TEST_F(PipelineTest, AmbiguousOutput) {
   expect_node_fault("{uses: test.add, in: {a: s}}", 28, "node 's' has several outputs and not just one metrics");
 }

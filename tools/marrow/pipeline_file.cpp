@@ -6,6 +6,7 @@
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
+#include "marrow/runtime/run_folder.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -50,6 +51,7 @@ bool load(const PipelineRequest& request, const Catalogue& catalogue, Pipeline& 
           bool json) {
   Diagnostics diagnostics;
   pipeline = read_pipeline(request.file, arguments_of(request), catalogue, diagnostics, inputs_required);
+  check_writers(pipeline, catalogue, diagnostics);
   if (json) print_json(diagnostics);
   if (diagnostics.empty()) return true;
   if (!json) print_faults(diagnostics);

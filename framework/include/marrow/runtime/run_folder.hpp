@@ -43,6 +43,9 @@ class RunFolder {
   std::unique_ptr<RunLog> log_;
 };
 
+/// Adds a fault for each output of the pipeline that could not be written: no library has a writer for its type.
+void check_writers(const Pipeline& pipeline, const Catalogue& catalogue, Diagnostics& diagnostics);
+
 /// The widest instruction set of this machine that libraries may choose at run time.
 std::string cpu_level();
 
