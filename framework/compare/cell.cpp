@@ -47,7 +47,7 @@ std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
 }
 
 /// The figure that a path names. Throws Error if it is missing or is not a finite number.
-Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
+marrow::Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
   const std::vector<std::string> parts = split(path);
   const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
                                    [&](const PipelineOutput& one) { return one.name == parts[0]; });
@@ -70,7 +70,7 @@ Metric figure(const Pipeline& pipeline, const RunResult& result, const std::stri
   std::string name;
   for (; used < parts.size(); ++used) name += (name.empty() ? "" : ".") + parts[used];
   std::vector<std::string> known;
-  for (const Metric& metric : value.as<Metrics>().items) {
+  for (const marrow::Metric& metric : value.as<Metrics>().items) {
     known.push_back(metric.name);
     if (metric.name != name) continue;
     if (!std::isfinite(metric.value))
@@ -165,7 +165,7 @@ fs::path CellRunner::case_folder(std::size_t index) {
   const ExperimentCase& one = experiment_.cases[index];
   if (!one.is_simulated) return one.folder;
   FoundCase& found = simulated_[index];
-  const fs::path outputs = found.use ? found.outputs : case_place(index), folder = case_folder_of(outputs);
+  fs::path outputs = found.use ? found.outputs : case_place(index), folder = case_folder_of(outputs);
   // Until this process uses the folder, another one may remove it when it tidies the store up.
   for (int tries = 0; !found.use; ++tries) {
     std::shared_ptr<const void> use = use_folder(folder);
@@ -295,7 +295,7 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
     row.evaluations += evaluations_in(value_of(done.result, output.source));
   if (!row.failed.empty()) return;
   for (const MetricChoice& metric : experiment_.metrics) {
-    const Metric found = figure(pipeline, done.result, metric.path);
+    const marrow::Metric found = figure(pipeline, done.result, metric.path);
     row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
     row.units.push_back(found.unit);
   }

@@ -87,7 +87,7 @@ std::string in_small_letters(std::string name) {
 fs::path file_of(StrictYaml& yaml, const YamlEntry& entry, const fs::path& folder) {
   const auto text = yaml.text(entry.value, entry.place, entry.key);
   if (!text) return {};
-  const fs::path file = plain_path(folder / *text);
+  fs::path file = plain_path(folder / *text);
   std::error_code error;
   if (fs::is_regular_file(file, error)) return file;
   yaml.fault(entry.place, "there is no file '" + *text + "'", "the path starts at the experiment's file");

@@ -11,7 +11,7 @@
 namespace marrow {
 namespace {
 
-constexpr double kFinest_mm = 0.001, kCoarsest_mm = 100, kFarthest_mm = 1e6;
+constexpr double kFinest_mm = 0.001, kCoarsest_mm = 100, kFarthestOrigin_mm = 1e6;
 
 std::string shortest(double number) {
   char text[32];
@@ -57,7 +57,7 @@ void check_volume(const Volume& volume, const std::string& what) {
   if (volume.values.size() != grid.count())
     throw Error(what + ": " + std::to_string(grid.count()) + " voxels expected from its size, got " +
                 std::to_string(volume.values.size()));
-  if (grid.origin_mm.cwiseAbs().maxCoeff() > kFarthest_mm)
+  if (grid.origin_mm.cwiseAbs().maxCoeff() > kFarthestOrigin_mm)
     throw Error(what + ": the volume begins " + shortest(grid.origin_mm.cwiseAbs().maxCoeff()) +
                 " mm from the origin; expected at most 1 km");
   check_rigid({grid.frame, "grid", grid.direction, grid.origin_mm}, what);

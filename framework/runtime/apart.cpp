@@ -170,7 +170,7 @@ class Reader {
   std::unique_ptr<Worker> worker_;
 };
 
-std::string number_text(double value) {
+std::string short_number(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);
   return text;
@@ -192,14 +192,14 @@ std::string failure_of(const std::string& file, const WorkerEnd& end, const Call
            " MB of memory, which is more than a file of its size should; where the file is good, raise the limit with "
            "--file-memory";
   if (end.signal == SIGXCPU)
-    return file + ": to read it takes more than " + number_text(limits.processor_s) +
+    return file + ": to read it takes more than " + short_number(limits.processor_s) +
            " s, which is more than a file of its size should; where the file is good, raise the limit with "
            "--file-seconds";
   if (end.signal)
     return file + ": to read it crashed the process that was started for it (" + strsignal(end.signal) +
            "); the file is damaged, or of a kind that its reader cannot take: copy or export it again";
   if (end.is_late)
-    return file + ": to read it takes more than " + number_text(limits.seconds) +
+    return file + ": to read it takes more than " + short_number(limits.seconds) +
            " s by the clock, which is more than a file of its size should; where the machine has much other work, try "
            "again, or "
            "raise the limit with --file-seconds";

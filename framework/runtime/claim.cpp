@@ -11,11 +11,10 @@
 #include <thread>
 
 #include "marrow/runtime/store.hpp"
+#include "stopwatch.hpp"
 
 namespace marrow {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 constexpr auto kAtOnce = std::chrono::milliseconds(100);  // shorter waits are not reported
 constexpr auto kLong = std::chrono::seconds(5);           // longer waits are shown to people

@@ -2,7 +2,6 @@
 // Checks the declarations of nodes and kinds when a plugin registers them. So a wrong default or port is found without
 // running anything.
 #include <algorithm>
-#include <array>
 #include <cctype>
 #include <cmath>
 #include <limits>
@@ -149,16 +148,6 @@ void check_names(const std::vector<std::string>& names, const std::string& what,
 }
 
 }  // namespace
-
-std::string unit_of_name(const std::string& name) {
-  static constexpr std::array<const char*, 8> kUnits{"mm", "deg", "rad", "px", "s", "hu", "kev", "percent"};
-  const std::size_t underscore = name.rfind('_');
-  const std::string suffix = underscore == std::string::npos ? name : name.substr(underscore + 1);
-  if (underscore == std::string::npos) return "";
-  for (const char* unit : kUnits)
-    if (suffix == unit) return suffix == "hu" ? "HU" : suffix == "kev" ? "keV" : suffix == "percent" ? "%" : suffix;
-  return "";
-}
 
 void check_declaration(NodeDefinition& node) {
   std::vector<std::string>& faults = node.faults;

@@ -52,7 +52,7 @@ std::string quoted_line(const std::string& line, int column) {
 
 bool Diagnostics::is_full() const { return items_.size() >= kMostKept; }
 
-void Diagnostics::add(Place place, std::string message, std::string hint) {
+void Diagnostics::add(Place place, const std::string& message, const std::string& hint) {
   if (is_full())
     ++not_kept_;
   else

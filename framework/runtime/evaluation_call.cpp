@@ -11,14 +11,12 @@
 #include "keys.hpp"
 #include "named_files.hpp"
 #include "resident_memory.hpp"
+#include "stopwatch.hpp"
 
 namespace marrow {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using Status = NodeRecord::Status;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// Sets the key of a value: the content hash of data, or the key of a function, which is made from the recipe. A
 /// function also keeps the node's inputs alive.

@@ -21,15 +21,13 @@
 #include "node_calls.hpp"
 #include "resident_memory.hpp"
 #include "stopped_nodes.hpp"
+#include "stopwatch.hpp"
 #include "thread_supply.hpp"
 
 namespace marrow {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using Status = NodeRecord::Status;
-
-double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 class Executor {
  public:

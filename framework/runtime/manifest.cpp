@@ -286,14 +286,13 @@ std::string difference(const json& described, const json& registered, const std:
   for (std::size_t i = 0; lists && i < described.size(); ++i) {
     const bool named = described[i].is_object() && described[i].contains("name");
     const std::string name = named ? described[i]["name"].get<std::string>() : std::to_string(i + 1);
-    if (const std::string found = difference(described[i], registered[i], path + "/" + name); !found.empty())
-      return found;
+    if (std::string found = difference(described[i], registered[i], path + "/" + name); !found.empty()) return found;
   }
   if (described.is_object() && registered.is_object())
     for (const json* side : {&described, &registered})
       for (const auto& [key, value] : side->items()) {
         const json before = described.value(key, json()), now = registered.value(key, json());
-        if (const std::string found = difference(before, now, path + "/" + key); !found.empty()) return found;
+        if (std::string found = difference(before, now, path + "/" + key); !found.empty()) return found;
       }
   const auto shown = [](const json& j) -> std::string {
     if (j.is_array()) return std::to_string(j.size()) + " of them";

@@ -22,4 +22,9 @@ std::string difference(const LibraryInfo& described, const LibraryInfo& register
 /// "not_above".
 const char* relation_type_name(RelationType type);
 
+namespace detail {
+/// Checks the declaration itself and fills `faults`. It does not check the contract of the kind.
+void check_declaration(NodeDefinition& node);
+}  // namespace detail
+
 }  // namespace marrow

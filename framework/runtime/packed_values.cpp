@@ -16,7 +16,7 @@
 namespace marrow {
 namespace {
 
-constexpr int kMostAxes = 8;
+constexpr int kMostLevels = 8;
 
 constexpr std::size_t kLarge = std::size_t(1) << 20;
 
@@ -162,9 +162,9 @@ void describe(const Value& value, FilePacker& data, Packer& description) {
   description.add(data.pieces());
 }
 
-class Reader {
+class PackedReader {
  public:
-  Reader(std::string_view bytes, pid_t process, const ContentOf& content_of)
+  PackedReader(std::string_view bytes, pid_t process, const ContentOf& content_of)
       : bytes_(bytes), process_(process), content_of_(content_of) {}
 
   std::vector<Value> values() {
@@ -187,7 +187,7 @@ class Reader {
   }
 
   Value value(Unpacker& description, int depth) {
-    if (depth > kMostAxes) fail();
+    if (depth > kMostLevels) fail();
     Value value;
     value.type.id = description.get<std::string>();
     value.type.version = description.get<std::int32_t>();
@@ -269,7 +269,7 @@ std::uint64_t bytes_in(int descriptor) {
 
 std::vector<Value> read_values(int descriptor, pid_t process, const ContentOf& content_of) {
   const std::string bytes = contents_of(descriptor);
-  return Reader(bytes, process, content_of).values();
+  return PackedReader(bytes, process, content_of).values();
 }
 
 const Content* content_of_own(const TypeInfo& type) {

@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool contains(const std::vector<std::string>& list, const std::string& item) {
+bool holds(const std::vector<std::string>& list, const std::string& item) {
   return std::find(list.begin(), list.end(), item) != list.end();
 }
 
@@ -32,7 +32,7 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
                      Diagnostics& diagnostics) {
   const std::vector<std::string> known = names_of(node.info.options);
   for (const auto& [name, value] : written.options)
-    if (!contains(known, name))
+    if (!holds(known, name))
       diagnostics.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
                       suggested(diagnostics, name, known));
   for (const OptionInfo& option : node.info.options) {

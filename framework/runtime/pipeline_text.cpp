@@ -13,9 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class Reader {
+class PipelineReader {
  public:
-  Reader(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics, bool inputs_required)
+  PipelineReader(const fs::path& file, const PipelineArguments& arguments, Diagnostics& diagnostics,
+                 bool inputs_required)
       : arguments_(arguments),
         diagnostics_(diagnostics),
         inputs_required_(inputs_required),
@@ -236,7 +237,7 @@ class Reader {
 
 WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineArguments& arguments,
                                       Diagnostics& diagnostics, bool inputs_required) {
-  return Reader(file, arguments, diagnostics, inputs_required).read();
+  return PipelineReader(file, arguments, diagnostics, inputs_required).read();
 }
 
 }  // namespace marrow

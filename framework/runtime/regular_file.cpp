@@ -36,16 +36,6 @@ Error changed() { return Error("was changed while it was read; try again when no
 
 bool same(const timespec& a, const timespec& b) { return a.tv_sec == b.tv_sec && a.tv_nsec == b.tv_nsec; }
 
-bool write_all(int descriptor, const std::string& text) {
-  for (std::size_t at = 0; at < text.size();) {
-    const ssize_t count = write(descriptor, text.data() + at, text.size() - at);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return false;
-    at += std::size_t(count);
-  }
-  return true;
-}
-
 /// Makes a new file next to the one that it will replace. Returns -1 with errno if it cannot be made.
 int make_temporary(const fs::path& file, mode_t mode, fs::path& temporary) {
   static std::atomic<unsigned> count{0};
@@ -60,6 +50,16 @@ int make_temporary(const fs::path& file, mode_t mode, fs::path& temporary) {
 }
 
 }  // namespace
+
+bool write_all(int descriptor, const std::string& text) {
+  for (std::size_t at = 0; at < text.size();) {
+    const ssize_t count = write(descriptor, text.data() + at, text.size() - at);
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return false;
+    at += std::size_t(count);
+  }
+  return true;
+}
 
 RegularFile::RegularFile(const fs::path& file) {
   // The kind of the file is checked before it is opened, because opening a device may have an effect. It is checked

@@ -41,6 +41,9 @@ Digest digest_of(const RegularFile& file);
 /// changes while it is read.
 std::string read_text(const RegularFile& file, std::size_t most_bytes);
 
+/// Writes all of the text, also in parts. Returns false, with errno, if that is not possible.
+bool write_all(int descriptor, const std::string& text);
+
 /// Writes a file under a temporary name and then renames it, so that no reader and no second writer sees half of it. If
 /// this fails, leaves nothing behind and throws Error with the file's name and the reason.
 void write_text(const std::filesystem::path& file, const std::string& text, mode_t mode);

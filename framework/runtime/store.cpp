@@ -30,7 +30,7 @@ constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes
 
 }  // namespace
 
-Store::Store(fs::path folder) : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))) {}
+Store::Store(const fs::path& folder) : folder_(folder.empty() ? folder : plain_path(fs::absolute(folder))) {}
 
 fs::path Store::default_folder() {
   const char* folder = std::getenv("MARROW_CACHE");
@@ -53,7 +53,7 @@ bool Store::is_there() const {
 
 std::string Store::prepare() const {
   if (is_checked_ && access((folder_ / kStoreMarker).c_str(), F_OK) == 0) return "";
-  const std::string fault = make_store(folder_);
+  std::string fault = make_store(folder_);
   is_checked_ = fault.empty();
   return fault;
 }

@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using Kind = StoreItem::Kind;
-using Clock = fs::file_time_type::clock;
+using FileClock = fs::file_time_type::clock;
 
 constexpr auto kDay = std::chrono::hours(24);
 
@@ -42,7 +42,7 @@ std::uint64_t bytes_of(const fs::path& path) {
 bool is_abandoned(const StoreItem& item) {
   std::error_code error;
   const auto changed = fs::last_write_time(item.path, error);
-  return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && Clock::now() - changed > kDay);
+  return (kill(item.process, 0) != 0 && errno == ESRCH) || (!error && FileClock::now() - changed > kDay);
 }
 
 /// Whether something is mounted on the folder that holds the item, on the item, or below it. What is there belongs to
@@ -171,8 +171,8 @@ std::string Store::tidy() const {
   if (!is_there()) return "";
   const fs::path mark = folder_ / "tidied";
   std::error_code error;
-  const auto age = Clock::now() - fs::last_write_time(mark, error);
-  if (!error && age >= Clock::duration::zero() && age < kDay) return "";  // a mark from the future says nothing
+  const auto age = FileClock::now() - fs::last_write_time(mark, error);
+  if (!error && age >= FileClock::duration::zero() && age < kDay) return "";  // a mark from the future says nothing
   constexpr std::string_view kText = "when the store was last brought back to its size\n";
   write_whole(mark, [&](Archive& out) { out.bytes(kText.data(), kText.size()); });
   return collect(*limit).fault;

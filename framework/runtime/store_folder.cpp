@@ -135,7 +135,7 @@ FolderState examine_store(const fs::path& folder) {
 std::string make_store(const fs::path& folder) {
   FolderState state = examine_store(folder);
   if (state.is_store || !state.fault.empty()) return state.fault;
-  if (const std::string fault = make_private_folder(folder); !fault.empty()) return fault;
+  if (std::string fault = make_private_folder(folder); !fault.empty()) return fault;
   state = examine_store(folder);  // another user may have been quicker
   if (state.is_store || !state.fault.empty()) return state.fault;
   chmod(folder.c_str(), 0700);

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "marrow/domain/error.hpp"
+#include "regular_file.hpp"
 
 namespace marrow {
 namespace {
@@ -18,14 +19,14 @@ namespace {
 namespace fs = std::filesystem;
 
 /// An open file, closed at the end of its scope.
-class Descriptor {
+class OpenFile {
  public:
-  Descriptor(const fs::path& file, int flags) : number_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {}
-  ~Descriptor() {
+  OpenFile(const fs::path& file, int flags) : number_(::open(file.c_str(), flags | O_CLOEXEC, 0666)) {}
+  ~OpenFile() {
     if (number_ >= 0) ::close(number_);
   }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
+  OpenFile(const OpenFile&) = delete;
+  OpenFile& operator=(const OpenFile&) = delete;
   operator int() const { return number_; }
   /// Returns false if the file cannot be closed: some file systems report only now that there is no space.
   bool close() { return ::close(std::exchange(number_, -1)) == 0; }
@@ -36,22 +37,12 @@ class Descriptor {
 
 std::string reason() { return errno == ENOSPC || errno == EDQUOT ? "the disk is full" : std::strerror(errno); }
 
-bool write_all(int descriptor, const std::string& text) {
-  for (std::size_t done = 0; done < text.size();) {
-    const ssize_t count = ::write(descriptor, text.data() + done, text.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count <= 0) return false;
-    done += std::size_t(count);
-  }
-  return true;
-}
-
 /// A name next to the file that no other thread or process writes to, unless a process on another machine has the same
 /// number.
 fs::path free_temporary(const fs::path& file) {
   static std::atomic<int> count{0};
   for (struct stat info{};;) {
-    const fs::path name = file.parent_path() / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count));
+    fs::path name = file.parent_path() / (".part" + std::to_string(::getpid()) + "-" + std::to_string(++count));
     if (::lstat(name.c_str(), &info) != 0) return name;
   }
 }
@@ -71,7 +62,7 @@ std::string read_text_file(const fs::path& file, std::uintmax_t most_bytes) {
   // The kind is also checked before the file is opened, because opening a device may have an effect.
   if (::stat(file.c_str(), &info) != 0) throw unreadable(reason());
   check_kind();
-  Descriptor descriptor(file, O_RDONLY | O_NONBLOCK | O_NOCTTY);
+  OpenFile descriptor(file, O_RDONLY | O_NONBLOCK | O_NOCTTY);
   if (descriptor < 0 || ::fstat(descriptor, &info) != 0) throw unreadable(reason());
   check_kind();
   if (std::uintmax_t(info.st_size) > most_bytes) throw too_long();
@@ -92,12 +83,12 @@ void write_text_file(const fs::path& file, const std::string& text, Kinds kinds)
   // stat() follows links, because /dev/stdout is a link.
   if (kinds == Kinds::files_and_pipes && ::stat(file.c_str(), &info) == 0 && !S_ISREG(info.st_mode) &&
       !S_ISDIR(info.st_mode)) {
-    Descriptor device(file, O_WRONLY);
+    OpenFile device(file, O_WRONLY);
     if (device < 0 || !write_all(device, text) || !device.close()) throw unwritten(reason());
     return;
   }
   const fs::path temporary = free_temporary(file);
-  Descriptor descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
+  OpenFile descriptor(temporary, O_WRONLY | O_CREAT | O_EXCL);
   if (descriptor < 0) throw unwritten(reason());
   if (write_all(descriptor, text) && descriptor.close() && ::rename(temporary.c_str(), file.c_str()) == 0) return;
   const std::string why = reason();

@@ -29,7 +29,7 @@ void look_up(uid_t user, const Use& use) {
 }  // namespace
 
 fs::path user_cache_folder() {
-  if (const fs::path cache = absolute_path_in("XDG_CACHE_HOME"); !cache.empty()) return cache;
+  if (fs::path cache = absolute_path_in("XDG_CACHE_HOME"); !cache.empty()) return cache;
   fs::path home = absolute_path_in("HOME");
   if (home.empty())
     look_up(geteuid(), [&](const passwd& entry) {

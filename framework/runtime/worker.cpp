@@ -22,11 +22,11 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/library.hpp"
 #include "no_process.hpp"
+#include "stopwatch.hpp"
 
 namespace marrow {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using nlohmann::json;
 
 constexpr std::size_t kLongestLine = std::size_t(64) << 20;
@@ -136,7 +136,7 @@ void kill_group(pid_t process) {
   kill(-process, SIGKILL);
 }
 
-std::string number_text(const char* form, double value) {
+std::string with_number(const char* form, double value) {
   char text[80];
   std::snprintf(text, sizeof text, form, value);
   return text;
@@ -219,7 +219,8 @@ std::optional<WorkerEnd> Worker::understand(const std::string& line, const Said&
     end.answer = message["end"];
   } else {
     const json reason = message.value("failed", json());
-    end.failed = reason.is_string() && reason != "" ? reason.get<std::string>() : "gave no reason";
+    end.failed = reason.is_string() && !reason.get_ref<const std::string&>().empty() ? reason.get<std::string>()
+                                                                                     : "gave no reason";
     end.is_out_of_memory = message.value("out_of_memory", json()) == json(true);
   }
   is_busy_ = false;
@@ -260,17 +261,17 @@ WorkerEnd Worker::ended(const std::string& why) {
 std::optional<WorkerEnd> Worker::check(const WorkerLimits& limits) {
   if (is_dead() || !is_busy_) return std::nullopt;
   if (seconds() > limits.seconds) {
-    WorkerEnd end = ended(number_text("took longer than %g s", limits.seconds));
+    WorkerEnd end = ended(with_number("took longer than %g s", limits.seconds));
     end.is_late = true;
     return end;
   }
   if (limits.seconds < WorkerLimits().seconds && suspended_seconds_ > limits.suspended_seconds) {
-    WorkerEnd end = ended(number_text("was suspended for more than %g s", limits.suspended_seconds));
+    WorkerEnd end = ended(with_number("was suspended for more than %g s", limits.suspended_seconds));
     end.is_late = true;
     return end;
   }
   if (memory_mb() > limits.memory_mb) {
-    WorkerEnd end = ended(number_text("used more than %g MB of memory", limits.memory_mb));
+    WorkerEnd end = ended(with_number("used more than %g MB of memory", limits.memory_mb));
     end.is_out_of_memory = true;
     return end;
   }

@@ -78,7 +78,7 @@ const NodeDefinition& find_node(const Plugin& plugin, const std::string& name) {
 }
 
 std::shared_ptr<void> options_of(const NodeDefinition& node, const json& options) {
-  const std::shared_ptr<void> result = node.make_options();
+  std::shared_ptr<void> result = node.make_options();
   if (options.size() != node.info.options.size())
     throw Error("the library has other options than a moment ago; run it again");
   for (std::size_t i = 0; i < options.size(); ++i) {

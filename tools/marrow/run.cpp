@@ -21,9 +21,9 @@ using nlohmann::json;
 using Kind = RunEvent::Kind;
 
 /// Shows the events of a run: one line for each finished step, and one line for the current step that is rewritten.
-class Progress {
+class RunProgress {
  public:
-  Progress(const RunRequest& request, RunFolder& folder)
+  RunProgress(const RunRequest& request, RunFolder& folder)
       : request_(request), log_(folder.log()), is_terminal_(isatty(STDERR_FILENO)) {
     log_.show_from(silent() ? LogLevel::error : request.log_level);
   }
@@ -158,7 +158,7 @@ void print_json_summary(const RunResult& result, const std::vector<RunFolder::Wr
 
 RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const RunRequest& request,
                    const PipelineArguments& arguments, const Store* store, RunFolder& folder) {
-  Progress progress(request, folder);
+  RunProgress progress(request, folder);
   RunSettings settings;
   settings.seed = request.seed;
   settings.threads = request.threads;

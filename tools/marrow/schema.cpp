@@ -11,12 +11,12 @@
 namespace marrow::cli {
 namespace {
 
-using json = nlohmann::ordered_json;
+using Json = nlohmann::ordered_json;
 
-json scalar_schema(const OptionInfo& option) {
+Json scalar_schema(const OptionInfo& option) {
   // For every type of option, the value may be the name of an input ("$case").
-  const json name = {{"type", "string"}, {"pattern", "\\$"}};
-  json value;
+  const Json name = {{"type", "string"}, {"pattern", "\\$"}};
+  Json value;
   switch (option.type) {
     case OptionType::boolean:
       value = {{"type", "boolean"}};
@@ -38,8 +38,8 @@ json scalar_schema(const OptionInfo& option) {
   return {{"anyOf", {value, name}}};
 }
 
-json option_schema(const OptionInfo& option) {
-  json schema = scalar_schema(option);
+Json option_schema(const OptionInfo& option) {
+  Json schema = scalar_schema(option);
   if (option.type == OptionType::numbers || option.type == OptionType::texts || option.type == OptionType::paths) {
     schema = {{"type", "array"}, {"items", schema}};
     if (option.length) schema["minItems"] = schema["maxItems"] = option.length;
@@ -49,25 +49,25 @@ json option_schema(const OptionInfo& option) {
   return schema;
 }
 
-json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
-  json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", json::object()}};
-  json required = json::array();
+Json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
+  Json with = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
+  Json required = Json::array();
   for (const OptionInfo& option : node.options) {
     with["properties"][option.name] = option_schema(option);
     if (option.required) required.push_back(option.name);
   }
   if (!required.empty()) with["required"] = required;
-  const json reference = {{"type", "string"}};
-  json in = {{"type", "object"}, {"additionalProperties", false}, {"properties", json::object()}};
+  const Json reference = {{"type", "string"}};
+  Json in = {{"type", "object"}, {"additionalProperties", false}, {"properties", Json::object()}};
   for (const KindPort& port : catalogue.ports_of_kind(node.kind()))
     in["properties"][port.name] = {{"description", port_text(port) + (port.help.empty() ? "" : ": " + port.help)},
                                    {"anyOf", {reference, {{"type", "array"}, {"items", reference}}}}};
-  json wired = json::array();
+  Json wired = Json::array();
   for (const PortInfo& port : node.inputs)
     if (!port.optional) wired.push_back(port.name);
-  json properties = {{"uses", {{"const", node.name}, {"description", node.summary}}}, {"with", with}, {"in", in}};
-  json schema = {{"properties", properties}};
-  json needs = json::array();
+  Json properties = {{"uses", {{"const", node.name}, {"description", node.summary}}}, {"with", with}, {"in", in}};
+  Json schema = {{"properties", properties}};
+  Json needs = Json::array();
   if (!required.empty()) needs.push_back("with");
   if (!wired.empty()) {
     schema["properties"]["in"]["required"] = wired;
@@ -77,13 +77,13 @@ json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
   return {{"if", {{"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
 }
 
-json pipeline_schema(const Catalogue& catalogue) {
-  json uses = json::array(), conditions = json::array();
+Json pipeline_schema(const Catalogue& catalogue) {
+  Json uses = Json::array(), conditions = Json::array();
   for (const std::string& name : catalogue.node_names()) {
     uses.push_back({{"const", name}, {"description", catalogue.find(name)->summary}});
     conditions.push_back(node_schema(*catalogue.find(name), catalogue));
   }
-  const json node = {{"type", "object"},
+  const Json node = {{"type", "object"},
                      {"required", {"uses"}},
                      {"additionalProperties", false},
                      {"properties",
@@ -91,7 +91,7 @@ json pipeline_schema(const Catalogue& catalogue) {
                        {"with", {{"type", "object"}, {"description", "options"}}},
                        {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}}}},
                      {"allOf", conditions}};
-  const json input = {{"type", "object"},
+  const Json input = {{"type", "object"},
                       {"additionalProperties", false},
                       {"properties",
                        {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},

@@ -40,7 +40,8 @@ Volume volume_of(const PlaneSolid& solid, const Grid& grid, double hu) {
       for (int x = 0; x < grid.size[0]; ++x) {
         int inside = 0;
         for (int i = 0; i < kParts * kParts * kParts; ++i) {
-          const Eigen::Vector3d part(i % kParts, i / kParts % kParts, i / kParts / kParts);
+          const int v = i / kParts % kParts, w = i / kParts / kParts;
+          const Eigen::Vector3d part(i % kParts, v, w);
           const Eigen::Vector3d p = grid.point_from_index(
               Eigen::Vector3d(x, y, z) + (part + Eigen::Vector3d::Constant(0.5 - 0.5 * kParts)) / kParts);
           inside += std::all_of(solid.begin(), solid.end(),

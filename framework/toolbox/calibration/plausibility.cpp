@@ -114,7 +114,7 @@ struct Mistake {
 };
 
 Mistake pixel_mistake(const std::string& sentence,
-                      std::function<Eigen::Vector2d(const Eigen::Vector2d&, double, double)> change) {
+                      const std::function<Eigen::Vector2d(const Eigen::Vector2d&, double, double)>& change) {
   return {sentence, [change](Camera& camera, SeenPoints& points) {
             for (auto& pixel : points.pixels) pixel = change(pixel, camera.width_px - 1, camera.height_px - 1);
           }};
@@ -126,7 +126,7 @@ Mistake point_mistake(const std::string& sentence, const Eigen::Vector3d& scale)
           }};
 }
 
-Mistake pose_mistake(const std::string& sentence, std::function<void(RigidTransform&)> change) {
+Mistake pose_mistake(const std::string& sentence, const std::function<void(RigidTransform&)>& change) {
   return {sentence, [change](Camera& camera, SeenPoints&) { change(camera.camera_from_world); }};
 }
 

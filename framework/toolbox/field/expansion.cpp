@@ -214,7 +214,7 @@ std::vector<std::uint8_t> race(const Volume& volume, const std::vector<std::vect
       if (owner[at] != kNobody) continue;
       owner[at] = fragment;
       const int x = int(at % row), y = int(at % slice / row), z = int(at / slice);
-      const auto visit = [&](int i, int j, int k) {
+      const auto visit = [&, fragment = fragment](int i, int j, int k) {
         if (!grid.contains(i, j, k)) return;
         const std::size_t next = grid.offset(i, j, k);
         if (owner[next] != kNobody) return;

@@ -262,7 +262,7 @@ void Front::advance(double step_mm) {
       // A voxel of the band has the speed of the closest point of the surface.
       const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
       int nearest[3];
-      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
+      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(std::floor(closest[k] + 0.5f)), 0, grid_.size[k] - 1);
       const std::int32_t slot = slots_[tile_of(nearest[0] / kTile, nearest[1] / kTile, nearest[2] / kTile)];
       if (slot < 0) return;
       const float speed =

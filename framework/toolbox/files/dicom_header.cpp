@@ -118,7 +118,7 @@ std::optional<std::vector<double>> DicomHeader::numbers(const DicomTag& tag, std
   const DicomTag::Kind kind = kind_of(*element, tag);
   const std::string bytes = bytes_of(*element, tag), value = kind == DicomTag::Kind::text ? without_padding(bytes) : "";
   if (kind == DicomTag::Kind::text && value.empty()) return std::nullopt;
-  const auto numbers =
+  auto numbers =
       kind == DicomTag::Kind::text ? numbers_in_text(value) : binary_numbers(bytes, kind, element->big_endian);
   if (!numbers || (count > 0 && numbers->size() != count)) {
     const std::string expected = count == 0 ? "numbers" : std::to_string(count) + (count == 1 ? " number" : " numbers");

@@ -131,7 +131,7 @@ std::filesystem::path file_beside(const std::filesystem::path& header, const std
       name.find('\0') != std::string::npos)
     throw Error(header.string() + ": names '" + shown(name) +
                 "' for its samples; expected one file that lies beside it");
-  const std::filesystem::path data = header.parent_path() / name;
+  std::filesystem::path data = header.parent_path() / name;
   std::error_code failure;
   if (!std::filesystem::exists(std::filesystem::symlink_status(data, failure)))
     throw Error(header.string() + ": names '" + shown(name) + "' for its samples, which is not there");

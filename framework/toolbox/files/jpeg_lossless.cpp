@@ -15,9 +15,9 @@ struct HuffmanTable {
   std::array<std::uint8_t, 65536> bits{}, symbol{};
 };
 
-class Decoder {
+class LosslessDecoder {
  public:
-  explicit Decoder(const CodedImage& image) : image_(image) {}
+  explicit LosslessDecoder(const CodedImage& image) : image_(image) {}
 
   std::vector<std::byte> run() {
     JpegSegments segments(image_.bytes);
@@ -140,6 +140,6 @@ class Decoder {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_lossless(const CodedImage& image) { return Decoder(image).run(); }
+std::vector<std::byte> decode_jpeg_lossless(const CodedImage& image) { return LosslessDecoder(image).run(); }
 
 }  // namespace marrow::files

@@ -20,9 +20,9 @@ struct RunContext {
   int a = 0, n = 1, negative = 0;
 };
 
-class Decoder {
+class JpegLsDecoder {
  public:
-  explicit Decoder(const CodedImage& image) : image_(image) {}
+  explicit JpegLsDecoder(const CodedImage& image) : image_(image) {}
 
   std::vector<std::byte> run() {
     JpegSegments segments(image_.bytes);
@@ -236,6 +236,6 @@ class Decoder {
 
 }  // namespace
 
-std::vector<std::byte> decode_jpeg_ls(const CodedImage& image) { return Decoder(image).run(); }
+std::vector<std::byte> decode_jpeg_ls(const CodedImage& image) { return JpegLsDecoder(image).run(); }
 
 }  // namespace marrow::files

@@ -11,13 +11,13 @@
 namespace marrow::files {
 namespace {
 
-struct Header {
+struct MetaHeader {
   HeaderFields fields;
   std::uint64_t end = 0;  ///< offset of samples in the same file
 };
 
-Header read_header(const InputFile& file) {
-  Header header{HeaderFields(file.path())};
+MetaHeader read_meta_header(const InputFile& file) {
+  MetaHeader header{HeaderFields(file.path())};
   HeaderLines lines(file);
   while (const auto line = lines.next()) {
     const std::string text = trimmed(*line);
@@ -32,7 +32,7 @@ Header read_header(const InputFile& file) {
   throw Error(file.path().string() + ": its header has no 'ElementDataFile'; it is no MetaImage, or is cut off");
 }
 
-Samples::Type type_of(const HeaderFields& fields) {
+Samples::Type meta_type(const HeaderFields& fields) {
   using Type = Samples::Type;
   static const std::map<std::string, Type> kTypes{
       {"met_char", Type::i8},       {"met_uchar", Type::u8},       {"met_short", Type::i16}, {"met_ushort", Type::u16},
@@ -109,7 +109,7 @@ std::uint64_t begin_of(const HeaderFields& fields, const InputFile& data, std::u
   return data.size() - std::min(data.size(), sample_bytes);  // the samples are at the end of the file
 }
 
-VolumeSamples read_samples(const Header& header, const InputFile& data, std::uint64_t header_end) {
+VolumeSamples read_samples(const MetaHeader& header, const InputFile& data, std::uint64_t header_end) {
   const HeaderFields& fields = header.fields;
   const long long dimensions = fields.whole_number_or("ndims", 3);
   if (dimensions < 1 || dimensions > 10) fields.refuse("ndims", "3");
@@ -124,7 +124,7 @@ VolumeSamples read_samples(const Header& header, const InputFile& data, std::uin
   }
   check_fields(fields);
   StoredSamples stored;
-  stored.type = type_of(fields);
+  stored.type = meta_type(fields);
   check_size(fields.path().string(), size, data.size());
   VolumeSamples volume;
   volume.geometry.dimensions = int(std::min(3ll, dimensions));
@@ -145,7 +145,7 @@ VolumeSamples read_samples(const Header& header, const InputFile& data, std::uin
 
 VolumeSamples read_meta_image(const std::filesystem::path& path, bool folder_is_named) {
   const InputFile file(path);
-  const Header header = read_header(file);
+  const MetaHeader header = read_meta_header(file);
   const std::string name = header.fields.text("elementdatafile");
   if (in_small_letters(name) == "local") return read_samples(header, file, header.end);
   const InputFile data(file_beside(path, name, folder_is_named));

@@ -15,9 +15,9 @@ namespace {
 
 constexpr std::size_t kHeaderBytes = 348;
 
-class Header {
+class NiftiHeader {
  public:
-  explicit Header(const InputFile& file) : what_(file.path().string()) {
+  explicit NiftiHeader(const InputFile& file) : what_(file.path().string()) {
     const auto stream = bytes_of_gzip_or_plain(file);
     if (stream->take(raw_.data(), kHeaderBytes) != kHeaderBytes) no_nifti();
     swapped_ = at<std::int32_t>(0) != int(kHeaderBytes);
@@ -49,7 +49,7 @@ class Header {
   bool swapped_ = false;
 };
 
-Samples::Type type_of(const Header& header) {
+Samples::Type nifti_type(const NiftiHeader& header) {
   using Type = Samples::Type;
   struct Known {
     int code, bits;
@@ -73,7 +73,7 @@ Samples::Type type_of(const Header& header) {
               ", which is not read; save it as 16 bit integers or float");
 }
 
-std::array<long long, 3> size_of(const Header& header) {
+std::array<long long, 3> size_of(const NiftiHeader& header) {
   const int dimensions = header.dim(0);
   if (dimensions < 1 || dimensions > 7)
     throw Error(header.what() + ": its header tells of " + std::to_string(dimensions) + " dimensions; it is damaged");
@@ -116,7 +116,7 @@ bool is_straight(const Affine& affine) {
   return true;
 }
 
-Affine sform(const Header& header) {
+Affine sform(const NiftiHeader& header) {
   Affine affine;
   for (std::size_t row = 0; row < 3; ++row)
     for (std::size_t k = 0; k < 4; ++k) affine[row][k] = header.at<float>(280 + 16 * row + 4 * k);
@@ -124,7 +124,7 @@ Affine sform(const Header& header) {
 }
 
 /// The matrix from the quaternion, as defined in nifti1.h.
-Affine qform(const Header& header) {
+Affine qform(const NiftiHeader& header) {
   double b = header.at<float>(256), c = header.at<float>(260), d = header.at<float>(264),
          a = 1 - (b * b + c * c + d * d);
   if (a < 1e-7) {
@@ -147,7 +147,7 @@ Affine qform(const Header& header) {
 }
 
 /// Whether both put every voxel of the volume at the same position, up to rounding (0.02 mm per axis).
-bool are_near(const Affine& one, const Affine& other, const Header& header) {
+bool are_near(const Affine& one, const Affine& other, const NiftiHeader& header) {
   for (std::size_t row = 0; row < 3; ++row) {
     double apart = std::abs(double(one[row][3]) - double(other[row][3]));
     for (std::size_t k = 0; k < 3; ++k)
@@ -157,7 +157,7 @@ bool are_near(const Affine& one, const Affine& other, const Header& header) {
   return true;
 }
 
-[[noreturn]] void refuse_two_places(const Header& header, const Affine& s, int scode, int qcode) {
+[[noreturn]] void refuse_two_places(const NiftiHeader& header, const Affine& s, int scode, int qcode) {
   const std::string codes =
       "sform (code " + std::to_string(scode) + ") and its qform (code " + std::to_string(qcode) + ")";
   if (!is_straight(s))
@@ -171,7 +171,7 @@ bool are_near(const Affine& one, const Affine& other, const Header& header) {
 
 /// If both are given, they must agree, or the sform must be that of the scanner (code 1). An sform that maps to another
 /// scan (code 2) is not used if the qform is that of the scanner.
-Affine affine_of(const Header& header) {
+Affine affine_of(const NiftiHeader& header) {
   const int qcode = header.at<std::int16_t>(252), scode = header.at<std::int16_t>(254);
   if (qcode <= 0 && scode <= 0)  // programs then assume different axes, and one of them mirrors the bone
     throw Error(header.what() +
@@ -187,7 +187,7 @@ Affine affine_of(const Header& header) {
               "it again");
 }
 
-void read_grid(const Header& header, Samples& samples) {
+void read_grid(const NiftiHeader& header, Samples& samples) {
   const double unit_mm = header.unit_mm();
   for (int k = 0; k < 3; ++k) {
     const double length = header.pixdim(k + 1);
@@ -211,7 +211,7 @@ void read_grid(const Header& header, Samples& samples) {
     samples.origin_mm[row] = (row < 2 ? -1.0 : 1.0) * double(affine[row][3]) * unit_mm;
 }
 
-void read_scaling(const Header& header, StoredSamples& stored) {
+void read_scaling(const NiftiHeader& header, StoredSamples& stored) {
   const double slope = header.at<float>(112), intercept = header.at<float>(116);
   if (slope == 0 || std::isnan(slope)) return;  // no scaling: 0 by nifti1.h, NaN by some programs
   if (!std::isfinite(slope) || !std::isfinite(intercept))
@@ -224,10 +224,10 @@ void read_scaling(const Header& header, StoredSamples& stored) {
 
 VolumeSamples read_nifti(const std::filesystem::path& path) {
   const InputFile file(path);
-  const Header header(file);
+  const NiftiHeader header(file);
   const auto size = size_of(header);
   StoredSamples stored;
-  stored.type = type_of(header);
+  stored.type = nifti_type(header);
   check_size(path.string(), size, file.size());
   VolumeSamples volume;
   volume.geometry.dimensions = std::min(3, header.dim(0));

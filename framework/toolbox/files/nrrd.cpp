@@ -11,12 +11,12 @@
 namespace marrow::files {
 namespace {
 
-struct Header {
+struct NrrdHeader {
   HeaderFields fields;
   std::uint64_t end = 0;  ///< offset of samples in the same file
 };
 
-Header read_header(const InputFile& file) {
+NrrdHeader read_nrrd_header(const InputFile& file) {
   static const std::set<std::string> kKnown{"content",
                                             "number",
                                             "type",
@@ -51,7 +51,7 @@ Header read_header(const InputFile& file) {
       {"blocksize", "block size"},     {"axismins", "axis mins"}, {"axismaxs", "axis maxs"}, {"centerings", "centers"},
       {"oldmin", "old min"},           {"oldmax", "old max"},     {"lineskip", "line skip"}, {"byteskip", "byte skip"},
       {"sampleunits", "sample units"}, {"datafile", "data file"}};
-  Header header{HeaderFields(file.path())};
+  NrrdHeader header{HeaderFields(file.path())};
   HeaderLines lines(file);
   const std::string what = file.path().string();
   const auto first = lines.next();
@@ -76,7 +76,7 @@ Header read_header(const InputFile& file) {
   }
 }
 
-Samples::Type type_of(const HeaderFields& fields) {
+Samples::Type nrrd_type(const HeaderFields& fields) {
   using Type = Samples::Type;
   static const std::map<std::string, Type> kTypes{{"signed char", Type::i8},
                                                   {"int8", Type::i8},
@@ -268,7 +268,7 @@ std::array<long long, 3> size_of(const HeaderFields& fields, long long dimension
 StoredSamples stored_in(const HeaderFields& fields, const InputFile& data, std::uint64_t header_end,
                         std::size_t count) {
   StoredSamples stored;
-  stored.type = type_of(fields);
+  stored.type = nrrd_type(fields);
   stored.count = count;
   const std::string encoding = in_small_letters(fields.text("encoding"));
   stored.is_packed = encoding == "gzip" || encoding == "gz";
@@ -291,7 +291,7 @@ StoredSamples stored_in(const HeaderFields& fields, const InputFile& data, std::
 
 VolumeSamples read_nrrd(const std::filesystem::path& path, bool folder_is_named) {
   const InputFile file(path);
-  const auto [fields, end] = read_header(file);
+  const auto [fields, end] = read_nrrd_header(file);
   const long long dimensions = fields.whole_number_or("dimension", 0);
   if (dimensions < 1 || dimensions > 16) fields.refuse("dimension", "3");
   const bool is_detached = fields.has("data file");

@@ -11,7 +11,7 @@ namespace marrow::files {
 inline std::size_t unpack_packbits(std::string_view packed, std::byte* to, std::size_t bytes) {
   std::size_t done = 0, at = 0;
   while (done < bytes && at < packed.size()) {
-    const int control = static_cast<signed char>(packed[at++]);
+    const int byte = static_cast<unsigned char>(packed[at++]), control = byte < 128 ? byte : byte - 256;
     if (control == -128) continue;
     const std::size_t count = std::size_t(control < 0 ? 1 - control : 1 + control), stored = control < 0 ? 1 : count;
     if (count > bytes - done || stored > packed.size() - at) return 0;

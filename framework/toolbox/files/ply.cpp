@@ -29,7 +29,7 @@ struct Element {
 };
 enum class Format { text, little, big };
 
-struct Header {
+struct PlyHeader {
   Format format = Format::text;
   std::vector<Element> elements;
   std::size_t end = 0;  ///< offset of the body
@@ -39,7 +39,7 @@ class HeaderReader {
  public:
   HeaderReader(const std::string& bytes, const std::string& what) : bytes_(bytes), what_(what) {}
 
-  Header read() {
+  PlyHeader read() {
     for (line_number_ = 1;; ++line_number_) {
       const std::size_t end = bytes_.find('\n', header_.end);
       if (end == std::string::npos || end - header_.end > 4096 || line_number_ > 2000)
@@ -131,7 +131,7 @@ class HeaderReader {
 
   const std::string& bytes_;
   const std::string& what_;
-  Header header_;
+  PlyHeader header_;
   int line_number_ = 1;
   bool has_format_ = false;
 };
@@ -305,7 +305,7 @@ void read_faces(const Element& element, Body& body, MeshBuilder& builder, const 
 }  // namespace
 
 Mesh read_ply(const std::string& bytes, const std::string& what) {
-  const Header header = HeaderReader(bytes, what).read();
+  const PlyHeader header = HeaderReader(bytes, what).read();
   Body body(header.format, std::string_view(bytes).substr(header.end), what);
   std::size_t faces = 0;
   for (const Element& element : header.elements)

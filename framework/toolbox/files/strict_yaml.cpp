@@ -12,7 +12,7 @@
 namespace marrow::files {
 namespace {
 
-constexpr std::uint64_t kLargestFile = 16 << 20;
+constexpr std::uint64_t kLargestYaml = 16 << 20;
 constexpr std::size_t kMostValues = 1'000'000, kMostFreeKeys = 1000;
 
 std::vector<std::string> split_lines(const std::string& text) {
@@ -29,7 +29,7 @@ std::vector<std::string> split_lines(const std::string& text) {
 }  // namespace
 
 YamlFile::YamlFile(std::filesystem::path path) : path_(std::move(path)) {
-  const std::string text = read_bytes(path_, kLargestFile, true);
+  const std::string text = read_bytes(path_, kLargestYaml, true);
   lines_ = split_lines(text);
   if (text.find('\0') != std::string::npos) throw Error(path_.string() + ": expected YAML text; this file is binary");
   try {

@@ -84,7 +84,7 @@ Eigen::Vector2d detector_pixel_mm(const DicomHeader& header, double magnificatio
     wanted.missing(kImagerPixelSpacing.text(), "or give pixel_mm");
     return {1, 1};
   }
-  const Eigen::Vector2d pixel((*spacing)[1], (*spacing)[0]);
+  Eigen::Vector2d pixel((*spacing)[1], (*spacing)[0]);
   const std::string what = header.path().string() + ": " + kImagerPixelSpacing.text() + " is missing; ";
   if (header.text(kSpacingCalibration)) {
     warnings.push_back(what + kPixelSpacing.text() +
@@ -299,7 +299,7 @@ XrayGeometry read_xray_geometry(const std::filesystem::path& path, int frame, co
   check_modality(header);
   check_motion(header, frame, frames);
   check_frame(header, frame, frames);
-  const XrayGeometry geometry = geometry_of_frame(file, std::max(1, frame), overrides);
+  XrayGeometry geometry = geometry_of_frame(file, std::max(1, frame), overrides);
   if (frame == 0) check_all_same(file, frames, geometry, overrides);
   return geometry;
 }

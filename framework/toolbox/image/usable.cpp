@@ -101,7 +101,8 @@ Circle best_circle(const Steps& steps, double tolerance_px, double largest_radiu
 Eigen::VectorXd waves(double angle, int count) {
   Eigen::VectorXd values(count);
   for (int i = 0; i < count; ++i) {
-    const double turn = (i + 1) / 2 * angle;
+    const int harmonic = (i + 1) / 2;
+    const double turn = harmonic * angle;
     values[i] = i == 0 ? 1 : i % 2 ? std::cos(turn) : std::sin(turn);
   }
   return values;
@@ -208,7 +209,8 @@ std::optional<Field> collimator_field(const cv::Mat& grey, double largest) {
 
   const double found = double(supporting(steps, field, kTolerance_px).size());
   const auto outside = [&](const cv::Point& corner) { return is_outside(field, corner); };
-  if (found < kRays / 10 || found < kSupported * rays_within(grey, field) ||
+  constexpr int kFewest = kRays / 10;
+  if (found < kFewest || found < kSupported * rays_within(grey, field) ||
       std::count_if(corners.begin(), corners.end(), outside) < 3)
     return std::nullopt;
   return field;

@@ -11,7 +11,7 @@
 namespace marrow::image {
 namespace {
 
-constexpr int kBlock = 16;
+constexpr int kWindowBlock = 16;
 constexpr int kBins = 256;  // of a histogram with 16 bins per octave
 
 /// Histograms of the magnitude in blocks. A bin is given by the exponent and the leading mantissa bits of the float, so
@@ -19,17 +19,18 @@ constexpr int kBins = 256;  // of a histogram with 16 bins per octave
 class BlockHistograms {
  public:
   BlockHistograms(const Gradient& gradient, const cv::Mat& usable)
-      : columns((usable.cols + kBlock - 1) / kBlock), rows((usable.rows + kBlock - 1) / kBlock) {
+      : columns((usable.cols + kWindowBlock - 1) / kWindowBlock),
+        rows((usable.rows + kWindowBlock - 1) / kWindowBlock) {
     double largest = 0;
     cv::minMaxLoc(gradient.magnitude, nullptr, &largest);
     lowest_ = int(std::bit_cast<std::uint32_t>(float(largest)) >> kShift) - (kBins - 1);
     counts_.assign(std::size_t(columns) * rows * kBins, 0);
     tbb::parallel_for(0, rows, [&](int row) {
-      for (int v = row * kBlock; v < std::min(usable.rows, (row + 1) * kBlock); ++v) {
+      for (int v = row * kWindowBlock; v < std::min(usable.rows, (row + 1) * kWindowBlock); ++v) {
         const float* magnitude = gradient.magnitude.ptr<float>(v);
         const uchar* use = usable.ptr<uchar>(v);
         for (int u = 0; u < usable.cols; ++u)
-          if (use[u]) ++counts(row, u / kBlock)[bin(magnitude[u])];
+          if (use[u]) ++counts(row, u / kWindowBlock)[bin(magnitude[u])];
       }
     });
   }
@@ -86,7 +87,7 @@ class BlockHistograms {
 std::array<cv::Mat, 3> window_percentiles(const Gradient& gradient, const cv::Mat& usable, int window_px,
                                           const std::array<double, 3>& percents) {
   const BlockHistograms histograms(gradient, usable);
-  const int reach = std::max(0, (window_px / kBlock - 1) / 2);
+  const int reach = std::max(0, (window_px / kWindowBlock - 1) / 2);
   std::array<cv::Mat, 3> percentiles;
   for (cv::Mat& values : percentiles) values.create(histograms.rows, histograms.columns, CV_32F);
   tbb::parallel_for(0, histograms.rows, [&](int row) {
@@ -103,31 +104,34 @@ std::array<cv::Mat, 3> window_percentiles(const Gradient& gradient, const cv::Ma
 cv::Mat block_noise(const Prepared& image, const Gradient& gradient) {
   const NoiseLevel noise(image, gradient);
   const cv::Size size = image.values.size();
-  cv::Mat levels((size.height + kBlock - 1) / kBlock, (size.width + kBlock - 1) / kBlock, CV_32F);
+  cv::Mat levels((size.height + kWindowBlock - 1) / kWindowBlock, (size.width + kWindowBlock - 1) / kWindowBlock,
+                 CV_32F);
   for (int row = 0; row < levels.rows; ++row)
     for (int column = 0; column < levels.cols; ++column) {
-      const cv::Rect block = cv::Rect(column * kBlock, row * kBlock, kBlock, kBlock) & cv::Rect({0, 0}, size);
+      const cv::Rect block =
+          cv::Rect(column * kWindowBlock, row * kWindowBlock, kWindowBlock, kWindowBlock) & cv::Rect({0, 0}, size);
       levels.at<float>(row, column) = noise.at(float(cv::mean(image.values(block))[0]));
     }
   return levels;
 }
 
 void interpolate_row(const cv::Mat& blocks, int v, std::vector<float>& row) {
-  const float place = std::clamp((float(v) + 0.5f) / kBlock - 0.5f, 0.0f, float(blocks.rows - 1));
+  const float place = std::clamp((float(v) + 0.5f) / kWindowBlock - 0.5f, 0.0f, float(blocks.rows - 1));
   const int top = std::min(int(place), std::max(0, blocks.rows - 2));
   const float lower_part = place - float(top);
   const float* upper = blocks.ptr<float>(top);
   const float* lower = blocks.ptr<float>(std::min(top + 1, blocks.rows - 1));
   const auto at = [&](int column) { return upper[column] + lower_part * (lower[column] - upper[column]); };
   const std::size_t width = row.size();
-  std::fill_n(row.begin(), std::min<std::size_t>(kBlock / 2, width), at(0));
+  std::fill_n(row.begin(), std::min<std::size_t>(kWindowBlock / 2, width), at(0));
   for (int column = 0; column < blocks.cols; ++column) {  // from this block's centre to the next one's
-    const std::size_t first = std::size_t(column) * kBlock + kBlock / 2;
+    const std::size_t first = std::size_t(column) * kWindowBlock + kWindowBlock / 2;
     const float here = at(column), change = at(std::min(column + 1, blocks.cols - 1)) - here;
-    std::array<float, kBlock> between;
-    for (int i = 0; i < kBlock; ++i) between[std::size_t(i)] = here + (float(i) + 0.5f) / kBlock * change;
+    std::array<float, kWindowBlock> between;
+    for (int i = 0; i < kWindowBlock; ++i) between[std::size_t(i)] = here + (float(i) + 0.5f) / kWindowBlock * change;
     if (first < width)
-      std::copy_n(between.begin(), std::min<std::size_t>(kBlock, width - first), row.begin() + std::ptrdiff_t(first));
+      std::copy_n(between.begin(), std::min<std::size_t>(kWindowBlock, width - first),
+                  row.begin() + std::ptrdiff_t(first));
   }
 }
 

@@ -24,7 +24,8 @@ struct Lattice {
   std::size_t index(int x, int y, int z) const { return (std::size_t(z) * size[1] + y) * size[0] + x; }
   Eigen::Vector3d point(std::size_t i) const {
     const std::size_t nx = std::size_t(size[0]), ny = std::size_t(size[1]);
-    return low + spacing * Eigen::Vector3d(double(i % nx), double(i / nx % ny), double(i / (nx * ny)));
+    const std::size_t x = i % nx, y = i / nx % ny, z = i / (nx * ny);
+    return low + spacing * Eigen::Vector3d(double(x), double(y), double(z));
   }
 };
 

@@ -10,7 +10,7 @@
 namespace marrow::shaft {
 namespace {
 
-constexpr double kStep_px = 0.125;
+constexpr double kSample_px = 0.125;
 constexpr double kReach_mm = 3;                          // length of the profile to either side
 constexpr double kInwards_mm = 0.3, kOutwards_mm = 1.2;  // range of positions in which the outline is sought
 constexpr double kPiece_mm = 4;                          // a bowed border is followed in pieces of this length
@@ -67,7 +67,7 @@ std::vector<double> profile_of(const cv::Mat& image, const EdgeMap& edges, const
     const Eigen::Vector2d on_line = point_at(border, stretch.along, s);
     std::vector<double> row;
     for (int i = -reach; i <= reach; ++i)
-      if (const auto value = line_integral_at(image, scale, on_line + (*distance + i * kStep_px) * border.normal))
+      if (const auto value = line_integral_at(image, scale, on_line + (*distance + i * kSample_px) * border.normal))
         row.push_back(*value);
     if (row.size() != sums.size()) continue;
     for (std::size_t i = 0; i < row.size(); ++i) sums[i] += row[i];
@@ -103,18 +103,18 @@ Eigen::VectorXd without_slope(Eigen::VectorXd profile) {
 std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMap& edges, const Border& border,
                                               const Support& support, const Stretch& stretch, double width_px,
                                               double pixel_mm) {
-  const int reach = std::max(4, int(kReach_mm / pixel_mm / kStep_px));
+  const int reach = std::max(4, int(kReach_mm / pixel_mm / kSample_px));
   const std::vector<double> profile = profile_of(image, edges, border, support, stretch, pixel_mm, reach);
   if (profile.empty()) return std::nullopt;
   const Eigen::VectorXd measured =
       without_slope(Eigen::Map<const Eigen::VectorXd>(profile.data(), Eigen::Index(profile.size())));
-  const int inwards = int(kInwards_mm / pixel_mm / kStep_px), outwards = int(kOutwards_mm / pixel_mm / kStep_px);
+  const int inwards = int(kInwards_mm / pixel_mm / kSample_px), outwards = int(kOutwards_mm / pixel_mm / kSample_px);
   double best_gain = 0;
   int best = outwards;
   for (double blur_px = kLeastBlur_px; blur_px < kMostBlur_px; blur_px *= 1.1) {
     std::vector<double> chords;  // at distances of -reach - outwards to reach + inwards steps from the outline
     for (int i = -reach - outwards; i <= reach + inwards; ++i)
-      chords.push_back(blurred_chord(i * kStep_px, width_px, blur_px));
+      chords.push_back(blurred_chord(i * kSample_px, width_px, blur_px));
     for (int shift = -inwards; shift <= outwards; ++shift) {
       const Eigen::VectorXd chord = without_slope(
           Eigen::Map<const Eigen::VectorXd>(chords.data() + (outwards - shift), Eigen::Index(profile.size())));
@@ -125,7 +125,7 @@ std::optional<double> outline_beyond_edges_px(const cv::Mat& image, const EdgeMa
     }
   }
   if (best == outwards || best == -inwards) return std::nullopt;
-  return best * kStep_px;
+  return best * kSample_px;
 }
 
 }  // namespace marrow::shaft

@@ -85,7 +85,7 @@ Surface reconstruct(const std::vector<OrientedPoint>& points, const Settings& se
   }
   Surface surface;
   for (const pcl::PointNormal& vertex : vertices) surface.vertices.push_back({vertex.x, vertex.y, vertex.z});
-  Triangulation(polygons, surface);
+  const Triangulation triangulation(polygons, surface);
   return surface;
 }
 

@@ -85,7 +85,7 @@ void add_capture(const Experiment& experiment, const Rows& rows, const StartErro
 }
 
 /// The values of one figure in the cells that both variants completed.
-std::vector<compare::Pair> pairs_of(const Rows& baseline, const Rows& variant, std::size_t metric) {
+std::vector<compare::Pair> cell_pairs(const Rows& baseline, const Rows& variant, std::size_t metric) {
   std::map<std::pair<std::string, std::string>, double> reference;
   for (const CellRow* row : baseline)
     if (row->failed.empty() && row->values[metric]) reference[{row->case_name, row->start}] = *row->values[metric];
@@ -164,7 +164,7 @@ Answer answer_of(const Experiment& experiment, const std::vector<CellRow>& rows)
   for (std::size_t m = 0; m < experiment.metrics.size(); ++m)
     for (std::size_t v = 0; v < experiment.variants.size(); ++v) {
       if (v == experiment.baseline) continue;
-      const std::vector<compare::Pair> pairs = pairs_of(of_variant[experiment.baseline], of_variant[v], m);
+      const std::vector<compare::Pair> pairs = cell_pairs(of_variant[experiment.baseline], of_variant[v], m);
       if (pairs.empty()) continue;
       answer.findings.push_back({v, m, compare::compare_pairs(pairs, kBootstrapSeed), 1, ""});
       p.push_back(answer.findings.back().comparison.test.p);

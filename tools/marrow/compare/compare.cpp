@@ -23,7 +23,7 @@ using compare::CellRunner;
 using compare::Experiment;
 
 /// Reads the experiment. If it has faults, prints all of them and returns false.
-bool load(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment) {
+bool load_experiment(const CompareRequest& request, const Catalogue& catalogue, Experiment& experiment) {
   Diagnostics diagnostics;
   experiment = compare::read_experiment(request.file, catalogue, diagnostics);
   if (diagnostics.empty()) return true;
@@ -76,7 +76,7 @@ int compare_variants(const CompareRequest& asked) {
   stop_on_signals();
   const Catalogue catalogue;
   Experiment experiment;
-  if (!load(request, catalogue, experiment)) return 2;
+  if (!load_experiment(request, catalogue, experiment)) return 2;
   if (request.dry_run) {
     const Store store;
     can_keep_results(store.fault(), request.no_cache);
@@ -93,7 +93,7 @@ int compare_variants(const CompareRequest& asked) {
 int run_cell(const CompareRequest& request, const std::string& id) {
   const Catalogue catalogue;
   Experiment experiment;
-  if (!load(request, catalogue, experiment)) return 2;
+  if (!load_experiment(request, catalogue, experiment)) return 2;
   const auto cell = compare::cell_of(experiment, id);
   if (!cell) {
     std::fprintf(stderr, "marrow: error: the experiment has no cell '%s': %s\n", printable(id).c_str(),

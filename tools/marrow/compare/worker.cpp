@@ -18,7 +18,7 @@ using compare::CellRunner;
 using compare::Experiment;
 using nlohmann::json;
 
-[[noreturn]] void refuse(const std::string& what) {
+[[noreturn]] void refuse_job(const std::string& what) {
   throw Error(what + " changed while the comparison ran; run it again");
 }
 
@@ -28,7 +28,7 @@ using nlohmann::json;
 CellIndex cell_in(CellRunner& runner, const json& asked) {
   const std::string id = asked.at("cell");
   const auto cell = compare::cell_of(runner.experiment(), id);
-  if (!cell || runner.key_of(*cell) != asked.at("key")) refuse("what cell " + id + " depends on");
+  if (!cell || runner.key_of(*cell) != asked.at("key")) refuse_job("what cell " + id + " depends on");
   return *cell;
 }
 
@@ -38,7 +38,7 @@ void make_case(CellRunner& runner, const json& asked) {
   const auto found = std::find_if(cases.begin(), cases.end(), [&](const auto& one) { return one.name == name; });
   const std::size_t index = std::size_t(found - cases.begin());
   if (found == cases.end() || runner.case_place(index).string() != bytes_of_json(asked.at("place")))
-    refuse("what case '" + name + "' is made from");
+    refuse_job("what case '" + name + "' is made from");
   runner.case_folder(index);
 }
 

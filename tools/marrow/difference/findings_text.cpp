@@ -127,7 +127,7 @@ void print_other_changes(const Findings& findings) {
               joined(texts).c_str());
 }
 
-void print_results(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
+void print_differing_results(const Findings& findings, std::set<std::pair<std::string, std::string>>& shown) {
   std::vector<OutputDifference> differing;
   std::vector<std::string> same, neither, only_before, only_now;
   for (const OutputDifference& output : findings.results)
@@ -179,7 +179,7 @@ void print(const Findings& findings) {
   print_consequences(findings);
   if (!difference.roots.empty()) std::printf("The same in both runs: %s\n", nodes.c_str());
   print_other_changes(findings);
-  print_results(findings, shown);
+  print_differing_results(findings, shown);
   if (has_unknown_amount(findings.first) || has_unknown_amount(findings.results))
     std::printf(
         "\nWhat the store no longer has is made again by running a folder's pipeline.yaml with its seed, as  marrow "

@@ -24,7 +24,7 @@ struct Diagnostic {
 /// Collects all faults of a file, so that they can be shown together. The first 1000 are kept, the others only counted.
 class Diagnostics {
  public:
-  void add(Place place, std::string message, std::string hint = {});
+  void add(Place place, const std::string& message, const std::string& hint = {});
   /// Adds the faults of another collection that are not here yet.
   void add_all(const Diagnostics& other);
   bool empty() const { return items_.empty(); }

@@ -19,7 +19,7 @@ struct Digest {
 class Hasher : public Archive {
  public:
   Hasher();
-  ~Hasher();
+  ~Hasher() override;
   Hasher(const Hasher&) = delete;
   Hasher& operator=(const Hasher&) = delete;
 

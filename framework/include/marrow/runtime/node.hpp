@@ -34,7 +34,9 @@ struct OptionValue : OptionVariant {
   using OptionVariant::OptionVariant;
   using OptionVariant::operator=;
   OptionValue() = default;
-  OptionValue(const OptionValue& other) : OptionVariant() { OptionVariant::operator=(other); }
+  OptionValue(const OptionValue& other) : OptionVariant() {  // NOLINT(bugprone-copy-constructor-init)
+    OptionVariant::operator=(other);
+  }
   OptionValue(OptionValue&&) noexcept = default;
   OptionValue& operator=(const OptionValue&) = default;
   OptionValue& operator=(OptionValue&&) noexcept = default;

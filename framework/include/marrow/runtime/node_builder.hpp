@@ -16,11 +16,30 @@
 namespace marrow {
 namespace detail {
 
-/// The unit that the suffix of a name gives ("mm" for "sigma_mm"), or "".
-std::string unit_of_name(const std::string& name);
-/// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
-/// fit) and fills `faults`. It does not check the contract of the kind.
-void check_declaration(NodeDefinition& node);
+/// The part of a NodeBuilder that does not depend on the function's type. It is compiled once, not in each plugin.
+class NodeDeclaration {
+ public:
+  explicit NodeDeclaration(NodeDefinition& node) : node_(node) {}
+  NodeDeclaration(const NodeDeclaration&) = delete;
+  /// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
+  /// fit) and fills `faults`. It does not check the contract of the kind.
+  ~NodeDeclaration();
+
+  NodeInfo& info() { return node_.info; }
+  void add_input(const TypeInfo& type, bool is_list, bool is_optional);
+  void name_input(std::string name, std::string help, Over axis);
+  void add_output(std::string name, std::string help, const TypeInfo& type, const Over& axis, bool is_list,
+                  bool is_optional);
+  /// An option with the unit that the suffix of its name gives ("mm" for "sigma_mm").
+  static OptionInfo option(std::string name, std::string help, OptionType type, std::size_t length,
+                           OptionValue default_value);
+  void add_option(OptionInfo info, std::function<void(void* options, const OptionValue&)> set);
+  void output_fault(const std::string& name, const char* fault);
+
+ private:
+  NodeDefinition& node_;
+  std::size_t named_inputs_ = 0;
+};
 
 }  // namespace detail
 
@@ -30,101 +49,74 @@ class NodeBuilder {
   using Options = std::conditional_t<std::is_void_v<typename detail::OptionsOf<Args...>::type>, detail::NoOptions,
                                      typename detail::OptionsOf<Args...>::type>;
 
-  NodeBuilder(NodeDefinition& node, R (*function)(Args...)) : node_(node) {
+  NodeBuilder(NodeDefinition& node, R (*function)(Args...)) : declaration_(node) {
     (add_port<Args>(), ...);
-    ports_ = node_.info.inputs.size();
-    node_.make_options = [] { return std::make_shared<Options>(); };
-    node_.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options,
-                                                Context& context) {
+    node.make_options = [] { return std::make_shared<Options>(); };
+    node.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options,
+                                               Context& context) {
       return call(function, *outputs, inputs, options, context, std::index_sequence_for<Args...>{});
     };
   }
-  NodeBuilder(const NodeBuilder&) = delete;
-  ~NodeBuilder() {
-    if (named_inputs_ != ports_)
-      node_.faults.push_back("the function takes " + std::to_string(ports_) + " inputs, but .in() names " +
-                             std::to_string(named_inputs_));
-    detail::check_declaration(node_);
-  }
 
   NodeBuilder& summary(std::string text) {
-    node_.info.summary = std::move(text);
+    declaration_.info().summary = std::move(text);
     return *this;
   }
   /// The node has this trait of its kind.
   NodeBuilder& trait(std::string name) {
-    node_.info.traits.push_back(std::move(name));
+    declaration_.info().traits.push_back(std::move(name));
     return *this;
   }
   /// A condition on options: not_above, below, same_length, as_many_or_none, exactly_one, at_least_one or distinct. A
   /// pipeline that breaks it is refused with the line of the option, so the node need not check it.
   NodeBuilder& relation(RelationInfo relation) {
-    node_.info.relations.push_back(std::move(relation));
+    declaration_.info().relations.push_back(std::move(relation));
     return *this;
   }
   /// The node draws from Context::seed(), so its results depend on the run's seed.
   NodeBuilder& random() {
-    node_.info.random = true;
+    declaration_.info().random = true;
     return *this;
   }
 
   NodeBuilder& in(std::string name, std::string help, Over axis = {}) {
-    if (named_inputs_ < ports_) {
-      PortInfo& port = node_.info.inputs[named_inputs_];
-      if (axis.axis.empty() != port.axis.empty()) {
-        std::string fault = "input '" + name;
-        node_.faults.push_back(
-            fault.append(axis.axis.empty() ? "': a List needs over(\"axis\")" : "': over() is for List inputs"));
-      }
-      port.name = std::move(name);
-      port.help = std::move(help);
-      port.axis = std::move(axis.axis);
-    }
-    ++named_inputs_;
+    declaration_.name_input(std::move(name), std::move(help), std::move(axis));
     return *this;
   }
 
   /// Names the returned value, or the next item of a returned tuple.
-  NodeBuilder& out(std::string name, std::string help, Over axis = {}) {
+  NodeBuilder& out(const std::string& name, const std::string& help, const Over& axis = {}) {
     const std::size_t index = outputs_->size();
     if constexpr (detail::IsTuple<R>::value) {
-      add_tuple_output(index, std::move(name), std::move(help), std::move(axis),
-                       std::make_index_sequence<std::tuple_size_v<R>>{});
+      add_tuple_output(index, name, help, axis, std::make_index_sequence<std::tuple_size_v<R>>{});
     } else if constexpr (Registered<typename detail::Returned<R>::Item>) {
-      add_output<R>(std::move(name), std::move(help), axis, [axis = axis.axis](const std::shared_ptr<const R>& whole) {
+      add_output<R>(name, help, axis, [axis = axis.axis](const std::shared_ptr<const R>& whole) {
         return detail::Returned<R>::value(whole, *whole, axis);
       });
     } else {
-      node_.faults.push_back("output '" + name + "': the returned type is not registered with MARROW_VALUE_TYPE");
+      declaration_.output_fault(name, "the returned type is not registered with MARROW_VALUE_TYPE");
     }
     return *this;
   }
   /// Names a member of the returned struct.
   template <class M, class S>
-  NodeBuilder& out(std::string name, M S::*member, std::string help, Over axis = {}) {
+  NodeBuilder& out(const std::string& name, M S::*member, const std::string& help, const Over& axis = {}) {
     static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
-    return add_output<M>(std::move(name), std::move(help), axis,
-                         [member, axis = axis.axis](const std::shared_ptr<const R>& whole) {
-                           return detail::Returned<M>::value(whole, (*whole).*member, axis);
-                         });
+    return add_output<M>(name, help, axis, [member, axis = axis.axis](const std::shared_ptr<const R>& whole) {
+      return detail::Returned<M>::value(whole, (*whole).*member, axis);
+    });
   }
 
   /// An option, bound to a member of the options struct. Its default is the value of the member in a
   /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required.
   template <class M, class O, class... Attributes>
-  NodeBuilder& option(std::string name, M O::*member, std::string help, Attributes... attributes) {
+  NodeBuilder& option(const std::string& name, M O::*member, const std::string& help, const Attributes&... attributes) {
     static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");
-    OptionInfo info;
-    info.name = name;
-    info.help = std::move(help);
-    info.unit = detail::unit_of_name(name);
-    info.type = detail::option_type<M>();
-    info.length = detail::option_length<M>();
-    info.default_value = detail::to_option_value<M>(Options{}.*member);
+    OptionInfo info = detail::NodeDeclaration::option(name, help, detail::option_type<M>(), detail::option_length<M>(),
+                                                      detail::to_option_value<M>(Options{}.*member));
     (apply(info, attributes), ...);
     detail::narrow_range<M>(info);
-    node_.info.options.push_back(std::move(info));
-    node_.set_option.push_back([member](void* options, const OptionValue& value) {
+    declaration_.add_option(std::move(info), [member](void* options, const OptionValue& value) {
       detail::from_option_value<M>(static_cast<Options*>(options)->*member, value);
     });
     return *this;
@@ -137,33 +129,27 @@ class NodeBuilder {
   void add_port() {
     using Argument = detail::Argument<A>;
     if constexpr (Argument::kPort) {
-      PortInfo port;
       constexpr detail::Role role = Argument::role();
-      port.optional = role == detail::Role::optional_input || role == detail::Role::optional_list;
-      if constexpr (role == detail::Role::list || role == detail::Role::optional_list) {
-        port.type = TypeInfo::of<typename Argument::Plain::value_type>();
-        port.axis.assign(1, '?');  // a placeholder until over() names the axis
-      } else {
-        port.type = TypeInfo::of<typename Argument::Plain>();
-      }
-      node_.info.inputs.push_back(std::move(port));
+      constexpr bool is_optional = role == detail::Role::optional_input || role == detail::Role::optional_list;
+      if constexpr (role == detail::Role::list || role == detail::Role::optional_list)
+        declaration_.add_input(TypeInfo::of<typename Argument::Plain::value_type>(), true, is_optional);
+      else
+        declaration_.add_input(TypeInfo::of<typename Argument::Plain>(), false, is_optional);
     }
   }
 
   template <class M>
-  NodeBuilder& add_output(std::string name, std::string help, const Over& axis, Output output) {
+  NodeBuilder& add_output(const std::string& name, const std::string& help, const Over& axis, Output output) {
     using Returned = detail::Returned<M>;
-    if (axis.axis.empty() == Returned::kList)
-      node_.faults.push_back("output '" + name +
-                             "': " + (Returned::kList ? "a List needs over(\"axis\")" : "over() is for a List"));
-    node_.info.outputs.push_back({std::move(name), std::move(help), TypeInfo::of<typename Returned::Item>(),
-                                  Returned::kOptional || Returned::kList, axis.axis});
+    declaration_.add_output(name, help, TypeInfo::of<typename Returned::Item>(), axis, Returned::kList,
+                            Returned::kOptional);
     outputs_->push_back(std::move(output));
     return *this;
   }
 
   template <std::size_t... I>
-  void add_tuple_output(std::size_t index, std::string name, std::string help, Over axis, std::index_sequence<I...>) {
+  void add_tuple_output(std::size_t index, const std::string& name, const std::string& help, const Over& axis,
+                        std::index_sequence<I...>) {
     const bool found = ((I == index && (add_output<std::tuple_element_t<I, R>>(
                                             name, help, axis,
                                             [axis = axis.axis](const std::shared_ptr<const R>& whole) {
@@ -172,7 +158,7 @@ class NodeBuilder {
                                             }),
                                         true)) ||
                         ...);
-    if (!found) node_.faults.push_back("output '" + name + "': the returned tuple has fewer items");
+    if (!found) declaration_.output_fault(name, "the returned tuple has fewer items");
   }
 
   static void apply(OptionInfo& info, const Minimum& minimum) { info.minimum = minimum.value; }
@@ -232,9 +218,8 @@ class NodeBuilder {
     return values;
   }
 
-  NodeDefinition& node_;
+  detail::NodeDeclaration declaration_;
   std::shared_ptr<std::vector<Output>> outputs_ = std::make_shared<std::vector<Output>>();
-  std::size_t ports_ = 0, named_inputs_ = 0;
 };
 
 }  // namespace marrow

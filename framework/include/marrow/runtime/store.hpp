@@ -55,7 +55,7 @@ class DamagedEntry : public Error {
 /// are patients' data.
 class Store {
  public:
-  explicit Store(std::filesystem::path folder = default_folder());
+  explicit Store(const std::filesystem::path& folder = default_folder());
   /// MARROW_CACHE if it is set. Else marrow/store in XDG_CACHE_HOME, in ~/.cache, or in .cache of the home folder that
   /// the system knows for the user. Empty if there is none of these: then nothing is kept.
   static std::filesystem::path default_folder();
