@@ -44,8 +44,8 @@ class StrictYaml {
       const YAML::Node& node, const Place& where, const OptionInfo& info, const std::string& what,
       const std::function<std::optional<std::string>(const std::string&, const Place&)>& substitute);
 
-  void fault(const Place& place, std::string message, std::string hint = {}) {
-    diagnostics_.add(place, std::move(message), std::move(hint));
+  void fault(const Place& place, const std::string& message, const std::string& hint = {}) {
+    diagnostics_.add(place, message, hint);
   }
 
  private:
