@@ -4,20 +4,11 @@
 #include <algorithm>
 
 #include "marrow/domain/printable.hpp"
+#include "pipeline_names.hpp"
 #include "pipeline_order.hpp"
 
 namespace marrow {
 namespace {
-
-std::string joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
-
-bool contains(const std::vector<std::string>& list, const std::string& item) {
-  return std::find(list.begin(), list.end(), item) != list.end();
-}
 
 /// Sorts sources before users, and otherwise keeps the order of the file.
 void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
@@ -27,7 +18,7 @@ void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
   if (!stuck.empty()) {
     std::vector<std::string> names;
     for (const std::size_t i : stuck) names.push_back(nodes[i].id);
-    diagnostics.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names));
+    diagnostics.add(nodes[stuck[0]].place, "these nodes wait for each other in a circle: " + joined(names, ", "));
     return;
   }
   std::vector<int> place_of(nodes.size());

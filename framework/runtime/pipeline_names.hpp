@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Names in the messages about a pipeline.
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -14,6 +15,10 @@ std::vector<std::string> names_of(const std::vector<T>& items) {
   std::vector<std::string> names;
   for (const T& item : items) names.push_back(item.name);
   return names;
+}
+
+inline bool contains(const std::vector<std::string>& list, const std::string& item) {
+  return std::find(list.begin(), list.end(), item) != list.end();
 }
 
 inline std::string joined(const std::vector<std::string>& list, const char* separator) {

@@ -14,10 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-bool holds(const std::vector<std::string>& list, const std::string& item) {
-  return std::find(list.begin(), list.end(), item) != list.end();
-}
-
 OptionValue in_folder(OptionValue value, OptionType type, const fs::path& folder) {
   const auto full = [&](const std::string& text) { return text.empty() ? text : plain_path(folder / text).string(); };
   if (type == OptionType::path) return full(std::get<std::string>(value));
@@ -32,7 +28,7 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
                      Diagnostics& diagnostics) {
   const std::vector<std::string> known = names_of(node.info.options);
   for (const auto& [name, value] : written.options)
-    if (!holds(known, name))
+    if (!contains(known, name))
       diagnostics.add(value.place, in_quotes(node.info.name) + " has no option " + in_quotes(name),
                       suggested(diagnostics, name, known));
   for (const OptionInfo& option : node.info.options) {
