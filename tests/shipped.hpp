@@ -3,6 +3,7 @@
 // Calls nodes as they are shipped: by name, out of their libraries. So a test is compiled in a moment, and says no more
 // of a node than a pipeline could.
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <marrow/domain/error.hpp>
 #include <marrow/runtime/attributes.hpp>
@@ -83,6 +84,7 @@ inline std::string refusal(const std::string& node, const Inputs& inputs, const 
 
 /// A figure of merit by its name; NaN where there is none.
 inline double figure(const marrow::Value& metrics, const std::string& name) {
+  if (metrics.is_absent()) return std::nan("");
   for (const marrow::Metric& metric : metrics.as<marrow::Metrics>().items)
     if (metric.name == name) return metric.value;
   return std::nan("");

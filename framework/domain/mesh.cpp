@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/domain/mesh.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow {
@@ -109,8 +109,7 @@ FragmentFrame fragment_frame(const Mesh& mesh) {
   FragmentFrame frame;
   frame.origin_mm = first / area;
   const Eigen::Matrix3d covariance = second / area - frame.origin_mm * frame.origin_mm.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-  Eigen::Vector3d along = solver.eigenvectors().col(2);
+  Eigen::Vector3d along = eigen_of_symmetric(covariance).vectors.col(2);
   if (along.z() < 0) along = -along;
   const Eigen::Vector3d reference = std::abs(along.x()) < 0.9 ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
   const Eigen::Vector3d frontal = (reference - along * along.dot(reference)).normalized();

@@ -131,6 +131,11 @@ std::filesystem::path files_folder() {
 }
 void set_files_folder(const std::filesystem::path& folder) { known_files_folder() = folder; }
 
+Inputs::Inputs(std::initializer_list<std::pair<std::string, Value>> values) : values_(values) {}
+
+Subject::Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options, Inputs further)
+    : node_(node), options_(std::move(options)), further_(std::move(further)) {}
+
 bool Subject::has_trait(const std::string& name) const {
   const std::vector<std::string>& traits = node_.info.traits;
   return std::find(traits.begin(), traits.end(), name) != traits.end();

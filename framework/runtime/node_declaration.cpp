@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <array>
+#include <cstddef>
 
 #include "manifest.hpp"
 #include "marrow/runtime/node_builder.hpp"
@@ -7,17 +8,71 @@
 namespace marrow::detail {
 namespace {
 
-std::string unit_of_name(const std::string& name) {
+std::string unit_of_name(std::string_view name) {
   static constexpr std::array<const char*, 8> kUnits{"mm", "deg", "rad", "px", "s", "hu", "kev", "percent"};
   const std::size_t underscore = name.rfind('_');
-  if (underscore == std::string::npos) return "";
-  const std::string suffix = name.substr(underscore + 1);
+  if (underscore == std::string_view::npos) return "";
+  const std::string suffix(name.substr(underscore + 1));
   for (const char* unit : kUnits)
     if (suffix == unit) return suffix == "hu" ? "HU" : suffix == "kev" ? "keV" : suffix == "percent" ? "%" : suffix;
   return "";
 }
 
+void apply(OptionInfo& option, const Attribute& attribute) {
+  switch (attribute.type) {
+    case Attribute::Type::minimum:
+      option.minimum = attribute.number;
+      break;
+    case Attribute::Type::maximum:
+      option.maximum = attribute.number;
+      break;
+    case Attribute::Type::unit:
+      option.unit = attribute.text;
+      break;
+    case Attribute::Type::choices:
+      option.choices.assign(attribute.names.begin(), attribute.names.end());
+      break;
+    case Attribute::Type::required:
+      option.required = true;
+      break;
+  }
+}
+
 }  // namespace
+
+Value value_of_item(const TypeInfo& type, std::shared_ptr<const void> item) {
+  Value value;
+  value.type = type;
+  if (item) value.data = std::move(item);
+  return value;
+}
+
+Value value_of_list(const TypeInfo& type, const std::vector<std::string>& names,
+                    std::vector<std::shared_ptr<const void>> items, std::string_view axis) {
+  Value value;
+  value.type = type;
+  if (items.empty()) return value;
+  value.axis = axis;
+  value.names = names;
+  for (std::shared_ptr<const void>& item : items) value.items.push_back(value_of_item(type, std::move(item)));
+  return value;
+}
+
+NodeDeclaration::NodeDeclaration(NodeDefinition& node, Function function, Call call,
+                                 std::shared_ptr<void> (*make_options)())
+    : node_(node), parts_(std::make_shared<std::vector<ReturnedPart>>()) {
+  node.make_options = make_options;
+  node.call = [function, call, parts = parts_](const std::vector<Value>& inputs, const void* options,
+                                               Context& context) {
+    const std::shared_ptr<const void> whole = call(function, inputs, options, context);
+    std::vector<Value> values;
+    for (const ReturnedPart& part : *parts) {
+      const std::shared_ptr<const void> place(whole, static_cast<const std::byte*>(whole.get()) + part.offset);
+      values.push_back(part.value(part.type, place, part.axis));
+    }
+    return values;
+  };
+}
 
 NodeDeclaration::~NodeDeclaration() {
   if (const std::size_t ports = node_.info.inputs.size(); named_inputs_ != ports)
@@ -25,6 +80,8 @@ NodeDeclaration::~NodeDeclaration() {
                            std::to_string(named_inputs_));
   check_declaration(node_);
 }
+
+std::size_t NodeDeclaration::outputs() const { return parts_->size(); }
 
 void NodeDeclaration::add_input(const TypeInfo& type, bool is_list, bool is_optional) {
   PortInfo port;
@@ -34,45 +91,62 @@ void NodeDeclaration::add_input(const TypeInfo& type, bool is_list, bool is_opti
   node_.info.inputs.push_back(std::move(port));
 }
 
-void NodeDeclaration::name_input(std::string name, std::string help, Over axis) {
+void NodeDeclaration::name_input(std::string_view name, std::string_view help, const Over& axis) {
   if (named_inputs_ < node_.info.inputs.size()) {
     PortInfo& port = node_.info.inputs[named_inputs_];
     if (axis.axis.empty() != port.axis.empty())
-      node_.faults.push_back("input '" + name +
+      node_.faults.push_back("input '" + std::string(name) +
                              "': " + (axis.axis.empty() ? "a List needs over(\"axis\")" : "over() is for List inputs"));
-    port.name = std::move(name);
-    port.help = std::move(help);
-    port.axis = std::move(axis.axis);
+    port.name = name;
+    port.help = help;
+    port.axis = axis.axis;
   }
   ++named_inputs_;
 }
 
-void NodeDeclaration::add_output(std::string name, std::string help, const TypeInfo& type, const Over& axis,
-                                 bool is_list, bool is_optional) {
-  if (axis.axis.empty() == is_list)
-    output_fault(name, is_list ? "a List needs over(\"axis\")" : "over() is for a List");
-  node_.info.outputs.push_back({std::move(name), std::move(help), type, is_optional || is_list, axis.axis});
+void NodeDeclaration::add_output(std::string_view name, std::string_view help, const Over& axis, ReturnedPart part) {
+  if (axis.axis.empty() == part.is_list)
+    output_fault(name, part.is_list ? "a List needs over(\"axis\")" : "over() is for a List");
+  PortInfo& port = node_.info.outputs.emplace_back();
+  port.name = name;
+  port.help = help;
+  port.type = part.type;
+  port.optional = part.is_optional || part.is_list;
+  port.axis = axis.axis;
+  part.axis = axis.axis;
+  parts_->push_back(std::move(part));
 }
 
-OptionInfo NodeDeclaration::option(std::string name, std::string help, OptionType type, std::size_t length,
-                                   OptionValue default_value) {
-  OptionInfo info;
-  info.unit = unit_of_name(name);
-  info.name = std::move(name);
-  info.help = std::move(help);
-  info.type = type;
-  info.length = length;
-  info.default_value = std::move(default_value);
-  return info;
+void NodeDeclaration::output_fault(std::string_view name, const char* fault) {
+  node_.faults.push_back("output '" + std::string(name) + "': " + fault);
 }
 
-void NodeDeclaration::add_option(OptionInfo info, std::function<void(void* options, const OptionValue&)> set) {
-  node_.info.options.push_back(std::move(info));
-  node_.set_option.push_back(std::move(set));
+void NodeDeclaration::add_option(std::string_view name, std::string_view help, const MemberType& type,
+                                 std::ptrdiff_t offset, const void* default_value,
+                                 std::initializer_list<Attribute> attributes) {
+  OptionInfo& option = node_.info.options.emplace_back();
+  option.name = name;
+  option.help = help;
+  option.unit = unit_of_name(name);
+  option.type = type.type;
+  option.length = type.length;
+  option.default_value = type.get(default_value);
+  for (const Attribute& attribute : attributes) apply(option, attribute);
+  type.narrow(option);
+  node_.set_option.push_back([offset, set = type.set](void* options, const OptionValue& value) {
+    set(static_cast<std::byte*>(options) + offset, value);
+  });
 }
 
-void NodeDeclaration::output_fault(const std::string& name, const char* fault) {
-  node_.faults.push_back("output '" + name + "': " + fault);
-}
+template const MemberType* member_type<bool>();
+template const MemberType* member_type<int>();
+template const MemberType* member_type<float>();
+template const MemberType* member_type<double>();
+template const MemberType* member_type<std::string>();
+template const MemberType* member_type<std::filesystem::path>();
+template const MemberType* member_type<std::vector<double>>();
+template const MemberType* member_type<std::vector<std::string>>();
+template const MemberType* member_type<std::vector<std::filesystem::path>>();
+template const MemberType* member_type<Eigen::Vector3d>();
 
 }  // namespace marrow::detail

@@ -30,7 +30,7 @@ struct Trailer {
 struct Piece {
   std::uint64_t place = 0;  ///< offset in the value's packed data
   std::uint64_t address = 0, size = 0;
-  static constexpr auto fields() { return std::make_tuple(&Piece::place, &Piece::address, &Piece::size); }
+  using fields = Fields<&Piece::place, &Piece::address, &Piece::size>;
 };
 
 /// Gathers small pieces. Larger ones are written to the file directly, or only their addresses are noted.

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 struct Remembered {
   std::string place;
   Store::Last last;
-  static constexpr auto fields() { return std::make_tuple(&Remembered::place, &Remembered::last); }
+  using fields = Fields<&Remembered::place, &Remembered::last>;
 };
 
 constexpr std::uint64_t kMostRemembered = 16 << 20;  // bytes

@@ -21,10 +21,8 @@ struct Leaf {
   std::uint64_t offset = 0, size = 0;  // of the packed value; the offset starts after the description
   std::string axis;
   std::vector<std::string> names;
-  static constexpr auto fields() {
-    return std::make_tuple(&Leaf::type, &Leaf::version, &Leaf::type_size, &Leaf::present, &Leaf::key, &Leaf::offset,
-                           &Leaf::size, &Leaf::axis, &Leaf::names);
-  }
+  using fields = Fields<&Leaf::type, &Leaf::version, &Leaf::type_size, &Leaf::present, &Leaf::key, &Leaf::offset,
+                        &Leaf::size, &Leaf::axis, &Leaf::names>;
 };
 
 struct EntryDescription {
@@ -32,10 +30,8 @@ struct EntryDescription {
   Provenance provenance;
   std::vector<Leaf> leaves;
   std::uint64_t payload = 0;  ///< bytes of all packed values
-  static constexpr auto fields() {
-    return std::make_tuple(&EntryDescription::key, &EntryDescription::provenance, &EntryDescription::leaves,
-                           &EntryDescription::payload);
-  }
+  using fields = Fields<&EntryDescription::key, &EntryDescription::provenance, &EntryDescription::leaves,
+                        &EntryDescription::payload>;
 };
 
 /// Throws Error if an output cannot be stored.

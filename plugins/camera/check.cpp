@@ -7,6 +7,7 @@
 #include <map>
 #include <marrow/plugin.hpp>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/draw/canvas.hpp"
 #include "marrow/toolbox/files/points_file.hpp"
@@ -48,7 +49,7 @@ std::optional<Eigen::Vector3d> triangulated(const KnownPoint& point, const List<
     ++count;
   }
   if (count < 2 || normal.determinant() < 1e-6) return std::nullopt;
-  return normal.ldlt().solve(right);
+  return solve_symmetric(normal, right);
 }
 
 void check_names(const std::vector<KnownPoint>& points, const List<View>& views) {

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Errors of a pose against the truth. Every table of marrow uses these figures. They describe the small motion from the
 // true pose to the found one, about the fragment's centroid and along its own axes.
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/geometry/targets.hpp"
 
 namespace {
@@ -32,7 +32,7 @@ marrow::Matrix6d in_frame(const marrow::Matrix6d& covariance, const marrow::Frag
 
 /// Standard deviation in the worst direction.
 double largest_deviation(const Eigen::Matrix3d& covariance) {
-  return std::sqrt(std::max(0.0, Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(covariance).eigenvalues()[2]));
+  return std::sqrt(std::max(0.0, marrow::eigen_of_symmetric(covariance).values[2]));
 }
 
 void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& frame, marrow::Metrics& metrics) {

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // A start from landmarks that were marked in one view or more. First poses are computed in several ways: from points
 // that two views show, and from each view alone. Each is refined over all views at once. The best one is the result.
-#include <Eigen/Cholesky>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <marrow/plugin.hpp>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/geometry/pose_starts.hpp"
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
@@ -98,7 +98,7 @@ RigidTransform refined(const std::vector<Sight>& sights, RigidTransform pose, co
     const Normal normal = normal_at(sights, pose, frame);
     Matrix6d damped = normal.curvature;
     damped.diagonal() *= 1 + damping;
-    const RigidTransform there = moved(pose, frame, -damped.ldlt().solve(normal.gradient));
+    const RigidTransform there = moved(pose, frame, -solve_symmetric(damped, normal.gradient));
     const double value_there = squares_px(sights, there);
     if (value_there < value) {
       const bool is_last = value - value_there <= 1e-14 * value;
@@ -176,7 +176,7 @@ Pose landmarks(const Mesh& model, const Landmarks& landmarks, const List<View>& 
   pose.world_from_model.source = model.frame;
   pose.cost = std::sqrt(found.front().squares_px / double(sights.size()));
   pose.covariance = options.noise_px * options.noise_px *
-                    normal_at(sights, pose.world_from_model, pose.frame).curvature.ldlt().solve(Matrix6d::Identity());
+                    inverse_of_symmetric(normal_at(sights, pose.world_from_model, pose.frame).curvature);
   if (pose.cost > 3 * options.noise_px) {
     pose.warnings.push_back(residual_warning(sights, pose, options.noise_px));
     context.warn(pose.warnings.back());

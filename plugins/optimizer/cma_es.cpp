@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Eigenvalues>
 #include <marrow/plugin.hpp>
 #include <numeric>
 #include <random>
 #include <vector>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
@@ -94,9 +94,9 @@ class Strategy {
                   c_1_ * (path_c_ * path_c_.transpose() + (is_slow ? 0 : c_c_ * (2 - c_c_)) * covariance_) +
                   c_mu_ * rank_mu;
     sigma_ *= std::exp(std::min(1.0, c_s_ / damping_ * (path_s_.norm() / expected_ - 1)));
-    const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(covariance_);
-    axes_ = solver.eigenvectors();
-    lengths_ = solver.eigenvalues().cwiseMax(1e-20).cwiseSqrt();
+    const SymmetricEigen<Eigen::Dynamic> eigen = eigen_of_symmetric(covariance_);
+    axes_ = eigen.vectors;
+    lengths_ = eigen.values.cwiseMax(1e-20).cwiseSqrt();
   }
 
   const Eigen::Index n_;

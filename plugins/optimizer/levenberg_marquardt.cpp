@@ -1,9 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <marrow/plugin.hpp>
 #include <string>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/search/evaluations.hpp"
 
 namespace {
@@ -32,9 +31,8 @@ Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::Vec
     for (Eigen::Index j = 0; j < i; ++j)
       about.curvature(i, j) = about.curvature(j, i) =
           (evaluate(shifted(i, h, j, h)) - above[i] - above[j] + value) / (h * h);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(about.curvature);
-  about.curvature =
-      solver.eigenvectors() * solver.eigenvalues().cwiseAbs().asDiagonal() * solver.eigenvectors().transpose();
+  const SymmetricEigen<Eigen::Dynamic> eigen = eigen_of_symmetric(about.curvature);
+  about.curvature = eigen.vectors * eigen.values.cwiseAbs().asDiagonal() * eigen.vectors.transpose();
   return about;
 }
 
@@ -83,7 +81,7 @@ class Search {
     for (; damping_ < kMostDamping; damping_ *= 8) {
       Eigen::MatrixXd damped = about_->curvature;
       damped.diagonal() += damping_ * steepness.cwiseMax(floor);
-      Eigen::VectorXd step = -damped.ldlt().solve(about_->gradient);
+      Eigen::VectorXd step = -solve_symmetric(damped, about_->gradient);
       if (!step.allFinite()) continue;
       if (step.norm() > kLongest) step *= kLongest / step.norm();
       const Eigen::VectorXd there = evaluate_.within(here_ + step);

@@ -2,11 +2,11 @@
 // Iterative closest points (ICP): Besl and McKay, A method for registration of 3-D shapes, IEEE PAMI 14, 1992, in PCL's
 // version. The target is a surface in the world, for example touched with a pointer or from another scan. Model and
 // target need not show the same part of the bone.
-#include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/match/closest_points.hpp"
 
 namespace {
@@ -35,11 +35,6 @@ void check_frames(const Pose& initial, const Mesh& model, const Mesh& target) {
   if (target.frame != initial.world_from_model.target)
     throw Error("the target is in the frame '" + target.frame + "', but the pose to start from leads to '" +
                 initial.world_from_model.target + "'; the target is a surface in the world");
-}
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * svd.matrixV().transpose();
 }
 
 std::string percent(std::size_t part, std::size_t whole) {
@@ -83,8 +78,8 @@ Result icp(const Pose& initial, const Mesh& model, const Mesh& target, const Opt
   result.pose = start;
   result.pose.warnings.clear();
   RigidTransform& pose = result.pose.world_from_model;
-  const Eigen::Matrix3d turn = nearest_rotation(found.motion.topLeftCorner<3, 3>());
-  pose.rotation = nearest_rotation(turn * pose.rotation);
+  const Eigen::Matrix3d turn = nearest_orthogonal(found.motion.topLeftCorner<3, 3>());
+  pose.rotation = nearest_orthogonal(turn * pose.rotation);
   pose.translation_mm = turn * (pose.translation_mm - middle) + found.motion.topRightCorner<3, 1>() + middle;
   result.pose.cost = found.rms;
   add_warnings(found, options, result.pose, context);

@@ -4,11 +4,11 @@
 // Mach. Intell. 14, 1992; similarity: Umeyama, same journal 13, 1991.) The template is one unbroken bone. So for
 // displaced fragments the result can be right for one fragment at most, as the chapter says and a test shows. A point
 // belongs to the fragment of the nearest seed.
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include <marrow/domain/decompositions.hpp>
 #include "marrow/toolbox/field/expansion.hpp"
 #include "marrow/toolbox/field/fragments.hpp"
 #include "marrow/toolbox/field/interior.hpp"
@@ -108,8 +108,8 @@ Moments moments_of(double volume, const Vector3d& first, const Eigen::Matrix3d& 
   Moments moments;
   moments.centre = first / volume;
   const Eigen::Matrix3d spread = second / volume - moments.centre * moments.centre.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-  moments.axes = solver.eigenvectors();
+  const SymmetricEigen<3> eigen = eigen_of_symmetric(spread);
+  moments.axes = eigen.vectors;
   if (moments.axes.determinant() < 0) moments.axes.col(0) *= -1;
   moments.size = std::sqrt(spread.trace());
   return moments;

@@ -1,19 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 // From images to the calibration: the beads are found, told apart, and the device comes out.
-#include "plugins/camera/bead_board.cpp"
-
 #include <gtest/gtest.h>
-#include <opencv2/imgproc.hpp>
 
 #include <cstdio>
 #include <map>
+#include <opencv2/imgproc.hpp>
 
 #include "camera/boards.hpp"
 #include "marrow/toolbox/files/calibration_file.hpp"
 #include "read/files.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace bead_board_test {
 
+using namespace marrow;
 using marrow::test::kBoardFile;
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
@@ -121,17 +121,29 @@ TEST(MatchBoard, EveryMatchIsRightAndFewAreMissing) {
   EXPECT_GT(found, 0.9 * expected);
 }
 
-BeadBoardResult calibrated(const List<Image>& images, BeadBoardOptions options = {}) {
-  options.board = kBoardFile;
-  Context context;
-  return bead_board(images, options, context);
+struct Result {
+  List<Camera> cameras;
+  Calibration calibration;
+  List<Picture> pictures;
+};
+
+Result calibrated(const List<Image>& images) {
+  const auto outputs =
+      shipped::call("camera.bead_board", {{"images", shipped::list(images, "view")}}, {{"board", kBoardFile.string()}});
+  return {outputs.at("camera").as_list<Camera>(), outputs.at("calibration").as<Calibration>(),
+          outputs.at("picture").as_list<Picture>()};
+}
+
+void write_calibration(const Calibration& calibration, const std::string& path) {
+  static const Catalogue catalogue;
+  catalogue.load_writer(TypeInfo::of<Calibration>()).write(&calibration, path);
 }
 
 TEST(BeadBoard, DeviceFromRenderedImages) {
   double focal = 0, principal = 0, worst_residual = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
     const Exposed exposed = expose(seed, 8);
-    const BeadBoardResult result = calibrated(exposed.images);
+    const Result result = calibrated(exposed.images);
     const auto& found = result.calibration;
     for (int i : {0, 1}) {
       focal = std::max(focal, 100 * std::abs(found.intrinsics(i, i) / exposed.device.intrinsics(i, i) - 1));
@@ -152,7 +164,7 @@ TEST(BeadBoard, DeviceFromRenderedImages) {
 
 TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
   const Exposed exposed = expose(9, 6);
-  const BeadBoardResult result = calibrated(exposed.images);
+  const Result result = calibrated(exposed.images);
   View view{"view1", exposed.images[0], result.cameras[0], {}};
   apply_calibration(view, result.calibration);
   double worst = 0;
@@ -175,7 +187,7 @@ TEST(BeadBoard, NoisyFaintAndBlurredBeads) {
   exposure.attenuation_per_mm = 0.5;
   exposure.blur_px = 1.5;
   const Exposed exposed = expose(21, 6, {}, exposure);
-  const BeadBoardResult result = calibrated(exposed.images);
+  const Result result = calibrated(exposed.images);
   std::printf("60 photons, faint and blurred: residual %.3f px, focal length off %.4f %%, principal point %.3f px\n",
               result.calibration.residual_px,
               100 * std::abs(result.calibration.intrinsics(0, 0) / exposed.device.intrinsics(0, 0) - 1),
@@ -309,4 +321,4 @@ TEST(BoardFile, RefusesBoardsThatLookAlikeWhenTurned) {
   EXPECT_SAYS(calibration::read_board_file(folder / "board.yaml"), "the two sides look the same");
 }
 
-}  // namespace
+}  // namespace bead_board_test

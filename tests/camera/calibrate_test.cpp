@@ -9,7 +9,7 @@
 #include "marrow/toolbox/calibration/calibrate.hpp"
 #include "read/files.hpp"
 
-namespace {
+namespace calibrate_test {
 
 using namespace marrow;
 using calibration::CalibrationModel;
@@ -206,4 +206,4 @@ TEST(Calibrate, RefusesWithoutEnoughBeads) {
   EXPECT_SAYS(calibration::calibrate(views, 1024, 1024, {}), "view 'view2': 5 beads are seen; at least 8 are needed");
 }
 
-}  // namespace
+}  // namespace calibrate_test

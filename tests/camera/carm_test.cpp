@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/camera/carm.cpp"
-
 #include <gtest/gtest.h>
 
+#include <cmath>
+
+#include "marrow/domain/c_arm.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace carm_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using marrow::world_from_camera_rotation;
 
-marrow::Camera view(double alpha_deg, double beta_deg, Options options = {}) {
-  options.names = {"one"};
-  options.alpha_deg = {alpha_deg};
-  options.beta_deg = {beta_deg};
-  return carm(options)[0];
+marrow::Camera view(double alpha_deg, double beta_deg, shipped::Options options = {}) {
+  options["names"] = std::vector<std::string>{"one"};
+  options["alpha_deg"] = std::vector<double>{alpha_deg};
+  options["beta_deg"] = std::vector<double>{beta_deg};
+  return shipped::call("camera.carm", {}, options).at("camera").as_list<marrow::Camera>()[0];
 }
 
 Vector3d towards_detector(const marrow::Camera& camera) { return camera.camera_from_world.rotation.row(2); }
@@ -51,16 +52,16 @@ TEST(CarmCamera, DirectionFollowsTheFormulaForBothAnglesTogether) {
 }
 
 TEST(CarmCamera, IsocentreProjectsToTheMiddleOfTheDetectorInEveryView) {
-  Options options;
-  options.isocentre_mm = {12, -7, 300};
-  options.width_px = 1024;
-  options.height_px = 768;
+  const Vector3d isocentre_mm(12, -7, 300);
+  const shipped::Options options{{"isocentre_mm", std::vector<double>{12, -7, 300}},
+                                 {"width_px", std::int64_t{1024}},
+                                 {"height_px", std::int64_t{768}}};
   for (double alpha : {-30.0, 0.0, 45.0})
     for (double beta : {-120.0, 0.0, 60.0, 90.0}) {
       const marrow::Camera camera = view(alpha, beta, options);
-      EXPECT_LT((project(camera, options.isocentre_mm) - Vector2d(511.5, 383.5)).norm(), 1e-9);
+      EXPECT_LT((project(camera, isocentre_mm) - Vector2d(511.5, 383.5)).norm(), 1e-9);
       // Isocentric: t is constant once the isocentre is the origin.
-      EXPECT_TRUE((camera.camera_from_world * options.isocentre_mm).isApprox(Vector3d(0, 0, 600), 1e-12));
+      EXPECT_TRUE((camera.camera_from_world * isocentre_mm).isApprox(Vector3d(0, 0, 600), 1e-12));
     }
 }
 
@@ -93,7 +94,7 @@ TEST(CarmCamera, RelativeMotionBetweenTwoPoses) {
 }
 
 TEST(CarmCamera, DefaultsAreTwoNamedViews) {
-  const auto cameras = carm(Options{});
+  const auto cameras = shipped::call("camera.carm", {}).at("camera").as_list<marrow::Camera>();
   EXPECT_EQ(cameras.names(), (std::vector<std::string>{"frontal", "lateral"}));
   EXPECT_EQ(cameras[0].width_px, 512);
 }
@@ -105,4 +106,4 @@ TEST(CarmCamera, DeclaresAnglesForEachViewAndTheDetectorBehindTheIsocentre) {
   EXPECT_TRUE(shipped::declares("camera.carm", marrow::below("source_to_isocentre_mm", "source_to_detector_mm")));
 }
 
-}  // namespace
+}  // namespace carm_test

@@ -1,20 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/camera/check.cpp"
-
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <cstdio>
-#include <opencv2/imgproc.hpp>
+#include <map>
 #include <random>
 
 #include "marrow/domain/c_arm.hpp"
+#include "marrow/toolbox/calibration/plausibility.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/points_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace check_test {
 
+using namespace marrow;
+using calibration::SeenPoints;
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 using marrow::test::put;
@@ -179,22 +183,23 @@ TEST(ImplausibleNumbers, AreNamed) {
 }
 
 struct Ran {
-  Checked checked;
+  shipped::Outputs outputs;
   std::vector<std::string> warnings;
   double value(const std::string& name) const {
-    for (const auto& item : checked.metrics.items)
-      if (item.name == name) return item.value;
-    ADD_FAILURE() << "no metric " << name;
-    return 0;
+    const double value = shipped::figure(outputs.at("metrics"), name);
+    if (std::isnan(value)) ADD_FAILURE() << "no metric " << name;
+    return value;
   }
+  List<Picture> pictures() const { return outputs.at("picture").as_list<Picture>(); }
 };
 
-Ran run(const List<View>& views, const Options& options, const Mesh* mesh = nullptr) {
+Ran run(const List<View>& views, const std::filesystem::path& points, const Mesh* mesh = nullptr) {
   Ran ran;
   Context::Hooks hooks;
-  hooks.log = [&](std::string_view text, marrow::LogLevel) { ran.warnings.emplace_back(text); };
-  Context context(hooks);
-  ran.checked = check(views, mesh, options, context);
+  hooks.log = [&](std::string_view text, LogLevel) { ran.warnings.emplace_back(text); };
+  shipped::Inputs inputs{{"views", shipped::list(views, "view")}};
+  if (mesh) inputs["mesh"] = shipped::item(*mesh);
+  ran.outputs = shipped::call("camera.check", inputs, {{"points", points.string()}}, Context(hooks));
   return ran;
 }
 
@@ -232,14 +237,12 @@ TEST(CheckNode, RightCamerasNeedNoWarning) {
   views.add("two", view_of("two", camera_at(0, 80)));
   for (const bool with_places : {true, false}) {
     put(folder / "points.yaml", points_text(views, 12, with_places));
-    Options options;
-    options.points = folder / "points.yaml";
-    const Ran ran = run(views, options);
+    const Ran ran = run(views, folder / "points.yaml");
     EXPECT_TRUE(ran.warnings.empty()) << ran.warnings[0];
     EXPECT_LT(ran.value("error"), 1e-4);
     EXPECT_EQ(ran.value("one.points"), 12);
     EXPECT_EQ(ran.value("warnings"), 0);
-    EXPECT_EQ(ran.checked.pictures.names(), views.names());
+    EXPECT_EQ(ran.pictures().names(), views.names());
   }
 }
 
@@ -249,14 +252,12 @@ TEST(CheckNode, WarnsInWords) {
   right.add("one", view_of("one", camera_at(5, 0)));
   right.add("two", view_of("two", camera_at(0, 80)));
   put(folder / "points.yaml", points_text(right, 12, true));
-  Options options;
-  options.points = folder / "points.yaml";
   List<View> views;
   views.add("one", right[0]);
   Camera moved = right[1].camera;
   moved.camera_from_world.translation_mm.x() += 5;
   views.add("two", view_of("two", moved));
-  Ran ran = run(views, options);
+  Ran ran = run(views, folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
   EXPECT_NE(ran.warnings[0].find("view 'two': the points are"), std::string::npos);
   EXPECT_NE(ran.warnings[0].find("its inner parameters are right, its pose is not, or the object has moved"),
@@ -269,7 +270,7 @@ TEST(CheckNode, WarnsInWords) {
   List<View> stretched;
   stretched.add("one", right[0]);
   stretched.add("two", view_of("two", longer));
-  ran = run(stretched, options);
+  ran = run(stretched, folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
   EXPECT_NE(ran.warnings[0].find(
                 "with the best pose: focal length, principal point, distortion or the points themselves are wrong"),
@@ -279,7 +280,7 @@ TEST(CheckNode, WarnsInWords) {
   twice.add("one", right[0]);
   twice.add("two", view_of("two", right[0].camera));
   put(folder / "points.yaml", points_text(twice, 12, true));
-  ran = run(twice, options);
+  ran = run(twice, folder / "points.yaml");
   ASSERT_EQ(ran.warnings.size(), 1u);
   EXPECT_NE(ran.warnings[0].find("look along nearly the same line"), std::string::npos);
 }
@@ -296,15 +297,28 @@ TEST(CheckNode, DrawsTheOutlineOfAMesh) {
     cube.triangles.push_back({std::uint32_t(q[0]), std::uint32_t(q[2]), std::uint32_t(q[3])});
   }
   ASSERT_TRUE(is_closed(cube));
-  EXPECT_EQ(outline_edges(cube, views[0].camera).size(), 4u) << "of the face towards the source";
   const Ran ran = run(views, {}, &cube);
   EXPECT_TRUE(ran.warnings.empty());
-  // The nearer face is 30 mm behind the isocentre, towards the source: its edge lies at 30 * 2000 / 570 px from the
+  const cv::Mat pixels = ran.pictures()[0].pixels;
+  const double scale = 1000 / 640.0;
+  const auto is_blue = [&](double u, double v) {
+    const auto in_picture = [&](double at_px) { return int(std::lround((at_px + 0.5) * scale - 0.5)); };
+    const cv::Vec3b pixel = pixels.at<cv::Vec3b>(in_picture(v), in_picture(u));
+    return pixel[2] > pixel[0] + 40;
+  };
+  // The nearer face is 30 mm behind the isocentre, towards the source: its edges lie at 30 * 2000 / 570 px from the
   // middle.
-  const double u = 319.5 + 9 + 30 * 2000 / 570.0, v = 255.5 - 6, scale = 1000 / 640.0;
-  const cv::Vec3b pixel =
-      ran.checked.pictures[0].pixels.at<cv::Vec3b>(int((v + 0.5) * scale), int(std::lround((u + 0.5) * scale - 0.5)));
-  EXPECT_GT(pixel[2], pixel[0] + 40) << "blue";
+  const double u = 319.5 + 9, v = 255.5 - 6, half = 30 * 2000 / 570.0;
+  for (double along = -half; along <= half; along += 1) {
+    EXPECT_TRUE(is_blue(u + half, v + along)) << along;
+    EXPECT_TRUE(is_blue(u - half, v + along)) << along;
+    EXPECT_TRUE(is_blue(u + along, v + half)) << along;
+    EXPECT_TRUE(is_blue(u + along, v - half)) << along;
+  }
+  int within = 0;
+  for (double across = 4 - half; across <= half - 4; across += 0.5)
+    for (double down = 4 - half; down <= half - 4; down += 0.5) within += is_blue(u + across, v + down);
+  EXPECT_EQ(within, 0) << "of the face towards the source only";
 }
 
 TEST(PointsFile, Faults) {
@@ -323,9 +337,8 @@ TEST(PointsFile, Faults) {
   List<View> views;
   views.add("two", view_of("two", camera_at(0, 0)));
   put(folder / "p.yaml", good);
-  Options options;
-  options.points = folder / "p.yaml";
-  EXPECT_SAYS(run(views, options), "point 'A' is seen in 'one', but there is no view of that name; there are 'two'");
+  EXPECT_SAYS(run(views, folder / "p.yaml"),
+              "point 'A' is seen in 'one', but there is no view of that name; there are 'two'");
 }
 
 // Twelve metal beads in two frames of a real biplane system, their places triangulated from the same pixels.
@@ -356,9 +369,7 @@ TEST(CheckNode, RealWristCameras) {
                 ", cam02: " + list(bead["uv_cam02"]) + "}}\n";
       }
     put(folder / "beads.yaml", text);
-    Options options;
-    options.points = folder / "beads.yaml";
-    const Ran ran = run(views, options);
+    const Ran ran = run(views, folder / "beads.yaml");
     for (const char* name : {"cam01", "cam02"})
       std::printf("frame %s, %s: %g beads, rms %.3f px, worst %.3f px, %.3f mm at the beads\n", frame, name,
                   ran.value(name + std::string(".points")), ran.value(name + std::string(".error")),
@@ -379,11 +390,11 @@ TEST(CheckNode, RealWristCameras) {
       mirrored += "}}\n";
     }
     put(folder / "beads.yaml", "marrow-points: 1\npoints:\n" + mirrored);
-    const Ran found = run(views, options);
+    const Ran found = run(views, folder / "beads.yaml");
     ASSERT_EQ(found.warnings.size(), 2u);
     for (const auto& warning : found.warnings)
       EXPECT_NE(warning.find("if the image is mirrored left to right"), std::string::npos) << warning;
   }
 }
 
-}  // namespace
+}  // namespace check_test

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/camera/dicom.cpp"
-
 #include <gtest/gtest.h>
+
+#include <cmath>
 
 #include "marrow/domain/c_arm.hpp"
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace dicom_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -30,17 +30,23 @@ struct Read {
   std::vector<std::string> warnings;
 };
 
-Read read(const Elements& elements, Options options = {}) {
+marrow::List<marrow::Camera> cameras_of(const std::vector<std::string>& paths, shipped::Options options = {},
+                                        const marrow::Context& context = marrow::Context()) {
+  options["paths"] = paths;
+  return shipped::call("camera.dicom", {}, options, context).at("camera").as_list<marrow::Camera>();
+}
+
+Read read(const Elements& elements, const shipped::Options& options = {}) {
   const TemporaryFolder folder;
   put(folder / "x.dcm", dicom_file(elements));
   Read result;
   marrow::Context::Hooks hooks;
   hooks.log = [&](std::string_view text, marrow::LogLevel) { result.warnings.emplace_back(text); };
-  marrow::Context context(hooks);
-  options.paths = {folder / "x.dcm"};
-  result.camera = dicom(options, context)[0];
+  result.camera = cameras_of({folder / "x.dcm"}, options, marrow::Context(hooks))[0];
   return result;
 }
+
+shipped::Options frame(std::int64_t number) { return {{"frame", number}}; }
 
 Elements with(Elements elements, std::uint32_t tag, const std::string& value) {
   elements[tag] = value;
@@ -124,10 +130,7 @@ TEST(DicomCamera, NamesAllThatIsMissing) {
               "source_to_detector_mm); DistanceSourceToPatient (0018,1111) or EstimatedRadiographicMagnificationFactor "
               "(0018,1114) (or "
               "give source_to_isocentre_mm); ImagerPixelSpacing (0018,1164) (or give pixel_mm)");
-  Options given;
-  given.source_to_detector_mm = 1100;
-  given.source_to_isocentre_mm = 700;
-  given.pixel_mm = 0.5;
+  const shipped::Options given{{"source_to_detector_mm", 1100.0}, {"source_to_isocentre_mm", 700.0}, {"pixel_mm", 0.5}};
   const marrow::Camera camera = read(without(fluoroscopy(), {0x00181110, 0x00181111, 0x00181164}), given).camera;
   EXPECT_NEAR(camera.intrinsics(0, 0), 2200, 1e-9);
   EXPECT_NEAR((camera.camera_from_world * Vector3d::Zero()).z(), 700, 1e-9);
@@ -217,9 +220,7 @@ TEST(DicomCamera, RefusesWhatCannotBe) {
               "PositionerPrimaryAngle (0018,1510): expected 1 number, got 'left'");
   EXPECT_SAYS(read(with(fluoroscopy(), 0x00181164, "DS:0.3")),
               "ImagerPixelSpacing (0018,1164): expected 2 numbers, got '0.3'");
-  Options second;
-  second.frame = 2;
-  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181500, "CS:DYNAMIC"), second), "the arm moves during this run");
+  EXPECT_SAYS(read(with(fluoroscopy(), 0x00181500, "CS:DYNAMIC"), frame(2)), "the arm moves during this run");
 }
 
 // Enhanced files keep the same elements in sequences: shared by all frames, or one item for each frame.
@@ -240,10 +241,7 @@ TEST(DicomCamera, IsocentreDistanceAsABinaryNumber) {
   EXPECT_NEAR((read(header).camera.camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
   const TemporaryFolder folder;
   put(folder / "x.dcm", implicit_file(header));
-  Options options;
-  options.paths = {folder / "x.dcm"};
-  marrow::Context context;
-  EXPECT_NEAR((dicom(options, context)[0].camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
+  EXPECT_NEAR((cameras_of({folder / "x.dcm"})[0].camera_from_world * Vector3d::Zero()).z(), 785.5, 1e-9);
   EXPECT_SAYS(read(with(header, 0x00189402, "FL:nan")),
               "DistanceSourceToIsocenter (0018,9402): expected 1 number, got 4 bytes");
 }
@@ -260,11 +258,7 @@ TEST(DicomCamera, AnglesOfEachFrameInAnImplicitFile) {
   header[0x52009230] = dicom_items(frames);
   const TemporaryFolder folder;
   put(folder / "x.dcm", implicit_file(header));
-  Options options;
-  options.paths = {folder / "x.dcm"};
-  options.frame = 2;
-  marrow::Context context;
-  EXPECT_TRUE(towards_detector(dicom(options, context)[0]).isApprox(Vector3d::UnitX()));
+  EXPECT_TRUE(towards_detector(cameras_of({folder / "x.dcm"}, frame(2))[0]).isApprox(Vector3d::UnitX()));
 }
 
 /// Three frames, at these angles.
@@ -289,13 +283,10 @@ TEST(DicomCamera, FramesWithAGeometryEachMustBeNamed) {
       read(turning),
       "x.dcm: has 3 frames with a geometry each (frame 1 at 0, 0 degrees; frame 2 at 30, 0 degrees; frame 3 at 60, 0 "
       "degrees); name the one that the image is of with frame (from 1)");
-  Options options;
-  options.frame = 3;
-  const Eigen::Matrix3d third = read(turning, options).camera.camera_from_world.rotation;
+  const Eigen::Matrix3d third = read(turning, frame(3)).camera.camera_from_world.rotation;
   EXPECT_TRUE(third.isApprox(at("60", "0").camera_from_world.rotation));
   EXPECT_TRUE(read(frames_at({"60", "60", "60"})).camera.camera_from_world.rotation.isApprox(third)) << "all alike";
-  options.frame = 4;
-  EXPECT_SAYS(read(turning, options), "x.dcm: has 3 frames; there is no frame 4");
+  EXPECT_SAYS(read(turning, frame(4)), "x.dcm: has 3 frames; there is no frame 4");
 }
 
 TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
@@ -307,11 +298,8 @@ TEST(DicomCamera, IncrementsOfTheAnglesAreMotion) {
   for (const std::uint32_t tag : {0x00181520u, 0x00181521u}) {
     const Elements moving = with(still, tag, "DS:0\\30\\60");
     EXPECT_SAYS(read(moving), "the arm moves during this run of 3 frames");
-    Options options;
-    options.frame = 3;
-    EXPECT_SAYS(read(moving, options), "use frame 1, or describe the C-arm yourself with the angles of frame 3");
-    options.frame = 1;
-    EXPECT_TRUE(read(moving, options)
+    EXPECT_SAYS(read(moving, frame(3)), "use frame 1, or describe the C-arm yourself with the angles of frame 3");
+    EXPECT_TRUE(read(moving, frame(1))
                     .camera.camera_from_world.rotation.isApprox(read(still).camera.camera_from_world.rotation));
   }
 }
@@ -320,14 +308,12 @@ TEST(DicomCamera, OneCameraPerFileByName) {
   const TemporaryFolder folder;
   put(folder / "front.dcm", dicom_file(fluoroscopy()));
   put(folder / "side.dcm", dicom_file(with(with(fluoroscopy(), kPrimary, "DS:90"), kOrientation, "CS:A\\F")));
-  Options options;
-  options.paths = {folder / "front.dcm", folder / "side.dcm"};
-  marrow::Context context;
-  EXPECT_EQ(dicom(options, context).names(), (std::vector<std::string>{"front", "side"}));
-  options.names = {"frontal", "frontal"};
-  EXPECT_SAYS(dicom(options, context), "names: two views are named 'frontal'");
+  const std::vector<std::string> paths{folder / "front.dcm", folder / "side.dcm"};
+  EXPECT_EQ(cameras_of(paths).names(), (std::vector<std::string>{"front", "side"}));
+  EXPECT_SAYS(cameras_of(paths, {{"names", std::vector<std::string>{"frontal", "frontal"}}}),
+              "names: two views are named 'frontal'");
   EXPECT_TRUE(shipped::declares("camera.dicom", marrow::as_many_or_none("names", "paths")));
   EXPECT_TRUE(shipped::declares("camera.dicom", marrow::at_least_one({"paths"})));
 }
 
-}  // namespace
+}  // namespace dicom_test

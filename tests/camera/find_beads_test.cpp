@@ -8,7 +8,7 @@
 #include <opencv2/core.hpp>
 #include <random>
 
-namespace {
+namespace find_beads_test {
 
 using marrow::calibration::BeadImage;
 using marrow::calibration::find_beads;
@@ -41,8 +41,6 @@ cv::Mat1f image_of(const std::vector<Ellipse>& ellipses, int width = 300, int he
 std::size_t count(const std::vector<Ellipse>& ellipses, double largest_px = 24, double least_contrast = 0.2) {
   return find_beads({image_of(ellipses)}, {largest_px, least_contrast}).size();
 }
-
-}  // namespace
 
 TEST(FindBeads, RoundMeansFourFifths) {
   for (const auto& [across, found] : {std::pair(16.0, 1u), {14.0, 1u}, {13.4, 1u}, {11.4, 0u}, {10.0, 0u}}) {
@@ -119,3 +117,5 @@ TEST(FindBeads, CentresOnSlopesAndBesideOthers) {
     }
   }
 }
+
+}  // namespace find_beads_test

@@ -6,10 +6,10 @@
 #include <algorithm>
 
 #include "camera/boards.hpp"
-#include "domain/message_of.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
+#include "read/files.hpp"
 
-namespace {
+namespace match_board_test {
 
 using namespace marrow;
 
@@ -76,8 +76,6 @@ Matched match(const Seen& seen) {
   return matched;
 }
 
-}  // namespace
-
 TEST(MatchBoard, AllThatAreSeenAndNoOthers) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed)
     for (const double pincushion : {0.0, 7.0}) {
@@ -103,3 +101,5 @@ TEST(MatchBoard, ASideIsFoundBySixTenthsOfItsBeads) {
         << message;
   }
 }
+
+}  // namespace match_board_test

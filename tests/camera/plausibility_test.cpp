@@ -9,7 +9,7 @@
 
 #include "marrow/domain/c_arm.hpp"
 
-namespace {
+namespace plausibility_test {
 
 using namespace marrow;
 using calibration::Device;
@@ -75,8 +75,6 @@ SeenPoints points_of(const Camera& camera, int count = 20) {
   }
   return points;
 }
-
-}  // namespace
 
 TEST(Plausibility, AnglesOfTheImage) {
   for (const auto& [angle, said] : {std::pair(59.9, false), {60.1, true}, {2.02, false}, {1.98, true}})
@@ -251,3 +249,5 @@ TEST(Refit, NeedsSixPoints) {
   EXPECT_NEAR(refit->turn_deg, 0, 1e-3);
   EXPECT_NEAR(refit->shift_mm, 4, 1e-3);
 }
+
+}  // namespace plausibility_test

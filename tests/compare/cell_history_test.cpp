@@ -9,13 +9,11 @@
 #include "framework/compare/draw.hpp"
 #include "marrow/compare/cell.hpp"
 
+namespace cell_history_test {
+
 using namespace marrow::compare;
 
-namespace {
-
 MetricChoice metric(MetricChoice::Better better, std::optional<double> limit) { return {"a.b", "", better, limit}; }
-
-}  // namespace
 
 TEST(CellRow, IsASuccessWithinEveryLimit) {
   Experiment experiment;
@@ -83,8 +81,6 @@ TEST(Histories, EachPartThatMayChangeAResultCounts) {
   }
 }
 
-namespace {
-
 /// SplitMix64 as scipy_test.py has it as well.
 struct SplitMix {
   std::uint64_t state;
@@ -95,8 +91,6 @@ struct SplitMix {
     return double((bits ^ (bits >> 31)) >> 11) / 9007199254740992.0;
   }
 };
-
-}  // namespace
 
 TEST(Draw, StartsAreTheSameOnAnyMachine) {
   StartProtocol protocol;
@@ -137,3 +131,5 @@ TEST(Draw, InputsAreUniformInTheirRanges) {
   EXPECT_NEAR(std::stod(values[2].value), 100 + random.uniform(), 1e-3);
   EXPECT_EQ(number_text(0.1 + 0.2), "0.3");
 }
+
+}  // namespace cell_history_test

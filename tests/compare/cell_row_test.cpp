@@ -7,7 +7,7 @@
 #include "marrow/compare/cell.hpp"
 #include "marrow/domain/error.hpp"
 
-namespace {
+namespace cell_row_test {
 
 using marrow::compare::CellRow;
 using nlohmann::json;
@@ -113,4 +113,4 @@ TEST(CellRowText, NoJson) {
   EXPECT_THROW(marrow::compare::row_from_json(endless, experiment()), marrow::Error);
 }
 
-}  // namespace
+}  // namespace cell_row_test

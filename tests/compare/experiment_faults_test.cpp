@@ -3,7 +3,15 @@
 #include "experiment_files.hpp"
 #include "framework/runtime/file_names.hpp"
 
-namespace {
+namespace experiment_faults_test {
+
+using experiment_files::ExperimentFiles;
+using experiment_files::kCases;
+using experiment_files::kHead;
+using experiment_files::kMetrics;
+using experiment_files::kPipeline;
+using experiment_files::kVariants;
+using runtime_fixture::test_catalogue;
 
 const std::string kStart = std::string(kHead) + kCases;   // lines 1 to 3
 const std::string kGood = kStart + kVariants + kMetrics;  // lines 1 to 7
@@ -264,4 +272,4 @@ TEST_F(ExperimentFaults, SuccessBaselineAndPictures) {
   expect_fault_of("timed_cells: all", "timed_cells: expected an integer, got 'all'");
 }
 
-}  // namespace
+}  // namespace experiment_faults_test

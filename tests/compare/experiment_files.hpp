@@ -6,6 +6,11 @@
 #include "marrow/compare/experiment.hpp"
 #include "runtime/fixture.hpp"
 
+namespace experiment_files {
+
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
+
 inline constexpr const char* kPipeline =
     "marrow: 1\ninputs: {case: {type: path}}\nnodes:\n  c: {uses: test.constant, with: {path: $case, value: 1}}\n"
     "  n: {uses: test.add, in: {a: c, b: c}}\n  f: {uses: test.fail_above, in: {a: n}, with: {value: 9}}\n"
@@ -33,3 +38,5 @@ class ExperimentFiles : public testing::Test {
   Scratch scratch;
   marrow::Diagnostics diagnostics;
 };
+
+}  // namespace experiment_files

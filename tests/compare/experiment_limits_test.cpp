@@ -7,9 +7,16 @@
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
 
-namespace {
+namespace experiment_limits_test {
 
 namespace fs = std::filesystem;
+using experiment_files::ExperimentFiles;
+using experiment_files::kCases;
+using experiment_files::kHead;
+using experiment_files::kMetrics;
+using experiment_files::kPipeline;
+using experiment_files::kVariants;
+using runtime_fixture::test_catalogue;
 
 const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3
 const std::string kGood = kStart + kVariants + kMetrics;
@@ -197,4 +204,4 @@ TEST_F(ExperimentLimits, AVariantWhoseOutputIsNoFigure) {
                "e.yaml:7:3: error: in variant 'two' output 'number' is truth, not figures of merit");
 }
 
-}  // namespace
+}  // namespace experiment_limits_test

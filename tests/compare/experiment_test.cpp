@@ -5,9 +5,16 @@
 #include "experiment_files.hpp"
 #include "marrow/compare/cell.hpp"
 
-namespace {
+namespace experiment_test {
 
+using experiment_files::ExperimentFiles;
+using experiment_files::kCases;
+using experiment_files::kHead;
+using experiment_files::kMetrics;
+using experiment_files::kPipeline;
+using experiment_files::kVariants;
 using marrow::compare::Experiment;
+using runtime_fixture::test_catalogue;
 
 TEST_F(ExperimentFiles, FoldersVariantsAndSuccess) {
   const Experiment e =
@@ -179,4 +186,4 @@ TEST_F(ExperimentFiles, WhatIsNoFolderIsNoCase) {
   EXPECT_EQ(read(std::string(kHead) + kCases + kVariants + kMetrics).cases.size(), 2u);
 }
 
-}  // namespace
+}  // namespace experiment_test

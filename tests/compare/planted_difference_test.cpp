@@ -7,9 +7,9 @@
 #include <marrow/compare/statistics.hpp>
 #include <random>
 
-using namespace marrow::compare;
+namespace planted_difference_test {
 
-namespace {
+using namespace marrow::compare;
 
 constexpr int case_count = 20;
 constexpr int starts = 3;
@@ -99,4 +99,4 @@ TEST(PlantedDifference, IsFound) {
   EXPECT_GE(found_of_100(0.2), 95);
 }
 
-}  // namespace
+}  // namespace planted_difference_test

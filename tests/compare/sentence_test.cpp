@@ -6,10 +6,10 @@
 
 #include "domain/message_of.hpp"
 
+namespace sentence_test {
+
 using namespace marrow::compare;
 using marrow::test::message_of;
-
-namespace {
 
 Comparison comparison_of(double difference, double lower, double upper, std::size_t cases = 20) {
   Comparison comparison;
@@ -112,4 +112,4 @@ TEST(Sentence, RefusesWhatIsNoProbability) {
   EXPECT_NE(message_of([&] { sentence("a", unnamed, comparison, 0.5, 5); }).find("alpha is 5"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace sentence_test

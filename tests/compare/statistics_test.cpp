@@ -8,10 +8,10 @@
 
 #include "domain/message_of.hpp"
 
+namespace statistics_test {
+
 using namespace marrow::compare;
 using marrow::test::message_of;
-
-namespace {
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 constexpr double infinite = std::numeric_limits<double>::infinity();
@@ -271,4 +271,4 @@ TEST(Holm, StepsDownAndKeepsTheOrder) {
   EXPECT_NE(message_of([] { holm({-0.1}); }).find("from 0 to 1"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace statistics_test

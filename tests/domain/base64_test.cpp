@@ -3,6 +3,8 @@
 
 #include <marrow/domain/base64.hpp>
 
+namespace base64_test {
+
 TEST(Base64, IsThatOfRfc4648) {
   for (const auto& [bytes, text] : {std::pair("", ""),
                                     {"f", "Zg=="},
@@ -14,3 +16,5 @@ TEST(Base64, IsThatOfRfc4648) {
     EXPECT_EQ(marrow::base64(bytes), text);
   EXPECT_EQ(marrow::base64(std::string("\xff\xfe\xfb\x00\x80\x3e", 6)), "//77AIA+") << "bytes are unsigned";
 }
+
+}  // namespace base64_test

@@ -5,7 +5,7 @@
 
 #include "domain/message_of.hpp"
 
-namespace {
+namespace camera_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -137,4 +137,4 @@ TEST(View, CheckNamesTheFault) {
   EXPECT_EQ(message_of([&] { check_view(view); }), "view 'lateral': the image is empty");
 }
 
-}  // namespace
+}  // namespace camera_test

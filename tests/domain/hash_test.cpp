@@ -6,7 +6,7 @@
 
 #include "domain/shapes.hpp"
 
-namespace {
+namespace hash_test {
 
 using marrow::hash_of;
 
@@ -149,4 +149,4 @@ TEST(Hash, IsWrittenAsHex) {
   EXPECT_EQ((marrow::Digest{0xfedcba9876543210u, 0x1u}.hex()), "0000000000000001fedcba9876543210");
 }
 
-}  // namespace
+}  // namespace hash_test

@@ -8,7 +8,7 @@
 #include "domain/message_of.hpp"
 #include "domain/shapes.hpp"
 
-namespace {
+namespace mesh_test {
 
 using Eigen::Vector3d;
 using marrow::Mesh;
@@ -168,4 +168,4 @@ TEST(Mesh, CheckNamesTheFault) {
   EXPECT_EQ(message_of([&] { fragment_frame(Mesh{}); }), "fragment frame: the surface has no triangles");
 }
 
-}  // namespace
+}  // namespace mesh_test

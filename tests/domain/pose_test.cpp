@@ -5,7 +5,7 @@
 
 #include "domain/message_of.hpp"
 
-namespace {
+namespace pose_test {
 
 using Eigen::Vector3d;
 using marrow::FragmentFrame;
@@ -59,4 +59,4 @@ TEST(MotionBetween, RefusesPosesInDifferentFrames) {
             "points in 'table'");
 }
 
-}  // namespace
+}  // namespace pose_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace printable_test {
 
 using marrow::cut;
 using marrow::printable;
@@ -54,4 +54,4 @@ TEST(Printable, LongTextsAreCutBetweenCharacters) {
   EXPECT_EQ(marrow::in_quotes("a"), "'a'");
 }
 
-}  // namespace
+}  // namespace printable_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace random_test {
 
 using marrow::Random;
 
@@ -44,4 +44,4 @@ TEST(Random, Distributions) {
   for (const int count : count_of) EXPECT_NEAR(count, kCount / 3.0, 5 * std::sqrt(kCount * 2.0 / 9));
 }
 
-}  // namespace
+}  // namespace random_test

@@ -5,7 +5,7 @@
 
 #include "domain/message_of.hpp"
 
-namespace {
+namespace transform_test {
 
 using Eigen::AngleAxisd;
 using Eigen::Matrix3d;
@@ -97,4 +97,4 @@ TEST(Angles, DegreesAndRadians) {
   EXPECT_DOUBLE_EQ(marrow::degrees(marrow::kPi / 6), 30);
 }
 
-}  // namespace
+}  // namespace transform_test

@@ -6,7 +6,7 @@
 
 #include "domain/message_of.hpp"
 
-namespace {
+namespace volume_test {
 
 using Eigen::Vector3d;
 using marrow::test::message_of;
@@ -87,4 +87,4 @@ TEST(Volume, CheckNamesTheFault) {
             "CT: voxel (1, 2, 3) is not a finite number; replace NaN and infinities (with -1000 HU for air)");
 }
 
-}  // namespace
+}  // namespace volume_test

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace yaml_test {
 
 using marrow::parse_yaml;
 
@@ -79,4 +79,4 @@ TEST(Yaml, Limits) {
   EXPECT_EQ(refusal("a: \"\\0\"\n"), "1: a text holds the character NUL (\\0); take it out");
 }
 
-}  // namespace
+}  // namespace yaml_test

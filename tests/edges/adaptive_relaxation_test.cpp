@@ -1,11 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "plugins/edges/adaptive_relaxation.cpp"
 
-#include <numeric>
+#include <gtest/gtest.h>
 
-static marrow::EdgeMap find_edges(const marrow::View& view) { return adaptive_relaxation(view, Options{}); }
-
-#include "edges/checks.hpp"
+#include "edges/drawn.hpp"
 #include "shipped.hpp"
 
 namespace {
@@ -60,7 +58,7 @@ TEST(AdaptiveRelaxation, DeclaresTheOrderOfItsThresholds) {
 }
 
 TEST(AdaptiveRelaxation, KeepsThickEdgesOnRequest) {
-  const auto view = drawn(64, [](double u, double) { return u < 30 ? 5000.0 : 9000.0; });
+  const auto view = edges::drawn(64, [](double u, double) { return u < 30 ? 5000.0 : 9000.0; });
   Options options;
   options.thin = false;
   EXPECT_GE(adaptive_relaxation(view, options).pixels.size(), adaptive_relaxation(view, Options{}).pixels.size());

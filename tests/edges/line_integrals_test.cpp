@@ -7,7 +7,7 @@
 #include <limits>
 #include <opencv2/core.hpp>
 
-namespace {
+namespace line_integrals_test {
 
 using marrow::image::GreyScale;
 using marrow::image::line_integrals;
@@ -51,4 +51,4 @@ TEST(LineIntegrals, WithoutLightAreThoseOfDarkPixels) {
   }
 }
 
-}  // namespace
+}  // namespace line_integrals_test

@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-namespace {
+namespace usable_test {
 
 using namespace marrow::image;
 
@@ -107,4 +107,4 @@ TEST(Usable, FindsTheFieldOfRealFrames) {
   }
 }
 
-}  // namespace
+}  // namespace usable_test

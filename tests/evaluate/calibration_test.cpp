@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/calibration.cpp"
-
 #include <gtest/gtest.h>
 
-namespace {
+#include <cmath>
+
+#include "shipped.hpp"
+
+namespace calibration_test {
+
+using marrow::Calibration;
+using shipped::figure;
 
 Calibration device() {
   Calibration device;
@@ -12,11 +17,12 @@ Calibration device() {
   return device;
 }
 
-double value(const marrow::Metrics& metrics, const std::string& name) {
-  for (const auto& item : metrics.items)
-    if (item.name == name) return item.value;
-  ADD_FAILURE() << name;
-  return 0;
+shipped::Inputs inputs(const Calibration& found, const Calibration& truth) {
+  return {{"calibration", shipped::item(found)}, {"truth", shipped::item(truth)}};
+}
+
+marrow::Value errors(const Calibration& found, const Calibration& truth) {
+  return shipped::call("evaluate.calibration", inputs(found, truth)).at("metrics");
 }
 
 TEST(EvaluateCalibration, FiguresByHand) {
@@ -27,12 +33,12 @@ TEST(EvaluateCalibration, FiguresByHand) {
   found.intrinsics(0, 2) += 0.25;
   found.intrinsics(1, 2) -= 0.5;
   found.residual_px = 0.2;
-  const marrow::Metrics metrics = calibration_error(found, truth);
-  EXPECT_NEAR(value(metrics, "focal_error"), 0.2, 1e-9);
-  EXPECT_NEAR(value(metrics, "principal_u_error"), 0.25, 1e-12);
-  EXPECT_NEAR(value(metrics, "principal_v_error"), 0.5, 1e-12);
-  EXPECT_NEAR(value(metrics, "distortion_error"), 0, 1e-9) << "undistorted pixels stay where they are";
-  EXPECT_EQ(value(metrics, "residual"), 0.2);
+  const marrow::Value metrics = errors(found, truth);
+  EXPECT_NEAR(figure(metrics, "focal_error"), 0.2, 1e-9);
+  EXPECT_NEAR(figure(metrics, "principal_u_error"), 0.25, 1e-12);
+  EXPECT_NEAR(figure(metrics, "principal_v_error"), 0.5, 1e-12);
+  EXPECT_NEAR(figure(metrics, "distortion_error"), 0, 1e-9) << "undistorted pixels stay where they are";
+  EXPECT_EQ(figure(metrics, "residual"), 0.2);
 }
 
 TEST(EvaluateCalibration, DistortionIsTheShiftOfPixelsLessItsMean) {
@@ -55,18 +61,14 @@ TEST(EvaluateCalibration, DistortionIsTheShiftOfPixelsLessItsMean) {
   double squares = 0;
   for (const auto& shift : shifts) squares += (shift - mean).squaredNorm() / 441;
   EXPECT_GT(mean.norm(), 0.1);
-  EXPECT_NEAR(value(calibration_error(found, truth), "distortion_error"), std::sqrt(squares), 1e-9);
+  EXPECT_NEAR(figure(errors(found, truth), "distortion_error"), std::sqrt(squares), 1e-9);
 }
 
 TEST(EvaluateCalibration, RefusesOtherSizes) {
   Calibration other = device();
   other.width_px = 512;
-  try {
-    calibration_error(other, device());
-    FAIL();
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "the calibration is of images of 512 x 1001 pixels, the truth of 1001 x 1001");
-  }
+  EXPECT_EQ(shipped::refusal("evaluate.calibration", inputs(other, device())),
+            "the calibration is of images of 512 x 1001 pixels, the truth of 1001 x 1001");
 }
 
-}  // namespace
+}  // namespace calibration_test

@@ -3,7 +3,7 @@
 
 #include "shipped.hpp"
 
-namespace {
+namespace dice_test {
 
 using Eigen::Vector3d;
 
@@ -80,4 +80,4 @@ TEST(Dice, SaysWhatIsWrong) {
   EXPECT_EQ(refusal(other, box), "field: 512 voxels expected from its size, got 511");
 }
 
-}  // namespace
+}  // namespace dice_test

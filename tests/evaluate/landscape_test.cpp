@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/landscape.cpp"
-
 #include <gtest/gtest.h>
 
-namespace {
+#include "shipped.hpp"
+
+namespace landscape_test {
 
 /// A bowl about a known pose: squared offset in degrees and mm about a frame away from the origin.
 class Bowl : public marrow::Cost {
@@ -30,9 +30,12 @@ TEST(Landscape, IsTheCostAlongEachAxisOfTheFragment) {
     marrow::Vector6d motion = marrow::Vector6d::Zero();
     motion[axis] = axis < 3 ? marrow::radians(2.5) : 2.5;
     const marrow::Truth floor{marrow::moved(pose.world_from_model, pose.frame, motion)};
-    marrow::Context context;
-    const auto profile =
-        landscape(Bowl(floor.world_from_model, pose.frame), pose, &floor, {}, context).profiles.at(std::size_t(axis));
+    const auto cost = marrow::Value::of<marrow::Cost>(std::make_shared<const Bowl>(floor.world_from_model, pose.frame));
+    const auto landscape =
+        shipped::call("evaluate.landscape",
+                      {{"cost", cost}, {"pose", shipped::item(pose)}, {"truth", shipped::item(floor)}})
+            .at("landscape");
+    const auto& profile = landscape.as<marrow::Landscape>().profiles.at(std::size_t(axis));
     EXPECT_EQ(profile.unit, axis < 3 ? "deg" : "mm");
     ASSERT_EQ(profile.costs.size(), 81u);
     EXPECT_NEAR(profile.offsets.front(), -10, 1e-12);
@@ -44,4 +47,4 @@ TEST(Landscape, IsTheCostAlongEachAxisOfTheFragment) {
   }
 }
 
-}  // namespace
+}  // namespace landscape_test

@@ -3,7 +3,9 @@
 
 #include "evaluate/poses.hpp"
 
-namespace {
+namespace mtre_test {
+
+using namespace known_poses;
 
 TEST(Mtre, OfATranslationIsItsLengthEverywhere) {
   const auto metrics =
@@ -49,4 +51,4 @@ TEST(Mtre, SaysWhatIsWrong) {
       "the pose is world_from_mri, but the truth is world_from_ct; compare poses between the same two frames");
 }
 
-}  // namespace
+}  // namespace mtre_test

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/outline_distance.cpp"
-
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <map>
 #include <random>
 
-namespace {
+#include "evaluate/listener.hpp"
+#include "shipped.hpp"
+
+namespace outline_distance_test {
 
 /// An outline that is the vertical line u = 100 from v = 20 to 119, normal to the right; it ignores the pose.
 class LineProjector : public marrow::OutlineProjector {
@@ -19,6 +21,19 @@ class LineProjector : public marrow::OutlineProjector {
     for (int v = 20; v < 120; ++v) points.push_back({100, float(v), 1, 0, Eigen::Vector3f(0, 0, 600)});
     return points;
   }
+};
+
+/// An outline of one point.
+class PointProjector : public marrow::OutlineProjector {
+ public:
+  explicit PointProjector(const marrow::OutlinePoint& point) : point_(point) {}
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const marrow::RigidTransform&,
+                                            double) const override {
+    return {point_};
+  }
+
+ private:
+  marrow::OutlinePoint point_;
 };
 
 /// Focal length 1000 px, so that 1 px is 0.6 mm at the outline's depth of 600 mm.
@@ -38,13 +53,25 @@ marrow::EdgeMap line_of_edges(float u, float direction_u, int from_v = 0, int to
   return edges;
 }
 
-std::map<std::string, double> distances(const marrow::List<marrow::View>& views,
-                                        const marrow::List<marrow::EdgeMap>& edges, const Options& options = {}) {
-  marrow::Context context;
+template <class Projector = LineProjector>
+shipped::Inputs inputs(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges,
+                       const Projector& projector = {}) {
+  return {{"pose", shipped::item(marrow::Pose())},
+          {"projector", marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const Projector>(projector))},
+          {"views", shipped::list(views, "view")},
+          {"edges", shipped::list(edges, "view")}};
+}
+
+std::map<std::string, double> distances(const shipped::Inputs& inputs, const shipped::Options& options = {}) {
+  const auto metrics = shipped::call("evaluate.outline_distance", inputs, options).at("metrics");
   std::map<std::string, double> values;
-  for (const auto& item : outline_distance({}, LineProjector(), views, edges, options, context).items)
-    values[item.name] = item.value;
+  for (const auto& item : metrics.as<marrow::Metrics>().items) values[item.name] = item.value;
   return values;
+}
+std::map<std::string, double> distances(const marrow::List<marrow::View>& views,
+                                        const marrow::List<marrow::EdgeMap>& edges,
+                                        const shipped::Options& options = {}) {
+  return distances(inputs(views, edges), options);
 }
 
 template <class T>
@@ -69,16 +96,14 @@ TEST(OutlineDistance, EdgesOfAnotherDirectionDoNotCount) {
   marrow::EdgeMap edges = line_of_edges(109, 1);
   for (const auto& edge : line_of_edges(101, -1).pixels) edges.pixels.push_back(edge);
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges))["median_px"], 9, 1e-6);
-  Options options;
-  options.angle_deg = 180;
+  const shipped::Options options{{"angle_deg", 180.0}};
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", edges), options)["median_px"], 1, 1e-6);
 }
 
 TEST(OutlineDistance, UnmatchedPointsCountWithTheReach) {
   // Edges beside the upper 60 of 100 outline points only; the lower ones are more than the reach of 5 px away but for 4
   // of them (v = 80 to 83 reach the last edge at v = 79, 3 px to the side).
-  Options options;
-  options.reach_px = 5;
+  const shipped::Options options{{"reach_px", 5.0}};
   auto found = distances(one("frontal", view("frontal")), one("frontal", line_of_edges(103, 1, 0, 80)), options);
   EXPECT_NEAR(found["median_px"], 3, 1e-6);
   EXPECT_NEAR(found["p90_px"], 5, 1e-6);
@@ -108,8 +133,7 @@ TEST(OutlineDistance, MaskedPointsAreLeftOut) {
 }
 
 TEST(OutlineDistance, FindsFarEdgesAcrossCells) {
-  Options options;
-  options.reach_px = 500;
+  const shipped::Options options{{"reach_px", 500.0}};
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(199, 1)), options)["p90_px"], 99,
               1e-6);
   EXPECT_NEAR(distances(one("frontal", view("frontal")), one("frontal", line_of_edges(0, 1)), options)["p90_px"], 100,
@@ -127,21 +151,27 @@ TEST(OutlineDistance, TheNearestEdgeIsThatOfASearchThroughAll) {
   }
   edges.pixels.push_back({-20, 30, 1, 0, 1});  // beyond the image, as a detector may say of its border
   edges.pixels.push_back({230, 170, 1, 0, 1});
-  const EdgeSearch search(edges);
+  marrow::View seen = view("frontal", 203);
+  seen.image.pixels = cv::Mat(149, 203, CV_8U, cv::Scalar(128));
+  seen.camera.height_px = 149;
+  const auto views = one("frontal", seen);
+  const auto of_views = one("frontal", edges);
   int none = 0;
   for (int i = 0; i < 3000; ++i) {
     const double u = 203 * part(), v = 149 * part(), angle = 6.28 * part(), reach_px = i % 3 == 0 ? 400 : 60 * part(),
-                 least_cosine = i % 2 ? 0.9 : -1;
+                 angle_deg = i % 2 ? marrow::degrees(std::acos(0.9)) : 180,
+                 least_cosine = std::cos(marrow::radians(angle_deg));
+    const marrow::OutlinePoint point{float(u), float(v), float(std::cos(angle)), float(std::sin(angle)),
+                                     Eigen::Vector3f(0, 0, 600)};
     double best = std::numeric_limits<double>::infinity();
     for (const auto& edge : edges.pixels)
-      if (edge.direction_u * std::cos(angle) + edge.direction_v * std::sin(angle) >= least_cosine)
-        best = std::min(best, std::hypot(edge.u_px - u, edge.v_px - v));
-    const marrow::EdgePixel* found = search.nearest(u, v, std::cos(angle), std::sin(angle), reach_px, least_cosine);
-    ASSERT_EQ(found != nullptr, best <= reach_px) << best << " px, reach " << reach_px;
-    if (found) {
-      EXPECT_EQ(std::hypot(found->u_px - u, found->v_px - v), best);
-    }
-    none += !found;
+      if (edge.direction_u * double(point.normal_u) + edge.direction_v * double(point.normal_v) >= least_cosine)
+        best = std::min(best, std::hypot(double(edge.u_px) - point.u_px, double(edge.v_px) - point.v_px));
+    auto found =
+        distances(inputs(views, of_views, PointProjector(point)), {{"reach_px", reach_px}, {"angle_deg", angle_deg}});
+    ASSERT_EQ(found["matched_percent"], best <= reach_px ? 100 : 0) << best << " px, reach " << reach_px;
+    EXPECT_EQ(found["median_px"], std::min(best, reach_px));
+    none += best > reach_px;
   }
   EXPECT_GT(none, 100);
   EXPECT_LT(none, 2000);
@@ -175,25 +205,18 @@ TEST(OutlineDistance, AViewWithoutOutlineIsLeftOutWithAWarning) {
   marrow::EdgeMap narrow = line_of_edges(50, 1);
   narrow.width_px = 90;
   edges.add("narrow", narrow);
-  std::string warning;
-  marrow::Context::Hooks hooks;
-  hooks.log = [&](std::string_view message, marrow::LogLevel level) {
-    warning += level == marrow::LogLevel::warning ? message : "";
-  };
-  marrow::Context context(hooks);
-  EXPECT_EQ(outline_distance({}, LineProjector(), views, edges, {}, context).items.size(), 14u);
-  EXPECT_EQ(warning, "view 'narrow': no part of the outline is inside the image at this pose; the view is left out");
+  listener::Listener listener;
+  const auto metrics =
+      shipped::call("evaluate.outline_distance", inputs(views, edges), {}, listener.context).at("metrics");
+  EXPECT_EQ(metrics.as<marrow::Metrics>().items.size(), 14u);
+  ASSERT_EQ(listener.warnings.size(), 1u);
+  EXPECT_EQ(listener.warnings[0],
+            "view 'narrow': no part of the outline is inside the image at this pose; the view is left out");
 }
 
 TEST(OutlineDistance, SaysWhatIsWrong) {
-  const auto message = [](const marrow::List<marrow::View>& views,
-                          const marrow::List<marrow::EdgeMap>& edges) -> std::string {
-    try {
-      distances(views, edges);
-    } catch (const marrow::Error& error) {
-      return error.what();
-    }
-    return "no error";
+  const auto message = [](const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
+    return shipped::refusal("evaluate.outline_distance", inputs(views, edges));
   };
   EXPECT_EQ(message(one("frontal", view("frontal")), one("lateral", line_of_edges(101, 1))),
             "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
@@ -206,8 +229,7 @@ TEST(OutlineDistance, SaysWhatIsWrong) {
   narrow.width_px = 90;
   EXPECT_EQ(message(one("frontal", view("frontal", 90)), one("frontal", narrow)),
             "the outline is outside the image in every view (1), so there is no distance; check the pose and that the "
-            "cameras "
-            "and the model use the same world frame");
+            "cameras and the model use the same world frame");
 }
 
-}  // namespace
+}  // namespace outline_distance_test

@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/pose_error.cpp"
-
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <map>
 
 #include "domain/shapes.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace pose_error_test {
 
 using Eigen::AngleAxisd;
 using Eigen::Vector3d;
@@ -35,9 +35,17 @@ marrow::Pose displaced(const marrow::Truth& truth, double angle_deg, const Vecto
   return pose;
 }
 
+shipped::Inputs inputs(const marrow::Pose& pose, const marrow::Truth& truth, const marrow::Mesh& model) {
+  return {{"pose", shipped::item(pose)}, {"truth", shipped::item(truth)}, {"model", shipped::item(model)}};
+}
+
+marrow::Metrics metrics_of(const marrow::Pose& pose, const marrow::Truth& truth) {
+  return shipped::call("evaluate.pose_error", inputs(pose, truth, shaft())).at("metrics").as<marrow::Metrics>();
+}
+
 std::map<std::string, double> errors(const marrow::Pose& pose, const marrow::Truth& truth) {
   std::map<std::string, double> values;
-  for (const auto& item : pose_error(pose, truth, shaft(), {}).items) values[item.name] = item.value;
+  for (const auto& item : metrics_of(pose, truth).items) values[item.name] = item.value;
   return values;
 }
 
@@ -133,34 +141,26 @@ TEST(PoseError, NoPredictionWithoutAFiniteCovariance) {
 }
 
 TEST(PoseError, UnitsFollowTheNames) {
-  for (const auto& item : pose_error(displaced(some_truth(), 1, kLong, kLong), some_truth(), shaft(), {}).items)
+  for (const auto& item : metrics_of(displaced(some_truth(), 1, kLong, kLong), some_truth()).items)
     EXPECT_EQ(item.unit, item.name.substr(item.name.rfind('_') + 1)) << item.name;
 }
 
-template <class Function>
-std::string message_of(Function function) {
-  try {
-    function();
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
 TEST(PoseError, SaysWhatIsWrong) {
+  const auto refusal = [](const marrow::Pose& pose, const marrow::Mesh& model) {
+    return shipped::refusal("evaluate.pose_error", inputs(pose, {}, model));
+  };
   marrow::Pose pose;
   pose.world_from_model.source = "mri";
-  EXPECT_EQ(message_of([&] { pose_error(pose, {}, shaft(), {}); }),
+  EXPECT_EQ(refusal(pose, shaft()),
             "the pose is world_from_mri, but the truth is world_from_ct; compare poses between the same two frames");
   marrow::Mesh model = shaft();
   model.frame = "stl";
-  EXPECT_EQ(message_of([&] { pose_error({}, {}, model, {}); }),
+  EXPECT_EQ(refusal({}, model),
             "the model is in the frame 'stl', but the pose takes points in 'ct'; give the model that was registered");
   pose = {};
   pose.world_from_model.translation_mm[1] = std::nan("");
-  EXPECT_EQ(message_of([&] { pose_error(pose, {}, shaft(), {}); }),
-            "pose: the transform has a number that is not finite");
-  EXPECT_EQ(message_of([&] { pose_error({}, {}, {}, {}); }), "fragment frame: the surface has no triangles");
+  EXPECT_EQ(refusal(pose, shaft()), "pose: the transform has a number that is not finite");
+  EXPECT_EQ(refusal({}, {}), "fragment frame: the surface has no triangles");
 }
 
-}  // namespace
+}  // namespace pose_error_test

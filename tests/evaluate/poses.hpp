@@ -4,6 +4,8 @@
 #include "domain/shapes.hpp"
 #include "shipped.hpp"
 
+namespace known_poses {
+
 /// The truth of all tests: CT coordinates are the world's.
 inline marrow::Value exact() { return shipped::item(marrow::Truth()); }
 
@@ -42,3 +44,5 @@ inline marrow::List<marrow::View> two_views() {
 }
 
 inline marrow::Value views_of(const marrow::List<marrow::View>& views) { return shipped::list(views, "view"); }
+
+}  // namespace known_poses

@@ -4,7 +4,9 @@
 
 #include "evaluate/poses.hpp"
 
-namespace {
+namespace projection_distance_test {
+
+using namespace known_poses;
 
 const std::string kProjection = "evaluate.projection_distance", kReprojection = "evaluate.reprojection_distance";
 
@@ -91,4 +93,4 @@ TEST(ProjectionDistance, SaysWhatIsWrong) {
             "another world frame?");
 }
 
-}  // namespace
+}  // namespace projection_distance_test

@@ -1,21 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/shaft_lines.cpp"
-
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "edges/radiograph.hpp"
+#include "evaluate/listener.hpp"
 #include "initial/tube.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace shaft_lines_test {
 
-/// Keeps what a node warns of.
-struct Listener {
-  std::vector<std::string> warnings;
-  marrow::Context context{
-      marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, marrow::LogLevel level) {
-                               if (level == marrow::LogLevel::warning) warnings.emplace_back(message);
-                             }}};
-};
+using listener::Listener;
+using marrow::List, marrow::Mesh, marrow::ShaftLines, marrow::Truth, marrow::View;
 
 constexpr double kRadius_mm = 14;
 
@@ -45,15 +41,22 @@ ShaftLines borders(const View& view, double radius_mm = kRadius_mm) {
   return tube::borders(view.camera, {0, 0, 0}, Eigen::Vector3d::UnitZ(), radius_mm, 100, 400);
 }
 
+marrow::Value compared(const ShaftLines& lines, const List<Mesh>& models, const List<Truth>& truths,
+                       const Listener& listener) {
+  return shipped::call("evaluate.shaft_lines",
+                       {{"lines", shipped::item(lines)},
+                        {"view", shipped::item(frontal())},
+                        {"models", shipped::list(models, "fragment")},
+                        {"truths", shipped::list(truths, "fragment")}},
+                       {}, listener.context)
+      .at("metrics");
+}
+
 double figure(const ShaftLines& lines, const std::string& name) {
-  Listener listener;
+  const Listener listener;
   const Bone truth = bone();
-  const auto metrics = shaft_lines(lines, frontal(), truth.models, truth.truths, {}, listener.context);
-  if (metrics)
-    for (const auto& item : metrics->items)
-      if (item.name == name) return item.value;
-  ADD_FAILURE() << "no figure " << name;
-  return 0;
+  const auto metrics = compared(lines, truth.models, truth.truths, listener);
+  return metrics.is_absent() ? std::nan("") : shipped::figure(metrics, name);
 }
 
 TEST(EvaluateShaftLines, ExactBordersHaveNoError) {
@@ -133,14 +136,15 @@ TEST(EvaluateShaftLines, AgainstTheFragmentWhoseOutlineIsNearest) {
   truths.add("distal", off);
   truths.add("far", truth.truths[1]);
   truths.add("near", truth.truths[2]);
-  const auto metrics = shaft_lines(borders(frontal()), frontal(), truth.models, truths, {}, listener.context);
-  ASSERT_TRUE(metrics);
-  EXPECT_NEAR(metrics->items[1].value, 0.3, 0.02) << metrics->items[1].name;
+  const auto metrics = compared(borders(frontal()), truth.models, truths, listener);
+  ASSERT_FALSE(metrics.is_absent());
+  const marrow::Metric& second = metrics.as<marrow::Metrics>().items[1];
+  EXPECT_NEAR(second.value, 0.3, 0.02) << second.name;
 }
 
 TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
   Listener listener;
-  EXPECT_FALSE(shaft_lines(borders(frontal()), frontal(), {}, {}, {}, listener.context));
+  EXPECT_TRUE(compared(borders(frontal()), {}, {}, listener).is_absent());
   ASSERT_EQ(listener.warnings.size(), 1u);
   EXPECT_EQ(
       listener.warnings[0],
@@ -148,4 +152,4 @@ TEST(EvaluateShaftLines, WithoutABoneThereTheyCannotBeCompared) {
       "compare it with");
 }
 
-}  // namespace
+}  // namespace shaft_lines_test

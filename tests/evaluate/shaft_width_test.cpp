@@ -1,25 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/evaluate/shaft_width.cpp"
-
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "edges/radiograph.hpp"
 #include "evaluate/cone.hpp"
+#include "evaluate/listener.hpp"
 #include "initial/tube.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace shaft_width_test {
 
-/// Keeps what a node warns of.
-struct Listener {
-  std::vector<std::string> warnings;
-  marrow::Context context{
-      marrow::Context::Hooks{0, nullptr, {}, [this](std::string_view message, marrow::LogLevel level) {
-                               if (level == marrow::LogLevel::warning) warnings.emplace_back(message);
-                             }}};
-};
+using listener::Listener;
+using marrow::List, marrow::ShaftLines, marrow::View;
+using shipped::figure;
 
 marrow::View view_at(const std::string& name, double angle_deg) {
   marrow::View view;
@@ -47,26 +42,29 @@ Scene scene_of(double radius_mm, std::vector<double> angles = {0, 90}) {
   return scene;
 }
 
-double figure(const marrow::Metrics& metrics, const std::string& name) {
-  for (const auto& item : metrics.items)
-    if (item.name == name) return item.value;
-  ADD_FAILURE() << "no figure " << name;
-  return 0;
+const std::string kNode = "evaluate.shaft_width";
+
+shipped::Inputs inputs(const List<ShaftLines>& lines, const List<View>& views) {
+  return {{"lines", shipped::list(lines, "view")}, {"views", shipped::list(views, "view")}};
+}
+
+marrow::Value width(const Scene& scene, const Listener& listener, const shipped::Options& options = {}) {
+  return shipped::call(kNode, inputs(scene.lines, scene.views), options, listener.context).at("metrics");
 }
 
 TEST(ShaftWidth, DeclaresADeviationForEachWidth) {
-  EXPECT_TRUE(shipped::declares("evaluate.shaft_width", marrow::same_length({"width_mm", "width_deviation_mm"})));
+  EXPECT_TRUE(shipped::declares(kNode, marrow::same_length({"width_mm", "width_deviation_mm"})));
 }
 
 TEST(ShaftWidth, IsExactWhereTheMagnificationIsNot) {
   const Scene scene = scene_of(14);
   Listener listener;
-  const auto metrics = shaft_width(scene.lines, scene.views, {}, listener.context);
-  ASSERT_TRUE(metrics);
+  const auto metrics = width(scene, listener);
+  ASSERT_FALSE(metrics.is_absent());
   for (const std::string name : {"frontal", "lateral"}) {
-    EXPECT_NEAR(figure(*metrics, name + "_width_mm"), 28, 1e-6);
-    std::printf("%s: magnified by %.3f\n", name.c_str(), figure(*metrics, name + "_magnification"));
-    EXPECT_GT(std::abs(figure(*metrics, name + "_magnification") - 1), 0.03);
+    EXPECT_NEAR(figure(metrics, name + "_width_mm"), 28, 1e-6);
+    std::printf("%s: magnified by %.3f\n", name.c_str(), figure(metrics, name + "_magnification"));
+    EXPECT_GT(std::abs(figure(metrics, name + "_magnification") - 1), 0.03);
   }
   EXPECT_TRUE(listener.warnings.empty());
 }
@@ -86,9 +84,9 @@ TEST(ShaftWidth, IsThatOfAnyCylinderFromTwoAndThreeViews) {
         scene.views.add(view.name, view);
       }
       Listener listener;
-      const auto metrics = shaft_width(scene.lines, scene.views, {}, listener.context);
-      ASSERT_TRUE(metrics);
-      for (const View& view : scene.views) EXPECT_NEAR(figure(*metrics, view.name + "_width_mm"), 2 * radius_mm, 1e-6);
+      const auto metrics = width(scene, listener);
+      ASSERT_FALSE(metrics.is_absent());
+      for (const View& view : scene.views) EXPECT_NEAR(figure(metrics, view.name + "_width_mm"), 2 * radius_mm, 1e-6);
     }
 }
 
@@ -113,15 +111,15 @@ TEST(ShaftWidth, OfAConeIsThatInTheMiddleOfEachPair) {
       scene.views.add(view.name, view);
     }
     Listener listener;
-    const auto metrics = shaft_width(scene.lines, scene.views, {}, listener.context);
-    ASSERT_TRUE(metrics);
+    const auto metrics = width(scene, listener);
+    ASSERT_FALSE(metrics.is_absent());
     for (const View& view : scene.views) {
       const ShaftLines& lines = *scene.lines.find(view.name);
       const Eigen::Vector2d seen =
           0.25 * (lines.left.from_px + lines.left.to_px + lines.right.from_px + lines.right.to_px);
       const Eigen::Vector3d there =
           nearest(middle, direction, marrow::source_position_mm(view.camera), marrow::ray_direction(view.camera, seen));
-      EXPECT_NEAR(figure(*metrics, view.name + "_width_mm"), 2 * known.radius_mm(there), 1e-6) << half_angle_deg;
+      EXPECT_NEAR(figure(metrics, view.name + "_width_mm"), 2 * known.radius_mm(there), 1e-6) << half_angle_deg;
     }
   }
 }
@@ -129,7 +127,7 @@ TEST(ShaftWidth, OfAConeIsThatInTheMiddleOfEachPair) {
 TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
   const Scene scene = scene_of(40);
   Listener listener;
-  shaft_width(scene.lines, scene.views, {}, listener.context);
+  width(scene, listener);
   ASSERT_EQ(listener.warnings.size(), 2u);
   EXPECT_EQ(
       listener.warnings[0],
@@ -139,54 +137,45 @@ TEST(ShaftWidth, WarnsWhereItIsNoShaft) {
 
 TEST(ShaftWidth, IsHeldAgainstOtherBonesWhereTheseAreGiven) {
   const Scene scene = scene_of(14);
-  Options tibia;
-  tibia.width_mm = {22, 27}, tibia.width_deviation_mm = {1, 2};
+  using Numbers = std::vector<double>;
+  shipped::Options tibia{{"width_mm", Numbers{22, 27}}, {"width_deviation_mm", Numbers{1, 2}}};
   Listener listener;
-  shaft_width(scene.lines, scene.views, tibia, listener.context);
+  width(scene, listener, tibia);
   EXPECT_TRUE(listener.warnings.empty());
-  tibia.width_mm = {22, 37};
-  shaft_width(scene.lines, scene.views, tibia, listener.context);
+  tibia["width_mm"] = Numbers{22, 37};
+  width(scene, listener, tibia);
   ASSERT_EQ(listener.warnings.size(), 2u);
   EXPECT_NE(listener.warnings[1].find("28 mm apart"), std::string::npos);
   EXPECT_NE(listener.warnings[1].find("(19.0 to 43.0 mm)"), std::string::npos);
 }
 
-std::string refusal(const Scene& scene, const Options& options) {
-  Listener listener;
-  try {
-    shaft_width(scene.lines, scene.views, options, listener.context);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "no error";
+std::string refusal(const Scene& scene, const shipped::Options& options = {}) {
+  return shipped::refusal(kNode, inputs(scene.lines, scene.views), options);
+}
+std::string refusal(const Scene& scene, const std::vector<double>& width_mm, const std::vector<double>& deviation_mm) {
+  return refusal(scene, {{"width_mm", width_mm}, {"width_deviation_mm", deviation_mm}});
 }
 
 TEST(ShaftWidth, IsRefusedFromViewsOfTheSameSideAndWidthsThatAreNone) {
-  EXPECT_EQ(refusal(scene_of(14, {0, 4}), {}),
+  EXPECT_EQ(refusal(scene_of(14, {0, 4})),
             "the 2 views see the shaft from nearly the same side: the planes of its axis meet at 3.7 degrees, where 10 "
             "are needed; use views farther apart");
-  EXPECT_EQ(refusal(scene_of(14), {{30, 0}, {3, 3}}), "width_mm and width_deviation_mm must be positive");
-  EXPECT_EQ(refusal(scene_of(14), {{30, 30}, {3, -3}}), "width_mm and width_deviation_mm must be positive");
+  EXPECT_EQ(refusal(scene_of(14), {30, 0}, {3, 3}), "width_mm and width_deviation_mm must be positive");
+  EXPECT_EQ(refusal(scene_of(14), {30, 30}, {3, -3}), "width_mm and width_deviation_mm must be positive");
 }
 
 TEST(ShaftWidth, SaysWhatItNeeds) {
   Listener listener;
   const Scene one = scene_of(14, {0});
-  EXPECT_FALSE(shaft_width(one.lines, one.views, {}, listener.context));
+  EXPECT_TRUE(width(one, listener).is_absent());
   ASSERT_EQ(listener.warnings.size(), 1u);
   EXPECT_EQ(
       listener.warnings[0],
       "there are shaft lines of one view alone: where the bone lies between source and detector, and so its diameter, "
       "is not known");
   const Scene two = scene_of(14);
-  try {
-    shaft_width(two.lines, one.views, {}, listener.context);
-    ADD_FAILURE() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "there are shaft lines of a view 'lateral', but no such view; wire the views that the lines were found in");
-  }
+  EXPECT_EQ(refusal({two.lines, one.views}),
+            "there are shaft lines of a view 'lateral', but no such view; wire the views that the lines were found in");
 }
 
-}  // namespace
+}  // namespace shaft_width_test

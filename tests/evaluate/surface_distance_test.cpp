@@ -4,7 +4,7 @@
 #include "domain/shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace surface_distance_test {
 
 using Eigen::Vector3d;
 using marrow::test::box;
@@ -90,4 +90,4 @@ TEST(SurfaceDistance, SaysWhatIsWrong) {
       "the mesh is in the frame 'world', but the reference in 'ct'; move one of them into the frame of the other");
 }
 
-}  // namespace
+}  // namespace surface_distance_test

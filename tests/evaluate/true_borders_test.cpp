@@ -10,7 +10,7 @@
 #include "edges/radiograph.hpp"
 #include "evaluate/cone.hpp"
 
-namespace {
+namespace true_borders_test {
 
 using marrow::LineSegment, marrow::Mesh, marrow::RigidTransform, marrow::ShaftLines;
 
@@ -156,4 +156,4 @@ TEST(TrueBorders, NeedTheSurfaceInAThirdOfTheStretch) {
   EXPECT_FALSE(true_borders::borders_beside({}, cylinder(), posed({0, 0, 0}, {0, 0, 0}), camera, 3));
 }
 
-}  // namespace
+}  // namespace true_borders_test

@@ -2,9 +2,9 @@
 #include <gtest/gtest.h>
 
 #include "domain/shapes.hpp"
-#include "evaluate/poses.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace two_poses_test {
 
 using shipped::figure;
 
@@ -142,4 +142,4 @@ TEST(ReductionGap, SaysWhatIsWrong) {
   }
 }
 
-}  // namespace
+}  // namespace two_poses_test

@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <gtest/gtest.h>
-
 #include <Eigen/Geometry>
+#include <marrow/domain/pose.hpp>
 
-#include "marrow/plugin.hpp"
+#include "shipped.hpp"
+
+namespace fracture_poses {
 
 /// The proximal fragment somewhere, the distal one displaced from beside it by a motion about its own axes (degrees,
 /// mm).
@@ -24,9 +25,8 @@ inline marrow::List<marrow::Pose> displaced(const marrow::Vector6d& motion_deg_m
   return poses;
 }
 
-inline double figure(const marrow::Metrics& metrics, const std::string& name) {
-  for (const marrow::Metric& metric : metrics.items)
-    if (metric.name == name) return metric.value;
-  ADD_FAILURE() << "no figure " << name;
-  return 0;
+inline shipped::Inputs inputs(const marrow::List<marrow::Pose>& poses) {
+  return {{"poses", shipped::list(poses, "fragment")}};
 }
+
+}  // namespace fracture_poses

@@ -10,7 +10,7 @@
 #include "edges/radiograph.hpp"
 #include "initial/tube.hpp"
 
-namespace {
+namespace axis_test {
 
 using namespace marrow::shaft;
 
@@ -127,4 +127,4 @@ TEST(Axis, IsRefusedFromViewsOfTheSameSide) {
   }
 }
 
-}  // namespace
+}  // namespace axis_test

@@ -6,7 +6,7 @@
 
 #include "initial/landmark_scene.hpp"
 
-namespace {
+namespace fiducials_test {
 
 using Eigen::Vector3d;
 using scene::exact_pose, scene::model, scene::seen_in;
@@ -128,4 +128,4 @@ TEST(Fiducials, SaysWhatIsWrong) {
             "model: the surface has no triangles");
 }
 
-}  // namespace
+}  // namespace fiducials_test

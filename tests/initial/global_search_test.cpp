@@ -6,7 +6,7 @@
 #include "register/well.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace global_search_test {
 
 using marrow::Cost;
 using marrow::Pose;
@@ -35,8 +35,6 @@ struct Trial {
   Pose truth;
   shipped::Inputs inputs;
 };
-
-}  // namespace
 
 TEST(GlobalSearch, FindsThePoseAmongManyMinimaWithoutAStart) {
   const Trial trial;
@@ -83,3 +81,5 @@ TEST(GlobalSearch, SaysWhatIsWrong) {
   trial.inputs["model"] = shipped::item(marrow::Mesh{});
   EXPECT_NE(shipped::refusal("initial.global_search", trial.inputs).find("model"), std::string::npos);
 }
+
+}  // namespace global_search_test

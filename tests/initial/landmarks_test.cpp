@@ -6,7 +6,7 @@
 
 #include "initial/landmark_scene.hpp"
 
-namespace {
+namespace landmarks_test {
 
 using Eigen::Vector3d;
 using scene::exact_pose, scene::model, scene::seen_in, scene::views;
@@ -163,4 +163,4 @@ TEST(Landmarks, WarnsOfExchangedNames) {
   EXPECT_GT(pose.cost, 3);
 }
 
-}  // namespace
+}  // namespace landmarks_test

@@ -1,23 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/initial/shaft_axis.cpp"
-
 #include <gtest/gtest.h>
 
 #include <chrono>
 
 #include "edges/radiograph.hpp"
 #include "initial/tube.hpp"
+#include "marrow/toolbox/shaft/model_borders.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace shaft_axis_test {
 
-template <class Function>
-std::string error_of(Function function) {
-  try {
-    function();
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "no error";
+using marrow::List, marrow::Mesh, marrow::Pose, marrow::RigidTransform, marrow::ShaftLines, marrow::View;
+
+shipped::Inputs inputs_of(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views,
+                          const Pose* start) {
+  shipped::Inputs inputs{{"model", shipped::item(model)},
+                         {"lines", shipped::list(lines, "view")},
+                         {"views", shipped::list(views, "view")}};
+  if (start) inputs["start"] = shipped::item(*start);
+  return inputs;
+}
+Pose shaft_axis(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start,
+                const shipped::Options& options = {}) {
+  return shipped::call("initial.shaft_axis", inputs_of(model, lines, views, start), options).at("pose").as<Pose>();
+}
+std::string refusal(const Mesh& model, const List<ShaftLines>& lines, const List<View>& views, const Pose* start) {
+  return shipped::refusal("initial.shaft_axis", inputs_of(model, lines, views, start));
 }
 
 RigidTransform posed(const Eigen::Vector3d& rotation_deg, const Eigen::Vector3d& translation_mm) {
@@ -39,7 +47,7 @@ struct TrueViews {
       ShaftLines window;
       window.left = {{300, 60}, {300, 350}};
       window.right = {{200, 60}, {200, 350}};
-      const auto borders = *model_borders(model, truth, view.camera, window, 3);
+      const auto borders = *marrow::shaft::model_borders(model, truth, view.camera, window, 3);
       ShaftLines seen;
       seen.left = borders.left;
       seen.right = borders.right;
@@ -70,7 +78,7 @@ TEST(ShaftAxis, FindsTheAxisOfACylinderFromTwoAndThreeViews) {
       views.add(view.name, view);
       lines.add(view.name, tube::borders(view.camera, truth.translation_mm, truth.rotation.col(2), 14, 60, 350));
     }
-    const Pose pose = shaft_axis(model, lines, views, nullptr, Options{});
+    const Pose pose = shaft_axis(model, lines, views, nullptr);
     const auto [turned_deg, off_mm] = axis_errors(pose, truth);
     std::printf("cylinder, %zu views: %.4f deg, %.4f mm, %d rounds\n", angles.size(), turned_deg, off_mm,
                 pose.evaluations);
@@ -96,7 +104,7 @@ TEST(ShaftAxis, IsNotMisledByBowTaperAndRidge) {
     const RigidTransform truth = posed(tilt, {6, -9, 0});
     const TrueViews setup(model, truth, {0, 90});
     const auto before = std::chrono::steady_clock::now();
-    const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr, Options{});
+    const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr);
     const double ms = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - before).count();
     const auto [turned_deg, off_mm] = axis_errors(pose, truth);
     std::printf("bowed, tapered, ridged: %.4f deg, %.4f mm, %d rounds, %.1f ms, %zu triangles\n", turned_deg, off_mm,
@@ -112,7 +120,7 @@ TEST(ShaftAxis, KeepsRotationAboutAndPlaceAlongTheAxisFromTheStart) {
   const TrueViews setup(model, truth, {0, 90});
   Pose start;
   start.world_from_model = posed({0, 0, 25}, {0, 0, 7});
-  const Pose pose = shaft_axis(model, setup.lines, setup.views, &start, Options{});
+  const Pose pose = shaft_axis(model, setup.lines, setup.views, &start);
   const Eigen::Matrix3d turn = pose.world_from_model.rotation * start.world_from_model.rotation.transpose();
   EXPECT_NEAR(marrow::vector_from_rotation(turn).dot(Eigen::Vector3d::UnitZ()), 0, 1e-3);
   const Eigen::Vector3d axis = truth.rotation.col(2);
@@ -123,8 +131,7 @@ TEST(ShaftAxis, TakesTheDepthOfASingleViewFromTheWidth) {
   const Mesh model = tube::cylinder(14, 90);
   const RigidTransform truth = posed({0, 5, 0}, {9, 30, 0});  // 30 mm farther from the source than the start
   const TrueViews setup(model, truth, {0});
-  Options exact;
-  exact.border_inset_mm = 0;  // these borders are those of the silhouette itself
+  const shipped::Options exact{{"border_inset_mm", 0.0}};  // these borders are those of the silhouette itself
   const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr, exact);
   const Eigen::Vector3d off = pose.world_from_model * pose.frame.origin_mm - truth * pose.frame.origin_mm;
   const auto [turned_deg, off_mm] = axis_errors(pose, truth);
@@ -140,9 +147,7 @@ TEST(ShaftAxis, LeavesAPerfectStartWhereItIs) {
   start.world_from_model = posed({6, 5, 40}, {9, -12, 0});
   for (const std::vector<double>& angles : {std::vector<double>{0}, {0, 90}, {0, 60, 120}}) {
     const TrueViews setup(model, start.world_from_model, angles);
-    Options exact;
-    exact.border_inset_mm = 0;
-    const Pose pose = shaft_axis(model, setup.lines, setup.views, &start, exact);
+    const Pose pose = shaft_axis(model, setup.lines, setup.views, &start, {{"border_inset_mm", 0.0}});
     const auto [turned_deg, off_mm] = axis_errors(pose, start.world_from_model);
     EXPECT_LT(turned_deg, 0.02);
     EXPECT_LT(off_mm, 0.02);
@@ -156,7 +161,7 @@ TEST(ShaftAxis, WarnsOfBordersThatAreNotThoseOfTheModel) {
   side.camera = radiograph::camera(90);
   setup.views.add("lateral", side);
   setup.lines.add("lateral", tube::borders(side.camera, {0, 0, 0}, {0, 0, 1}, 19, 60, 350));
-  const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr, Options{});
+  const Pose pose = shaft_axis(model, setup.lines, setup.views, nullptr);
   ASSERT_EQ(pose.warnings.size(), 1u);
   EXPECT_EQ(
       pose.warnings[0],
@@ -188,7 +193,7 @@ TEST(ShaftAxis, TakesTheLinesWhereTheFragmentIs) {
   }
   Pose start;
   start.world_from_model = posed({0, 0, 0}, {0, 0, 50});
-  const Pose pose = shaft_axis(model, lines, views, &start, Options{});
+  const Pose pose = shaft_axis(model, lines, views, &start);
   const auto [turned_deg, off_mm] = axis_errors(pose, truth);
   std::printf("second pair: %.4f deg, %.4f mm\n", turned_deg, off_mm);
   EXPECT_LT(turned_deg, 0.02);
@@ -203,22 +208,19 @@ TEST(ShaftAxis, SaysWhatIsMissing) {
     list.add("at 0", setup.views[0]);
     return list;
   }();
-  EXPECT_EQ(error_of([&] { shaft_axis(model, setup.lines, one_view, nullptr, Options{}); }),
+  EXPECT_EQ(refusal(model, setup.lines, one_view, nullptr),
             "there are shaft lines of a view 'at 90', but no view of that name");
-  EXPECT_EQ(error_of([&] { shaft_axis(model, {}, setup.views, nullptr, Options{}); }),
-            "there are no shaft lines; wire the lines of at least one view");
+  EXPECT_EQ(refusal(model, {}, setup.views, nullptr), "there are no shaft lines; wire the lines of at least one view");
   Pose far;
   far.world_from_model.translation_mm = {0, 0, 400};
   EXPECT_EQ(
-      error_of([&] { shaft_axis(model, setup.lines, setup.views, &far, Options{}); }),
+      refusal(model, setup.lines, setup.views, &far),
       "view 'at 0': where the image shows the shaft, the model at its start does not appear, nor does another pair "
       "of lines fit it; give a start nearer to the bone");
   List<ShaftLines> empty_lines;
   empty_lines.add("at 0", ShaftLines{});
-  EXPECT_EQ(error_of([&] { shaft_axis(model, empty_lines, setup.views, nullptr, Options{}); }),
-            "view 'at 0': a border of the shaft has no length");
-  EXPECT_EQ(error_of([&] { shaft_axis(Mesh{}, setup.lines, setup.views, nullptr, Options{}); }),
-            "model: the surface has no triangles");
+  EXPECT_EQ(refusal(model, empty_lines, setup.views, nullptr), "view 'at 0': a border of the shaft has no length");
+  EXPECT_EQ(refusal(Mesh{}, setup.lines, setup.views, nullptr), "model: the surface has no triangles");
 }
 
-}  // namespace
+}  // namespace shaft_axis_test

@@ -1,18 +1,26 @@
-// SPDX-License-Identifier: GPL-3.0-or-later
-// Linked to CGAL's surface mesher, as the node is.
-#include "plugins/mesh/delaunay.cpp"
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+
 #include "mesh/shapes.hpp"
 
-namespace {
+namespace delaunay_test {
 
+using Eigen::Vector3d;
 using marrow::kPi;
+using marrow::Mesh;
+using marrow::SignedField;
 
-Mesh mesh_of(const SignedField& field, const Options& options = {}) {
-  marrow::Context context;
-  return delaunay(field, options, context);
+constexpr const char* kNode = "mesh.delaunay";
+
+Mesh mesh_of(const SignedField& field, const shipped::Options& options = {}) {
+  return mesh_shapes::meshed(kNode, field, options);
 }
 
 /// Smallest angle of a mesh's triangles.
@@ -28,33 +36,30 @@ double smallest_angle_deg(const Mesh& mesh) {
 }
 
 TEST(Delaunay, SphereInATurnedGrid) {
-  const shapes::Distance distance = [](const Vector3d& p) { return shapes::sphere(p, 15); };
-  const Mesh mesh = mesh_of(shapes::field_of(shapes::turned_grid({48, 48, 40}), distance));
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); };
+  const Mesh mesh = mesh_of(mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}), distance));
   EXPECT_EQ(mesh.frame, "scanner");
   EXPECT_TRUE(marrow::is_manifold(mesh));
-  EXPECT_EQ(shapes::euler_number(mesh), 2);
-  EXPECT_LT(shapes::largest_error_mm(mesh, distance), 0.03) << "vertices lie on the trilinear field's zero level";
+  EXPECT_EQ(mesh_shapes::euler_number(mesh), 2);
+  EXPECT_LT(mesh_shapes::largest_error_mm(mesh, distance), 0.03) << "vertices lie on the trilinear field's zero level";
   EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (4.0 / 3 * kPi * 15 * 15 * 15), 1, 1e-2);
-  EXPECT_TRUE(shapes::normals_point_outward(mesh, distance));
+  EXPECT_TRUE(mesh_shapes::normals_point_outward(mesh, distance));
   EXPECT_GT(smallest_angle_deg(mesh), 29.9);
 }
 
 TEST(Delaunay, Torus) {
-  const shapes::Distance distance = [](const Vector3d& p) { return shapes::torus(p, 12, 5); };
-  const Mesh mesh = mesh_of(shapes::field_of(shapes::turned_grid({50, 50, 50}), distance));
-  EXPECT_EQ(shapes::euler_number(mesh), 0);
+  const mesh_shapes::Distance distance = [](const Vector3d& p) { return mesh_shapes::torus(p, 12, 5); };
+  const Mesh mesh = mesh_of(mesh_shapes::field_of(mesh_shapes::turned_grid({50, 50, 50}), distance));
+  EXPECT_EQ(mesh_shapes::euler_number(mesh), 0);
   EXPECT_NEAR(marrow::enclosed_volume_mm3(mesh) / (2 * kPi * kPi * 12 * 25), 1, 1.5e-2);
 }
 
 TEST(Delaunay, TrianglesAreAsSmallAsAskedFor) {
-  const auto field =
-      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
-  Options options;
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}),
+                                           [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); });
   std::size_t fewer = 0;
   for (const double size_mm : {4.0, 2.0, 1.0}) {
-    options.size_mm = size_mm;
-    options.distance_mm = size_mm;
-    const Mesh mesh = mesh_of(field, options);
+    const Mesh mesh = mesh_of(field, {{"size_mm", size_mm}, {"distance_mm", size_mm}});
     EXPECT_GT(double(mesh.triangles.size()), 1.5 * double(fewer));
     fewer = mesh.triangles.size();
     for (const auto& t : mesh.triangles)
@@ -63,18 +68,14 @@ TEST(Delaunay, TrianglesAreAsSmallAsAskedFor) {
 }
 
 TEST(Delaunay, KeepsApartWhatOneSampleParts) {
-  const auto field =
-      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::two_slabs(p, 1.5); });
-  Options options;
-  options.largest_only = false;
-  EXPECT_EQ(shapes::euler_number(mesh_of(field, options)), 4);
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}),
+                                           [](const Vector3d& p) { return mesh_shapes::two_slabs(p, 1.5); });
+  EXPECT_EQ(mesh_shapes::euler_number(mesh_of(field, {{"largest_only", false}})), 4);
 }
 
 TEST(Delaunay, FindsPartsMuchSmallerThanItsTriangles) {
-  Options options;
-  options.largest_only = false;
   for (unsigned inside = 1; inside < 256; ++inside) {
-    const Mesh mesh = mesh_of(shapes::pattern_field(inside, false), options);
+    const Mesh mesh = mesh_of(mesh_shapes::pattern_field(inside, false), {{"largest_only", false}});
     EXPECT_TRUE(marrow::is_manifold(mesh)) << "pattern " << inside;
     EXPECT_GT(marrow::enclosed_volume_mm3(mesh), 0);
   }
@@ -82,8 +83,8 @@ TEST(Delaunay, FindsPartsMuchSmallerThanItsTriangles) {
 
 /// CGAL's own order of cells is that of their addresses; several at once lie in memory otherwise than one alone.
 TEST(Delaunay, SameBytesWhereverItsMemoryLies) {
-  const auto field =
-      shapes::field_of(shapes::turned_grid({40, 40, 32}), [](const Vector3d& p) { return shapes::torus(p, 9, 4); });
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({40, 40, 32}),
+                                           [](const Vector3d& p) { return mesh_shapes::torus(p, 9, 4); });
   const Mesh alone = mesh_of(field);
   std::array<Mesh, 6> together;
   tbb::parallel_for(0, 6, [&](int i) { together[std::size_t(i)] = mesh_of(field); });
@@ -96,7 +97,7 @@ TEST(Delaunay, SameBytesWhereverItsMemoryLies) {
 TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
   int refused = 0;
   for (unsigned seed = 0; seed < 12; ++seed) try {
-      EXPECT_TRUE(marrow::is_manifold(mesh_of(shapes::noise_field({9, 8, 10}, seed, 0.4)))) << "seed " << seed;
+      EXPECT_TRUE(marrow::is_manifold(mesh_of(mesh_shapes::noise_field({9, 8, 10}, seed, 0.4)))) << "seed " << seed;
     } catch (const marrow::Error& error) {
       ++refused;
       EXPECT_EQ(std::string(error.what()).rfind("field: Delaunay refinement does not close its surface: ", 0), 0u)
@@ -105,31 +106,15 @@ TEST(Delaunay, NoiseIsClosedOrRefusedInWords) {
   std::printf("%d of 12 fields of noise refused\n", refused);
 }
 
-TEST(Delaunay, StopsWhereTheFieldIsTooRoughForWhatIsAsked) {
-  const auto field = shapes::noise_field({9, 8, 10}, 3, 0.4);
-  marrow::delaunay::LevelSet level_set;
-  const Interpolated value(field);
-  level_set.value = [&](const Vector3d& p) { return value(p + Vector3d(4, 3.5, 4.5)); };
-  level_set.radius_mm = 12;
-  for (const Vector3d& index : spread_points(marrow::surface::Signs(field), 2))
-    level_set.points_mm.push_back(index - Vector3d(4, 3.5, 4.5));
-  const auto surface = marrow::delaunay::mesh(level_set, {30, 0.05, 0.01, 3000}, [] {});
-  EXPECT_FALSE(surface.complete);
-  EXPECT_LT(surface.vertices_mm.size(), 5000u);
-}
-
 TEST(Delaunay, CanBeCancelled) {
   std::atomic<bool> cancelled = true;
   marrow::Context::Hooks hooks;
   hooks.cancelled = &cancelled;
-  marrow::Context context(hooks);
-  const auto field =
-      shapes::field_of(shapes::turned_grid({48, 48, 40}), [](const Vector3d& p) { return shapes::sphere(p, 15); });
-  EXPECT_THROW(delaunay(field, {}, context), marrow::Cancelled);
+  const auto field = mesh_shapes::field_of(mesh_shapes::turned_grid({48, 48, 40}),
+                                           [](const Vector3d& p) { return mesh_shapes::sphere(p, 15); });
+  EXPECT_THROW(shipped::call(kNode, {{"field", shipped::item(field)}}, {}, marrow::Context(hooks)), marrow::Cancelled);
 }
 
-TEST(Delaunay, SaysWhatIsWrongWithAField) {
-  shapes::expect_texts_for_bad_fields([](const SignedField& field) { mesh_of(field); });
-}
+TEST(Delaunay, SaysWhatIsWrongWithAField) { mesh_shapes::expect_texts_for_bad_fields(kNode); }
 
-}  // namespace
+}  // namespace delaunay_test

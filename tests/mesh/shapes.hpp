@@ -7,12 +7,14 @@
 #include <cmath>
 #include <functional>
 #include <random>
+#include <string>
 
 #include "marrow/domain/manifold.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/volume.hpp"
+#include "shipped.hpp"
 
-namespace shapes {
+namespace mesh_shapes {
 
 using Distance = std::function<double(const Eigen::Vector3d&)>;
 
@@ -71,36 +73,34 @@ inline double two_slabs(const Eigen::Vector3d& p, double gap_mm) {
   return std::min(box(p - Eigen::Vector3d(0, 0, shift_mm)), box(p + Eigen::Vector3d(0, 0, shift_mm)));
 }
 
-/// What a node refuses a field with, or "no error".
-template <class Node>
-std::string message_of(const Node& node, const marrow::SignedField& field) {
-  try {
-    node(field);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "no error";
+/// What a node makes of a field.
+inline marrow::Mesh meshed(const std::string& node, const marrow::SignedField& field,
+                           const shipped::Options& options = {}) {
+  return shipped::call(node, {{"field", shipped::item(field)}}, options).at("mesh").as<marrow::Mesh>();
+}
+
+inline std::string refusal(const std::string& node, const marrow::SignedField& field) {
+  return shipped::refusal(node, {{"field", shipped::item(field)}});
 }
 
 /// Every mesher says the same of a field that is no good.
-template <class Node>
-void expect_texts_for_bad_fields(const Node& node) {
-  EXPECT_EQ(message_of(node, {}),
+inline void expect_texts_for_bad_fields(const std::string& node) {
+  EXPECT_EQ(refusal(node, {}),
             "field: 0 values do not fill a grid of 0 x 0 x 0 voxels; wire the output of a segment node");
   marrow::SignedField field;
   field.grid.size = {3, 3, 3};
   field.values_mm.assign(27, 2.f);
-  EXPECT_EQ(message_of(node, field),
+  EXPECT_EQ(refusal(node, field),
             "field: there is no surface, as no value is negative (inside); the segmentation found nothing: check its "
             "seeds and thresholds");
   field.values_mm.assign(27, -2.f);
-  EXPECT_EQ(message_of(node, field),
+  EXPECT_EQ(refusal(node, field),
             "field: there is no surface, as every value is negative (inside); the segmentation ran over the whole "
             "volume: raise its threshold");
   field.values_mm[13] = std::nanf("");
-  EXPECT_EQ(message_of(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
+  EXPECT_EQ(refusal(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
   field.values_mm[13] = -INFINITY;
-  EXPECT_EQ(message_of(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
+  EXPECT_EQ(refusal(node, field), "field: some values are not finite numbers; a signed distance in mm was expected");
 }
 
 /// Euler's number of a closed mesh: vertices - edges + faces, 2 for a sphere, 0 for a torus.
@@ -126,4 +126,4 @@ inline bool normals_point_outward(const marrow::Mesh& mesh, const Distance& dist
   return true;
 }
 
-}  // namespace shapes
+}  // namespace mesh_shapes

@@ -1,19 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/mesh/simplify.cpp"
-
 #include <gtest/gtest.h>
 
 #include "domain/shapes.hpp"
 #include "project/shapes.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace simplify_test {
+
+marrow::Mesh simplify(const marrow::Mesh& mesh, const shipped::Options& options = {}) {
+  return shipped::call("mesh.simplify", {{"mesh", shipped::item(mesh)}}, options).at("mesh").as<marrow::Mesh>();
+}
 
 TEST(Simplify, KeepsTheShapeOfASphere) {
   const marrow::Mesh sphere = shapes::sphere(25);
   ASSERT_GT(sphere.triangles.size(), 20000u);
-  Options options;
-  options.triangles = 2000;
-  const marrow::Mesh simple = simplify(sphere, options);
+  const marrow::Mesh simple = simplify(sphere, {{"triangles", std::int64_t{2000}}});
   EXPECT_LE(simple.triangles.size(), 2000u);
   EXPECT_GT(simple.triangles.size(), 1800u);
   EXPECT_EQ(simple.frame, sphere.frame);
@@ -25,9 +26,9 @@ TEST(Simplify, KeepsTheShapeOfASphere) {
 
 TEST(Simplify, LeavesASmallMeshAsItIs) {
   const marrow::Mesh box = marrow::test::box({0, 0, 0}, {20, 20, 20});
-  const marrow::Mesh same = simplify(box, {});
+  const marrow::Mesh same = simplify(box);
   EXPECT_EQ(same.vertices_mm, box.vertices_mm);
   EXPECT_EQ(same.triangles, box.triangles);
 }
 
-}  // namespace
+}  // namespace simplify_test

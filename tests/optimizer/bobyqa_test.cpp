@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/optimizer/bobyqa.cpp"
-
 #include "optimizer_behaviour.hpp"
+
+namespace bobyqa_test {
+
+std::shared_ptr<const marrow::Optimizer> bobyqa() { return optimizer_behaviour::made_by("optimizer.bobyqa"); }
 
 TEST(Bobyqa, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*bobyqa()); }
 TEST(Bobyqa, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*bobyqa()); }
@@ -20,3 +22,5 @@ TEST(Bobyqa, RefusesOneDimension) {
     EXPECT_STREQ(error.what(), "BOBYQA minimises functions of two or more numbers, got 1; use another optimizer");
   }
 }
+
+}  // namespace bobyqa_test

@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/optimizer/direct.cpp"
+#include <cmath>
 
 #include "optimizer_behaviour.hpp"
+
+namespace direct_test {
+
+std::shared_ptr<const marrow::Optimizer> direct() { return optimizer_behaviour::made_by("optimizer.direct"); }
 
 TEST(Direct, LeavesLocalMinima) {
   auto problem = optimizer_behaviour::valley();
@@ -12,7 +16,7 @@ TEST(Direct, LeavesLocalMinima) {
     return sum;
   };
   problem.start = Eigen::Vector2d(-2, 3);
-  const auto result = direct({})->minimise(problem);
+  const auto result = direct()->minimise(problem);
   EXPECT_NEAR(result.x[0], 1.3, 0.01);
   EXPECT_NEAR(result.x[1], -0.7, 0.01);
 }
@@ -21,9 +25,11 @@ TEST(Direct, TakesNanForTheWorst) {
   problem.function = [](const Eigen::VectorXd& x) {
     return x[0] > 2 ? std::nan("") : (x - Eigen::Vector2d(1.2, -1)).squaredNorm();
   };
-  const auto result = direct({})->minimise(problem);
+  const auto result = direct()->minimise(problem);
   EXPECT_NEAR(result.x[0], 1.2, 0.02) << "boxes whose middle is not a number are divided last";
   EXPECT_NEAR(result.x[1], -1, 0.02);
 }
-TEST(Direct, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*direct({})); }
-TEST(Direct, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*direct({})); }
+TEST(Direct, LetsExceptionsPass) { optimizer_behaviour::lets_exceptions_pass(*direct()); }
+TEST(Direct, RefusesNonsense) { optimizer_behaviour::refuses_nonsense(*direct()); }
+
+}  // namespace direct_test

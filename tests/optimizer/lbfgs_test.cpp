@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/optimizer/lbfgs.cpp"
-
 #include "optimizer_behaviour.hpp"
+
+namespace lbfgs_test {
+
+std::shared_ptr<const marrow::Optimizer> lbfgs() { return optimizer_behaviour::made_by("optimizer.lbfgs"); }
 
 TEST(Lbfgs, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*lbfgs()); }
 TEST(Lbfgs, KeepsToBoundsAndBudget) { optimizer_behaviour::keeps_to_bounds_and_budget(*lbfgs()); }
@@ -21,3 +23,5 @@ TEST(Lbfgs, UsesDerivatives) {
   EXPECT_NEAR((result.x - Eigen::Vector2d(1, 1)).norm(), 0, 1e-5);
   EXPECT_LT(result.evaluations, 150);
 }
+
+}  // namespace lbfgs_test

@@ -1,7 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/optimizer/levenberg_marquardt.cpp"
+#include <cmath>
 
 #include "optimizer_behaviour.hpp"
+
+namespace levenberg_marquardt_test {
+
+std::shared_ptr<const marrow::Optimizer> levenberg_marquardt() {
+  return optimizer_behaviour::made_by("optimizer.levenberg_marquardt");
+}
 
 TEST(LevenbergMarquardt, FindsTheMinimum) { optimizer_behaviour::finds_the_minimum(*levenberg_marquardt()); }
 TEST(LevenbergMarquardt, KeepsToBoundsAndBudget) {
@@ -43,3 +49,5 @@ TEST(LevenbergMarquardt, SurvivesDerivativesThatAreNoNumbers) {
   };
   EXPECT_NEAR(levenberg_marquardt()->minimise(problem).value, 3, 1e-4);
 }
+
+}  // namespace levenberg_marquardt_test

@@ -7,9 +7,17 @@
 #include <limits>
 #include <marrow/domain/error.hpp>
 #include <marrow/domain/functions.hpp>
-#include <stdexcept>
+#include <memory>
+#include <string>
+
+#include "shipped.hpp"
 
 namespace optimizer_behaviour {
+
+/// The minimiser that a node gives with its defaults.
+inline std::shared_ptr<const marrow::Optimizer> made_by(const std::string& node) {
+  return std::static_pointer_cast<const marrow::Optimizer>(shipped::call(node, {}).at("optimizer").data);
+}
 
 inline marrow::MinimisationProblem valley() {
   marrow::MinimisationProblem problem;

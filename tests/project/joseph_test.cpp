@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/project/joseph.cpp"
+#include "project/made.hpp"
+#include "project/radiograph_behaviour.hpp"
 
-#include "radiograph_behaviour.hpp"
-
-namespace {
+namespace joseph_test {
 
 std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& volume,
                                                         const marrow::SignedField* field) {
-  return joseph(volume, field, AttenuationOptions{});
+  return made::radiographs("project.joseph", volume, field);
 }
-
-}  // namespace
 
 TEST(Joseph, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.03, 0.2); }
 TEST(Joseph, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
@@ -19,3 +16,5 @@ TEST(Joseph, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree
 TEST(Joseph, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }
 TEST(Joseph, SourceWithin) { radiograph_behaviour::source_within(make); }
 TEST(Joseph, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }
+
+}  // namespace joseph_test

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "radiograph_behaviour.hpp"
-#include "shipped.hpp"
+#include "project/made.hpp"
+#include "project/radiograph_behaviour.hpp"
 
-namespace {
+namespace lightfield_test {
 
 using marrow::RadiographProjector;
 using marrow::Volume;
@@ -16,22 +16,15 @@ shipped::Inputs inputs(const Volume& volume, const marrow::SignedField* field) {
   return in;
 }
 
-/// The projector keeps what it was made from.
-std::shared_ptr<const RadiographProjector> made(const std::string& node, const shipped::Inputs& in,
-                                                const shipped::Options& options = {}) {
-  const auto kept =
-      std::make_shared<std::pair<shipped::Inputs, shipped::Outputs>>(in, shipped::call(node, in, options));
-  return {kept, &kept->second.at("projector").as<RadiographProjector>()};
-}
 std::shared_ptr<const RadiographProjector> make_medium(const Volume& volume, const marrow::SignedField* field) {
-  return made("project.lightfield", inputs(volume, field), {{"step_mm", 2.0}, {"step_deg", 1.5}, {"range_deg", 2.0}});
+  return made::projector<RadiographProjector>("project.lightfield", inputs(volume, field),
+                                              {{"step_mm", 2.0}, {"step_deg", 1.5}, {"range_deg", 2.0}});
 }
 /// In a moment.
 std::shared_ptr<const RadiographProjector> make_coarse(const Volume& volume, const marrow::SignedField* field) {
-  return made("project.lightfield", inputs(volume, field), {{"step_mm", 5.0}, {"step_deg", 4.0}, {"range_deg", 2.0}});
+  return made::projector<RadiographProjector>("project.lightfield", inputs(volume, field),
+                                              {{"step_mm", 5.0}, {"step_deg", 4.0}, {"range_deg", 2.0}});
 }
-
-}  // namespace
 
 TEST(LightField, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make_medium, 0.2, 1.0); }
 TEST(LightField, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make_coarse); }
@@ -45,12 +38,13 @@ TEST(LightField, FinerStepsAreMoreAccurate) {
   const marrow::Camera& camera = radiograph_behaviour::camera(0);
   marrow::RigidTransform pose = shapes::centred_at({3, -4, 6});
   pose.rotation = marrow::rotation_from_vector({0.05, -0.04, 0.06});
-  const auto exact = made("project.siddon_jacobs", {{"volume", in.at("volume")}});
+  const auto exact = made::projector<RadiographProjector>("project.siddon_jacobs", {{"volume", in.at("volume")}});
   const marrow::PixelGrid grid{150, 150, 3, 70, 70};
   const auto expected = exact->radiograph(camera, pose, grid);
   const auto error = [&](double step_mm, double step_deg) {
     const auto values =
-        made("project.lightfield", in, {{"step_mm", step_mm}, {"step_deg", step_deg}, {"range_deg", 4.0}})
+        made::projector<RadiographProjector>("project.lightfield", in,
+                                             {{"step_mm", step_mm}, {"step_deg", step_deg}, {"range_deg", 4.0}})
             ->radiograph(camera, pose, grid);
     double sum = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -67,10 +61,10 @@ TEST(LightField, OutOfRangeItIsJosephs) {
   const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
   const marrow::Camera& camera = radiograph_behaviour::camera(40);
   const std::vector<Eigen::Vector2f> pixels{{250, 250}, {240, 263}, {300, 222}};
-  const auto values =
-      made("project.lightfield", in, {{"step_mm", 5.0}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
-  const auto expected =
-      made("project.joseph", {{"volume", in.at("volume")}})->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
+  const auto values = made::projector<RadiographProjector>("project.lightfield", in, {{"step_mm", 5.0}})
+                          ->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
+  const auto expected = made::projector<RadiographProjector>("project.joseph", {{"volume", in.at("volume")}})
+                            ->radiograph(camera, shapes::centred_at({0, 0, 0}), pixels);
   for (std::size_t i = 0; i < pixels.size(); ++i) EXPECT_NEAR(values[i], expected[i], 1e-3);
 }
 
@@ -85,3 +79,5 @@ TEST(LightField, SaysWhatIsWrong) {
   EXPECT_EQ(shipped::refusal("project.lightfield", in),
             "there is no view, so it is not known about which directions to integrate; wire 'views'");
 }
+
+}  // namespace lightfield_test

@@ -9,7 +9,7 @@
 #include <map>
 
 #include "marrow/plugin.hpp"
-#include "shapes.hpp"
+#include "project/shapes.hpp"
 
 namespace radiograph_behaviour {
 

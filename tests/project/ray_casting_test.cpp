@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/project/ray_casting.cpp"
+#include "project/made.hpp"
+#include "project/radiograph_behaviour.hpp"
 
-#include "radiograph_behaviour.hpp"
-
-namespace {
+namespace ray_casting_test {
 
 std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& volume,
                                                         const marrow::SignedField* field) {
-  return ray_casting(volume, field, Options{});
+  return made::radiographs("project.ray_casting", volume, field);
 }
-
-}  // namespace
 
 TEST(RayCasting, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.03, 0.2); }
 TEST(RayCasting, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
@@ -19,3 +16,5 @@ TEST(RayCasting, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_a
 TEST(RayCasting, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }
 TEST(RayCasting, SourceWithin) { radiograph_behaviour::source_within(make); }
 TEST(RayCasting, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }
+
+}  // namespace ray_casting_test

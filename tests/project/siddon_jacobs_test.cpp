@@ -1,16 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/project/siddon_jacobs.cpp"
+#include "project/made.hpp"
+#include "project/radiograph_behaviour.hpp"
 
-#include "radiograph_behaviour.hpp"
-
-namespace {
+namespace siddon_jacobs_test {
 
 std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& volume,
                                                         const marrow::SignedField* field) {
-  return siddon_jacobs(volume, field, AttenuationOptions{});
+  return made::radiographs("project.siddon_jacobs", volume, field);
 }
-
-}  // namespace
 
 TEST(SiddonJacobs, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.07, 2); }
 TEST(SiddonJacobs, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
@@ -19,3 +16,5 @@ TEST(SiddonJacobs, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels
 TEST(SiddonJacobs, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }
 TEST(SiddonJacobs, SourceWithin) { radiograph_behaviour::source_within(make); }
 TEST(SiddonJacobs, RefusesNonsense) { radiograph_behaviour::refuses_nonsense(make); }
+
+}  // namespace siddon_jacobs_test

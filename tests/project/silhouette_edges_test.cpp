@@ -1,15 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/project/silhouette_edges.cpp"
+#include "project/made.hpp"
+#include "project/outline_behaviour.hpp"
 
-#include "outline_behaviour.hpp"
-
-namespace {
+namespace silhouette_edges_test {
 
 std::shared_ptr<const marrow::OutlineProjector> make(const marrow::Mesh& mesh, const marrow::Volume* volume) {
-  return silhouette_edges(mesh, volume, Options{});
+  return made::outlines("project.silhouette_edges", mesh, volume);
 }
-
-}  // namespace
 
 TEST(SilhouetteEdges, SphereIsItsTangentCone) { outline_behaviour::sphere_is_its_tangent_cone(make, 0.02, 0.01); }
 TEST(SilhouetteEdges, HiddenPartsAreLeftOut) { outline_behaviour::hidden_parts_are_left_out(make); }
@@ -48,3 +45,5 @@ TEST(SilhouetteEdges, AgreesWithItselfOnAGridTwiceAsCoarse) {
              coarse = projector->outline(shapes::c_arm(90), pose, 2);
   EXPECT_NEAR(double(fine.size()), 2.0 * double(coarse.size()), 0.03 * double(fine.size()));
 }
+
+}  // namespace silhouette_edges_test

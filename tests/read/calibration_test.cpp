@@ -6,17 +6,18 @@
 
 #include <opencv2/core.hpp>
 
-#include "plugins/read/view.cpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace calibration_test {
 
 using marrow::Calibration;
 using marrow::Camera;
 using marrow::RadialDistortion;
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
+using marrow::test::view_from;
 using marrow::test::with;
 
 constexpr int kWidth = 200, kHeight = 160;
@@ -95,7 +96,7 @@ TEST(Calibration, CameraFileWithDistortion) {
   const TemporaryFolder folder;
   write_image(folder / "a.tif");
   put(folder / "a.yaml", camera_text());
-  const marrow::View read = view(nullptr, {"a", folder / "a.tif", folder / "a.yaml", {}, 0});
+  const marrow::View read = view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml"});
   expect_straight(read);
   EXPECT_EQ(read.camera.camera_from_world.translation_mm.z(), 900);
 }
@@ -107,7 +108,7 @@ TEST(Calibration, CalibrationOfTheDeviceReplacesTheCameraMatrix) {
   Camera nominal{kWidth, kHeight, Eigen::Matrix3d::Identity(), {}};
   nominal.intrinsics << 600, 0, 99.5, 0, 600, 79.5, 0, 0, 1;
   nominal.camera_from_world = {"camera", "world", Eigen::Matrix3d::Identity(), {0, 0, 600}};
-  const marrow::View read = view(&nominal, {"a", folder / "a.tif", {}, folder / "c.yaml", 0});
+  const marrow::View read = view_from(&nominal, {"a", folder / "a.tif", {}, folder / "c.yaml"});
   expect_straight(read);
   EXPECT_EQ(read.camera.camera_from_world.translation_mm.z(), 600);
 }
@@ -141,18 +142,18 @@ TEST(Calibration, Refusals) {
   write_image(folder / "a.tif");
   put(folder / "a.yaml", camera_text());
   put(folder / "c.yaml", calibration_text());
-  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml", 0}),
+  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "a.yaml", folder / "c.yaml"}),
               "it is removed only once");
   put(folder / "c.yaml", with(calibration_text(), "width_px: 200", "width_px: 300"));
   put(folder / "plain.yaml", with(camera_text(), "radial_distortion: [3, 10, 0]\n", ""));
-  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}),
+  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),
               "the image has 200 x 160 pixels, but the calibration is of images of 300 x 160");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[-30, 0, 0]"));
-  EXPECT_SAYS(view(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml", 0}),
+  EXPECT_SAYS(view_from(nullptr, {"a", folder / "a.tif", folder / "plain.yaml", folder / "c.yaml"}),
               "the radial distortion folds the image");
   put(folder / "c.yaml", with(calibration_text(), "[3, 10, 0]", "[3, 10]"));
   EXPECT_SAYS(marrow::files::read_calibration_file(folder / "c.yaml"),
               "c.yaml:5:20: calibration: radial_distortion: expected 3 numbers");
 }
 
-}  // namespace
+}  // namespace calibration_test

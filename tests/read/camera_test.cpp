@@ -1,20 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/camera.cpp"
-
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
 #include "read/files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace camera_test {
 
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
-marrow::Camera read(const std::filesystem::path& path) {
-  marrow::Context context;
-  return camera({path}, context);
+marrow::Camera read(const std::filesystem::path& path, const marrow::Context& context = marrow::Context()) {
+  return marrow::test::read_by<marrow::Camera>("read.camera", path, {}, context);
 }
 
 const std::string kXmalab =
@@ -111,8 +109,7 @@ TEST(ReadCamera, OwnYaml) {
   std::string warning;
   marrow::Context::Hooks hooks;
   hooks.log = [&](std::string_view text, marrow::LogLevel) { warning = text; };
-  marrow::Context context(hooks);
-  EXPECT_EQ(::camera({folder / "cam.yaml"}, context).width_px, 640);
+  EXPECT_EQ(read(folder / "cam.yaml", marrow::Context(hooks)).width_px, 640);
   EXPECT_NE(warning.find("cam.yaml: the images of this camera are distorted"), std::string::npos);
   put(folder / "cam.yaml", with(kYaml, "target: camera", "target: detector"));
   EXPECT_SAYS(read(folder / "cam.yaml"),
@@ -123,4 +120,4 @@ TEST(ReadCamera, OwnYaml) {
   EXPECT_SAYS(read(folder / "cam.yaml"), "cam.yaml:2:11: camera: width_px: expected a whole number, got '640.5'");
 }
 
-}  // namespace
+}  // namespace camera_test

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/case.cpp"
-
 #include <gtest/gtest.h>
 
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace case_test {
 
+using marrow::test::case_at;
 using marrow::test::ItkGrid;
 using marrow::test::message_of;
 using marrow::test::put;
@@ -66,7 +66,7 @@ class ReadCase : public testing::Test {
     put(folder / "frontal.yaml", kCamera);
     put(folder / "case.yaml", kCase);
   }
-  marrow::Case read() { return read_case({folder.path()}); }
+  marrow::Case read() { return case_at(folder.path()); }
   std::string said(const std::string& text) {
     put(folder / "case.yaml", text);
     return message_of([&] { read(); });
@@ -175,7 +175,7 @@ TEST_F(ReadCase, TheMaskIsMirroredWithItsImage) {
     elements[0x00200020] = mirrored ? "CS:L\\F" : "CS:R\\F";
     put(folder / "lateral.dcm", marrow::test::dicom_file(elements));
     marrow::Case value;
-    ASSERT_EQ(message_of([&] { value = read_case({folder.path()}); }), "");
+    ASSERT_EQ(message_of([&] { value = read(); }), "");
     const marrow::View& view = value.views[1];
     EXPECT_EQ(view.image.pixels.at<std::uint16_t>(0, mirrored ? 5 : 0), 0);
     EXPECT_EQ(view.mask.at<std::uint8_t>(0, mirrored ? 5 : 0), 0);
@@ -208,9 +208,9 @@ TEST_F(ReadCase, StartAndTruthForAllFragmentsOrNone) {
 }
 
 TEST_F(ReadCase, WantsTheFolder) {
-  EXPECT_SAYS(read_case({folder / "case.yaml"}),
+  EXPECT_SAYS(case_at(folder / "case.yaml"),
               "expected the folder of a case, which holds case.yaml (name the folder, not a file in it)");
-  EXPECT_SAYS(read_case({folder / "absent"}), "there is no such folder");
+  EXPECT_SAYS(case_at(folder / "absent"), "there is no such folder");
   std::filesystem::remove(folder / "case.yaml");
   EXPECT_SAYS(read(), "case.yaml: there is no such file");
 }
@@ -243,4 +243,4 @@ TEST_F(ReadCase, MutationsAreReadOrDiagnosed) {
   }
 }
 
-}  // namespace
+}  // namespace case_test

@@ -12,7 +12,9 @@
 #include "read/damage.hpp"
 #include "read/itk_files.hpp"
 
-namespace marrow::test {
+namespace damaged {
+
+using namespace marrow::test;
 
 inline constexpr int kCuts = 40, kFlips = 60;
 /// What a reader may reserve for small files: the largest sample unpacks to 200 kB, and the libraries' own buffers are
@@ -69,4 +71,4 @@ Sample written(const TemporaryFolder& folder, const std::string& name, const Itk
   return sample;
 }
 
-}  // namespace marrow::test
+}  // namespace damaged

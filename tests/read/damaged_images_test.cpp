@@ -7,8 +7,9 @@
 #include "read/damaged.hpp"
 #include "read/dicom_text.hpp"
 
-namespace {
+namespace damaged_images_test {
 
+using namespace damaged;
 using namespace marrow::test;
 using Path = std::filesystem::path;
 
@@ -60,4 +61,4 @@ TEST(Damaged, DicomImage) {
   expect_handled(folder, sample, [](const Path& path) { marrow::files::read_xray_geometry(path, 1, {}); });
 }
 
-}  // namespace
+}  // namespace damaged_images_test

@@ -5,8 +5,9 @@
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "read/damaged.hpp"
 
-namespace {
+namespace damaged_meshes_test {
 
+using namespace damaged;
 using namespace marrow::test;
 using Path = std::filesystem::path;
 
@@ -63,4 +64,4 @@ TEST(Damaged, Meshes) {
                  read);
 }
 
-}  // namespace
+}  // namespace damaged_meshes_test

@@ -5,8 +5,9 @@
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "read/damaged.hpp"
 
-namespace {
+namespace damaged_volumes_test {
 
+using namespace damaged;
 using namespace marrow::test;
 using marrow::files::VolumeReading;
 using Path = std::filesystem::path;
@@ -158,4 +159,4 @@ TEST(Damaged, DicomSeries) {
   });
 }
 
-}  // namespace
+}  // namespace damaged_volumes_test

@@ -2,22 +2,19 @@
 // DICOM series through read.volume.
 #include <gtest/gtest.h>
 
-#include "plugins/read/volume.cpp"
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace dicom_test {
 
 using marrow::test::DicomSlice;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_dicom;
 
 marrow::Volume read(const std::filesystem::path& path, const std::string& series_uid = "") {
-  Options options;
-  options.path = path;
-  options.series_uid = series_uid;
-  return volume(options);
+  return marrow::test::read_by<marrow::Volume>("read.volume", path, {{"series_uid", series_uid}});
 }
 
 DicomSlice slice_at(double z, int base) {
@@ -283,4 +280,4 @@ TEST(ReadDicom, TruncatedRealSliceIsDiagnosed) {
   marrow::test::expect_damage_is_diagnosed(path, folder / "vhf.1001.dcm", [&](const auto&) { read(folder.path()); });
 }
 
-}  // namespace
+}  // namespace dicom_test

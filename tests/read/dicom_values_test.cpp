@@ -6,7 +6,7 @@
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 
-namespace {
+namespace dicom_values_test {
 
 using namespace marrow::test;
 
@@ -183,4 +183,4 @@ TEST_F(DicomValues, OfOtherThanEveryFrameAreRefused) {
   EXPECT_SAYS(image(dicom_file(two), 3), "it has 3 frames, but values for 2 (PerFrameFunctionalGroupsSequence)");
 }
 
-}  // namespace
+}  // namespace dicom_values_test

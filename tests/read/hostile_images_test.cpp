@@ -11,7 +11,7 @@
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
 
-namespace {
+namespace hostile_images_test {
 
 using namespace marrow::test;
 using namespace std::string_literals;
@@ -239,4 +239,4 @@ TEST(Damaged, FilesOfTheAudit) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_images_test

@@ -2,8 +2,9 @@
 // MetaImage and NRRD files whose headers, which are texts, lie: fields, sizes of voxels, units and spaces.
 #include "read/hostile_volumes.hpp"
 
-namespace {
+namespace hostile_metaimage_nrrd_test {
 
+using namespace hostile_volumes;
 using namespace marrow::test;
 
 /// `text` without the line that begins with `start`.
@@ -122,4 +123,4 @@ TEST_F(Hostile, NrrdThatSaysTwiceHowLargeVoxelsAre) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_metaimage_nrrd_test

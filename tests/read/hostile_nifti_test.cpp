@@ -4,8 +4,9 @@
 
 #include "read/hostile_volumes.hpp"
 
-namespace {
+namespace hostile_nifti_test {
 
+using namespace hostile_volumes;
 using namespace marrow::test;
 
 TEST_F(Hostile, NiftiWhoseTypeAndBitsDisagree) {
@@ -83,4 +84,4 @@ TEST_F(Hostile, NiftiThatSaysTwiceHowLargeVoxelsAre) {
   EXPECT_EQ(volume_at(folder / "b.nii").grid.spacing_mm[2], 1);
 }
 
-}  // namespace
+}  // namespace hostile_nifti_test

@@ -2,8 +2,9 @@
 // TIFF stacks that lie: pages that are no slices, fields of other kinds, directories in a circle.
 #include "read/hostile_volumes.hpp"
 
-namespace {
+namespace hostile_tiff_test {
 
+using namespace hostile_volumes;
 using namespace marrow::test;
 
 std::string tiff_entry(int tag, int type, std::uint32_t count, std::uint32_t value) {
@@ -87,4 +88,4 @@ TEST_F(Hostile, TiffWhosePagesShareTheirBytes) {
   expect("a.tif", bytes, "its pages lie over each other");
 }
 
-}  // namespace
+}  // namespace hostile_tiff_test

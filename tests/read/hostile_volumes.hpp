@@ -8,7 +8,9 @@
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
 
-namespace marrow::test {
+namespace hostile_volumes {
+
+using namespace marrow::test;
 
 inline marrow::Volume volume_at(const std::filesystem::path& path) {
   marrow::files::VolumeReading reading;
@@ -45,4 +47,4 @@ class Hostile : public testing::Test {
   TemporaryFolder folder;
 };
 
-}  // namespace marrow::test
+}  // namespace hostile_volumes

@@ -6,8 +6,9 @@
 
 #include "read/hostile_volumes.hpp"
 
-namespace {
+namespace hostile_volumes_test {
 
+using namespace hostile_volumes;
 using namespace marrow::test;
 
 TEST_F(Hostile, PackedSamplesAreVerifiedToTheirEnd) {
@@ -154,4 +155,4 @@ TEST_F(Hostile, PipesDevicesAndLinksToThemselvesAreNoFiles) {
   EXPECT_REFUSED(volume_at(folder / "z.nii"), "z.nii", "expected a file, this is none");
 }
 
-}  // namespace
+}  // namespace hostile_volumes_test

@@ -1,20 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/image.cpp"
-
 #include <gtest/gtest.h>
 #include <zlib.h>
 
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace image_test {
 
 using marrow::test::ItkGrid;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
 
-marrow::Image read(const std::filesystem::path& path) { return image({path, 0}); }
+marrow::Image read(const std::filesystem::path& path, int frame = 0) {
+  return marrow::test::read_by<marrow::Image>("read.image", path, {{"frame", std::int64_t{frame}}});
+}
 
 template <class T>
 ItkGrid<T> ramp(unsigned width, unsigned height, double step) {
@@ -167,9 +168,9 @@ TEST(ReadImage, DicomFrames) {
   elements[0x7FE00010] += second;
   marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
   EXPECT_SAYS(read(folder / "x.dcm"), "x.dcm: has 2 frames; name one with frame (from 1)");
-  EXPECT_EQ(image({folder / "x.dcm", 1}).pixels.at<std::uint16_t>(0, 2), 2);
-  EXPECT_EQ(image({folder / "x.dcm", 2}).pixels.at<std::uint16_t>(0, 2), 3);
-  EXPECT_SAYS(image({folder / "x.dcm", 3}), "has 2 frames; there is no frame 3");
+  EXPECT_EQ(read(folder / "x.dcm", 1).pixels.at<std::uint16_t>(0, 2), 2);
+  EXPECT_EQ(read(folder / "x.dcm", 2).pixels.at<std::uint16_t>(0, 2), 3);
+  EXPECT_SAYS(read(folder / "x.dcm", 3), "has 2 frames; there is no frame 3");
 }
 
 // What an enhanced file says of each frame: values, what they stand for, and whether it is mirrored.
@@ -188,9 +189,9 @@ TEST(ReadImage, DicomFramesHaveTheirOwnValues) {
   };
   elements[0x52009230] = groups("DS:1", "SS:1", "DS:0") + groups("DS:2", "SS:-1", "DS:180").substr(3);
   marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
-  EXPECT_EQ(image({folder / "x.dcm", 1}).pixels.at<std::uint16_t>(3, 1), 301);
+  EXPECT_EQ(read(folder / "x.dcm", 1).pixels.at<std::uint16_t>(3, 1), 301);
   // Of the second one: twice the values, the highest the darkest; from behind, "R\\F" is mirrored.
-  EXPECT_EQ(image({folder / "x.dcm", 2}).pixels.at<float>(3, 1), 2 * 305 - 2 * 304);
+  EXPECT_EQ(read(folder / "x.dcm", 2).pixels.at<float>(3, 1), 2 * 305 - 2 * 304);
 }
 
-}  // namespace
+}  // namespace image_test

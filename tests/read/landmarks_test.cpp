@@ -6,7 +6,7 @@
 #include "read/files.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace landmarks_test {
 
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
@@ -109,4 +109,4 @@ TEST(ReadLandmarks, RefusesFilesOfAnotherKind) {
       std::string::npos);
 }
 
-}  // namespace
+}  // namespace landmarks_test

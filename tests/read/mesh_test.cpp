@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/mesh.cpp"
-
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstring>
 
 #include "read/files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace mesh_test {
 
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::with;
 
-marrow::Mesh read(const std::filesystem::path& path, double scale = 1) {
-  marrow::Context context;
-  return mesh({path, scale}, context);
+marrow::Mesh read(const std::filesystem::path& path, double scale = 1,
+                  const marrow::Context& context = marrow::Context()) {
+  return marrow::test::read_by<marrow::Mesh>("read.mesh", path, {{"scale", scale}}, context);
 }
 
 /// A tetrahedron with corners at the origin and 1 along each axis: volume 1/6.
@@ -120,8 +121,7 @@ TEST(ReadMesh, WarnsOfASurfaceInMetres) {
   std::string warning;
   marrow::Context::Hooks hooks;
   hooks.log = [&](std::string_view message, marrow::LogLevel) { warning = message; };
-  marrow::Context context(hooks);
-  mesh({folder / "a.stl", 0.4}, context);
+  read(folder / "a.stl", 0.4, marrow::Context(hooks));
   EXPECT_NE(warning.find("is it in metres? Then give scale: 1000"), std::string::npos) << warning;
 }
 
@@ -233,4 +233,4 @@ TEST(ReadMesh, AFileOfSeveralSolidsMustBeWhole) {
   EXPECT_SAYS(read(folder / "half.stl"), "has no 'endfacet'");
 }
 
-}  // namespace
+}  // namespace mesh_test

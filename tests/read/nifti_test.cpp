@@ -9,7 +9,7 @@
 #include "read/hostile.hpp"
 #include "read/itk_files.hpp"
 
-namespace {
+namespace nifti_test {
 
 using namespace marrow::test;
 
@@ -78,4 +78,4 @@ TEST_F(TwoPlaces, SformBesideTheQform) {
   EXPECT_FLOAT_EQ(float(grid_of(replaced(with_codes(3, 1), place(2, 3), number(0.001f))).origin_mm[2]), 0.001f);
 }
 
-}  // namespace
+}  // namespace nifti_test

@@ -4,7 +4,7 @@
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
 
-namespace {
+namespace nrrd_test {
 
 using namespace marrow::test;
 
@@ -30,4 +30,4 @@ TEST_F(Nrrd, CentersAreOfEachAxis) {
     EXPECT_SAYS(grid_with(ends + "\ncenters: " + wrong), "expected one of cell, node and none for each of the axes");
 }
 
-}  // namespace
+}  // namespace nrrd_test

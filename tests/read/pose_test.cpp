@@ -1,16 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/pose.cpp"
-
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include "marrow/toolbox/files/yaml_text.hpp"
 #include "read/files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace pose_test {
 
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::with;
+
+marrow::Pose pose_at(const std::filesystem::path& path) {
+  return marrow::test::read_by<marrow::Pose>("read.pose", path);
+}
 
 const std::string kPose = R"(marrow-pose: 1
 target: world
@@ -22,7 +26,7 @@ translation_mm: [1, -2.5, 3e2]
 TEST(ReadPose, RotationAndTranslation) {
   const TemporaryFolder folder;
   put(folder / "p.yaml", kPose);
-  const marrow::Pose value = pose({folder / "p.yaml"});
+  const marrow::Pose value = pose_at(folder / "p.yaml");
   EXPECT_EQ(value.world_from_model.target, "world");
   EXPECT_EQ(value.world_from_model.source, "ct");
   EXPECT_EQ(value.world_from_model * Eigen::Vector3d(10, 0, 0), Eigen::Vector3d(1, 7.5, 300));
@@ -35,8 +39,8 @@ TEST(ReadPose, PlacementsOfTheWrist) {
   MARROW_NEED_DATA(data, "wrist/start.json");
   const YAML::Node starts = YAML::LoadFile(data)["radius"];
   for (const char* frame : {"0002", "0158"}) {
-    const marrow::Pose value = pose({std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist" /
-                                     ("radius-" + std::string(frame) + ".pose.yaml")});
+    const marrow::Pose value = pose_at(std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist" /
+                                       ("radius-" + std::string(frame) + ".pose.yaml"));
     const auto rows = starts[frame]["index_to_world_3x4"].as<std::vector<std::vector<double>>>();
     for (const Eigen::Vector3d& index :
          {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(67, 85, 0), Eigen::Vector3d(30, 40, 127)}) {
@@ -63,7 +67,7 @@ TEST(ReadPose, WhatASearchWroteIsReadBack) {
   written.evaluations = 20;
   written.convergence = {{10, 2.5}, {20, 0.125}};
   put(folder / "p.yaml", marrow::files::pose(written));
-  const marrow::Pose read = pose({folder / "p.yaml"});
+  const marrow::Pose read = pose_at(folder / "p.yaml");
   EXPECT_EQ(read.world_from_model.translation_mm, written.world_from_model.translation_mm);
   EXPECT_EQ(read.world_from_model.rotation, written.world_from_model.rotation);
   EXPECT_EQ(read.frame.origin_mm, written.frame.origin_mm);
@@ -80,7 +84,7 @@ TEST(ReadPose, DiagnosesFaults) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {
     put(folder / "p.yaml", text);
-    EXPECT_SAYS(pose({folder / "p.yaml"}), said);
+    EXPECT_SAYS(pose_at(folder / "p.yaml"), said);
   };
   expect(with(kPose, "[1, 0, 0]", "[1, 0]"), "p.yaml:4:11: pose: rotation: expected 3 rows of 3 numbers");
   expect(with(kPose, "[1, 0, 0]", "[-1, 0, 0]"), "not a rotation (off orthonormal by 0");
@@ -95,4 +99,4 @@ TEST(ReadPose, DiagnosesFaults) {
   expect(kPose + "---\n" + kPose, "the file goes on after the end of its first document");
 }
 
-}  // namespace
+}  // namespace pose_test

@@ -1,22 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/seeds.cpp"
-
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "read/files.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace seeds_test {
 
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
+
+marrow::List<marrow::Seeds> seeds_at(const std::filesystem::path& path) {
+  return shipped::call("read.seeds", {}, {{"path", path.string()}}).at("seeds").as_list<marrow::Seeds>();
+}
 
 TEST(ReadSeeds, FragmentsInTheirOrder) {
   const TemporaryFolder folder;
   put(folder / "s.yaml",
       "marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]], register: false}\n  distal:\n    seeds:\n      - "
       "[4, 5, 6]\n      - [7, 8, 9]\n");
-  const marrow::List<marrow::Seeds> value = seeds({folder / "s.yaml"});
+  const marrow::List<marrow::Seeds> value = seeds_at(folder / "s.yaml");
   EXPECT_EQ(value.names(), (std::vector<std::string>{"proximal", "distal"}));
   EXPECT_FALSE(value[0].wanted);
   EXPECT_TRUE(value[1].wanted);
@@ -25,7 +28,7 @@ TEST(ReadSeeds, FragmentsInTheirOrder) {
 
 TEST(ReadSeeds, SeedsOfTheWristLieInBone) {
   const auto file = std::filesystem::path(MARROW_SOURCE_DIR) / "pipelines/wrist/radius.seeds.yaml";
-  const marrow::List<marrow::Seeds> radius = seeds({file});
+  const marrow::List<marrow::Seeds> radius = seeds_at(file);
   EXPECT_EQ(radius.names(), std::vector<std::string>{"radius"});
   MARROW_NEED_DATA(data, "wrist/volumes/rad_dcm_cropped.tif");
   const marrow::Volume ct = marrow::files::read_volume_file(data, {{0.39625, 0.39625, 0.625}, {}, -1024, ""});
@@ -37,7 +40,7 @@ TEST(ReadSeeds, DiagnosesFaults) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {
     put(folder / "s.yaml", "marrow-seeds: 1\n" + text);
-    EXPECT_SAYS(seeds({folder / "s.yaml"}), said);
+    EXPECT_SAYS(seeds_at(folder / "s.yaml"), said);
   };
   expect("", "key 'fragments' is missing");
   expect("fragments: {}\n", "fragments: expected fragments by name");
@@ -48,4 +51,4 @@ TEST(ReadSeeds, DiagnosesFaults) {
          "s.yaml:2:38: 'a' is given twice in fragments; the first is at line 2");
 }
 
-}  // namespace
+}  // namespace seeds_test

@@ -7,7 +7,7 @@
 #include "read/files.hpp"
 #include "read/hostile.hpp"
 
-namespace {
+namespace tiff_test {
 
 using namespace marrow::test;
 
@@ -160,4 +160,4 @@ TEST_F(Tiff, OnlyOnePlainStackOfOmeIsAVolume) {
   expect_no_volume(pages_of(4, "<OME>" + image_text + image_text + "</OME>"), "is an OME file of 2 images");
 }
 
-}  // namespace
+}  // namespace tiff_test

@@ -1,14 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/view.cpp"
-
 #include <gtest/gtest.h>
 
 #include "read/dicom_text.hpp"
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace view_test {
+
+using marrow::test::view_from;
 
 TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   const marrow::test::TemporaryFolder folder;
@@ -17,15 +18,15 @@ TEST(ReadView, TakesItsCameraFromAFileOrAValue) {
   marrow::test::put(folder / "a.txt",
                     "image size\n6,4\n\ncamera matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\n"
                     "translation\n0\n0\n600\n");
-  const marrow::View from_file = view(nullptr, {"frontal", folder / "a.png", folder / "a.txt", {}, 0});
+  const marrow::View from_file = view_from(nullptr, {"frontal", folder / "a.png", folder / "a.txt"});
   EXPECT_EQ(from_file.name, "frontal");
   EXPECT_EQ(from_file.camera.width_px, 6);
   marrow::Camera camera = from_file.camera;
   camera.camera_from_world.translation_mm.z() = 700;
-  EXPECT_EQ(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}).camera.camera_from_world.translation_mm.z(), 700);
+  EXPECT_EQ(view_from(&camera, {"frontal", folder / "a.png"}).camera.camera_from_world.translation_mm.z(), 700);
   EXPECT_TRUE(shipped::declares("read.view", marrow::exactly_one({"in.camera", "camera"})));
   camera.width_px = 7;
-  EXPECT_SAYS(view(&camera, {"frontal", folder / "a.png", {}, {}, 0}),
+  EXPECT_SAYS(view_from(&camera, {"frontal", folder / "a.png"}),
               "view 'frontal': the image has 6 x 4 pixels, but its camera is for 7 x 4");
 }
 
@@ -35,8 +36,8 @@ TEST(ReadView, ValuesThatGoThroughATableAreRefused) {
   elements[0x00283000] = marrow::test::dicom_item({{0x00283002, "US:4"}});
   marrow::test::put(folder / "x.dcm", marrow::test::dicom_file(elements));
   const marrow::Camera camera;
-  EXPECT_SAYS(view(&camera, {"frontal", folder / "x.dcm", {}, {}, 0}),
+  EXPECT_SAYS(view_from(&camera, {"frontal", folder / "x.dcm"}),
               "x.dcm: its values go through a table (ModalityLUTSequence), which is not read; export it without one");
 }
 
-}  // namespace
+}  // namespace view_test

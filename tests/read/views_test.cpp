@@ -1,18 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/views.cpp"
-
 #include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
 
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace views_test {
 
 using marrow::test::ItkGrid;
 using marrow::test::put;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
+
+std::vector<std::string> texts(const std::vector<std::filesystem::path>& paths) { return {paths.begin(), paths.end()}; }
 
 class ReadViews : public testing::Test {
  protected:
@@ -23,16 +26,19 @@ class ReadViews : public testing::Test {
       put(folder / name,
           "image size\n6,4\n\ncamera "
           "matrix\n10,0,3\n0,10,2\n0,0,1\n\nrotation\n1,0,0\n0,1,0\n0,0,1\n\ntranslation\n0\n0\n600\n");
-    options.names = {"one", "two"};
-    options.images = {folder / "a.png", folder / "b.png"};
-    options.cameras = {folder / "a.txt", folder / "b.txt"};
+    options["names"] = std::vector<std::string>{"one", "two"};
+    options["images"] = texts({folder / "a.png", folder / "b.png"});
+    options["cameras"] = texts({folder / "a.txt", folder / "b.txt"});
+  }
+  marrow::List<marrow::View> views(const shipped::Inputs& inputs = {}) {
+    return shipped::call("read.views", inputs, options).at("views").as_list<marrow::View>();
   }
   TemporaryFolder folder;
-  Options options;
+  shipped::Options options;
 };
 
 TEST_F(ReadViews, ImagesWithTheirCameras) {
-  const auto value = views(nullptr, options);
+  const auto value = views();
   EXPECT_EQ(value.names(), (std::vector<std::string>{"one", "two"}));
   EXPECT_EQ(value[1].name, "two");
   EXPECT_EQ(value[1].camera.camera_from_world.translation_mm.z(), 600);
@@ -45,15 +51,16 @@ TEST_F(ReadViews, CamerasAsValuesAreFoundByName) {
   cameras.add("two", camera);
   camera.camera_from_world.translation_mm.z() = 1;
   cameras.add("one", camera);
-  options.cameras.clear();
-  EXPECT_EQ(views(&cameras, options)[0].camera.camera_from_world.translation_mm.z(), 1);
-  options.names[1] = "three";
-  EXPECT_SAYS(views(&cameras, options), "view 'three' has no camera of that name; there are 'two', 'one'");
+  options.erase("cameras");
+  const shipped::Inputs wired{{"camera", shipped::list(cameras, "view")}};
+  EXPECT_EQ(views(wired)[0].camera.camera_from_world.translation_mm.z(), 1);
+  options["names"] = std::vector<std::string>{"one", "three"};
+  EXPECT_SAYS(views(wired), "view 'three' has no camera of that name; there are 'two', 'one'");
 }
 
 TEST_F(ReadViews, DiagnosesFaults) {
   write_itk(folder / "b.png", ItkGrid<std::uint8_t>{.size = {6, 5}, .samples = std::vector<std::uint8_t>(30, 9)});
-  EXPECT_SAYS(views(nullptr, options), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
+  EXPECT_SAYS(views(), "view 'two': the image has 6 x 5 pixels, but its camera is for 6 x 4");
 }
 
 TEST_F(ReadViews, DeclaresAnImageAndACameraForEachName) {
@@ -62,8 +69,8 @@ TEST_F(ReadViews, DeclaresAnImageAndACameraForEachName) {
   EXPECT_TRUE(shipped::declares("read.views", marrow::same_length({"names", "images"})));
   EXPECT_TRUE(shipped::declares("read.views", marrow::exactly_one({"in.camera", "cameras"})));
   EXPECT_TRUE(shipped::declares("read.views", marrow::as_many_or_none("cameras", "names")));
-  options.cameras.pop_back();
-  EXPECT_THROW(views(nullptr, options), std::out_of_range) << "nothing is read past the end of a list";
+  options["cameras"] = texts({folder / "a.txt"});
+  EXPECT_THROW(views(), std::out_of_range) << "nothing is read past the end of a list";
 }
 
 TEST(ReadImages, DeclaresANameForEachOrNone) {
@@ -72,13 +79,14 @@ TEST(ReadImages, DeclaresANameForEachOrNone) {
 
 TEST_F(ReadViews, RealWristPairs) {
   MARROW_NEED_DATA(data, "wrist");
-  options.images = {data / "images/xr_rad_uln_cam01_UND.0002.tif", data / "images/xr_rad_uln_cam02_UND.0002.tif"};
-  options.cameras = {data / "cameras/xr_calib_wrist_cam01.txt", data / "cameras/xr_calib_wrist_cam02.txt"};
-  const auto value = views(nullptr, options);
+  options["images"] =
+      texts({data / "images/xr_rad_uln_cam01_UND.0002.tif", data / "images/xr_rad_uln_cam02_UND.0002.tif"});
+  options["cameras"] = texts({data / "cameras/xr_calib_wrist_cam01.txt", data / "cameras/xr_calib_wrist_cam02.txt"});
+  const auto value = views();
   EXPECT_EQ(value[0].image.width(), 1760);
   const double angle = std::acos(
       value[0].camera.camera_from_world.rotation.row(2).dot(value[1].camera.camera_from_world.rotation.row(2)));
   EXPECT_NEAR(marrow::degrees(angle), 110, 3) << "the cameras stand 110 degrees apart";
 }
 
-}  // namespace
+}  // namespace views_test

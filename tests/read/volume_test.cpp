@@ -1,30 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/read/volume.cpp"
-
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <limits>
 
 #include "read/files.hpp"
 #include "read/itk_files.hpp"
+#include "read/reading.hpp"
 
-namespace {
+namespace volume_test {
 
 using marrow::test::ItkGrid;
 using marrow::test::TemporaryFolder;
 using marrow::test::write_itk;
 
-marrow::Volume read(const std::filesystem::path& path, Options with = {}) {
-  with.path = path;
-  return volume(with);
+marrow::Volume read(const std::filesystem::path& path, const shipped::Options& options = {}) {
+  return marrow::test::read_by<marrow::Volume>("read.volume", path, options);
 }
 
-Options options(std::vector<double> voxel_size_mm, std::vector<std::string> flip = {}, double value_offset_hu = 0) {
-  Options options;
-  options.voxel_size_mm = std::move(voxel_size_mm);
-  options.flip = std::move(flip);
-  options.value_offset_hu = value_offset_hu;
-  return options;
+shipped::Options options(const std::vector<double>& voxel_size_mm, const std::vector<std::string>& flip = {},
+                         double value_offset_hu = 0) {
+  return {{"voxel_size_mm", voxel_size_mm}, {"flip", flip}, {"value_offset_hu", value_offset_hu}};
 }
 
 /// A grid turned about a skew axis, so that a transposed or mirrored direction would be seen.
@@ -165,4 +161,4 @@ TEST(ReadVolume, HeadersThatClaimTooMuchAreRefusedBeforeAnythingIsAllocated) {
   EXPECT_SAYS(read(folder / "huge.mha"), "its header claims 9000 x 9000 x 9000 samples, but the file has only");
 }
 
-}  // namespace
+}  // namespace volume_test

@@ -4,7 +4,7 @@
 #include "domain/shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace icp_test {
 
 using Eigen::Vector3d;
 
@@ -151,4 +151,4 @@ TEST(Icp, SaysWhatIsWrong) {
             "better start, or raise reach_mm");
 }
 
-}  // namespace
+}  // namespace icp_test

@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/register/multiresolution.cpp"
-#include "framework/toolbox/search/predicted_covariance.hpp"
-#include "framework/toolbox/search/scan.hpp"
-
 #include <gtest/gtest.h>
 #include <oneapi/tbb/global_control.h>
 
+#include <atomic>
+#include <cmath>
+
+#include "framework/toolbox/search/predicted_covariance.hpp"
+#include "framework/toolbox/search/scan.hpp"
 #include "ideal_edges.hpp"
-#include "nodes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace multiresolution_test {
 
 /// Errors (frontal, lateral, axial rotation [deg]; then translations [mm]).
 marrow::Vector6d error_of(const marrow::Pose& pose, const marrow::Pose& truth) {
@@ -25,25 +25,50 @@ marrow::Vector6d motion(double rx, double ry, double rz, double tx, double ty, d
   return deg_and_mm;
 }
 
+struct Result {
+  marrow::Pose pose;
+  marrow::List<marrow::Pose> stages;
+};
+
+/// What a registration is given, and what its cost was made from.
+struct Problem {
+  shipped::Inputs scene, inputs;
+};
+
 /// A fragment at a known pose, seen from given angles.
 struct Trial {
-  Trial(marrow::Mesh surface, double height_mm) : mesh(std::move(surface)), projector(outline_node(mesh)) {
+  Trial(marrow::Mesh surface, double height_mm)
+      : mesh(std::move(surface)),
+        projector(shipped::call("project.silhouette_edges", {{"mesh", shipped::item(mesh)}}).at("projector")) {
     truth.frame = marrow::fragment_frame(mesh);
     truth.world_from_model =
         marrow::search::moved_by_units(shapes::centred_at({0, 0, height_mm}), truth.frame, motion(3, -5, 6, 3, -4, 5));
   }
-  Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
-             const marrow::search::SearchOptions& options = {}) const {
-    const ideal_edges::Scene scene = ideal_edges::scene_of(*projector, truth.world_from_model, angles_deg, faults);
-    const auto cost = cost_node(*projector, scene.views, scene.edges);
+  Problem problem(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults,
+                  const marrow::Vector6d& away) const {
+    const ideal_edges::Scene seen =
+        ideal_edges::scene_of(projector.as<marrow::OutlineProjector>(), truth.world_from_model, angles_deg, faults);
     marrow::Pose start = truth;
     start.world_from_model = marrow::search::moved_by_units(truth.world_from_model, truth.frame, away);
-    marrow::Context context;
-    return multiresolution(*cost, *optimizer_node(), start, options, context);
+    Problem problem;
+    problem.scene = {{"projector", projector},
+                     {"views", shipped::list(seen.views, "view")},
+                     {"edges", shipped::list(seen.edges, "view")}};
+    const shipped::Options ideal{{"model_error_px", 0.0}};  // ideal edges have none
+    problem.inputs = {{"cost", shipped::call("similarity.contour_distance", problem.scene, ideal).at("cost")},
+                      {"optimizer", shipped::call("optimizer.levenberg_marquardt", {}).at("optimizer")},
+                      {"initial", shipped::item(start)}};
+    return problem;
+  }
+  Result run(const std::vector<double>& angles_deg, const ideal_edges::Faults& faults, const marrow::Vector6d& away,
+             const shipped::Options& options = {}) const {
+    const Problem given = problem(angles_deg, faults, away);
+    const auto outputs = shipped::call("register.multiresolution", given.inputs, options);
+    return {outputs.at("pose").as<marrow::Pose>(), outputs.at("stages").as_list<marrow::Pose>()};
   }
 
   marrow::Mesh mesh;
-  std::shared_ptr<const marrow::OutlineProjector> projector;
+  marrow::Value projector;
   marrow::Pose truth;
 };
 
@@ -51,8 +76,6 @@ const Trial& femur() {
   static const Trial trial(shapes::distal_femur(), 85);
   return trial;
 }
-
-}  // namespace
 
 TEST(Multiresolution, PerfectEdgesGiveTheTruth) {
   const Result result = femur().run({0, 90}, {}, motion(1, -1.5, 9, -2, 1.5, -9));
@@ -84,12 +107,13 @@ TEST(Multiresolution, SurvivesNoiseGapsOutliersAndAFatModel) {
 }
 
 TEST(Multiresolution, ScattersPosesAboutAStartThatIsWrongInAllAxes) {
-  marrow::search::SearchOptions options;
-  options.scan_poses = 1000;
-  options.scan_rotation_deg = options.scan_translation_mm = 6;
-  options.scan_side_deg = options.scan_side_mm = 6;
-  options.candidates = 40;
-  options.finalists = 8;
+  const shipped::Options options{{"scan_poses", std::int64_t{1000}},
+                                 {"scan_rotation_deg", 6.0},
+                                 {"scan_translation_mm", 6.0},
+                                 {"scan_side_deg", 6.0},
+                                 {"scan_side_mm", 6.0},
+                                 {"candidates", std::int64_t{40}},
+                                 {"finalists", std::int64_t{8}}};
   ideal_edges::Faults faults{0.5, 0.25, 3000, -1.5, true, 3};
   const std::vector<marrow::Vector6d> starts{motion(6, -5, 6, 6, -5, 6), motion(-5, -6, -6, 5, 6, -5),
                                              motion(5, 6, -5, -6, 6, 6)};
@@ -130,10 +154,9 @@ TEST(Multiresolution, ScattersEvenlyWithinTheRanges) {
 
 TEST(Multiresolution, TheLastLevelChoosesAmongTheFinalists) {
   ideal_edges::Faults faults{0.5, 0.25, 800, -1.5, true, 3};
-  marrow::search::SearchOptions one, three;
-  three.finalists = 3;
   const marrow::Vector6d away = motion(1.5, -1, 10, 2, 2, 10);
-  EXPECT_LE(femur().run({0, 90}, faults, away, three).pose.cost, femur().run({0, 90}, faults, away, one).pose.cost);
+  EXPECT_LE(femur().run({0, 90}, faults, away, {{"finalists", std::int64_t{3}}}).pose.cost,
+            femur().run({0, 90}, faults, away).pose.cost);
 }
 
 TEST(Multiresolution, PredictsItsScatter) {
@@ -201,12 +224,12 @@ TEST(Multiresolution, DeclaresAsManyNumbersForEachLevel) {
 }
 
 TEST(Multiresolution, StopsWhenCancelled) {
-  const ideal_edges::Scene scene =
-      ideal_edges::scene_of(*femur().projector, femur().truth.world_from_model, {0, 90}, {});
-  const auto cost = cost_node(*femur().projector, scene.views, scene.edges);
+  const Problem problem = femur().problem({0, 90}, {}, motion(0, 0, 0, 0, 0, 0));
   const std::atomic<bool> cancelled{true};
   marrow::Context::Hooks hooks;
   hooks.cancelled = &cancelled;
-  marrow::Context context(hooks);
-  EXPECT_THROW(multiresolution(*cost, *optimizer_node(), femur().truth, {}, context), marrow::Cancelled);
+  EXPECT_THROW(shipped::call("register.multiresolution", problem.inputs, {}, marrow::Context(hooks)),
+               marrow::Cancelled);
 }
+
+}  // namespace multiresolution_test

@@ -7,7 +7,7 @@
 
 #include "bowl.hpp"
 
-namespace {
+namespace predicted_covariance_test {
 
 using marrow::Matrix6d;
 using marrow::Vector6d;
@@ -45,8 +45,6 @@ class Counted : public Bowl {
   }
   mutable std::atomic<int> asked = 0;
 };
-
-}  // namespace
 
 TEST(PredictedCovariance, IsTheInverseOfTheCurvatureTimesTheFactor) {
   for (const double factor : {1.0, 2.0, 350.0}) {
@@ -144,3 +142,5 @@ TEST(PredictedCovariance, OfADirectionThatOnlyTwoAxesTogetherLeaveOpen) {
   EXPECT_TRUE(std::isfinite(predicted.covariance().norm()));
   EXPECT_NEAR(predicted.covariance()(3, 3), 1, 1e-6);
 }
+
+}  // namespace predicted_covariance_test

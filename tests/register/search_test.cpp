@@ -10,7 +10,7 @@
 #include "framework/toolbox/search/predicted_covariance.hpp"
 #include "framework/toolbox/search/scan.hpp"
 
-namespace {
+namespace search_test {
 
 using marrow::Matrix6d;
 using marrow::Pose;
@@ -44,8 +44,6 @@ Bowl bowl(double likelihood_factor = 1) {
 Vector6d from_truth(const marrow::RigidTransform& pose) {
   return well::way(truth().world_from_model, pose, truth().frame);
 }
-
-}  // namespace
 
 TEST(Scan, OfTheAxisIsAGridWithinItsRanges) {
   SearchOptions options;
@@ -285,3 +283,5 @@ TEST(Derivatives, AreThoseOfTheCoordinates) {
   }
   EXPECT_TRUE(std::isnan(marrow::search::in_coordinates(std::nullopt, motion(0, 0, 0, 0, 0, 0), kAllAxes).value));
 }
+
+}  // namespace search_test

@@ -4,7 +4,7 @@
 #include "shipped.hpp"
 #include "well.hpp"
 
-namespace {
+namespace sequence_test {
 
 using marrow::Cost;
 using marrow::Pose;
@@ -36,8 +36,6 @@ struct Trial {
 };
 
 double apart(const Pose& a, const Pose& b) { return well::way(a.world_from_model, b.world_from_model, a.frame).norm(); }
-
-}  // namespace
 
 TEST(Sequence, TheFirstCostLeadsAndTheSecondDecides) {
   const Pose first = pose_at(truth(), 0.2, -0.1, 0.3, 0.2, -0.2, 0.3);
@@ -113,3 +111,5 @@ TEST(Sequence, SaysWhatIsWrong) {
   trial.inputs["initial"] = shipped::item(broken);
   EXPECT_NE(shipped::refusal("register.sequence", trial.inputs).find("the pose to start from"), std::string::npos);
 }
+
+}  // namespace sequence_test

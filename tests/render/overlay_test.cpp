@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/render/overlay.cpp"
-
 #include <gtest/gtest.h>
 
-namespace {
+#include "marrow/toolbox/draw/canvas.hpp"
+#include "render/pictures.hpp"
+#include "shipped.hpp"
+
+namespace overlay_test {
+
+using namespace marrow::draw;
+using pictures::has;
 
 /// A square outline of 40 px about the image point of the model's origin.
 class SquareProjector : public marrow::OutlineProjector {
@@ -50,16 +55,16 @@ marrow::Pose pose_at(double x_mm) {
   return pose;
 }
 
-Options tripled() {
-  Options options;
-  options.size_px = 600;
-  return options;
-}
+const shipped::Options kTripled{{"size_px", std::int64_t{600}}};
 
-bool has(const cv::Mat& picture, cv::Point pixel, const cv::Scalar& colour) {
-  const auto value = picture.at<cv::Vec3b>(pixel);
-  return std::abs(value[0] - colour[0]) < 40 && std::abs(value[1] - colour[1]) < 40 &&
-         std::abs(value[2] - colour[2]) < 40;
+/// The picture of a pose; `more` are inputs besides pose, projector and view.
+cv::Mat overlay(const marrow::Pose& pose, const shipped::Inputs& more = {}, const shipped::Options& options = kTripled,
+                const marrow::View& seen = view()) {
+  shipped::Inputs inputs = more;
+  inputs["pose"] = shipped::item(pose);
+  inputs["projector"] = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const SquareProjector>());
+  inputs["view"] = shipped::item(seen);
+  return shipped::call("render.overlay", inputs, options).at("picture").as<marrow::Picture>().pixels;
 }
 
 /// Pixels of a colour anywhere above the legend.
@@ -72,21 +77,18 @@ bool contains(const cv::Mat& picture, int height, const cv::Scalar& colour) {
 
 // Pixel u of the image has its centre at 3 u + 1 in a panel of three times the size.
 TEST(Overlay, DrawsTheResultWhereTheProjectorSays) {
-  const marrow::Picture picture =
-      overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled());
-  EXPECT_EQ(picture.pixels.type(), CV_8UC3);
-  EXPECT_EQ(picture.pixels.cols, 600);
-  EXPECT_GT(picture.pixels.rows, 300);  // the legend lies beneath
+  const cv::Mat picture = overlay(pose_at(10));
+  EXPECT_EQ(picture.type(), CV_8UC3);
+  EXPECT_EQ(picture.cols, 600);
+  EXPECT_GT(picture.rows, 300);  // the legend lies beneath
   for (cv::Point pixel : {cv::Point(391, 151), cv::Point(271, 151), cv::Point(331, 91), cv::Point(331, 211)})
-    EXPECT_TRUE(has(picture.pixels, pixel, kSkyBlue)) << pixel;
-  EXPECT_TRUE(has(picture.pixels, {331, 151}, {128, 128, 128})) << "a constant image is mid grey";
+    EXPECT_TRUE(has(picture, pixel, kSkyBlue)) << pixel;
+  EXPECT_TRUE(has(picture, {331, 151}, {128, 128, 128})) << "a constant image is mid grey";
 }
 
 TEST(Overlay, BeforeIsOnTheLeftAndAfterOnTheRight) {
-  const marrow::Pose start = pose_at(-40);
-  const marrow::Truth truth{at(10)};
   const cv::Mat picture =
-      overlay(pose_at(40), SquareProjector(), view(), &start, &truth, nullptr, nullptr, tripled()).pixels;
+      overlay(pose_at(40), {{"start", shipped::item(pose_at(-40))}, {"truth", shipped::item(marrow::Truth{at(10)})}});
   EXPECT_EQ(picture.cols, 1200);
   EXPECT_TRUE(has(picture, {241, 151}, kOrange));
   EXPECT_TRUE(has(picture, {391, 151}, kYellow));
@@ -101,28 +103,30 @@ TEST(Overlay, DrawsEdgesAndShaftLines) {
   marrow::ShaftLines lines;
   lines.left = {{20, 30}, {20, 90}};
   lines.right = {{30, 30}, {30, 90}};
-  const cv::Mat picture =
-      overlay(pose_at(0), SquareProjector(), view(), nullptr, nullptr, &edges, &lines, tripled()).pixels;
+  const cv::Mat picture = overlay(pose_at(0), {{"edges", shipped::item(edges)}, {"lines", shipped::item(lines)}});
   EXPECT_TRUE(has(picture, {61, 151}, kGreen));
   EXPECT_TRUE(has(picture, {91, 151}, kGreen));
   EXPECT_TRUE(has(picture, {451, 211}, {166, 124, 147})) << "halfway between grey and the colour of edges";
 }
 
 TEST(Overlay, SaysWhenTheOutlineIsOutside) {
-  const cv::Mat picture =
-      overlay(pose_at(500), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, tripled()).pixels;
+  const cv::Mat picture = overlay(pose_at(500));
   EXPECT_FALSE(contains(picture, 300, kSkyBlue));
-  EXPECT_EQ(make_layer("result", kSkyBlue, 1, SquareProjector(), view(), at(500), {}).text,
-            "result: outside the image");
+  EXPECT_TRUE(pictures::has_legend(picture, 300, {{"result: outside the image", kSkyBlue}}));
 }
 
 TEST(Overlay, ZoomShowsTheOutlinesAndAMargin) {
-  Options options = tripled();
-  options.zoom = true;
-  const cv::Mat picture =
-      overlay(pose_at(10), SquareProjector(), view(), nullptr, nullptr, nullptr, nullptr, options).pixels;
-  EXPECT_EQ(region(view(), {make_layer("", {}, 1, SquareProjector(), view(), at(10), options)}),
-            cv::Rect(82, 22, 57, 57));
+  shipped::Options options = kTripled;
+  options["zoom"] = true;
+  const cv::Mat picture = overlay(pose_at(10), {}, options);
+  // Pixels of many values tell in the margin, where nothing is drawn, which part of the image it is.
+  marrow::View varied = view();
+  for (int v = 0; v < 100; ++v)
+    for (int u = 0; u < 200; ++u) varied.image.pixels.at<std::uint16_t>(v, u) = (7919 * u + 1733 * v) % 4001 + 1000;
+  const cv::Mat zoomed = overlay(pose_at(10), {}, options, varied);
+  const Panel expected = make_panel(varied, {82, 22, 57, 57}, 600, Contrast::local);
+  for (const cv::Rect& margin : {cv::Rect(0, 540, 600, 60), cv::Rect(540, 40, 60, 560)})
+    EXPECT_TRUE(pictures::same(zoomed(margin), expected.pixels(margin))) << margin;
   EXPECT_EQ(picture.cols, 600);
   EXPECT_TRUE(has(picture, {int((130 - 82 + 0.5) * 600 / 57), 300}, kSkyBlue));
 }
@@ -147,7 +151,7 @@ TEST(Overlay, ContrastIgnoresNotANumberAndWhatTheMaskHides) {
 TEST(Overlay, SaysWhatIsWrong) {
   const auto message = [](const marrow::View& view, const marrow::Pose& pose) -> std::string {
     try {
-      overlay(pose, SquareProjector(), view, nullptr, nullptr, nullptr, nullptr, {});
+      overlay(pose, {}, {}, view);
     } catch (const marrow::Error& error) {
       return error.what();
     }
@@ -164,4 +168,4 @@ TEST(Overlay, SaysWhatIsWrong) {
   EXPECT_EQ(message(view(), pose), "pose 'result': the transform has a number that is not finite");
 }
 
-}  // namespace
+}  // namespace overlay_test

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/render/scene.cpp"
-
 #include <gtest/gtest.h>
 
 #include "domain/message_of.hpp"
 #include "domain/shapes.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace scene_test {
 
 /// 100 x 100 pixels, one pixel per mm at the world's origin, 1000 mm from the source, looking along +z.
 marrow::View view() {
@@ -26,10 +25,14 @@ marrow::Pose at(const Eigen::Vector3d& translation_mm) {
 }
 
 cv::Mat draw(const marrow::List<marrow::Mesh>& meshes, const marrow::List<marrow::Pose>& poses) {
-  Options options;
-  options.size_px = 200;
-  marrow::Context context;
-  return scene(meshes, poses, view(), options, context).pixels;
+  return shipped::call("render.scene",
+                       {{"meshes", shipped::list(meshes, "fragment")},
+                        {"poses", shipped::list(poses, "fragment")},
+                        {"view", shipped::item(view())}},
+                       {{"size_px", std::int64_t{200}}})
+      .at("picture")
+      .as<marrow::Picture>()
+      .pixels;
 }
 
 marrow::List<marrow::Mesh> two_boxes() {
@@ -80,4 +83,4 @@ TEST(Scene, SaysWhichPoseIsMissing) {
             "fragment 'proximal': there is a mesh, but no pose of that name");
 }
 
-}  // namespace
+}  // namespace scene_test

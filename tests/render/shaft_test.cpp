@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/render/shaft.cpp"
-
 #include <gtest/gtest.h>
 
-namespace {
+#include "marrow/toolbox/draw/canvas.hpp"
+#include "render/pictures.hpp"
+#include "shipped.hpp"
+
+namespace shaft_test {
+
+using namespace marrow::draw;
+using pictures::has;
 
 marrow::View view() {
   marrow::View view;
@@ -25,49 +30,48 @@ marrow::ShaftLines lines() {
   return lines;
 }
 
-bool has(const cv::Mat& picture, cv::Point pixel, const cv::Scalar& colour) {
-  const auto value = picture.at<cv::Vec3b>(pixel);
-  return std::abs(value[0] - colour[0]) < 40 && std::abs(value[1] - colour[1]) < 40 &&
-         std::abs(value[2] - colour[2]) < 40;
-}
-
 // Pixel u of the image has its centre at 5 u + 2 in a panel of five times the size.
-Options five_times() {
-  Options options;
-  options.size_px = 500;
-  return options;
+const shipped::Options kFiveTimes{{"size_px", std::int64_t{500}}};
+
+cv::Mat shaft(const marrow::ShaftLines& lines, const shipped::Options& options = kFiveTimes) {
+  return shipped::call("render.shaft", {{"lines", shipped::item(lines)}, {"view", shipped::item(view())}}, options)
+      .at("picture")
+      .as<marrow::Picture>()
+      .pixels;
 }
 
 TEST(RenderShaft, ChosenAndRejectedPairsHaveTheirColours) {
-  const cv::Mat picture = shaft(lines(), view(), nullptr, five_times()).pixels;
+  const cv::Mat picture = shaft(lines());
   EXPECT_TRUE(has(picture, {152, 250}, kSkyBlue));
   EXPECT_TRUE(has(picture, {302, 250}, kSkyBlue));
   EXPECT_TRUE(has(picture, {202, 250}, kOrange));
   EXPECT_TRUE(has(picture, {427, 250}, kOrange));
 }
 
-TEST(RenderShaft, TheLineMidwayIsDrawn) {
-  EXPECT_TRUE(has(shaft(lines(), view(), nullptr, five_times()).pixels, {227, 250}, kSkyBlue));
-}
+TEST(RenderShaft, TheLineMidwayIsDrawn) { EXPECT_TRUE(has(shaft(lines()), {227, 250}, kSkyBlue)); }
 
 TEST(RenderShaft, DrawsNoMoreRejectedPairsThanAsked) {
-  Options options = five_times();
-  options.rejected = 1;
-  const cv::Mat picture = shaft(lines(), view(), nullptr, options).pixels;
+  shipped::Options options = kFiveTimes;
+  options["rejected"] = std::int64_t{1};
+  const cv::Mat picture = shaft(lines(), options);
   EXPECT_TRUE(has(picture, {202, 250}, kOrange));
   EXPECT_FALSE(has(picture, {427, 250}, kOrange));
-  options.rejected = 0;
-  EXPECT_FALSE(has(shaft(lines(), view(), nullptr, options).pixels, {202, 250}, kOrange));
+  options["rejected"] = std::int64_t{0};
+  EXPECT_FALSE(has(shaft(lines(), options), {202, 250}, kOrange));
 }
 
 TEST(RenderShaft, TellsWidthAndScore) {
-  EXPECT_EQ(describe(lines()), "chosen: 27.3 +- 1.4 mm wide, log likelihood -1.25");
+  const cv::Mat picture = shaft(lines(), {{"size_px", std::int64_t{1000}}});
+  EXPECT_TRUE(pictures::has_legend(picture, 1000,
+                                   {{"chosen: 27.3 +- 1.4 mm wide, log likelihood -1.25", kSkyBlue},
+                                    {"rejected 1: 10.0 mm wide: the marrow canal", kOrange},
+                                    {"rejected 2: 5.0 mm wide: too narrow", kOrange}}));
 }
 
 TEST(RenderShaft, LinesThatAreNotFiniteDrawNothing) {
   marrow::ShaftLines broken = lines();
   broken.left.from_px.x() = broken.rejected[0].left.from_px.y() = std::nan("");
-  EXPECT_FALSE(shaft(broken, view(), nullptr, five_times()).pixels.empty());
+  EXPECT_FALSE(shaft(broken).empty());
 }
 
-}  // namespace
+}  // namespace shaft_test

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Readers run apart: whatever a file makes them do is one node's error.
-#include "runtime/apart.hpp"
+#include "framework/runtime/apart.hpp"
 
 #include <signal.h>
 #include <unistd.h>
@@ -11,11 +11,13 @@
 #include "marrow/runtime/worker.hpp"
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace apart_test {
 
 using marrow::NodeRecord;
 using marrow::RunEvent;
 using marrow::RunResult;
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
 
 class ApartTest : public testing::Test {
  protected:
@@ -212,4 +214,4 @@ TEST_F(ApartTest, FolderThatCannotBeHashedIsOneNodesError) {
                                         "; copy it into the folder");
 }
 
-}  // namespace
+}  // namespace apart_test

@@ -8,7 +8,7 @@
 
 #include "marrow/runtime/types.hpp"
 
-namespace tested {
+namespace archive_test {
 
 enum class Side : std::int8_t { left, right };
 bool is_valid(Side side) { return side == Side::left || side == Side::right; }
@@ -18,17 +18,11 @@ struct alignas(512) Item {  // takes more memory than packed
   bool is_seen = false;
   Side side = Side::left;
   std::optional<double> value;
-  static constexpr auto fields() { return std::make_tuple(&Item::name, &Item::is_seen, &Item::side, &Item::value); }
+  using fields = marrow::Fields<&Item::name, &Item::is_seen, &Item::side, &Item::value>;
 };
-
-}  // namespace tested
-
-namespace {
 
 using marrow::Packer;
 using marrow::Unpacker;
-using tested::Item;
-using tested::Side;
 
 template <class T>
 std::string packed(const T& value) {
@@ -121,4 +115,4 @@ TEST(Archive, AnyBytesAreAValueOrASentence) {
   expect_that_any_bytes_do(std::vector<Item>(5, {"name", true, Side::right, 2.5}), chance);
 }
 
-}  // namespace
+}  // namespace archive_test

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Nodes against the contract of their kind.
-#include "runtime/contract.hpp"
+#include "framework/runtime/contract.hpp"
 
 #include <gtest/gtest.h>
 
 #include "marrow/plugin.hpp"
 
-namespace {
+namespace contract_test {
 
 using marrow::NodeInfo;
 using marrow::TypeInfo;
@@ -91,4 +91,4 @@ TEST(Contract, WithoutAKindPortsAreFree) {
   EXPECT_EQ(contract_faults(node<marrow::Volume, marrow::Volume>("a", "b"), nullptr), Faults{});
 }
 
-}  // namespace
+}  // namespace contract_test

@@ -7,7 +7,7 @@
 
 #include "marrow/plugin.hpp"
 
-namespace {
+namespace declaration_test {
 
 using marrow::List;
 using marrow::Metrics;
@@ -159,4 +159,4 @@ TEST(Declaration, ChecksOfAKind) {
                                                                    "check 'contract' is named twice"}));
 }
 
-}  // namespace
+}  // namespace declaration_test

@@ -9,7 +9,7 @@
 
 #include "marrow/runtime/abi.hpp"
 
-namespace {
+namespace diagnostics_test {
 
 using marrow::Diagnostics;
 
@@ -99,4 +99,4 @@ TEST(Suggestion, LongAndManyNamesTakeNoTime) {
   EXPECT_LT(double(std::clock() - start) / CLOCKS_PER_SEC, marrow::abi_stamp().sanitizers ? 60 : 20);
 }
 
-}  // namespace
+}  // namespace diagnostics_test

@@ -5,12 +5,14 @@
 #include "marrow/runtime/run_folder.hpp"
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace executor_test {
 
 using marrow::NodeRecord;
 using marrow::Pipeline;
 using marrow::RunEvent;
 using marrow::RunResult;
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
 using Status = NodeRecord::Status;
 
 class ExecutorTest : public testing::Test {
@@ -280,4 +282,4 @@ TEST_F(ExecutorTest, RunFolderThatCannotBeMade) {
   }
 }
 
-}  // namespace
+}  // namespace executor_test

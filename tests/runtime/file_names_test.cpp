@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-namespace {
+namespace file_names_test {
 
 using marrow::fault_of_name;
 using marrow::file_name_of;
@@ -90,4 +90,4 @@ TEST(FileNames, OfOneListAreDistinct) {
   EXPECT_EQ(marrow::distinct_names({"a", "a (2)", "a", "a (2)"}), (Texts{"a", "a (2)", "a (3)", "a (2) (2)"}));
 }
 
-}  // namespace
+}  // namespace file_names_test

@@ -10,6 +10,8 @@
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/pipeline.hpp"
 
+namespace runtime_fixture {
+
 /// A folder of a test's own, removed at its end.
 class Scratch {
  public:
@@ -32,3 +34,5 @@ inline const marrow::Catalogue& test_catalogue() {
   static const marrow::Catalogue catalogue({std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "plugins"});
   return catalogue;
 }
+
+}  // namespace runtime_fixture

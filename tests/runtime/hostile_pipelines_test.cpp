@@ -4,10 +4,12 @@
 
 #include "runtime/pipeline_fixture.hpp"
 
-namespace {
+namespace hostile_pipelines_test {
 
 using marrow::Diagnostics;
 using marrow::Pipeline;
+using pipeline_fixture::PipelineTest;
+using runtime_fixture::test_catalogue;
 
 /// A pipeline of one node with a key before it.
 std::string with_key(const std::string& key) {
@@ -175,4 +177,4 @@ TEST_F(PipelineTest, SmallFilesTakeNoTime) {
   }
 }
 
-}  // namespace
+}  // namespace hostile_pipelines_test

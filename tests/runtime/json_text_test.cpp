@@ -8,7 +8,7 @@
 
 #include "marrow/domain/error.hpp"
 
-namespace {
+namespace json_text_test {
 
 std::string fault_of(const std::function<void()>& read) {
   try {
@@ -57,4 +57,4 @@ TEST(JsonText, WholeNumbersWithinBounds) {
     EXPECT_NE(fault(text).find("expected a whole number"), std::string::npos) << text;
 }
 
-}  // namespace
+}  // namespace json_text_test

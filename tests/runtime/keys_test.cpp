@@ -17,7 +17,7 @@
 
 #include "framework/runtime/mapping.hpp"
 
-namespace {
+namespace keys_test {
 
 namespace fs = std::filesystem;
 using marrow::Digest;
@@ -80,8 +80,6 @@ class Keys : public testing::Test {
   marrow::PipelineNode node_;
   std::vector<Value> inputs_;
 };
-
-}  // namespace
 
 TEST_F(Keys, EachPartOfARecipeCountsOnItsOwn) {
   const marrow::PipelineNode node = node_;
@@ -310,3 +308,5 @@ TEST_F(Keys, WhatMadeADifference) {
   EXPECT_EQ(marrow::difference(before, now),
             "it uses edges.sobel, used edges.canny; input 'image' changed; input 'region' changed");
 }
+
+}  // namespace keys_test

@@ -65,9 +65,9 @@ TEST(LackOfMemory, WhileAManifestIsRead) {
 }
 
 TEST(LackOfMemory, WhileAPipelineIsRead) {
-  const Scratch scratch;
+  const runtime_fixture::Scratch scratch;
   const auto file = scratch.write("p.yaml", "marrow: 1\nnodes:\n  a: {uses: test.constant}\noutputs: {a: a}\n");
-  const marrow::Catalogue& catalogue = test_catalogue();
+  const marrow::Catalogue& catalogue = runtime_fixture::test_catalogue();
   EXPECT_GT(failures_of([&] {
               marrow::Diagnostics diagnostics;
               marrow::read_pipeline(file, {}, catalogue, diagnostics);

@@ -5,9 +5,10 @@
 #include "marrow/runtime/library.hpp"
 #include "runtime/fixture.hpp"
 
-namespace library_test {
+namespace library_fixture {
 
 namespace fs = std::filesystem;
+using runtime_fixture::Scratch;
 inline const fs::path kBad = fs::path(MARROW_BINARY_DIR) / "tests" / "bad_plugins";
 inline const fs::path kGood = fs::path(MARROW_BINARY_DIR) / "tests" / "plugins" / "marrow_test_numbers.so";
 
@@ -37,4 +38,4 @@ class LibraryTest : public testing::Test {
   const marrow::Digest framework = marrow::file_digest(marrow::framework_file());
 };
 
-}  // namespace library_test
+}  // namespace library_fixture

@@ -7,14 +7,14 @@
 
 #include "runtime/library_fixture.hpp"
 
-namespace {
+namespace library_test {
 
 namespace fs = std::filesystem;
-using library_test::kBad;
-using library_test::kGood;
+using library_fixture::kBad;
+using library_fixture::kGood;
 using nlohmann::json;
 
-class LibraryTest : public library_test::LibraryTest {
+class LibraryTest : public library_fixture::LibraryTest {
  protected:
   /// The good library with other bytes at the beginning.
   fs::path copy_with_header(const std::function<void(Elf64_Ehdr&)>& change) {
@@ -348,4 +348,4 @@ TEST_F(LibraryTest, LibraryThatLacksAnotherIsAskedAgain) {
   EXPECT_TRUE(!fs::exists(scratch.path / "cache") || fs::is_empty(scratch.path / "cache" / "marrow" / "libraries"));
 }
 
-}  // namespace
+}  // namespace library_test

@@ -7,7 +7,7 @@
 
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace manifest_test {
 
 using marrow::OptionType;
 using nlohmann::json;
@@ -301,4 +301,4 @@ TEST(Manifest, MutantsAreRefusedOrConsistent) {
   EXPECT_GT(believed, 50);
 }
 
-}  // namespace
+}  // namespace manifest_test

@@ -1,15 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/named_files.hpp"
+#include "framework/runtime/named_files.hpp"
 
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include "framework/runtime/keys.hpp"
 #include "runtime/fixture.hpp"
-#include "runtime/keys.hpp"
 
-namespace {
+namespace named_files_test {
 
 namespace fs = std::filesystem;
+using runtime_fixture::Scratch;
 
 class NamedFilesTest : public testing::Test {
  protected:
@@ -88,4 +89,4 @@ TEST_F(NamedFilesTest, DigestOfASettledFileSeesAWriteThatKeepsSizeAndTime) {
   EXPECT_NE(marrow::path_digest(file), before);
 }
 
-}  // namespace
+}  // namespace named_files_test

@@ -2,7 +2,10 @@
 // Every diagnostic of a pipeline file, at its place.
 #include "runtime/pipeline_fixture.hpp"
 
-namespace {
+namespace pipeline_faults_test {
+
+using pipeline_fixture::PipelineTest;
+using runtime_fixture::test_catalogue;
 
 TEST_F(PipelineTest, RenamedNodeIsPointedAtWhereItIsDefined) {
   read(
@@ -225,4 +228,4 @@ TEST_F(PipelineTest, NoNodes) {
   expect_fault("marrow: 1\nnodes: {}\noutputs: {}\n", 1, 1, "the pipeline has no nodes", "name them under  nodes:");
 }
 
-}  // namespace
+}  // namespace pipeline_faults_test

@@ -5,6 +5,11 @@
 
 #include "runtime/fixture.hpp"
 
+namespace pipeline_fixture {
+
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
+
 class PipelineTest : public testing::Test {
  protected:
   marrow::Pipeline read(const std::string& text, const marrow::PipelineArguments& arguments = {}) {
@@ -31,3 +36,5 @@ class PipelineTest : public testing::Test {
   Scratch scratch;
   marrow::Diagnostics diagnostics;
 };
+
+}  // namespace pipeline_fixture

@@ -3,9 +3,10 @@
 #include "framework/runtime/file_names.hpp"
 #include "runtime/pipeline_fixture.hpp"
 
-namespace {
+namespace pipeline_test {
 
 using marrow::Pipeline;
+using pipeline_fixture::PipelineTest;
 
 TEST_F(PipelineTest, GoodFileIsResolved) {
   const Pipeline p = read(
@@ -134,4 +135,4 @@ TEST_F(PipelineTest, SourcesComeFirstInTheFilesOrderOtherwise) {
   EXPECT_EQ(p.nodes[std::size_t(p.outputs[0].source.node)].id, "e");
 }
 
-}  // namespace
+}  // namespace pipeline_test

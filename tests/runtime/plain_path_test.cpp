@@ -8,10 +8,11 @@
 
 #include "fixture.hpp"
 
-namespace {
+namespace plain_path_test {
 
 namespace fs = std::filesystem;
 using marrow::plain_path;
+using runtime_fixture::Scratch;
 
 TEST(PlainPath, FoldersGoWithWhatLeadsOutOfThem) {
   const Scratch scratch;
@@ -50,4 +51,4 @@ TEST(PlainPath, RelativeOnes) {
   EXPECT_EQ(plain_path("./x"), "x");
 }
 
-}  // namespace
+}  // namespace plain_path_test

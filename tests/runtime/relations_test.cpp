@@ -3,11 +3,12 @@
 // no sense when its plugin registers.
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace relations_test {
 
 using marrow::Diagnostics;
 using marrow::Override;
 using marrow::Plugin;
+using runtime_fixture::Scratch;
 
 const marrow::Catalogue& related_nodes() {
   static const marrow::Catalogue catalogue({std::filesystem::path(MARROW_BINARY_DIR) / "tests" / "relation_plugins"});
@@ -238,4 +239,4 @@ TEST(RelationDeclaration, TooFewOrTooManyNames) {
             "relation at_least_one: option 'low' is never empty, so it is always given\n");
 }
 
-}  // namespace
+}  // namespace relations_test

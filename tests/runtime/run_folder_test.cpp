@@ -6,18 +6,20 @@
 #include <unistd.h>
 
 #include <atomic>
+#include <cctype>
 #include <nlohmann/json.hpp>
-#include <regex>
 #include <set>
 #include <thread>
 
 #include "runtime/fixture.hpp"
 #include "write/full_disk.hpp"
 
-namespace {
+namespace run_folder_test {
 
 namespace fs = std::filesystem;
 using marrow::RunFolder;
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
 
 std::string text_of(const fs::path& file) {
   std::ostringstream text;
@@ -174,11 +176,13 @@ TEST_F(RunFolderTest, LogTakesNoEscapeSequencesAndNoForgedLines) {
   folder.log().show_from(marrow::LogLevel::error);
   folder.log().write(marrow::LogLevel::warning, "view \x1b[2J", "mind\n2026-01-01 00:00:00.000 [error] forged");
   folder.log().write(marrow::LogLevel::debug, "", "next");
-  const std::string time = "[0-9]{4}-[0-9]{2}-[0-9]{2} [0-9]{2}:[0-9]{2}:[0-9]{2}\\.[0-9]{3} ";
-  const std::regex expected(time +
-                            "\\[warning\\] view \\\\x1b\\[2J: mind\n  2026-01-01 00:00:00.000 \\[error\\] forged\n" +
-                            time + "\\[debug\\] next\n");
-  EXPECT_TRUE(std::regex_match(text_of(folder.path() / "log.txt"), expected)) << text_of(folder.path() / "log.txt");
+  const std::string time = "0000-00-00 00:00:00.000", second = " [debug] next\n",
+                    first = " [warning] view \\x1b[2J: mind\n  2026-01-01 00:00:00.000 [error] forged\n";
+  std::string log = text_of(folder.path() / "log.txt");
+  for (const std::size_t start : {std::size_t(0), time.size() + first.size()})
+    for (std::size_t i = start; i < std::min(log.size(), start + time.size()); ++i)
+      if (std::isdigit(static_cast<unsigned char>(log[i]))) log[i] = '0';
+  EXPECT_EQ(log, time + first + time + second);
 }
 
 TEST_F(RunFolderTest, EachItemHasAFileOfItsOwn) {
@@ -250,4 +254,4 @@ TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {
   EXPECT_TRUE(fs::is_regular_file(folder.path() / "outputs" / "x.json"));
 }
 
-}  // namespace
+}  // namespace run_folder_test

@@ -10,10 +10,12 @@
 
 #include "runtime/store_fixture.hpp"
 
-namespace {
+namespace store_claim_test {
 
 using marrow::Digest;
 using marrow::Store;
+using store_fixture::number;
+using store_fixture::StoreTest;
 
 /// Starts a process that claims a key, then does `work`; returns once the key is claimed.
 template <class Work>
@@ -107,4 +109,4 @@ TEST_F(StoreTest, WaitingForAnotherIsSaidAndIsCancelled) {
   waitpid(child, nullptr, 0);
 }
 
-}  // namespace
+}  // namespace store_claim_test

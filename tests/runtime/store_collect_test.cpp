@@ -6,10 +6,12 @@
 
 #include "runtime/store_fixture.hpp"
 
-namespace {
+namespace store_collect_test {
 
 namespace fs = std::filesystem;
 using marrow::Store;
+using store_fixture::many;
+using store_fixture::StoreTest;
 
 TEST_F(StoreTest, TheLeastRecentlyUsedGoFirst) {
   for (int i = 0; i < 4; ++i) {
@@ -52,4 +54,4 @@ TEST_F(StoreTest, WhatNodesCameToGoesWithTheirResults) {
   EXPECT_TRUE(fs::is_empty(store.folder() / "last"));
 }
 
-}  // namespace
+}  // namespace store_collect_test

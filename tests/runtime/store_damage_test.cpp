@@ -11,11 +11,15 @@
 
 #include "runtime/store_fixture.hpp"
 
-namespace {
+namespace store_damage_test {
 
 namespace fs = std::filesystem;
 using marrow::RunResult;
 using marrow::Store;
+using runtime_fixture::test_catalogue;
+using store_fixture::many;
+using store_fixture::only_file;
+using store_fixture::StoreTest;
 
 TEST_F(StoreTest, EveryDamageIsNoticedAndMadeAgain) {
   const std::string nodes = "  c: {uses: test.constant, with: {value: 5}}\n";
@@ -108,4 +112,4 @@ TEST_F(StoreTest, AFolderThatCannotBeWrittenIsAWarning) {
   EXPECT_NE(messages.find("results are not kept: cannot use the folder"), std::string::npos) << messages;
 }
 
-}  // namespace
+}  // namespace store_damage_test

@@ -6,7 +6,7 @@
 
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace store_entry_test {
 
 namespace fs = std::filesystem;
 using marrow::Digest;
@@ -15,6 +15,8 @@ using marrow::Leaf;
 using marrow::Metrics;
 using marrow::Store;
 using marrow::Value;
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
 
 template <class T>
 Value value_of(T item) {
@@ -171,4 +173,4 @@ TEST_F(StoreEntryTest, AResultOfOtherTypesThanTheNodesIsMadeAgain) {
   }
 }
 
-}  // namespace
+}  // namespace store_entry_test

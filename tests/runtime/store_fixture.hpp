@@ -4,6 +4,11 @@
 #include "marrow/runtime/store.hpp"
 #include "runtime/fixture.hpp"
 
+namespace store_fixture {
+
+using runtime_fixture::Scratch;
+using runtime_fixture::test_catalogue;
+
 inline marrow::Value number(double value) {
   marrow::Value result = marrow::Value::of<marrow::Metrics>(
       std::make_shared<const marrow::Metrics>(marrow::Metrics{{{"value", value, "mm"}}}));
@@ -70,3 +75,5 @@ class StoreTest : public testing::Test {
   marrow::RunSettings settings;
   std::string messages;
 };
+
+}  // namespace store_fixture

@@ -13,13 +13,14 @@
 #include "marrow/runtime/store.hpp"
 #include "runtime/fixture.hpp"
 
-namespace {
+namespace store_folder_test {
 
 namespace fs = std::filesystem;
 using marrow::Digest;
 using marrow::Metrics;
 using marrow::Store;
 using marrow::Value;
+using runtime_fixture::Scratch;
 
 Value number(double value) {
   Value result = Value::of<Metrics>(std::make_shared<const Metrics>(Metrics{{{"value", value, "mm"}}}));
@@ -327,4 +328,4 @@ TEST_F(StoreFolderTest, ItIsTidiedOnceADayWhateverTheClockOnceSaid) {
   EXPECT_FALSE(store.find(marrow::hash_of(1)));
 }
 
-}  // namespace
+}  // namespace store_folder_test

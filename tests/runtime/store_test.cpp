@@ -2,13 +2,16 @@
 // What earlier runs left is read back, and a plan says so before.
 #include "runtime/store_fixture.hpp"
 
-namespace {
+namespace store_test {
 
 using marrow::Digest;
 using marrow::Metrics;
 using marrow::PlannedNode;
 using marrow::RunResult;
 using marrow::Value;
+using store_fixture::many;
+using store_fixture::number;
+using store_fixture::StoreTest;
 using What = PlannedNode::What;
 
 constexpr const char* kChain =
@@ -133,4 +136,4 @@ TEST_F(StoreTest, WarningsAreRepeated) {
   EXPECT_EQ(messages, "mind the gap\n");
 }
 
-}  // namespace
+}  // namespace store_test

@@ -10,11 +10,12 @@
 #include "runtime/fixture.hpp"
 #include "write/full_disk.hpp"
 
-namespace {
+namespace text_file_test {
 
 namespace fs = std::filesystem;
 using marrow::read_text_file;
 using marrow::write_text_file;
+using runtime_fixture::Scratch;
 
 std::string fault_of(const std::function<void()>& act) {
   try {
@@ -120,4 +121,4 @@ TEST_F(TextFileTest, ManyWritersLeaveOneWholeFile) {
   EXPECT_EQ(files(), 1u);
 }
 
-}  // namespace
+}  // namespace text_file_test

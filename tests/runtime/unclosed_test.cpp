@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace unclosed_test {
 
 /// As "mark line:column"; "" where all is closed.
 std::string unclosed(const std::string& text) {
@@ -45,4 +45,4 @@ TEST(Unclosed, WordsAndCommentsAreText) {
   EXPECT_EQ(unclosed("[a#]"), "") << "no comment within a word";
 }
 
-}  // namespace
+}  // namespace unclosed_test

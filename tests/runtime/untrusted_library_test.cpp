@@ -15,12 +15,12 @@
 #include "framework/runtime/trust.hpp"
 #include "runtime/library_fixture.hpp"
 
-namespace {
+namespace untrusted_library_test {
 
 namespace fs = std::filesystem;
 constexpr uid_t kSomebody = 54321;
 
-class UntrustedLibraryTest : public library_test::LibraryTest {
+class UntrustedLibraryTest : public library_fixture::LibraryTest {
  protected:
   UntrustedLibraryTest() { unsetenv("MARROW_TRUST_ALL_PLUGINS"); }
   ~UntrustedLibraryTest() override { unsetenv("MARROW_TRUST_ALL_PLUGINS"); }
@@ -278,4 +278,4 @@ TEST_F(UntrustedLibraryTest, DigestIsOfTheWholeFile) {
   EXPECT_THROW(marrow::file_digest(scratch.path), marrow::Error);
 }
 
-}  // namespace
+}  // namespace untrusted_library_test

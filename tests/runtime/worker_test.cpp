@@ -12,7 +12,7 @@
 
 #include "marrow/domain/error.hpp"
 
-namespace {
+namespace worker_test {
 
 using marrow::Worker;
 using marrow::WorkerEnd;
@@ -194,4 +194,4 @@ TEST(Worker, BytesThatAreNoTextTravelToo) {
     EXPECT_EQ(marrow::bytes_of_json(json::parse(marrow::json_of_bytes(text).dump())), text);
 }
 
-}  // namespace
+}  // namespace worker_test

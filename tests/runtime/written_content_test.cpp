@@ -6,10 +6,11 @@
 
 #include "fixture.hpp"
 
-namespace {
+namespace written_content_test {
 
 namespace fs = std::filesystem;
 using marrow::content_of;
+using runtime_fixture::Scratch;
 
 TEST(WrittenContent, OfAFileIsWhatItHolds) {
   const Scratch scratch;
@@ -36,4 +37,4 @@ TEST(WrittenContent, OfAFolderIsAllBelowIt) {
   EXPECT_NE(content_of(scratch.path / "two"), whole);
 }
 
-}  // namespace
+}  // namespace written_content_test

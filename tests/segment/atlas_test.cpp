@@ -1,11 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/segment/atlas.cpp"
-
 #include <gtest/gtest.h>
 
-#include "segment/broken_tube.hpp"
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
 
-namespace {
+#include "marrow/domain/mesh.hpp"
+#include "segment/broken_tube.hpp"
+#include "segment/segmented.hpp"
+
+namespace atlas_test {
+
+using Eigen::Vector3d;
+using marrow::List;
+using marrow::Mesh;
+using marrow::Seeds;
+using marrow::Volume;
 
 /// A bone with ends that are not round, so that it lies one way only, in two fragments of a known displacement.
 struct Bone {
@@ -80,9 +91,16 @@ Mesh template_mesh(double scale, const Vector3d& shift) {
   return mesh;
 }
 
+shipped::Inputs inputs(const Bone& bone, const Mesh& whole) {
+  shipped::Inputs inputs = segmented::inputs(bone.volume(), bone.seeds());
+  inputs["template"] = shipped::item(whole);
+  return inputs;
+}
+
 std::array<phantom::Accuracy, 2> accuracy_of(const Bone& bone) {
-  Context context;
-  const auto fields = atlas(bone.volume(), bone.seeds(), template_mesh(1.15, {30, -20, 12}), {}, context);
+  const auto fields = shipped::call("segment.atlas", inputs(bone, template_mesh(1.15, {30, -20, 12})))
+                          .at("field")
+                          .as_list<marrow::SignedField>();
   EXPECT_EQ(fields.size(), 2u);
   EXPECT_EQ(phantom::overlap(fields), 0u);
   std::array<phantom::Accuracy, 2> accuracies;
@@ -113,13 +131,8 @@ TEST(Atlas, FailsOnADisplacedFracture) {
 TEST(Atlas, WantsAClosedTemplate) {
   Mesh open = template_mesh(1, Vector3d::Zero());
   open.triangles.pop_back();
-  Context context;
-  try {
-    atlas(Bone{}.volume(), Bone{}.seeds(), open, {}, context);
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "template: a closed surface expected, got one with holes; its inside is not defined");
-  }
+  EXPECT_EQ(shipped::refusal("segment.atlas", inputs({}, open)),
+            "template: a closed surface expected, got one with holes; its inside is not defined");
 }
 
-}  // namespace
+}  // namespace atlas_test

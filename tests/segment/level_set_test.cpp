@@ -1,17 +1,28 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/segment/level_set.cpp"
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstring>
+#include <functional>
 
 #include "segment/distal_end.hpp"
+#include "segment/segmented.hpp"
 
-namespace {
+namespace level_set_test {
 
 using Eigen::Vector3d;
+using marrow::List;
+using marrow::Seeds;
+using marrow::SignedField;
+using marrow::Volume;
+
+List<SignedField> level_set_fields(const Volume& volume, const List<Seeds>& seeds) {
+  return segmented::fields("segment.level_set", volume, seeds);
+}
 
 /// A long bone along z, slightly tilted, that leaves the volume at both ends, of a wall that gets thinner upwards.
 struct HollowBone {
@@ -49,9 +60,8 @@ TEST(LevelSet, HollowBoneOverMarrowAndOverSpongyBone) {
         phantom::ct_grid({64, 60, 110}), [&](const Vector3d& p) { return bone.hu(p); }, 0.5, 30, 1);
     List<Seeds> seeds;
     seeds.add("distal", Seeds{"distal", {bone.seed(-20)}});
-    Context context;
     List<SignedField> fields;
-    const double seconds = timed([&] { fields = level_set_fields(volume, seeds, {}, context); });
+    const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
     ASSERT_EQ(fields.size(), 1u);
     const auto accuracy = phantom::compare(fields[0], [&](const Vector3d& p) { return bone.outer(p); });
     phantom::print("inside " + std::to_string(int(inside_hu)) + " HU", accuracy);
@@ -76,8 +86,7 @@ TEST(LevelSet, TwoFragmentsOneMillimetreApart) {
   List<Seeds> seeds;
   seeds.add("proximal", Seeds{"proximal", {bone.seed(30)}});
   seeds.add("distal", Seeds{"distal", {bone.seed(-30)}});
-  Context context;
-  const auto fields = level_set_fields(volume, seeds, {}, context);
+  const auto fields = level_set_fields(volume, seeds);
   ASSERT_EQ(fields.size(), 2u);
   for (std::size_t f = 0; f < 2; ++f) {
     const double side = f == 0 ? -1 : 1;
@@ -108,8 +117,7 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
     List<Seeds> seeds;
     seeds.add("proximal", Seeds{"proximal", {bone.seed(40)}});
     seeds.add("distal", Seeds{"distal", {bone.seed(-15)}});
-    Context context;
-    const auto fields = level_set_fields(volume, seeds, {}, context);
+    const auto fields = level_set_fields(volume, seeds);
     for (std::size_t f = 0; f < 2; ++f) {
       const double side = f == 0 ? -1 : 1;
       const auto truth = [&](const Vector3d& p) { return std::max(bone.outer(p), side * normal.dot(p) + gap_mm / 2); };
@@ -126,9 +134,8 @@ TEST(LevelSet, TwoFragmentsInVoxelsAsWideAsTheGap) {
 TEST(LevelSet, ADistalEndWithThinCortexAndAnInvisibleGap) {
   const phantom::DistalEnd bone;
   const Volume volume = bone.scan_of({128, 128, 192}, 40);
-  Context context;
   List<SignedField> fields;
-  const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds(), {}, context); });
+  const double seconds = timed([&] { fields = level_set_fields(volume, bone.seeds()); });
   std::printf("%.2f s\n", seconds);
   for (std::size_t f = 0; f < 2; ++f) {
     const auto accuracy = phantom::compare(
@@ -170,8 +177,7 @@ TEST(LevelSet, TurnedGridAndTheSameBytesAtAnyNumberOfThreads) {
   const Volume volume = bone.volume();
   const auto at_threads = [&](std::size_t threads) {
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    Context context;
-    return level_set_fields(volume, bone.seeds(bone.at(8.5, 0, 0)), {}, context);
+    return level_set_fields(volume, bone.seeds(bone.at(8.5, 0, 0)));
   };
   const auto one = at_threads(1), two = at_threads(2);
   EXPECT_EQ(std::memcmp(one[0].values_mm.data(), two[0].values_mm.data(), one[0].values_mm.size() * sizeof(float)), 0);
@@ -183,13 +189,7 @@ TEST(LevelSet, TurnedGridAndTheSameBytesAtAnyNumberOfThreads) {
 }
 
 std::string message_of(const Volume& volume, const List<Seeds>& seeds) {
-  Context context;
-  try {
-    level_set_fields(volume, seeds, {}, context);
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "no error";
+  return shipped::refusal("segment.level_set", segmented::inputs(volume, seeds));
 }
 
 TEST(LevelSet, SaysWhatIsWrongWithSeeds) {
@@ -222,9 +222,8 @@ TEST(LevelSet, DISABLED_WholeFemurInSeconds) {
   List<Seeds> seeds;
   seeds.add("proximal", Seeds{"proximal", {bone.seed(60)}, false});
   seeds.add("distal", Seeds{"distal", {bone.seed(-60)}});
-  Context context;
   List<SignedField> fields;
-  const double seconds = timed([&] { fields = level_set_fields(volume, seeds, {}, context); });
+  const double seconds = timed([&] { fields = level_set_fields(volume, seeds); });
   std::printf("130x110x470, two fragments: %.2f s\n", seconds);
   RecordProperty("milliseconds", int(1000 * seconds));
   ASSERT_EQ(fields.size(), 1u);
@@ -236,4 +235,4 @@ TEST(LevelSet, DISABLED_WholeFemurInSeconds) {
   EXPECT_LT(std::abs(accuracy.bias_mm), 0.1);
 }
 
-}  // namespace
+}  // namespace level_set_test

@@ -1,23 +1,22 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/segment/region_growing.cpp"
-
 #include <gtest/gtest.h>
 
 #include "segment/broken_tube.hpp"
+#include "segment/segmented.hpp"
 
-namespace {
+namespace region_growing_test {
+
+constexpr const char* kNode = "segment.region_growing";
 
 TEST(RegionGrowing, TwoFragmentsOneMillimetreApart) {
   const phantom::BrokenTube tube;
-  Context context;
-  phantom::expect_both(tube, region_growing(tube.volume(), tube.seeds(), {.least_hu = 650}, context));
+  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds(), {{"least_hu", 650.0}}));
 }
 
 TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {
   const phantom::BrokenTube tube;
-  Context context;
-  const auto both = region_growing(tube.volume(), tube.seeds(), {}, context);
-  const auto one = region_growing(tube.volume(), tube.seeds(false), {}, context);
+  const auto both = segmented::fields(kNode, tube.volume(), tube.seeds());
+  const auto one = segmented::fields(kNode, tube.volume(), tube.seeds(false));
   ASSERT_EQ(one.size(), 1u);
   EXPECT_EQ(one.name(0), "distal");
   std::size_t different = 0;  // both may fill the same voxel of the gap
@@ -28,15 +27,10 @@ TEST(RegionGrowing, GivesOnlyWantedFragmentsAndKeepsThemFromTheOthersBone) {
 
 TEST(RegionGrowing, SaysWhatIsWrongWithSeeds) {
   const phantom::BrokenTube tube;
-  List<Seeds> seeds;
-  seeds.add("distal", Seeds{"distal", {{0, 0, -15}}});
-  Context context;
-  try {
-    region_growing(tube.volume(), seeds, {}, context);
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_NE(std::string(error.what()).find("is not in bone"), std::string::npos) << error.what();
-  }
+  marrow::List<marrow::Seeds> seeds;
+  seeds.add("distal", marrow::Seeds{"distal", {{0, 0, -15}}});
+  const std::string text = shipped::refusal(kNode, segmented::inputs(tube.volume(), seeds));
+  EXPECT_NE(text.find("is not in bone"), std::string::npos) << text;
 }
 
-}  // namespace
+}  // namespace region_growing_test

@@ -1,37 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/segment/sparse_field.cpp"
-
 #include <gtest/gtest.h>
 
 #include "segment/broken_tube.hpp"
+#include "segment/segmented.hpp"
 
-namespace {
+namespace sparse_field_test {
+
+constexpr const char* kNode = "segment.sparse_field";
 
 TEST(SparseField, TwoFragmentsOneMillimetreApart) {
   const phantom::BrokenTube tube;
-  Context context;
-  phantom::expect_both(tube, sparse_field(tube.volume(), tube.seeds(), {}, context));
+  phantom::expect_both(tube, segmented::fields(kNode, tube.volume(), tube.seeds()));
 }
 
 TEST(SparseField, GivesOnlyWantedFragments) {
   const phantom::BrokenTube tube;
-  Context context;
-  const auto fields = sparse_field(tube.volume(), tube.seeds(false), {}, context);
+  const auto fields = segmented::fields(kNode, tube.volume(), tube.seeds(false));
   ASSERT_EQ(fields.size(), 1u);
   EXPECT_EQ(fields.name(0), "distal");
 }
 
 TEST(SparseField, SaysWhenTheVolumeIsTooThin) {
-  marrow::Volume volume{phantom::ct_grid({20, 20, 3}), std::vector<float>(1200, 900.f)};
-  List<Seeds> seeds;
-  seeds.add("distal", Seeds{"distal", {{0, 0, 0}}});
-  Context context;
-  try {
-    sparse_field(volume, seeds, {}, context);
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(), "volume: at least 4 voxels along each axis expected, got 3");
-  }
+  const marrow::Volume volume{phantom::ct_grid({20, 20, 3}), std::vector<float>(1200, 900.f)};
+  marrow::List<marrow::Seeds> seeds;
+  seeds.add("distal", marrow::Seeds{"distal", {{0, 0, 0}}});
+  EXPECT_EQ(shipped::refusal(kNode, segmented::inputs(volume, seeds)),
+            "volume: at least 4 voxels along each axis expected, got 3");
 }
 
-}  // namespace
+}  // namespace sparse_field_test

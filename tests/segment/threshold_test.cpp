@@ -1,13 +1,20 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/segment/threshold.cpp"
-
 #include <gtest/gtest.h>
 
-#include "segment/distal_end.hpp"
+#include <algorithm>
+#include <cmath>
 
-namespace {
+#include "segment/distal_end.hpp"
+#include "segment/segmented.hpp"
+
+namespace threshold_test {
 
 using Eigen::Vector3d;
+using marrow::List;
+using marrow::Seeds;
+using marrow::Volume;
+
+constexpr const char* kNode = "segment.threshold";
 
 /// Two capsules with a wall of 3 mm over marrow.
 struct Pair {
@@ -28,8 +35,7 @@ TEST(Threshold, OneFieldForEachFragmentWithItsCanalFilled) {
   List<Seeds> seeds;
   seeds.add("proximal", Seeds{"proximal", {{10.5, 0, 16}}});
   seeds.add("distal", Seeds{"distal", {{9.5, 0, -19}}});
-  Context context;
-  const auto fields = threshold(pair.volume(), &seeds, {.threshold_hu = 550}, context);
+  const auto fields = segmented::fields(kNode, pair.volume(), seeds, {{"threshold_hu", 550.0}});
   ASSERT_EQ(fields.size(), 2u);
   const auto proximal = phantom::compare(fields[0], [&](const Vector3d& p) { return pair.second(p); });
   const auto distal = phantom::compare(fields[1], [&](const Vector3d& p) { return pair.first(p); });
@@ -44,27 +50,25 @@ TEST(Threshold, OneFieldForEachFragmentWithItsCanalFilled) {
 
 TEST(Threshold, TheLargestBoneWithoutSeeds) {
   const Pair pair;
-  Context context;
-  const auto fields = threshold(pair.volume(), nullptr, {.threshold_hu = 550}, context);
+  const auto fields = segmented::fields(kNode, pair.volume(), {}, {{"threshold_hu", 550.0}});
   ASSERT_EQ(fields.size(), 1u);
   EXPECT_EQ(fields.name(0), "bone");
   EXPECT_GT(phantom::compare(fields[0], [&](const Vector3d& p) { return pair.second(p); }).dice, 0.98);
 }
 
 TEST(Threshold, TouchingFragmentsAreSharedOutHalfway) {
-  marrow::Grid grid = phantom::ct_grid({24, 24, 41});
+  const marrow::Grid grid = phantom::ct_grid({24, 24, 41});
   const auto rod = [](const Vector3d& p) { return std::hypot(p.x(), p.y()) - 6; };
   const Volume volume = phantom::scan(
       grid, [&](const Vector3d& p) { return 1000 * phantom::filled(rod(p)); }, 0.5, 0, 1);
   List<Seeds> seeds;
   seeds.add("low", Seeds{"low", {{0, 0, -15}}, false});
   seeds.add("high", Seeds{"high", {{0, 0, 15}}});
-  Context context;
-  const auto fields = threshold(volume, &seeds, {.threshold_hu = 500}, context);
+  const auto fields = segmented::fields(kNode, volume, seeds, {{"threshold_hu", 500.0}});
   ASSERT_EQ(fields.size(), 1u);
   EXPECT_EQ(fields.name(0), "high");
-  EXPECT_LT(sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, 2})), 0);
-  EXPECT_GT(sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, -2})), 0);
+  EXPECT_LT(marrow::sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, 2})), 0);
+  EXPECT_GT(marrow::sample_trilinear(grid, fields[0].values_mm, grid.index_from_point({0, 0, -2})), 0);
 }
 
 TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
@@ -78,20 +82,14 @@ TEST(Threshold, ASeedInSparseSpongyBoneIsGoodBesideOneInCortex) {
   const auto at_height = [&](double z) -> Vector3d { return volume.grid.origin_mm + Eigen::Vector3d(8, 8, z); };
   List<Seeds> seeds;
   seeds.add("distal", Seeds{"distal", {at_height(4), at_height(20)}});
-  Context context;
-  const auto fields = threshold(volume, &seeds, {}, context);
-  EXPECT_LT(sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(20))), 0);
-  EXPECT_GT(sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(4))), 0);
+  const auto fields = segmented::fields(kNode, volume, seeds);
+  EXPECT_LT(marrow::sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(20))), 0);
+  EXPECT_GT(marrow::sample_trilinear(volume.grid, fields[0].values_mm, volume.grid.index_from_point(at_height(4))), 0);
   List<Seeds> only_spongy;
   only_spongy.add("distal", Seeds{"distal", {at_height(4)}});
-  try {
-    threshold(volume, &only_spongy, {}, context);
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "seeds of fragment 'distal': at none of them the CT reaches the threshold of 250 HU, or it belongs to "
-                 "another fragment; add a point in cortical bone, or lower threshold_hu");
-  }
+  EXPECT_EQ(shipped::refusal(kNode, segmented::inputs(volume, only_spongy)),
+            "seeds of fragment 'distal': at none of them the CT reaches the threshold of 250 HU, or it belongs to "
+            "another fragment; add a point in cortical bone, or lower threshold_hu");
 }
 
 // What the level set is for: level_set_test.cpp segments the same CT to 0.1 mm. (Higher thresholds find no spongy bone
@@ -102,8 +100,7 @@ TEST(Threshold, NoThresholdSegmentsADistalEnd) {
   const auto seeds = bone.seeds();
   double least_mm = 1e9;
   for (const double threshold_hu : {160.0, 200.0, 250.0}) {
-    Context context;
-    const auto fields = threshold(volume, &seeds, {.threshold_hu = threshold_hu}, context);
+    const auto fields = segmented::fields(kNode, volume, seeds, {{"threshold_hu", threshold_hu}});
     double worst_mm = 0;
     for (std::size_t f = 0; f < 2; ++f) {
       const auto accuracy = phantom::compare(
@@ -119,15 +116,9 @@ TEST(Threshold, NoThresholdSegmentsADistalEnd) {
 
 TEST(Threshold, SaysWhenThereIsNoBone) {
   const Volume volume{phantom::ct_grid({8, 8, 8}), std::vector<float>(512, 30.f)};
-  Context context;
-  try {
-    threshold(volume, nullptr, {}, context);
-    FAIL() << "no error";
-  } catch (const marrow::Error& error) {
-    EXPECT_STREQ(error.what(),
-                 "volume: no voxel reaches the threshold of 250 HU, so there is no bone; lower threshold_hu, and "
-                 "check that the CT is in Hounsfield units");
-  }
+  EXPECT_EQ(shipped::refusal(kNode, {{"volume", shipped::item(volume)}}),
+            "volume: no voxel reaches the threshold of 250 HU, so there is no bone; lower threshold_hu, and "
+            "check that the CT is in Hounsfield units");
 }
 
-}  // namespace
+}  // namespace threshold_test

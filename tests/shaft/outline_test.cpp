@@ -7,7 +7,7 @@
 #include <opencv2/imgproc.hpp>
 #include <random>
 
-namespace {
+namespace outline_test {
 
 using namespace marrow::shaft;
 
@@ -68,4 +68,4 @@ TEST(Outline, IsNotMadeUp) {
                                        kPixel_mm));  // no edges
 }
 
-}  // namespace
+}  // namespace outline_test

@@ -3,27 +3,29 @@
 // Views and edge maps for tests of the shaft nodes.
 #include <gtest/gtest.h>
 
-#include <marrow/domain/error.hpp>
+#include <marrow/domain/camera.hpp>
+#include <marrow/domain/features.hpp>
+#include <string>
 
 #include "edges/radiograph.hpp"
-#include "initial/tube.hpp"
-#include "shaft/find_edges.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace scenes {
 
-using marrow::ShaftLines;
-
-template <class Function>
-std::string error_of(Function function) {
-  try {
-    function();
-  } catch (const marrow::Error& error) {
-    return error.what();
+/// A test of each node of the kind.
+class Shaft : public testing::TestWithParam<std::string> {
+ protected:
+  std::string node() const { return "shaft." + GetParam(); }
+  marrow::ShaftLines find_shaft(const marrow::EdgeMap& edges, const marrow::View& view,
+                                const shipped::Options& options = {}) const {
+    return shipped::call(node(), {{"edges", shipped::item(edges)}, {"view", shipped::item(view)}}, options,
+                         marrow::Context(1))
+        .at("lines")
+        .as<marrow::ShaftLines>();
   }
-  return "no error";
-}
+};
 
-marrow::View empty_view(int size = 512) {
+inline marrow::View empty_view(int size = 512) {
   marrow::View view;
   view.name = "frontal";
   view.camera = radiograph::camera(0, size);
@@ -32,15 +34,15 @@ marrow::View empty_view(int size = 512) {
 }
 
 /// A view that is darker between two columns.
-[[maybe_unused]] marrow::View dark_between(int from_u, int to_u) {
+inline marrow::View dark_between(int from_u, int to_u) {
   marrow::View view = empty_view();
   view.image.pixels.colRange(from_u, to_u) = 500;
   return view;
 }
 
 /// Adds exact edge pixels along a segment, one each pixel, with the bright side towards `bright`.
-void draw(marrow::EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
-          const Eigen::Vector2d& bright) {
+inline void draw(marrow::EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+                 const Eigen::Vector2d& bright) {
   const Eigen::Vector2d along = (to - from).normalized();
   Eigen::Vector2d normal(-along.y(), along.x());
   if (normal.dot(bright) < 0) normal = -normal;
@@ -50,7 +52,7 @@ void draw(marrow::EdgeMap& edges, const Eigen::Vector2d& from, const Eigen::Vect
   }
 }
 
-marrow::EdgeMap no_edges() { return {512, 512, {}}; }
-const Eigen::Vector2d kLeft(-1, 0), kRight(1, 0);
+inline marrow::EdgeMap no_edges() { return {512, 512, {}}; }
+inline const Eigen::Vector2d kLeft(-1, 0), kRight(1, 0);
 
-}  // namespace
+}  // namespace scenes

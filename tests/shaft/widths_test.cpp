@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace widths_test {
 
 using marrow::shaft::Widths;
 
@@ -35,4 +35,4 @@ TEST(Widths, MayBeThoseOfAnotherBone) {
   EXPECT_THROW(Widths({25, 30}, {2}, 0), std::out_of_range) << "nothing is read past the end of a list";
 }
 
-}  // namespace
+}  // namespace widths_test

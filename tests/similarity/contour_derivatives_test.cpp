@@ -12,7 +12,7 @@
 #include "project/shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace contour_derivatives_test {
 
 using marrow::Cost;
 using marrow::FragmentFrame;
@@ -149,8 +149,6 @@ void expect_curvature_at_the_bottom(const Cost& cost) {
       EXPECT_NEAR(about->curvature(i, j), found(i, j), 0.01 * std::sqrt(found(i, i) * found(j, j))) << i << ", " << j;
 }
 
-}  // namespace
-
 TEST(ContourDerivatives, TheSlopeIsThatOfTheValueWithAnEdgeOffset) {
   for (const double offset_px : {0.0, 1.5, -1.0})
     expect_slope(*cost_of(0, {{"estimate_offset", false}, {"edge_offset_px", offset_px}}), 0.005);
@@ -166,8 +164,6 @@ TEST(ContourDerivatives, TheCurvatureIsThatOfTheValueAtTheBottom) {
   expect_curvature_at_the_bottom(*cost_of(1.5, {{"estimate_offset", false}, {"edge_offset_px", 1.5}}));
   expect_curvature_at_the_bottom(*cost_of(1.5, {}));
 }
-
-namespace {
 
 /// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
 class Line : public marrow::OutlineProjector {
@@ -211,8 +207,6 @@ Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options opt
 double factor(const std::vector<marrow::EdgeMap>& maps, const shipped::Options& options) {
   return cost_of_line(maps, options)->likelihood_factor(shifted(0)).value_or(-1);
 }
-
-}  // namespace
 
 TEST(ContourLikelihood, IsWhatOneComputesByHand) {
   // All 100 edges lie 0.5 px off, in blocks of 14, 32, 32 and 22 points.
@@ -259,3 +253,5 @@ TEST(ContourLikelihood, PredictsTheScatterThatNoiseMakes) {
   EXPECT_LT(predicted, 1.4 * squares);
   EXPECT_GT(predicted, squares / 1.4);
 }
+
+}  // namespace contour_derivatives_test

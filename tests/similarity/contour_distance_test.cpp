@@ -1,13 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/contour_distance.cpp"
-
 #include <gtest/gtest.h>
 
-#include <limits>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <marrow/domain/case.hpp>
+#include <marrow/domain/features.hpp>
+#include <marrow/domain/functions.hpp>
+#include <memory>
+#include <vector>
 
+#include "marrow/toolbox/match/nearest_outline.hpp"
 #include "project/shapes.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace contour_distance_test {
 
 /// An outline that is a straight upright line at u = 100 + the pose's x in mm, for v from 50 to 149, facing left.
 class LineProjector : public marrow::OutlineProjector {
@@ -47,39 +53,36 @@ marrow::RigidTransform shifted(double x, double z = 0) {
   return pose;
 }
 
-Options fixed_offset(double offset_px = 0) {
-  Options options;
-  options.estimate_offset = false;
-  options.edge_offset_px = offset_px;
-  options.contour_spacing_px = 1;
-  options.reach_px = 10;
-  options.model_error_px = 0;
-  return options;
+shipped::Options fixed_offset(double offset_px = 0) {
+  return {{"estimate_offset", false},
+          {"edge_offset_px", offset_px},
+          {"contour_spacing_px", 1.0},
+          {"reach_px", 10.0},
+          {"model_error_px", 0.0}};
 }
 
-const LineProjector kLine;
+const auto kLine = std::make_shared<const LineProjector>();
 
 /// Of one fragment alone.
-std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjector& projector,
-                                                     const marrow::List<marrow::View>& views,
+shipped::Inputs inputs(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
+  return {{"projector", marrow::Value::of<marrow::OutlineProjector>(kLine)},
+          {"views", shipped::list(views, "view")},
+          {"edges", shipped::list(edges, "view")}};
+}
+
+std::shared_ptr<const marrow::Cost> contour_distance(const marrow::List<marrow::View>& views,
                                                      const marrow::List<marrow::EdgeMap>& edges,
-                                                     const Options& options) {
-  return contour_distance(projector, views, edges, nullptr, nullptr, options);
+                                                     const shipped::Options& options) {
+  return std::static_pointer_cast<const marrow::Cost>(
+      shipped::call("similarity.contour_distance", inputs(views, edges), options).at("cost").data);
 }
 
 std::string message(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
-  try {
-    contour_distance(kLine, views, edges, Options{});
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
+  return shipped::refusal("similarity.contour_distance", inputs(views, edges));
 }
 
-}  // namespace
-
 TEST(ContourDistance, IsTheDistanceThatOneComputesByHand) {
-  const auto cost = contour_distance(kLine, one_view(), edge_maps(line_at(100.25, -1)), fixed_offset());
+  const auto cost = contour_distance(one_view(), edge_maps(line_at(100.25, -1)), fixed_offset());
   for (const double x : {-7.0, -2.0, 0.25, 1.0, 4.0}) {
     const double distance = x - 0.25;
     EXPECT_NEAR(cost->value(shifted(x)), std::sqrt(1 + distance * distance) - 1, 1e-5) << x;
@@ -90,34 +93,33 @@ TEST(ContourDistance, IsTheDistanceThatOneComputesByHand) {
 TEST(ContourDistance, EdgesOfTheOtherDirectionDoNotCount) {
   marrow::EdgeMap map = line_at(100, -1);
   for (const auto& edge : line_at(103, 1).pixels) map.pixels.push_back(edge);
-  const auto cost = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  const auto cost = contour_distance(one_view(), edge_maps(map), fixed_offset());
   EXPECT_NEAR(cost->value(shifted(3)), std::sqrt(10.0) - 1, 1e-5);
 }
 
 TEST(ContourDistance, OffsetIsGivenOrFound) {
   // The edges lie 2 px to the right of u = 100, which for an outline facing left is 2 px inside.
   const auto edges = edge_maps(line_at(102, -1));
-  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(-2))->value(shifted(0)), 0, 1e-5);
-  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1,
-              1e-5);
-  Options found = fixed_offset();
-  found.estimate_offset = true;
-  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, found)->value(shifted(0)), 0, 1e-5);
+  EXPECT_NEAR(contour_distance(one_view(), edges, fixed_offset(-2))->value(shifted(0)), 0, 1e-5);
+  EXPECT_NEAR(contour_distance(one_view(), edges, fixed_offset(2))->value(shifted(0)), std::sqrt(17.0) - 1, 1e-5);
+  shipped::Options found = fixed_offset();
+  found["estimate_offset"] = true;
+  EXPECT_NEAR(contour_distance(one_view(), edges, found)->value(shifted(0)), 0, 1e-5);
   // No more than 3 px are put down to the offset.
-  EXPECT_NEAR(contour_distance(kLine, one_view(), edges, found)->value(shifted(-3)), std::sqrt(5.0) - 1, 1e-5);
+  EXPECT_NEAR(contour_distance(one_view(), edges, found)->value(shifted(-3)), std::sqrt(5.0) - 1, 1e-5);
 }
 
 TEST(ContourDistance, PointsOutsideImageAndMaskDoNotPay) {
   marrow::EdgeMap map = line_at(100, -1);
   for (auto& edge : map.pixels)
     if (edge.v_px > 95) edge.u_px = 150;
-  const auto all = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  const auto all = contour_distance(one_view(), edge_maps(map), fixed_offset());
   EXPECT_GT(all->value(shifted(0)), 2);
   cv::Mat mask(200, 200, CV_8U, cv::Scalar(1));
   mask.rowRange(85, 200).setTo(0);
-  Options options = fixed_offset();
-  options.contour_spacing_px = 0.5;  // 69 points of the upper part remain
-  EXPECT_NEAR(contour_distance(kLine, one_view(mask), edge_maps(map), options)->value(shifted(0)),
+  shipped::Options options = fixed_offset();
+  options["contour_spacing_px"] = 0.5;  // 69 points of the upper part remain
+  EXPECT_NEAR(contour_distance(one_view(mask), edge_maps(map), options)->value(shifted(0)),
               51.0 / 120 * all->value(shifted(100)), 1e-5)
       << "60 px of outline are the least that is evidence";
   EXPECT_NEAR(all->value(shifted(0, 500)), std::sqrt(101.0) - 1, 1e-5) << "nothing to compare is the worst";
@@ -126,7 +128,7 @@ TEST(ContourDistance, PointsOutsideImageAndMaskDoNotPay) {
 TEST(ContourDistance, LevelsAndLikelihood) {
   marrow::EdgeMap map = line_at(100, -1);
   for (std::size_t i = 0; i < map.pixels.size(); ++i) map.pixels[i].u_px += (i / 40) % 2 ? 0.5f : -0.5f;
-  const auto cost = contour_distance(kLine, one_view(), edge_maps(map), fixed_offset());
+  const auto cost = contour_distance(one_view(), edge_maps(map), fixed_offset());
   const auto coarse = cost->at_level({5, 4});
   EXPECT_NEAR(coarse->value(shifted(30)), std::sqrt(17.0) - 1, 1e-5);
   const auto factor = cost->likelihood_factor(shifted(0));
@@ -138,9 +140,9 @@ TEST(ContourDistance, LevelsAndLikelihood) {
   EXPECT_GT(sd, 0.12);
   EXPECT_LT(sd, 0.48);
   // An error of 1 px that each block may have as a whole makes that about 1 / sqrt(4.5) = 0.5 px.
-  Options rough = fixed_offset();
-  rough.model_error_px = 1;
-  const auto rough_factor = contour_distance(kLine, one_view(), edge_maps(map), rough)->likelihood_factor(shifted(0));
+  shipped::Options rough = fixed_offset();
+  rough["model_error_px"] = 1.0;
+  const auto rough_factor = contour_distance(one_view(), edge_maps(map), rough)->likelihood_factor(shifted(0));
   EXPECT_GT(*factor / *rough_factor, 2);
   EXPECT_LT(*factor / *rough_factor, 20);
   EXPECT_FALSE(cost->likelihood_factor(shifted(50)).has_value()) << "nothing is near";
@@ -192,3 +194,5 @@ TEST(NearestOutline, IsThatOfASearchThroughAll) {
     EXPECT_GT(within, 5);
   }
 }
+
+}  // namespace contour_distance_test

@@ -6,7 +6,7 @@
 #include "other_fragment.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace drr_edges_test {
 
 using intensity_behaviour::at;
 using marrow::RadiographProjector;
@@ -77,8 +77,6 @@ double value(const shipped::Inputs& inputs, const marrow::RigidTransform& pose, 
 }
 
 double loss(double distance) { return std::sqrt(1 + distance * distance) - 1; }
-
-}  // namespace
 
 TEST(DrrEdges, FindsTheRadiographsEdgesBetweenPixels) {
   for (const std::int64_t step : {1, 2, 3})
@@ -159,3 +157,5 @@ TEST(DrrEdges, Levels) {
   EXPECT_LT(coarse->value(at(0, 0)), 0.1);
   EXPECT_NEAR(coarse->value(at(12, 0)), loss(12), 0.5);
 }
+
+}  // namespace drr_edges_test

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/entropy_of_difference.cpp"
+#include <gtest/gtest.h>
 
 #include "intensity_behaviour.hpp"
 
-namespace {
+namespace entropy_of_difference_test {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
-                                         const marrow::List<marrow::View>& views) {
-  return entropy_of_difference(projector, views, nullptr, nullptr, nullptr, Options{});
-}
+constexpr const char* kNode = "similarity.entropy_of_difference";
 
-}  // namespace
+TEST(EntropyOfDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(kNode, false); }
+TEST(EntropyOfDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
+TEST(EntropyOfDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
+TEST(EntropyOfDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(EntropyOfDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
-TEST(EntropyOfDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make, false); }
-TEST(EntropyOfDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(EntropyOfDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
-TEST(EntropyOfDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
-TEST(EntropyOfDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }
+}  // namespace entropy_of_difference_test

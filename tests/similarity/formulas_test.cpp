@@ -3,13 +3,14 @@
 // pixel by pixel over all of the image.
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <map>
 #include <numeric>
 
 #include "intensity_behaviour.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace formulas_test {
 
 constexpr int kWidth = 200, kHeight = 170, kMargin_px = 400;  // so wide that all of the image is compared
 
@@ -104,8 +105,6 @@ double value(const std::string& measure, double du, double dv, shipped::Options 
 }
 
 const std::vector<std::pair<double, double>> kPlaces{{0, 0}, {2, -1}, {-5, 6}};
-
-}  // namespace
 
 TEST(Formulas, NormalisedCrossCorrelation) {
   for (const auto& [du, dv] : kPlaces) {
@@ -218,3 +217,5 @@ TEST(Formulas, WhatTheModelDoesNotReachCountsAsWell) {
     EXPECT_GT(near(60, 40), 0.95) << measure << ": where the image is even, the model explains nothing";
   }
 }
+
+}  // namespace formulas_test

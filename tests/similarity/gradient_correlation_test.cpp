@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/gradient_correlation.cpp"
+#include <gtest/gtest.h>
 
 #include "intensity_behaviour.hpp"
 
-namespace {
+namespace gradient_correlation_test {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
-                                         const marrow::List<marrow::View>& views) {
-  return gradient_correlation(projector, views, nullptr, nullptr, nullptr, marrow::match::IntensityOptions{});
-}
+constexpr const char* kNode = "similarity.gradient_correlation";
 
-}  // namespace
+TEST(GradientCorrelation, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(kNode); }
+TEST(GradientCorrelation, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
+TEST(GradientCorrelation, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
+TEST(GradientCorrelation, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(GradientCorrelation, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
-TEST(GradientCorrelation, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make); }
-TEST(GradientCorrelation, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(GradientCorrelation, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
-TEST(GradientCorrelation, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
-TEST(GradientCorrelation, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }
+}  // namespace gradient_correlation_test

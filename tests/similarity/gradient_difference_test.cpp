@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/gradient_difference.cpp"
+#include <gtest/gtest.h>
 
 #include "intensity_behaviour.hpp"
 
-namespace {
+namespace gradient_difference_test {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
-                                         const marrow::List<marrow::View>& views) {
-  return gradient_difference(projector, views, nullptr, nullptr, nullptr, marrow::match::IntensityOptions{});
-}
+constexpr const char* kNode = "similarity.gradient_difference";
 
-}  // namespace
+TEST(GradientDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(kNode); }
+TEST(GradientDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
+TEST(GradientDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
+TEST(GradientDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(GradientDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
-TEST(GradientDifference, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make); }
-TEST(GradientDifference, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(GradientDifference, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
-TEST(GradientDifference, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
-TEST(GradientDifference, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }
+}  // namespace gradient_difference_test

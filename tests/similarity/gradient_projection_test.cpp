@@ -7,7 +7,7 @@
 #include "project/shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace gradient_projection_test {
 
 using marrow::RigidTransform;
 
@@ -53,8 +53,6 @@ shipped::Inputs inputs() {
 RigidTransform shifted(double x, double y, double z) {
   return shapes::centred_at(kMiddle_mm - Eigen::Vector3d(x, y, z));
 }
-
-}  // namespace
 
 TEST(GradientProjection, IsBestAtTheTruth) {
   const shipped::Inputs in = inputs();
@@ -217,3 +215,5 @@ TEST(GradientProjection, SaysWhatIsWrong) {
   EXPECT_EQ(shipped::refusal("similarity.gradient_projection", in),
             "the volume has no gradient on the mesh: wire the volume that the mesh was made from");
 }
+
+}  // namespace gradient_projection_test

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace inputs_test {
 
 /// Two opposite sides of a rectangle, both of which belong to it: it is open where the CT ends. It may reach beyond the
 /// image, against the contract.
@@ -50,4 +50,4 @@ TEST(WithoutShadows, FillsAnOutlineInsideTheImageAlone) {
     }
 }
 
-}  // namespace
+}  // namespace inputs_test

@@ -3,11 +3,17 @@
 // What every cost of grey values must do, on two dark blobs whose radiograph is a formula.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <functional>
+#include <marrow/domain/case.hpp>
+#include <marrow/domain/functions.hpp>
+#include <memory>
 #include <random>
+#include <string>
+#include <utility>
+#include <vector>
 
-#include "marrow/plugin.hpp"
+#include "shipped.hpp"
 #include "similarity/pixelwise_projector.hpp"
 
 namespace intensity_behaviour {
@@ -19,7 +25,6 @@ using marrow::PixelGrid;
 using marrow::RadiographProjector;
 using marrow::RigidTransform;
 using marrow::View;
-using Make = std::function<std::shared_ptr<const Cost>(const RadiographProjector&, const List<View>&)>;
 
 /// Line integrals of two blobs, which move by a pixel a millimetre.
 inline double blobs(double u, double v) {
@@ -77,11 +82,19 @@ inline List<View> views_of(const View& view) {
   return views;
 }
 
+/// The cost that a node gives with its defaults. It refers to the projector.
+inline std::shared_ptr<const Cost> make(const std::string& node, const std::shared_ptr<const BlobProjector>& projector,
+                                        const List<View>& views) {
+  const shipped::Inputs inputs{{"projector", marrow::Value::of<RadiographProjector>(projector)},
+                               {"views", shipped::list(views, "view")}};
+  return std::static_pointer_cast<const Cost>(shipped::call(node, inputs).at("cost").data);
+}
+
 /// Best where the model is, and the worse the further it is off; some costs are best there, but have no slope to it
 /// from afar.
-inline void is_best_at_the_truth(const Make& make, bool has_slope = true) {
-  const BlobProjector projector;
-  const auto cost = make(projector, views_of(view_of()));
+inline void is_best_at_the_truth(const std::string& node, bool has_slope = true) {
+  const auto projector = std::make_shared<const BlobProjector>();
+  const auto cost = make(node, projector, views_of(view_of()));
   const double best = cost->value(at(0, 0));
   for (const auto& [u, v] : std::vector<std::pair<double, double>>{{1, 0}, {0, 1}, {-0.7, 0.7}}) {
     double before = best;
@@ -93,54 +106,55 @@ inline void is_best_at_the_truth(const Make& make, bool has_slope = true) {
   }
 }
 
-inline void is_unmoved_by_brightness(const Make& make) {
-  const BlobProjector projector;
-  const auto one = make(projector, views_of(view_of(50000, 0.02, 0))),
-             darker = make(projector, views_of(view_of(25000, 0.02, 0)));
+inline void is_unmoved_by_brightness(const std::string& node) {
+  const auto projector = std::make_shared<const BlobProjector>();
+  const auto one = make(node, projector, views_of(view_of(50000, 0.02, 0))),
+             darker = make(node, projector, views_of(view_of(25000, 0.02, 0)));
   EXPECT_NEAR(one->value(at(3, 2)), darker->value(at(3, 2)), 0.01);
 }
 
 /// Nothing to compare is the worst, and never NaN.
-inline void nothing_is_the_worst(const Make& make, double worst) {
-  const BlobProjector projector;
+inline void nothing_is_the_worst(const std::string& node, double worst) {
+  const auto projector = std::make_shared<const BlobProjector>();
   View view = view_of();
-  EXPECT_EQ(make(projector, views_of(view))->value(at(500, 0)), worst) << "out of the image";
+  EXPECT_EQ(make(node, projector, views_of(view))->value(at(500, 0)), worst) << "out of the image";
   View constant = view;
   constant.image.pixels = cv::Mat(170, 200, CV_16U, cv::Scalar(30000));
-  const double even = make(projector, views_of(constant))->value(at(0, 0));
+  const double even = make(node, projector, views_of(constant))->value(at(0, 0));
   EXPECT_TRUE(std::isfinite(even));
-  EXPECT_GT(even, make(projector, views_of(view))->value(at(0, 0)));
+  EXPECT_GT(even, make(node, projector, views_of(view))->value(at(0, 0)));
   View masked = view;
   masked.mask = cv::Mat(170, 200, CV_8U, cv::Scalar(0));
-  EXPECT_TRUE(std::isfinite(make(projector, views_of(masked))->value(at(0, 0))));
+  EXPECT_TRUE(std::isfinite(make(node, projector, views_of(masked))->value(at(0, 0))));
   View few = masked;
   few.mask(cv::Rect(89, 79, 3, 3)).setTo(1);
-  EXPECT_EQ(make(projector, views_of(few))->value(at(0, 0)), make(projector, views_of(masked))->value(at(0, 0)))
+  EXPECT_EQ(make(node, projector, views_of(few))->value(at(0, 0)),
+            make(node, projector, views_of(masked))->value(at(0, 0)))
       << "nine pixels say no more than none";
   View black = view;
   black.image.pixels = cv::Mat(170, 200, CV_16U, cv::Scalar(0));
-  EXPECT_TRUE(std::isfinite(make(projector, views_of(black))->value(at(0, 0))));
+  EXPECT_TRUE(std::isfinite(make(node, projector, views_of(black))->value(at(0, 0))));
   View nan = view;
   view.image.pixels.convertTo(nan.image.pixels, CV_32F);
   nan.image.pixels.at<float>(80, 90) = std::nanf("");
-  EXPECT_TRUE(std::isfinite(make(projector, views_of(nan))->value(at(0, 0))))
+  EXPECT_TRUE(std::isfinite(make(node, projector, views_of(nan))->value(at(0, 0))))
       << "a pixel that is not a number is left out";
 }
 
-inline void levels_compare_fewer_pixels(const Make& make) {
-  const BlobProjector projector;
-  const auto cost = make(projector, views_of(view_of()))->at_level({1, 1, 4});
+inline void levels_compare_fewer_pixels(const std::string& node) {
+  const auto projector = std::make_shared<const BlobProjector>();
+  const auto cost = make(node, projector, views_of(view_of()))->at_level({1, 1, 4});
   EXPECT_LT(cost->value(at(0, 0)), cost->value(at(5, 0)));
-  const auto same = make(projector, views_of(view_of()));
+  const auto same = make(node, projector, views_of(view_of()));
   EXPECT_EQ(same->at_level({1, 1, 0})->value(at(1, 0)), same->value(at(1, 0)));
 }
 
-inline void refuses_nonsense(const Make& make) {
-  const BlobProjector projector;
+inline void refuses_nonsense(const std::string& node) {
+  const auto projector = std::make_shared<const BlobProjector>();
   View broken = view_of();
   broken.camera.width_px = 10;
-  EXPECT_THROW(make(projector, views_of(broken)), marrow::Error);
-  EXPECT_THROW(make(projector, {}), marrow::Error);
+  EXPECT_THROW(make(node, projector, views_of(broken)), marrow::Error);
+  EXPECT_THROW(make(node, projector, {}), marrow::Error);
 }
 
 }  // namespace intensity_behaviour

@@ -8,7 +8,7 @@
 
 #include "marrow/toolbox/match/patches.hpp"
 
-namespace {
+namespace intensity_test {
 
 using marrow::match::Gradients;
 using marrow::match::Patch;
@@ -124,4 +124,4 @@ TEST(Patches, AConstantRadiographSaysNothing) {
         << i;
 }
 
-}  // namespace
+}  // namespace intensity_test

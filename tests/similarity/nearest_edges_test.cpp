@@ -6,7 +6,7 @@
 
 #include <random>
 
-namespace {
+namespace nearest_edges_test {
 
 constexpr double kTolerance_rad = 0.4;
 
@@ -65,8 +65,9 @@ void compare_with_a_search(int width, int height, int count, unsigned seed) {
         ASSERT_EQ((cell - from).squaredNorm(), least) << "at " << u << ' ' << v << " in sector " << sector;
         for (const marrow::EdgePixel& edge : nearest.all())
           if (edge.direction_u * middle.x() + edge.direction_v * middle.y() >= std::cos(kTolerance_rad) &&
-              cell_of(edge.u_px, edge.v_px, width, height) == cell)
+              cell_of(edge.u_px, edge.v_px, width, height) == cell) {
             ASSERT_LE(edge.magnitude, found->magnitude) << "a cell keeps its strongest edge";
+          }
       }
   }
 }
@@ -110,4 +111,4 @@ TEST(NearestEdges, AreSmoothedAlongTheirBorder) {
   EXPECT_EQ(nearest.all()[22].u_px, 10.6f);
 }
 
-}  // namespace
+}  // namespace nearest_edges_test

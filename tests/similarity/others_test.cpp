@@ -6,7 +6,7 @@
 #include "other_fragment.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace others_test {
 
 using intensity_behaviour::at;
 using intensity_behaviour::BlobProjector;
@@ -44,8 +44,6 @@ double value(const std::string& node, const shipped::Inputs& inputs, const marro
   const marrow::Value cost = shipped::call(node, inputs, options).at("cost");
   return cost.as<Cost>().value(pose);
 }
-
-}  // namespace
 
 TEST(Others, TheirShadowsDoNotCount) {
   const shipped::Options options{{"blur_px", 0.0}};
@@ -173,3 +171,5 @@ TEST(Others, BothWaysAndWeights) {
   options["weights"] = std::vector<double>{1};
   EXPECT_EQ(shipped::refusal(node, inputs, options), "weights has 1 numbers, but there are 2 views; give one for each");
 }
+
+}  // namespace others_test

@@ -4,7 +4,7 @@
 #include "intensity_behaviour.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace patch_correlation_test {
 
 using intensity_behaviour::at;
 using marrow::RadiographProjector;
@@ -57,8 +57,6 @@ shipped::Inputs blob_inputs(const marrow::View& view) {
           {"views", shipped::list(intensity_behaviour::views_of(view), "view")}};
 }
 
-}  // namespace
-
 TEST(PatchCorrelation, IsTheCorrelationOfOneSquare) {
   const auto right = [](double u, double) { return u; };
   EXPECT_NEAR(value(right, [](double u, double) { return 0.3 * u + 1; }), 0, 1e-6);
@@ -80,3 +78,5 @@ TEST(PatchCorrelation, IsBestAtTheTruth) {
   EXPECT_LT(value(2, 0), value(4, 0));
   EXPECT_EQ(value(500, 0), 2);
 }
+
+}  // namespace patch_correlation_test

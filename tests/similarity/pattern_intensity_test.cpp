@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/similarity/pattern_intensity.cpp"
+#include <gtest/gtest.h>
 
 #include "intensity_behaviour.hpp"
 
-namespace {
+namespace pattern_intensity_test {
 
-std::shared_ptr<const marrow::Cost> make(const marrow::RadiographProjector& projector,
-                                         const marrow::List<marrow::View>& views) {
-  return pattern_intensity(projector, views, nullptr, nullptr, nullptr, Options{});
-}
+constexpr const char* kNode = "similarity.pattern_intensity";
 
-}  // namespace
+TEST(PatternIntensity, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(kNode); }
+TEST(PatternIntensity, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
+TEST(PatternIntensity, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
+TEST(PatternIntensity, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(PatternIntensity, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
-TEST(PatternIntensity, IsBestAtTheTruth) { intensity_behaviour::is_best_at_the_truth(make); }
-TEST(PatternIntensity, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(make); }
-TEST(PatternIntensity, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(make, 2); }
-TEST(PatternIntensity, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(make); }
-TEST(PatternIntensity, RefusesNonsense) { intensity_behaviour::refuses_nonsense(make); }
+}  // namespace pattern_intensity_test

@@ -9,7 +9,7 @@
 #include "project/shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace ray_to_surface_test {
 
 using marrow::Cost;
 using marrow::RigidTransform;
@@ -79,8 +79,6 @@ RigidTransform shifted(double x, double y, double z) { return shapes::centred_at
 double tukey(double d, double reach) {
   return d < reach ? reach * reach / 6 * (1 - std::pow(1 - d * d / (reach * reach), 3)) : reach * reach / 6;
 }
-
-}  // namespace
 
 TEST(RayToSurface, IsTheDistanceThatOneComputesByHand) {
   const Made cost(inputs(), {{"ray_step", std::int64_t(1)}, {"reach_mm", 5.0}});
@@ -177,3 +175,5 @@ TEST(RayToSurface, SaysWhatIsWrong) {
   EXPECT_EQ(shipped::refusal("similarity.ray_to_surface", broken),
             "the field has no inside, so no ray can touch its surface; check the segmentation");
 }
+
+}  // namespace ray_to_surface_test

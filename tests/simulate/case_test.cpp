@@ -2,11 +2,13 @@
 // The chain from a bone to a case, as pipelines/simulate.yaml wires it.
 #include <gtest/gtest.h>
 
-#include "all_nodes.hpp"
+#include "nodes.hpp"
 #include "shapes.hpp"
 
-namespace {
+namespace case_test {
 
+using namespace marrow;
+using phantom::Phantom;
 namespace test = phantom::test;
 
 struct Chain {
@@ -17,29 +19,35 @@ struct Chain {
 
 const Chain& chain() {
   static const Chain made = [] {
-    Context context(11);
-    FemurOptions shape;
-    shape.resolution_mm = 2;
-    FractureOptions broken;
-    broken.level = 0.3;
-    broken.rotation_deg = {0, 0, 8};
     Chain result;
-    result.phantom = fracture(femur(shape, context), broken);
-    CtOptions scanner;
-    scanner.spacing_mm = {1.2, 1.2, 1.5};
-    scanner.range_mm = {0, 250};
-    result.ct = scan(result.phantom, scanner, context);
+    result.phantom = simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}, 11),
+                                         {{"level", 0.3}, {"rotation_deg", std::vector<double>{0, 0, 8}}});
+    result.ct = simulated::ct(
+        result.phantom, {{"spacing_mm", std::vector<double>{1.2, 1.2, 1.5}}, {"range_mm", std::vector<double>{0, 250}}},
+        11);
     List<Camera> cameras;
     cameras.add("frontal", test::camera(0, 256));
     cameras.add("lateral", test::camera(90, 256));
-    result.views = fluoroscopy(result.phantom, cameras, {}, context);
+    result.views = simulated::fluoroscopy(result.phantom, cameras, 11);
     return result;
   }();
   return made;
 }
 
+/// The case with another CT than the chain's.
+Case assemble_with(const Volume& ct, const shipped::Options& options = {}) {
+  return shipped::call("simulate.case",
+                       {{"volume", shipped::item(ct)},
+                        {"views", shipped::list(chain().views, "view")},
+                        {"phantom", shipped::item(chain().phantom)}},
+                       options)
+      .at("case")
+      .as<Case>();
+}
+Case assemble(const shipped::Options& options = {}) { return assemble_with(chain().ct, options); }
+
 TEST(SimulateCase, HoldsSeedsTruthAndViewsAndNoStart) {
-  const Case result = assemble(chain().ct, chain().views, chain().phantom, {});
+  const Case result = assemble();
   EXPECT_EQ(result.views.names(), (std::vector<std::string>{"frontal", "lateral"}));
   EXPECT_EQ(result.truth.names(), std::vector<std::string>{"distal"});
   EXPECT_TRUE(result.start.empty());
@@ -58,16 +66,14 @@ TEST(SimulateCase, HoldsSeedsTruthAndViewsAndNoStart) {
 }
 
 TEST(SimulateCase, BothFragmentsCanBeWanted) {
-  const Case result = assemble(chain().ct, chain().views, chain().phantom, {{"distal", "proximal"}});
+  const Case result = assemble({{"register", std::vector<std::string>{"distal", "proximal"}}});
   EXPECT_EQ(result.truth.names(), (std::vector<std::string>{"proximal", "distal"}));
   EXPECT_TRUE(result.seeds.find("proximal")->wanted);
 }
 
 TEST(SimulateCase, StartsAtTheTruthOnlyWhenAsked) {
-  CaseOptions options;
-  EXPECT_TRUE(assemble(chain().ct, chain().views, chain().phantom, options).start.empty());
-  options.start = "exact";
-  const Case result = assemble(chain().ct, chain().views, chain().phantom, options);
+  EXPECT_TRUE(assemble().start.empty());
+  const Case result = assemble({{"start", std::string("exact")}});
   ASSERT_EQ(result.start.names(), std::vector<std::string>{"distal"}) << "only fragments that are registered have one";
   const RigidTransform &start = result.start[0].world_from_model, &truth = result.truth[0].world_from_model;
   EXPECT_EQ(start.rotation, truth.rotation);
@@ -93,16 +99,15 @@ TEST(SimulateCase, ImagesShowDarkBoneWithinTheField) {
 }
 
 TEST(SimulateCase, WrongFragmentsAndUncoveredOnesAreExplained) {
-  EXPECT_EQ(test::message_of([] { assemble(chain().ct, chain().views, chain().phantom, {{"middle"}}); }),
+  EXPECT_EQ(test::message_of([] {
+              assemble({{"register", std::vector<std::string>{"middle"}}});
+            }),
             "simulate.case: the option 'register' names the fragment 'middle', but there are: proximal, distal");
-  CtOptions upper;
-  upper.spacing_mm = {2, 2, 2};
-  upper.range_mm = {200, 300};
-  Context context;
-  const Volume ct = scan(chain().phantom, upper, context);
-  EXPECT_EQ(test::message_of([&] { assemble(ct, chain().views, chain().phantom, {}); }),
+  const Volume ct = simulated::ct(
+      chain().phantom, {{"spacing_mm", std::vector<double>{2, 2, 2}}, {"range_mm", std::vector<double>{200, 300}}});
+  EXPECT_EQ(test::message_of([&] { assemble_with(ct); }),
             "simulate.case: fragment 'distal' has no seed within the CT; let simulate.ct cover more of it (range_mm)");
-  EXPECT_NE(test::message_of([] { assemble(Volume{}, chain().views, chain().phantom, {}); }), "no error");
+  EXPECT_NE(test::message_of([] { assemble_with(Volume{}); }), "no error");
 }
 
-}  // namespace
+}  // namespace case_test

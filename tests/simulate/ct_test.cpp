@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/simulate/ct.cpp"
-
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
+#include "nodes.hpp"
 #include "shapes.hpp"
 
-namespace {
+namespace ct_test {
 
+using namespace marrow;
+using phantom::Phantom;
 namespace test = phantom::test;
 
 Phantom tube() {
@@ -24,10 +25,7 @@ float at(const Volume& volume, const Eigen::Vector3d& point) {
 }
 
 TEST(SimulateCt, MaterialsHaveTheirHounsfieldUnits) {
-  CtOptions options;
-  options.noise_hu = 0;
-  Context context;
-  const Volume volume = scan(tube(), options, context);
+  const Volume volume = simulated::ct(tube(), {{"noise_hu", 0.0}});
   EXPECT_NEAR(at(volume, {10.5, 0, 30}), 1450, 1);
   EXPECT_NEAR(at(volume, {0, -10.5, 30}), 1450, 1);
   EXPECT_NEAR(at(volume, {0, 0, 45}), -20, 1);
@@ -44,18 +42,13 @@ TEST(SimulateCt, EdgesAreAGaussianStepAlongEachAxis) {
   // x lengths are exact; along y and z a face lies halfway between the last ray outside and the first one inside, at
   // most 0.15 mm off.
   Phantom phantom = test::whole(test::box({0, 0, 0}, {30, 30, 30}));
-  CtOptions options;
-  options.noise_hu = 0;
-  options.blur_mm = 0.9;
-  options.margin_mm = 6.3;
-  Context context;
-  const Volume volume = scan(phantom, options, context);
-  const Raster raster = raster_under(volume.grid, options.blur_mm);
+  const Volume volume = simulated::ct(phantom, {{"noise_hu", 0.0}, {"blur_mm", 0.9}, {"margin_mm", 6.3}});
   for (int axis = 0; axis < 3; ++axis) {
     const Eigen::Vector3d point(15, 15, 15);
-    const double fine = raster.spacing_mm[axis];
-    const double face =
-        axis == 0 ? 0 : raster.origin_mm[axis] + (std::ceil(-raster.origin_mm[axis] / fine) - 0.5) * fine;
+    // The rays through the voxels' centres and, at most 0.3 mm apart, between them.
+    const double low = volume.grid.origin_mm[axis], spacing = volume.grid.spacing_mm[axis];
+    const double fine = spacing / std::ceil(spacing / 0.3);
+    const double face = axis == 0 ? 0 : low + (std::ceil(-low / fine) - 0.5) * fine;
     EXPECT_LE(std::abs(face), 0.15);
     for (int i = 0; i < 20; ++i) {
       Eigen::Vector3d index = volume.grid.index_from_point(point);
@@ -70,16 +63,15 @@ TEST(SimulateCt, EdgesAreAGaussianStepAlongEachAxis) {
 }
 
 TEST(SimulateCt, NoiseHasItsSpreadAndDependsOnTheSeedAlone) {
-  CtOptions options;
+  shipped::Options options;
   const auto scanned = [&](std::uint64_t seed, std::size_t threads) {
     tbb::global_control control(tbb::global_control::max_allowed_parallelism, threads);
-    Context context(seed);
-    return scan(tube(), options, context).values;
+    return simulated::ct(tube(), options, seed).values;
   };
   const auto one = scanned(5, 1);
   EXPECT_EQ(one, scanned(5, 4));
   EXPECT_NE(one, scanned(6, 4));
-  options.noise_hu = 0;
+  options["noise_hu"] = 0.0;
   const auto clean = scanned(5, 4);
   double sum = 0, squares = 0;
   for (std::size_t i = 0; i < one.size(); ++i) {
@@ -91,51 +83,45 @@ TEST(SimulateCt, NoiseHasItsSpreadAndDependsOnTheSeedAlone) {
 }
 
 TEST(SimulateCt, RangeCoversOnlyPartOfTheBone) {
-  CtOptions options;
-  options.range_mm = {20, 45};
-  Context context;
-  const Volume volume = scan(tube(), options, context);
+  shipped::Options options{{"range_mm", std::vector<double>{20, 45}}};
+  const Volume volume = simulated::ct(tube(), options);
   EXPECT_NEAR(volume.grid.origin_mm.z(), 20, 1e-9);
   EXPECT_EQ(volume.grid.size[2], 26);
-  options.noise_hu = 0;
-  const Volume part = scan(tube(), options, context);
-  options.range_mm = {0, 0};
-  const Volume all = scan(tube(), options, context);
+  options["noise_hu"] = 0.0;
+  const Volume part = simulated::ct(tube(), options);
+  options["range_mm"] = std::vector<double>{0, 0};
+  const Volume all = simulated::ct(tube(), options);
   EXPECT_EQ(part.at(20, 20, 10), all.at(20, 20, 10 + 32));  // the whole CT begins 12 mm below the bone
 }
 
 TEST(SimulateCt, FragmentsLieWhereTheCtHasThem) {
   Phantom phantom = test::whole(test::box({0, 0, 0}, {10, 10, 10}));
   phantom.fragments[0].ct_from_bone.translation_mm = {100, 0, 0};
-  CtOptions options;
-  options.noise_hu = 0;
-  Context context;
-  const Volume volume = scan(phantom, options, context);
+  const Volume volume = simulated::ct(phantom, {{"noise_hu", 0.0}});
   EXPECT_NEAR(at(volume, {105, 5, 5}), 1450, 1);
   EXPECT_LT(volume.grid.point_from_index({0, 0, 0}).x(), 100);
   EXPECT_GT(volume.grid.point_from_index({0, 0, 0}).x(), 80);
 }
 
 TEST(SimulateCt, BadInputIsExplained) {
-  Context context;
-  CtOptions options;
   Phantom open = tube();
   open.bone.outer.triangles.pop_back();
-  EXPECT_EQ(test::message_of([&] { scan(open, options, context); }),
+  EXPECT_EQ(test::message_of([&] { simulated::ct(open, {}); }),
             "simulate.ct, outer surface: the surface is open or not consistently oriented, so it has no inside; close "
             "its holes "
             "(each edge must be shared by exactly two triangles)");
-  options.range_mm = {100, 200};
-  EXPECT_EQ(test::message_of([&] { scan(tube(), options, context); }),
+  EXPECT_EQ(test::message_of([] {
+              simulated::ct(tube(), {{"range_mm", std::vector<double>{100, 200}}});
+            }),
             "simulate.ct: range_mm 100.000000 to 200.000000 (from the distal end) holds no part of the bone");
-  options.range_mm = {0, 0};
-  options.spacing_mm[1] = 0;
-  EXPECT_EQ(test::message_of([&] { scan(tube(), options, context); }),
+  EXPECT_EQ(test::message_of([] {
+              simulated::ct(tube(), {{"spacing_mm", std::vector<double>{0.8, 0, 1.0}}});
+            }),
             "simulate.ct: spacing_mm must be positive, got 0.000000");
-  EXPECT_EQ(test::message_of([&] {
-              scan(Phantom{tube().bone, {}, {}}, CtOptions{}, context);
+  EXPECT_EQ(test::message_of([] {
+              simulated::ct(Phantom{tube().bone, {}, {}}, {});
             }),
             "simulate.ct: the phantom has no fragments; break the bone first");
 }
 
-}  // namespace
+}  // namespace ct_test

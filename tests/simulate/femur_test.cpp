@@ -1,20 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/simulate/femur.cpp"
-
 #include <gtest/gtest.h>
 
+#include "nodes.hpp"
 #include "shapes.hpp"
 
-namespace {
+namespace femur_test {
 
+using namespace marrow;
+using phantom::Bone;
 namespace test = phantom::test;
 
-FemurOptions coarse() {
-  FemurOptions options;
-  options.resolution_mm = 2;
-  options.ripple_mm = 0;
-  return options;
-}
+shipped::Options coarse() { return {{"resolution_mm", 2.0}, {"ripple_mm", 0.0}}; }
 
 struct Extent {
   Eigen::Vector3d low = Eigen::Vector3d::Constant(1e9), high = Eigen::Vector3d::Constant(-1e9);
@@ -34,8 +30,7 @@ Extent extent(const Mesh& mesh, double from, double to) {
 }
 
 TEST(SimulateFemur, HasTheMeasuresItIsMadeFrom) {
-  Context context;
-  const Bone bone = femur(coarse(), context);
+  const Bone bone = simulated::femur(coarse());
   EXPECT_TRUE(is_closed(bone.outer));
   EXPECT_TRUE(is_closed(bone.inner));
   EXPECT_NEAR(extent(bone.outer, 0, 1).size().z(), 446, 3);
@@ -50,8 +45,7 @@ TEST(SimulateFemur, HasTheMeasuresItIsMadeFrom) {
 }
 
 TEST(SimulateFemur, CondylesTellItsAxialRotation) {
-  Context context;
-  const Bone bone = femur(coarse(), context);
+  const Bone bone = simulated::femur(coarse());
   // Two condyles with a notch behind: at 5 % of the length no surface lies behind the middle, but much beside it.
   const Extent all = extent(bone.outer, 0.03, 0.05);
   double behind_middle = -1e9, behind = -1e9;
@@ -64,38 +58,35 @@ TEST(SimulateFemur, CondylesTellItsAxialRotation) {
 }
 
 TEST(SimulateFemur, RightIsTheMirrorImageOfLeft) {
-  Context context;
-  FemurOptions options = coarse();
-  const Bone left = femur(options, context);
-  options.side = "right";
-  const Bone right = femur(options, context);
+  shipped::Options options = coarse();
+  const Bone left = simulated::femur(options);
+  options["side"] = std::string("right");
+  const Bone right = simulated::femur(options);
   EXPECT_NEAR(enclosed_volume_mm3(left.outer) / enclosed_volume_mm3(right.outer), 1, 1e-3);
   EXPECT_NEAR(extent(left.outer, 0, 1).low.x(), -extent(right.outer, 0, 1).high.x(), 1);
 }
 
 TEST(SimulateFemur, ShapeSeedAndVariationGiveOtherBonesAndNothingElseDoes) {
-  FemurOptions options = coarse();
-  options.resolution_mm = 3;
-  options.variation = 1;
-  Context one(1), two(2);
-  const Bone a = femur(options, one), b = femur(options, two);
+  shipped::Options options = coarse();
+  options["resolution_mm"] = 3.0;
+  options["variation"] = 1.0;
+  const Bone a = simulated::femur(options, 1), b = simulated::femur(options, 2);
   EXPECT_EQ(a.outer.vertices_mm, b.outer.vertices_mm);  // the run's seed is for noise only
-  options.shape_seed = 2;
-  const Bone c = femur(options, one);
+  options["shape_seed"] = std::int64_t{2};
+  const Bone c = simulated::femur(options, 1);
   EXPECT_NE(a.outer.vertices_mm.size(), c.outer.vertices_mm.size());
   for (int seed = 3; seed < 9; ++seed) {
-    options.shape_seed = seed;
-    EXPECT_TRUE(is_closed(femur(options, one).outer)) << seed;
+    options["shape_seed"] = std::int64_t{seed};
+    EXPECT_TRUE(is_closed(simulated::femur(options, 1).outer)) << seed;
   }
 }
 
 TEST(SimulateFemur, ThinShaftIsExplained) {
-  Context context;
-  FemurOptions options = coarse();
-  options.canal_diameter_mm = 26;
-  EXPECT_EQ(test::message_of([&] { femur(options, context); }),
+  shipped::Options options = coarse();
+  options["canal_diameter_mm"] = 26.0;
+  EXPECT_EQ(test::message_of([&] { simulated::femur(options); }),
             "simulate.femur: a canal of 26.000000 mm leaves less than 2 mm of cortex in a shaft of 28.000000 mm; make "
             "the canal narrower");
 }
 
-}  // namespace
+}  // namespace femur_test

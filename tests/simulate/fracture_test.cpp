@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/simulate/fracture.cpp"
-
 #include <gtest/gtest.h>
 
+#include "nodes.hpp"
 #include "shapes.hpp"
 
-namespace {
+namespace fracture_test {
 
+using namespace marrow;
+using phantom::Bone, phantom::Fragment, phantom::Phantom;
 namespace test = phantom::test;
 
 Bone shaft() {
@@ -21,19 +22,31 @@ Bone shaft() {
   return bone;
 }
 
+/// Points of the surface along which a bone breaks, in a raster over it. The block below has its floor 5 mm deeper.
+std::vector<Eigen::Vector3d> relief(const Bone& bone, const shipped::Options& options) {
+  std::vector<Eigen::Vector3d> points = simulated::fracture(bone, options).fracture.vertices_mm;
+  double floor = 1e9;
+  for (const auto& point : points) floor = std::min(floor, point.z());
+  std::erase_if(points, [&](const auto& point) { return point.z() < floor + 2; });
+  EXPECT_GT(points.size(), 1000u);
+  return points;
+}
+
 TEST(SimulateFracture, CentreOfAnOutlineIsExact) {
-  const Eigen::Vector2d centre = centre_at(shaft().outer, 12.34);
-  EXPECT_NEAR(centre.x(), 3, 0.02);
-  EXPECT_NEAR(centre.y(), 0, 0.02);
+  const Bone bone = shaft();
+  double low = 1e9, high = -1e9;
+  for (const auto& vertex : bone.outer.vertices_mm) low = std::min(low, vertex.z()), high = std::max(high, vertex.z());
+  // A smooth fracture contains the centre of the outline at its level, and rises here by 1 mm in 1 mm.
+  shipped::Options options{{"level", (12.34 - low) / (high - low)}, {"obliquity_deg", 45.0}, {"roughness_mm", 0.0}};
+  options["direction_deg"] = 0.0;
+  for (const auto& point : relief(bone, options)) ASSERT_NEAR(point.x() - (point.z() - 12.34), 3, 0.02);
+  options["direction_deg"] = 90.0;
+  for (const auto& point : relief(bone, options)) ASSERT_NEAR(point.y() - (point.z() - 12.34), 0, 0.02);
 }
 
 TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
-  FractureOptions options;
-  options.level = 0.4;
-  options.obliquity_deg = 30;
-  options.direction_deg = 0;
-  options.roughness_mm = 0;
-  const Phantom phantom = fracture(shaft(), options);
+  const Phantom phantom = simulated::fracture(
+      shaft(), {{"level", 0.4}, {"obliquity_deg", 30.0}, {"direction_deg", 0.0}, {"roughness_mm", 0.0}});
   EXPECT_TRUE(is_closed(phantom.fracture));
   EXPECT_GT(enclosed_volume_mm3(phantom.fracture), 0);
   double below = -1e9, above = 1e9;  // the surface's height at the axis and 10 mm to the left
@@ -46,31 +59,29 @@ TEST(SimulateFracture, CutsAtItsLevelWithItsObliquity) {
 }
 
 TEST(SimulateFracture, RoughnessIsItsRootMeanSquareAndItsSeedChangesIt) {
-  FractureOptions options;
-  options.obliquity_deg = 0;
-  options.roughness_mm = 1.5;
-  options.level = 0.5;
-  const auto relief = [&](int seed) {
-    options.fracture_seed = seed;
-    return Relief(options, {0, 0, 0});
+  Bone block;  // wide against the longest waves of the relief, 40 mm
+  block.outer = test::box({-60, -60, -100}, {60, 60, 100});
+  shipped::Options options{{"obliquity_deg", 0.0}, {"roughness_mm", 1.5}, {"level", 0.5}};
+  const auto surface = [&](int seed) {
+    options["fracture_seed"] = std::int64_t{seed};
+    return relief(block, options);
   };
   double squares = 0;
-  int count = 0;
-  for (int seed = 1; seed <= 40; ++seed) {
-    const Relief surface = relief(seed);
-    for (double x = -200; x <= 200; x += 7.7)
-      for (double y = -200; y <= 200; y += 7.3, ++count) squares += std::pow(surface({x, y}), 2);
-  }
-  EXPECT_NEAR(std::sqrt(squares / count), 1.5, 0.1);
-  EXPECT_NE(relief(1)({3, 4}), relief(2)({3, 4}));
+  std::size_t count = 0;
+  for (int seed = 1; seed <= 40; ++seed)
+    for (const auto& point : surface(seed)) squares += point.z() * point.z(), ++count;
+  EXPECT_NEAR(std::sqrt(squares / double(count)), 1.5, 0.1);
+  const auto one = surface(1), two = surface(2);
+  ASSERT_EQ(one.size(), two.size());
+  const std::size_t middle = one.size() / 2;
+  EXPECT_EQ(one[middle].head<2>(), two[middle].head<2>());
+  EXPECT_NE(one[middle].z(), two[middle].z());
 }
 
 TEST(SimulateFracture, MotionIsAboutTheFragmentsOwnAxes) {
-  FractureOptions options;
-  options.rotation_deg = {2, -3, 40};
-  options.translation_mm = {4, 5, -6};
-  options.ct_gap_mm = {0.5, 0, -2};
-  const Phantom phantom = fracture(shaft(), options);
+  const Phantom phantom = simulated::fracture(shaft(), {{"rotation_deg", std::vector<double>{2, -3, 40}},
+                                                        {"translation_mm", std::vector<double>{4, 5, -6}},
+                                                        {"ct_gap_mm", std::vector<double>{0.5, 0, -2}}});
   ASSERT_EQ(phantom.fragments.size(), 2u);
   EXPECT_EQ(phantom.fragments[0].name, "proximal");
   EXPECT_EQ(phantom.fragments[1].name, "distal");
@@ -90,9 +101,7 @@ TEST(SimulateFracture, MotionIsAboutTheFragmentsOwnAxes) {
 }
 
 TEST(SimulateFracture, SeedsLieInTheirOwnFragmentsCortex) {
-  FractureOptions options;
-  options.ct_gap_mm = {0, 0, -2};
-  const Phantom phantom = fracture(shaft(), options);
+  const Phantom phantom = simulated::fracture(shaft(), {{"ct_gap_mm", std::vector<double>{0, 0, -2}}});
   for (const Fragment& fragment : phantom.fragments) {
     EXPECT_GE(fragment.seeds_mm.size(), 8u) << fragment.name;
     for (const auto& seed : fragment.seeds_mm) {
@@ -110,23 +119,24 @@ TEST(SimulateFracture, SeedsLieInTheirOwnFragmentsCortex) {
 }
 
 TEST(SimulateFracture, BadInputIsExplained) {
-  FractureOptions options;
   Bone open = shaft();
   open.outer.triangles.pop_back();
-  EXPECT_EQ(test::message_of([&] { fracture(open, options); }),
+  EXPECT_EQ(test::message_of([&] { simulated::fracture(open, {}); }),
             "simulate.fracture, outer surface: the surface is open or not consistently oriented, so it has no inside; "
             "close its "
             "holes (each edge must be shared by exactly two triangles)");
   Bone inward = shaft();
   for (auto& triangle : inward.outer.triangles) std::swap(triangle[0], triangle[1]);
-  EXPECT_NE(test::message_of([&] { fracture(inward, options); }).find("the triangles face inward"), std::string::npos);
+  EXPECT_NE(test::message_of([&] { simulated::fracture(inward, {}); }).find("the triangles face inward"),
+            std::string::npos);
   Bone few = shaft();
   few.fill_fraction = {0.1, 0.2};
-  EXPECT_EQ(test::message_of([&] { fracture(few, options); }),
+  EXPECT_EQ(test::message_of([&] { simulated::fracture(few, {}); }),
             "simulate.fracture: the bone share needs as many positions as values, got 1 and 2");
-  options.level = 1.2;
-  EXPECT_EQ(test::message_of([&] { fracture(shaft(), options); }),
+  EXPECT_EQ(test::message_of([] {
+              simulated::fracture(shaft(), {{"level", 1.2}});
+            }),
             "simulate.fracture: the level 1.200000 must lie in 0.1 to 0.9 of the bone's length");
 }
 
-}  // namespace
+}  // namespace fracture_test

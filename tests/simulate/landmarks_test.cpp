@@ -3,7 +3,7 @@
 
 #include "shipped.hpp"
 
-namespace {
+namespace landmarks_test {
 
 /// A broken femur, the truth of its fragments, and two cameras that show 180 mm of its distal end.
 struct Broken {
@@ -97,4 +97,4 @@ TEST(SimulateLandmarks, SaysWhatIsWrong) {
             "or turn the cameras to a fragment");
 }
 
-}  // namespace
+}  // namespace landmarks_test

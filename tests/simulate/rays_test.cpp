@@ -9,7 +9,7 @@
 #include "marrow/toolbox/phantom/solid.hpp"
 #include "shapes.hpp"
 
-namespace {
+namespace rays_test {
 
 using namespace marrow;
 using namespace marrow::phantom;
@@ -147,4 +147,4 @@ TEST(Fill, MeanOverALineIsExact) {
   EXPECT_NEAR(fill.mean(4, 4 + 1e-6), 0.32, 1e-6);
 }
 
-}  // namespace
+}  // namespace rays_test

@@ -1,17 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/simulate/surface.cpp"
-
 #include <gtest/gtest.h>
 
-#include <cstring>
+#include <filesystem>
 #include <fstream>
 
+#include "marrow/toolbox/phantom/phantom.hpp"
 #include "shapes.hpp"
 #include "shipped.hpp"
 
-namespace {
+namespace surface_test {
 
 namespace fs = std::filesystem;
+using namespace marrow;
+using phantom::Bone;
 namespace test = phantom::test;
 
 fs::path write_stl(const std::string& name, const Mesh& mesh, bool ascii) {
@@ -44,19 +45,19 @@ fs::path write_stl(const std::string& name, const Mesh& mesh, bool ascii) {
   return path;
 }
 
-SurfaceOptions reading(const fs::path& path) {
-  SurfaceOptions options;
-  options.outer = path;
-  return options;
+shipped::Options reading(const fs::path& path) { return {{"outer", path.string()}}; }
+
+Bone surface(const shipped::Options& options) {
+  return shipped::call("simulate.surface", {}, options).at("bone").as<Bone>();
 }
 
 TEST(SimulateSurface, ReadsBinaryAndAsciiStlScalesAndTurns) {
   const Mesh box = test::box({0, 0, 0}, {0.4, 0.05, 0.03});  // metres, long axis along x
   for (bool ascii : {false, true}) {
-    SurfaceOptions options = reading(write_stl(ascii ? "ascii.stl" : "binary.stl", box, ascii));
-    options.scale = 1000;
-    options.rotation_deg = {0, -90, 0};
-    options.isocentre_from_distal_end_mm = 100;
+    shipped::Options options = reading(write_stl(ascii ? "ascii.stl" : "binary.stl", box, ascii));
+    options["scale"] = 1000.0;
+    options["rotation_deg"] = std::vector<double>{0, -90, 0};
+    options["isocentre_from_distal_end_mm"] = 100.0;
     const Bone bone = surface(options);
     EXPECT_EQ(bone.outer.vertices_mm.size(), 8u);
     EXPECT_NEAR(enclosed_volume_mm3(bone.outer), 400.0 * 50 * 30, 1);
@@ -70,7 +71,7 @@ TEST(SimulateSurface, ReadsBinaryAndAsciiStlScalesAndTurns) {
 }
 
 TEST(SimulateSurface, BadFilesAreExplained) {
-  const auto message = [](const SurfaceOptions& options) { return test::message_of([&] { surface(options); }); };
+  const auto message = [](const shipped::Options& options) { return test::message_of([&] { surface(options); }); };
   const fs::path folder = testing::TempDir();
   EXPECT_EQ(message(reading(folder / "missing.stl")), (folder / "missing.stl").string() + ": there is no such file");
   fs::create_directories(folder / "folder.stl");
@@ -106,12 +107,12 @@ TEST(SimulateSurface, DeclaresAShareOfBoneForEachHeight) {
 TEST(SimulateSurface, RealFemurIsAHollowBone) {
   const fs::path folder = fs::path(MARROW_SOURCE_DIR) / "../shared/data/femur";
   if (!fs::exists(folder / "femur.stl")) GTEST_SKIP() << "the real femur is not at " << folder;
-  SurfaceOptions options = reading(folder / "femur.stl");
-  options.inner = folder / "femur_cortex.stl";
+  shipped::Options options = reading(folder / "femur.stl");
+  options["inner"] = (folder / "femur_cortex.stl").string();
   const Bone bone = surface(options);
   EXPECT_EQ(bone.outer.triangles.size(), 20308u);
   EXPECT_LT(enclosed_volume_mm3(bone.inner), enclosed_volume_mm3(bone.outer));
   EXPECT_GT(enclosed_volume_mm3(bone.inner), 0.3 * enclosed_volume_mm3(bone.outer));
 }
 
-}  // namespace
+}  // namespace surface_test

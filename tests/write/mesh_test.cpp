@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/write/mesh.cpp"
-
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "write/full_disk.hpp"
+#include "write/writing.hpp"
 
-namespace {
+namespace mesh_test {
+
+using writing::write;
 
 marrow::Mesh example() {
   return {{{0, 0, 0}, {1.0 / 3, 0, 0}, {0, 1e-9, 0}, {0, 0, 12345.678}},
@@ -16,7 +17,7 @@ marrow::Mesh example() {
 
 TEST(WriteMesh, ReadsBackTheSameToTheLastBit) {
   const marrow::test::TemporaryFolder folder;
-  mesh(example(), (folder / "m.ply").string());
+  write(example(), folder / "m.ply");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_mesh_file(folder / "m.ply", 1)), marrow::hash_of(example()));
 }
 
@@ -24,7 +25,7 @@ TEST(WriteMesh, NameOfTheFrameAddsNothingToTheHeader) {
   const marrow::test::TemporaryFolder folder;
   marrow::Mesh value = example();
   value.frame = "ct\nelement vertex 1000000\r\x1b[2J";
-  mesh(value, (folder / "m.ply").string());
+  write(value, folder / "m.ply");
   EXPECT_EQ(marrow::files::read_mesh_file(folder / "m.ply", 1).vertices_mm.size(), 4u);
 }
 
@@ -32,7 +33,7 @@ TEST(WriteMesh, FullDisk) {
   const marrow::test::TemporaryFolder folder;
   for (const rlim_t bytes : {0, 100, 300})
     marrow::test::expect_full_disk_is_diagnosed(folder, "m.ply", bytes,
-                                                [](const std::string& path) { mesh(example(), path); });
+                                                [](const std::string& path) { write(example(), path); });
 }
 
-}  // namespace
+}  // namespace mesh_test

@@ -1,19 +1,21 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/write/text.cpp"
-
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <cmath>
 #include <limits>
+#include <nlohmann/json.hpp>
 
 #include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 #include "write/full_disk.hpp"
+#include "write/writing.hpp"
 
-namespace {
+namespace text_test {
 
 using marrow::test::bytes_of;
 using marrow::test::TemporaryFolder;
+using writing::write;
 
 marrow::Pose example_pose() {
   marrow::Pose value;
@@ -32,7 +34,7 @@ marrow::Pose example_pose() {
 
 TEST(WriteText, PoseReadsBackTheSameToTheLastBit) {
   const TemporaryFolder folder;
-  pose(example_pose(), (folder / "pose.yaml").string());
+  write(example_pose(), folder / "pose.yaml");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_pose_file(folder / "pose.yaml")), marrow::hash_of(example_pose()));
   const std::string text = bytes_of(folder / "pose.yaml");
   EXPECT_NE(text.find("target: world\nsource: ct\nmatrix:  # world_from_ct, mm\n"), std::string::npos) << text;
@@ -45,10 +47,10 @@ TEST(WriteText, PoseWithoutPredictionAndWithInfinities) {
   marrow::Pose value = example_pose();
   value.covariance.reset();
   value.warnings.clear();
-  pose(value, (folder / "pose.yaml").string());
+  write(value, folder / "pose.yaml");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_pose_file(folder / "pose.yaml")), marrow::hash_of(value));
   value.covariance = marrow::Matrix6d::Constant(std::numeric_limits<double>::infinity());
-  pose(value, (folder / "pose.yaml").string());
+  write(value, folder / "pose.yaml");
   EXPECT_FALSE(marrow::files::read_pose_file(folder / "pose.yaml").covariance);
   EXPECT_NE(bytes_of(folder / "pose.yaml").find("rotation_deg: [.inf, .inf, .inf]"), std::string::npos);
 }
@@ -60,16 +62,16 @@ TEST(WriteText, CameraAndSeedsReadBackTheSame) {
                          Eigen::Matrix3d::Identity(),
                          {"camera", "world", marrow::rotation_from_vector({1, 2, 3}), {1.0 / 3, 2, 600}}};
   written.intrinsics(0, 0) = 1706.484641638225;
-  camera(written, (folder / "c.yaml").string());
+  write(written, folder / "c.yaml");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_camera_file(folder / "c.yaml").camera), marrow::hash_of(written));
   const marrow::Seeds points{"distal: \"2\"", {{0.1, 0.2, 1.0 / 3}}, false};
-  seeds(points, (folder / "s.yaml").string());
+  write(points, folder / "s.yaml");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_seeds_file(folder / "s.yaml")[0]), marrow::hash_of(points));
 }
 
 TEST(WriteText, MetricsAreJson) {
   const TemporaryFolder folder;
-  metrics({{{"rotation error", 0.1, "deg"}, {"impossible", std::nan(""), "mm"}}}, (folder / "m.json").string());
+  write(marrow::Metrics{{{"rotation error", 0.1, "deg"}, {"impossible", std::nan(""), "mm"}}}, folder / "m.json");
   const auto json = nlohmann::json::parse(bytes_of(folder / "m.json"));
   EXPECT_EQ(json["metrics"][0]["name"], "rotation error");
   EXPECT_EQ(json["metrics"][0]["value"], 0.1);
@@ -81,11 +83,11 @@ TEST(WriteText, ShaftLinesAndTruthAreYaml) {
   marrow::ShaftLines lines;
   lines.left = {{1, 2}, {3, 4.5}};
   lines.rejected.push_back({{{5, 6}, {7, 8}}, {{9, 10}, {11, 12}}, "canal: too narrow"});
-  shaft_lines(lines, (folder / "l.yaml").string());
+  write(lines, folder / "l.yaml");
   const YAML::Node yaml = YAML::LoadFile(folder / "l.yaml");
   EXPECT_EQ(yaml["left"]["to_px"][1].as<double>(), 4.5);
   EXPECT_EQ(yaml["rejected"][0]["reason"].as<std::string>(), "canal: too narrow");
-  truth({example_pose().world_from_model}, (folder / "t.yaml").string());
+  write(marrow::Truth{example_pose().world_from_model}, folder / "t.yaml");
   EXPECT_EQ(YAML::LoadFile(folder / "t.yaml")["matrix"][2][3].as<double>(), 812.25);
 }
 
@@ -93,14 +95,14 @@ TEST(WriteText, FullDisk) {
   const TemporaryFolder folder;
   for (const rlim_t bytes : {0, 200})
     marrow::test::expect_full_disk_is_diagnosed(folder, "p.yaml", bytes,
-                                                [](const std::string& path) { pose(example_pose(), path); });
+                                                [](const std::string& path) { write(example_pose(), path); });
 }
 
 TEST(WriteText, AFolderOfThatNameIsNotReplaced) {
   const TemporaryFolder folder;
   std::filesystem::create_directory(folder / "p.yaml");
-  EXPECT_SAYS((pose(example_pose(), (folder / "p.yaml").string()), 0), "p.yaml: cannot be written");
+  EXPECT_SAYS(write(example_pose(), folder / "p.yaml"), "p.yaml: cannot be written");
   EXPECT_TRUE(std::filesystem::is_directory(folder / "p.yaml"));
 }
 
-}  // namespace
+}  // namespace text_test

@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "plugins/write/volume.cpp"
-
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "write/full_disk.hpp"
+#include "write/writing.hpp"
 
-namespace {
+namespace volume_test {
 
 using marrow::test::TemporaryFolder;
+using writing::write;
 
 marrow::Volume example(int size) {
   marrow::Volume value;
@@ -21,9 +21,9 @@ marrow::Volume example(int size) {
 TEST(WriteVolume, ReadsBackTheSame) {
   const TemporaryFolder folder;
   const marrow::Volume written = example(9);
-  volume(written, (folder / "ct.mha").string());
+  write(written, folder / "ct.mha");
   EXPECT_EQ(marrow::hash_of(marrow::files::read_volume_file(folder / "ct.mha", {})), marrow::hash_of(written));
-  signed_field({written.grid, written.values}, (folder / "field.mha").string());
+  write(marrow::SignedField{written.grid, written.values}, folder / "field.mha");
   EXPECT_EQ(marrow::files::read_volume_file(folder / "field.mha", {}).values, written.values);
 }
 
@@ -31,13 +31,13 @@ TEST(WriteVolume, FullDisk) {
   const TemporaryFolder folder;
   for (const rlim_t bytes : {0, 100, 5000})
     marrow::test::expect_full_disk_is_diagnosed(folder, "ct.mha", bytes,
-                                                [](const std::string& path) { volume(example(20), path); });
+                                                [](const std::string& path) { write(example(20), path); });
 }
 
 TEST(WriteVolume, RefusesAnEmptyOne) {
   const TemporaryFolder folder;
-  EXPECT_SAYS((volume({}, (folder / "ct.mha").string()), 0), "the volume is empty");
+  EXPECT_SAYS(write(marrow::Volume(), folder / "ct.mha"), "the volume is empty");
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 
-}  // namespace
+}  // namespace volume_test

@@ -8,7 +8,7 @@
 
 #include "marrow/domain/yaml.hpp"
 
-namespace {
+namespace yaml_text_test {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
@@ -206,4 +206,4 @@ fragments:
 )");
 }
 
-}  // namespace
+}  // namespace yaml_text_test

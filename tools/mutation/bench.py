@@ -14,26 +14,23 @@ import time
 
 from graph import Graph
 
-# For each folder, the tests near it, by the beginnings of the names of tests or of their programs.
+# For each folder, the tests near it, by the beginnings of their names. A GoogleTest suite is named program.suite.
 NEAR = {
     "framework/domain": [
-        "domain_",
-        "fracture_",
-        "evaluate_targets",
-        "evaluate_pose_error",
-        "evaluate_shapes",
-        "register_",
-        "camera_",
-        "mesh_",
-        "read_camera",
-        "read_pose",
-        "initial_axis",
-        "runtime_",
+        "domain.",
+        "fracture.",
+        "evaluate.",
+        "register.",
+        "camera.",
+        "mesh.",
+        "read.",
+        "initial.",
+        "runtime",
     ],
     "framework/runtime": [
-        "runtime_",
-        "domain_hash",
-        "compare_experiment",
+        "runtime",
+        "domain.",
+        "compare.",
         "cli_bad",
         "cli_ca",
         "cli_co",
@@ -46,19 +43,19 @@ NEAR = {
         "cli_sc",
         "cli_w",
     ],
-    "framework/compare": ["compare_", "cli_compare", "cli_commands"],
-    "plugins/camera": ["camera_", "conformance_camera", "cli_schema"],
-    "plugins/evaluate": ["evaluate_", "cli_schema"],
-    "plugins/fracture": ["fracture_", "evaluate_targets", "cli_schema"],
-    "plugins/register": ["register_", "initial_global_search", "cli_schema"],
-    "plugins/similarity": ["similarity_", "conformance_similarity", "register_multiresolution", "cli_schema"],
+    "framework/compare": ["compare.", "compare_", "cli_compare", "cli_commands"],
+    "plugins/camera": ["camera.", "conformance_camera", "cli_schema"],
+    "plugins/evaluate": ["evaluate.", "cli_schema"],
+    "plugins/fracture": ["fracture.", "evaluate.", "cli_schema"],
+    "plugins/register": ["register.", "initial.", "cli_schema"],
+    "plugins/similarity": ["similarity.", "conformance_similarity", "register.", "cli_schema"],
 }
 FOLDERS = sorted(NEAR)
 LEAST_LIMIT_S = 30
 
 
 class Test:
-    """One program of the test run. All GoogleTest cases of a program count as one test."""
+    """One test of the test run. All cases of a GoogleTest suite count as one test."""
 
     def __init__(self, name, command, properties):
         self.name, self.command = name, command
@@ -98,9 +95,11 @@ class Bench:
             if not command:
                 continue
             name = test["name"]
-            if any(part.startswith("--gtest_filter") for part in command):
-                name = os.path.basename(command[0]).removeprefix("test_")
-                command = [command[0], "--gtest_fail_fast", "--gtest_brief=1"]
+            chosen = next((part for part in command if part.startswith("--gtest_filter=")), None)
+            if chosen:
+                suite = chosen.removeprefix("--gtest_filter=").rsplit(".", 1)[0]
+                name = os.path.basename(command[0]).removeprefix("test_") + "." + suite
+                command = [command[0], "--gtest_filter=%s.*" % suite, "--gtest_fail_fast", "--gtest_brief=1"]
             tests.setdefault(name, Test(name, command, {p["name"]: p["value"] for p in test.get("properties", [])}))
         return tests
 

@@ -22,7 +22,7 @@ namespace marrow::conformance {
 class Inputs {
  public:
   Inputs() = default;
-  Inputs(std::initializer_list<std::pair<std::string, Value>> values) : values_(values) {}
+  Inputs(std::initializer_list<std::pair<std::string, Value>> values);
   /// Adds a value, or replaces the one of the same port and type.
   void set(const std::string& port, Value value);
   /// The value with the port's name and type, or nullptr.
@@ -50,8 +50,7 @@ struct Result {
 class Subject {
  public:
   /// `further` holds values for inputs that the kind does not declare. The inputs of a check take precedence.
-  explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {}, Inputs further = {})
-      : node_(node), options_(std::move(options)), further_(std::move(further)) {}
+  explicit Subject(const NodeDefinition& node, std::map<std::string, OptionValue> options = {}, Inputs further = {});
   const NodeInfo& info() const { return node_.info; }
   /// Whether the node declares this trait of its kind.
   bool has_trait(const std::string& name) const;

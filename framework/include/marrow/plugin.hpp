@@ -39,29 +39,27 @@ class Plugin {
  public:
   template <class R, class... Args>
   NodeBuilder<R, Args...> node(std::string name, R (*function)(Args...)) {
-    nodes.emplace_back();
-    nodes.back().info.name = std::move(name);
-    return NodeBuilder<R, Args...>(nodes.back(), function);
+    return NodeBuilder<R, Args...>(add_node(std::move(name)), function);
   }
   /// Registers how values of type T are written to disk as outputs of a pipeline. `function` gets the full path, which
   /// ends in `extension`; an empty extension means a folder. `function` throws Error if it cannot write the value.
   template <Registered T>
   void writer(std::string extension, void (*function)(const T&, const std::string& path), std::string help) {
-    writers.push_back(
+    add_writer(
         {{TypeInfo::of<T>(), std::move(extension), std::move(help)},
          [function](const void* value, const std::string& path) { function(*static_cast<const T*>(value), path); }});
   }
 
   /// Declares a kind of nodes with its contract. The nodes of the kind may be in other libraries.
-  KindBuilder kind(std::string name) {
-    kinds.emplace_back();
-    kinds.back().info.name = std::move(name);
-    return KindBuilder(kinds.back());
-  }
+  KindBuilder kind(std::string name);
 
   std::deque<NodeDefinition> nodes;
   std::deque<KindDefinition> kinds;
   std::vector<WriterDefinition> writers;
+
+ private:
+  NodeDefinition& add_node(std::string name);
+  void add_writer(WriterDefinition writer);
 };
 
 /// Begins the function that registers nodes and kinds. It makes a shared library a plugin.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::calibration {
@@ -68,8 +69,7 @@ Blob blob_at_half_peak(const cv::Mat1f& darkness, const cv::Mat1i& labels, int l
 /// A filled ellipse has the area 4 pi sqrt(det of its second moments). Two merged beads, a ring or a corner have a
 /// smaller one.
 bool is_round(const Blob& blob) {
-  const Eigen::Vector2d axes =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>(blob.spread, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector2d axes = eigen_of_symmetric(blob.spread).values;
   const double filled = blob.area / (4 * 3.14159265358979 * std::sqrt(axes[0] * axes[1]));
   return axes[0] > kLeastRoundness * kLeastRoundness * axes[1] && filled > 0.9 && filled < 1.1;
 }
@@ -101,7 +101,7 @@ class Background {
       normal += row * row.transpose();
       right += row * sample.z();
     }
-    plane_ = normal.ldlt().solve(right);
+    plane_ = solve_symmetric(normal, right);
     double squares = 0;
     const auto off = [&](const Eigen::Vector3d& s) { return s.z() - plane_.dot(Eigen::Vector3d(1, s.x(), s.y())); };
     for (const Eigen::Vector3d& sample : samples) squares += off(sample) * off(sample);

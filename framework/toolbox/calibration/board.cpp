@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/calibration/board.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/calibration/correspondence.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -39,9 +39,9 @@ Flat flat_of(const Board& board, int side) {
     const Eigen::Vector3d offset = board.beads[std::size_t(i)].centre_mm - plane.centre;
     spread += offset * offset.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(spread);
-  plane.normal = solver.eigenvectors().col(0);
-  plane.first = solver.eigenvectors().col(2);
+  const SymmetricEigen<3> eigen = eigen_of_symmetric(spread);
+  plane.normal = eigen.vectors.col(0);
+  plane.first = eigen.vectors.col(2);
   return plane;
 }
 

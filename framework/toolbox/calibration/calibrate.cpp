@@ -6,17 +6,13 @@
 #include <cmath>
 #include <opencv2/calib3d.hpp>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::calibration {
 namespace {
 
 constexpr std::size_t kLeastPoints = 8;
-
-Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  return svd.matrixU() * svd.matrixV().transpose();
-}
 
 /// The first two rows of [R|t] up to a common factor, from the radial alignment constraint: for any focal length,
 /// distance and radial distortion, a point is seen in the direction (r_1 X + t_x, r_2 X + t_y) from the principal
@@ -29,11 +25,11 @@ std::optional<Eigen::Matrix<double, 2, 4>> aligned_rows(const std::vector<Eigen:
     system.block<1, 4>(Eigen::Index(i), 4) = -seen[i].x() * points[i].transpose();
   }
   // The normal equations are exact enough for a start. A singular value decomposition would take a minute to compile.
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 8, 8>> least(system.transpose() * system);
+  const SymmetricEigen<8> least = eigen_of_symmetric<8>(system.transpose() * system);
   // Points in one plane leave more than one direction undetermined.
-  if (least.eigenvalues()[1] < 1e-12 * least.eigenvalues()[7]) return std::nullopt;
+  if (least.values[1] < 1e-12 * least.values[7]) return std::nullopt;
   Eigen::Matrix<double, 2, 4> rows;
-  rows << least.eigenvectors().col(0).head<4>().transpose(), least.eigenvectors().col(0).tail<4>().transpose();
+  rows << least.vectors.col(0).head<4>().transpose(), least.vectors.col(0).tail<4>().transpose();
   double agreement = 0;
   for (std::size_t i = 0; i < points.size(); ++i) agreement += seen[i].dot(rows * points[i]);
   return agreement < 0 ? -rows : rows;
@@ -61,7 +57,7 @@ std::optional<ClosedForm> closed_form_camera(const ViewPoints& view, const Eigen
   rotation.row(0) = rows->row(0).head<3>();
   rotation.row(1) = rows->row(1).head<3>();
   rotation.row(2) = rotation.row(0).cross(rotation.row(1));
-  rotation = nearest_rotation(rotation);
+  rotation = nearest_orthogonal(rotation);
   // f (r_1 X + t_x) = u (r_3 X + t_z), and the same for v: linear in f and t_z.
   Eigen::MatrixXd system(2 * points.size(), 2);
   Eigen::VectorXd right(2 * points.size());

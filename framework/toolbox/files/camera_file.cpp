@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/files/camera_file.hpp"
 
-#include <Eigen/SVD>
 #include <charconv>
 #include <cmath>
 #include <sstream>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/files/input_file.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
@@ -100,9 +100,8 @@ Camera read_xmalab(const std::filesystem::path& path) {
   text.title("rotation");
   const Eigen::Matrix3d rotation = read_matrix(text);
   // The file has 12 digits only. The nearest exact rotation is taken.
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(rotation, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d nearest_rotation = svd.matrixU() * svd.matrixV().transpose();
-  if ((nearest_rotation - rotation).cwiseAbs().maxCoeff() > 1e-4 || nearest_rotation.determinant() < 0)
+  const Eigen::Matrix3d nearest = nearest_orthogonal(rotation);
+  if ((nearest - rotation).cwiseAbs().maxCoeff() > 1e-4 || nearest.determinant() < 0)
     text.fail("the matrix under 'rotation' is not a rotation");
   camera.camera_from_world.rotation = nearest_rotation;
   text.title("translation");

@@ -2,11 +2,11 @@
 #include "marrow/toolbox/files/volume_file.hpp"
 
 #include <Eigen/LU>
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
 #include "header_lines.hpp"
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "samples.hpp"
 
@@ -76,8 +76,7 @@ Grid grid_of(const Samples& samples) {
   const Eigen::Matrix3d defect = grid.direction.transpose() * grid.direction - Eigen::Matrix3d::Identity();
   if (grid.direction.allFinite() && defect.cwiseAbs().maxCoeff() < kRoundedDirection &&
       defect.cwiseAbs().maxCoeff() > 1e-12) {
-    const Eigen::JacobiSVD<Eigen::Matrix3d> svd(grid.direction, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    grid.direction = svd.matrixU() * svd.matrixV().transpose();
+    grid.direction = nearest_orthogonal(grid.direction);
   }
   return grid;
 }

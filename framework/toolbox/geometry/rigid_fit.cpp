@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/geometry/rigid_fit.hpp"
 
-#include <Eigen/Eigenvalues>
-#include <Eigen/SVD>
 #include <cmath>
 #include <cstdio>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 
 namespace marrow::geometry {
@@ -18,11 +17,11 @@ Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& points) {
 }
 
 /// Squared extents of the points in ascending order (eigenvalues) and their directions (eigenvectors).
-Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> principal(const std::vector<Eigen::Vector3d>& points) {
+SymmetricEigen<3> principal(const std::vector<Eigen::Vector3d>& points) {
   const Eigen::Vector3d centre = centre_of(points);
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Eigen::Vector3d& point : points) scatter += (point - centre) * (point - centre).transpose();
-  return Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(scatter);
+  return eigen_of_symmetric(scatter);
 }
 
 double root_mean_square_mm(const Eigen::Matrix3d& map, const std::vector<Eigen::Vector3d>& from,
@@ -37,12 +36,12 @@ double root_mean_square_mm(const Eigen::Matrix3d& map, const std::vector<Eigen::
 }  // namespace
 
 Eigen::Vector3d plane_normal(const std::vector<Eigen::Vector3d>& points_mm) {
-  return principal(points_mm).eigenvectors().col(0);
+  return principal(points_mm).vectors.col(0);
 }
 
 bool lie_on_a_line(const std::vector<Eigen::Vector3d>& points_mm) {
   constexpr double kThinnest = 0.01;  // width of the points over their length
-  const Eigen::Vector3d squares = principal(points_mm).eigenvalues();
+  const Eigen::Vector3d squares = principal(points_mm).values;
   return !(squares[1] > kThinnest * kThinnest * squares[2]);
 }
 
@@ -61,14 +60,12 @@ RigidTransform fit_rigid(const std::vector<Eigen::Vector3d>& from_mm, const std:
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
   for (std::size_t i = 0; i < from_mm.size(); ++i)
     covariance += (to_mm[i] - to_centre) * (from_mm[i] - from_centre).transpose();
-  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(covariance, Eigen::ComputeFullU | Eigen::ComputeFullV);
-  const Eigen::Matrix3d orthogonal = svd.matrixU() * svd.matrixV().transpose();
-  Eigen::Vector3d signs(1, 1, orthogonal.determinant() < 0 ? -1 : 1);
+  const Eigen::Matrix3d orthogonal = nearest_orthogonal(covariance);
   RigidTransform fit;
   fit.source = "ct";
-  fit.rotation = svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+  fit.rotation = nearest_rotation(covariance);
   fit.translation_mm = to_centre - fit.rotation * from_centre;
-  if (signs.z() < 0) {
+  if (orthogonal.determinant() < 0) {
     // For points near one plane noise alone can give a reflection, but not one that fits so much better.
     const double turned = root_mean_square_mm(fit.rotation, from_mm, to_mm),
                  mirrored = root_mean_square_mm(orthogonal, from_mm, to_mm);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "usable.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
@@ -9,6 +8,7 @@
 #include <marrow/domain/error.hpp>
 #include <opencv2/imgproc.hpp>
 #include <random>
+#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::image {
 namespace {
@@ -133,7 +133,7 @@ void fit(const std::vector<Step>& steps, int harmonics, Field& field) {
     right += row * cv::norm(from);
   }
   for (int i = 3; i < harmonics; ++i) normal(i, i) += 0.05 * double(steps.size());
-  const Eigen::VectorXd solution = normal.ldlt().solve(right);
+  const Eigen::VectorXd solution = solve_symmetric(normal, right);
   field.harmonics.assign(solution.data(), solution.data() + harmonics);
   if (harmonics < 3) return;
   field.centre += cv::Point2d(solution[1], solution[2]);

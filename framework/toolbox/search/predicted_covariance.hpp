@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <marrow/domain/functions.hpp>
 #include <string>
 #include <vector>
+#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::search {
 
@@ -114,15 +114,15 @@ class PredictedCovariance {
         h.row(i).setZero();
         h.col(i).setZero();
       }
-    const Eigen::SelfAdjointEigenSolver<marrow::Matrix6d> solver(h);
+    const marrow::SymmetricEigen<6> eigen = marrow::eigen_of_symmetric(h);
     marrow::Vector6d variances;
     for (int i = 0; i < 6; ++i) {
-      const double information = factor * solver.eigenvalues()[i];
+      const double information = factor * eigen.values[i];
       variances[i] = information > 1 / kMostVariance ? 1 / information : kMostVariance;
     }
     marrow::Vector6d scale = steps_;
     scale.head<3>() *= marrow::radians(1);
-    const marrow::Matrix6d vectors = scale.asDiagonal() * solver.eigenvectors();
+    const marrow::Matrix6d vectors = scale.asDiagonal() * eigen.vectors;
     covariance_ = vectors * variances.asDiagonal() * vectors.transpose();
   }
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/shaft/axis.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 #include <cstdio>
 #include <marrow/domain/error.hpp>
 #include <string>
+#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -33,8 +33,8 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
     normals.row(Eigen::Index(i)) = planes[i].normal.transpose();
     offsets(Eigen::Index(i)) = planes[i].offset_mm;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> squares(normals.transpose() * normals);  // ascending
-  const double spread = planes.size() < 2 ? 0 : std::sqrt(squares.eigenvalues()(1) / squares.eigenvalues()(2));
+  const SymmetricEigen<3> squares = eigen_of_symmetric<3>(normals.transpose() * normals);  // ascending
+  const double spread = planes.size() < 2 ? 0 : std::sqrt(squares.values(1) / squares.values(2));
   // For two planes at an angle a the squared singular values are 1 +- cos a. Their ratio is tan(a / 2)^2.
   const double angle_deg = degrees(2 * std::atan(spread));
   if (angle_deg < 10) {
@@ -45,11 +45,10 @@ Axis axis_of_planes(const std::vector<Plane>& planes) {
                 " degrees, where 10 are needed; use views farther apart, or a single one");
   }
   Axis axis;
-  axis.direction = squares.eigenvectors().col(0);
+  axis.direction = squares.vectors.col(0);
   const Eigen::Vector3d right = normals.transpose() * offsets;
   for (Eigen::Index i = 1; i < 3; ++i)  // pseudo-inverse of rank two
-    axis.point_mm +=
-        squares.eigenvectors().col(i) * (squares.eigenvectors().col(i).dot(right) / squares.eigenvalues()(i));
+    axis.point_mm += squares.vectors.col(i) * (squares.vectors.col(i).dot(right) / squares.values(i));
   return axis;
 }
 

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/shaft/border.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -65,11 +65,11 @@ Border refit(const EdgeMap& edges, Border border, const Support& support, const 
     border.pixels = count;
     if (count < 10 || !(sum > 0)) return border.pixels = 0, border;
     const Eigen::Vector2d centre = first / sum;
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(second / sum - centre * centre.transpose());
-    const Eigen::Vector2d normal = solver.eigenvectors().col(0);  // the direction of least spread
+    const SymmetricEigen<2> eigen = eigen_of_symmetric<2>(second / sum - centre * centre.transpose());
+    const Eigen::Vector2d normal = eigen.vectors.col(0);  // the direction of least spread
     border.normal = normal.dot(border.normal) < 0 ? Eigen::Vector2d(-normal) : normal;
     border.rho = border.normal.dot(centre);
-    border.spread_px = std::sqrt(std::max(0.0, solver.eigenvalues()[0]));
+    border.spread_px = std::sqrt(std::max(0.0, eigen.values[0]));
   }
   return border;
 }

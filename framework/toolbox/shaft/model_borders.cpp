@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/shaft/model_borders.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
+#include "marrow/domain/decompositions.hpp"
 
 namespace marrow::shaft {
 namespace {
@@ -113,10 +113,7 @@ Axis axis_of_middles(const std::array<std::vector<Extreme>, 2>& sides) {
   }
   Axis axis;
   axis.point_mm = first / n;
-  axis.direction =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(second / n - axis.point_mm * axis.point_mm.transpose())
-          .eigenvectors()
-          .col(2);
+  axis.direction = eigen_of_symmetric<3>(second / n - axis.point_mm * axis.point_mm.transpose()).vectors.col(2);
   return axis;
 }
 

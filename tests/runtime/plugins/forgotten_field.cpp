@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// Must not compile: a member that fields() leaves out would be neither hashed nor stored.
+// Must not compile: a member that `fields` leaves out would be neither hashed nor stored.
 #include <marrow/plugin.hpp>
 
 struct Forgetful {
   int counted = 0;
   int forgotten = 0;
-  static constexpr auto fields() { return std::make_tuple(&Forgetful::counted); }
+  using fields = marrow::Fields<&Forgetful::counted>;
 };
 
 marrow::Digest digest_of(const Forgetful& value) { return marrow::hash_of(value); }

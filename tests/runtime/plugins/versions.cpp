@@ -18,7 +18,7 @@ class Scaler {
 /// A type that only this plugin knows.
 struct Powers {
   std::vector<double> values;
-  static constexpr auto fields() { return std::make_tuple(&Powers::values); }
+  using fields = marrow::Fields<&Powers::values>;
 };
 }  // namespace versions
 MARROW_FUNCTION_TYPE(versions::Scaler, "scaler", 1)

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Compares two values of any type with fields(), number by number.
+// Compares two values of any type with `fields`, number by number.
 #include <cmath>
 #include <opencv2/core.hpp>
 
@@ -20,7 +20,7 @@ struct NumberDifference {
     if constexpr (detail::Plain<T>) {
       add_number(double(a), double(b));
     } else if constexpr (detail::HasFields<T>) {
-      std::apply([&](auto... member) { (add(a.*member, b.*member), ...); }, T::fields());
+      detail::for_each_field<T>([&](auto member) { add(a.*member, b.*member); });
     } else {
       add_container(a, b);
     }

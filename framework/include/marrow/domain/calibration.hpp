@@ -5,9 +5,9 @@
 #include <Eigen/Core>
 #include <array>
 #include <string>
-#include <tuple>
 
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -21,7 +21,7 @@ struct RadialDistortion {
     return 1 + squared_radius * (k[0] + squared_radius * (k[1] + squared_radius * k[2]));
   }
   bool is_none() const { return k == std::array<double, 3>{0, 0, 0}; }
-  static constexpr auto fields() { return std::make_tuple(&RadialDistortion::k); }
+  using fields = Fields<&RadialDistortion::k>;
 };
 
 /// The intrinsic parameters of an imaging device, each with its standard deviation (0 if not known).
@@ -33,12 +33,10 @@ struct Calibration {
   std::array<double, 3> distortion_deviation{0, 0, 0};
   double residual_px = 0;  ///< standard deviation of the residuals per coordinate; 0 if not known
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Calibration::width_px, &Calibration::height_px, &Calibration::intrinsics,
-                           &Calibration::distortion, &Calibration::focal_deviation_px,
-                           &Calibration::principal_deviation_px, &Calibration::distortion_deviation,
-                           &Calibration::residual_px);
-  }
+  using fields =
+      Fields<&Calibration::width_px, &Calibration::height_px, &Calibration::intrinsics, &Calibration::distortion,
+             &Calibration::focal_deviation_px, &Calibration::principal_deviation_px, &Calibration::distortion_deviation,
+             &Calibration::residual_px>;
 };
 
 /// A camera as read from its file: the pinhole model, and the distortion that is still in its images.

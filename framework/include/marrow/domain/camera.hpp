@@ -2,9 +2,9 @@
 #pragma once
 #include <Eigen/Core>
 #include <string>
-#include <tuple>
 #include <vector>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/image.hpp"
 #include "marrow/domain/transform.hpp"
 
@@ -20,9 +20,7 @@ struct Camera {
   Eigen::Matrix3d intrinsics = Eigen::Matrix3d::Identity();
   RigidTransform camera_from_world{"camera", "world"};
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Camera::width_px, &Camera::height_px, &Camera::intrinsics, &Camera::camera_from_world);
-  }
+  using fields = Fields<&Camera::width_px, &Camera::height_px, &Camera::intrinsics, &Camera::camera_from_world>;
 };
 
 /// Pixel onto which a world point projects. NaN unless the point is in front of the source (z > 0 in the camera's
@@ -60,7 +58,7 @@ struct View {
   Image image;
   Camera camera;
   cv::Mat mask;
-  static constexpr auto fields() { return std::make_tuple(&View::name, &View::image, &View::camera, &View::mask); }
+  using fields = Fields<&View::name, &View::image, &View::camera, &View::mask>;
 };
 
 /// Throws Error if the image is empty, if the sizes of image, camera and mask differ, and as check_camera() does. The

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-#include <tuple>
 
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/volume.hpp"
@@ -17,9 +17,7 @@ struct Case {
   List<View> views;   ///< axis view
   List<Pose> start;   ///< axis fragment; empty if the case has none
   List<Truth> truth;  ///< axis fragment; empty if the case has none
-  static constexpr auto fields() {
-    return std::make_tuple(&Case::ct, &Case::seeds, &Case::views, &Case::start, &Case::truth);
-  }
+  using fields = Fields<&Case::ct, &Case::seeds, &Case::views, &Case::start, &Case::truth>;
 };
 
 }  // namespace marrow

@@ -2,8 +2,9 @@
 #pragma once
 #include <Eigen/Core>
 #include <string>
-#include <tuple>
 #include <vector>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -13,10 +14,8 @@ struct EdgePixel {
   float u_px = 0, v_px = 0;
   float direction_u = 0, direction_v = 0;
   float magnitude = 0;
-  static constexpr auto fields() {
-    return std::make_tuple(&EdgePixel::u_px, &EdgePixel::v_px, &EdgePixel::direction_u, &EdgePixel::direction_v,
-                           &EdgePixel::magnitude);
-  }
+  using fields = Fields<&EdgePixel::u_px, &EdgePixel::v_px, &EdgePixel::direction_u, &EdgePixel::direction_v,
+                        &EdgePixel::magnitude>;
 };
 
 /// The edge pixels of one image, in row-major order of the pixels (round(v), round(u)) to which they belong.
@@ -24,14 +23,14 @@ struct EdgeMap {
   int width_px = 0;
   int height_px = 0;
   std::vector<EdgePixel> pixels;
-  static constexpr auto fields() { return std::make_tuple(&EdgeMap::width_px, &EdgeMap::height_px, &EdgeMap::pixels); }
+  using fields = Fields<&EdgeMap::width_px, &EdgeMap::height_px, &EdgeMap::pixels>;
 };
 
 /// A straight piece of outline in an image. Both ends are pixel positions on the line.
 struct LineSegment {
   Eigen::Vector2d from_px = Eigen::Vector2d::Zero();
   Eigen::Vector2d to_px = Eigen::Vector2d::Zero();
-  static constexpr auto fields() { return std::make_tuple(&LineSegment::from_px, &LineSegment::to_px); }
+  using fields = Fields<&LineSegment::from_px, &LineSegment::to_px>;
 };
 
 /// The two outer borders of the shaft in one view. Both run in the same direction. `left` is on the left when looking
@@ -48,13 +47,11 @@ struct ShaftLines {
   struct Rejected {
     LineSegment left, right;
     std::string reason;
-    static constexpr auto fields() { return std::make_tuple(&Rejected::left, &Rejected::right, &Rejected::reason); }
+    using fields = Fields<&Rejected::left, &Rejected::right, &Rejected::reason>;
   };
   std::vector<Rejected> rejected;
-  static constexpr auto fields() {
-    return std::make_tuple(&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm,
-                           &ShaftLines::width_deviation_mm, &ShaftLines::log_likelihood, &ShaftLines::rejected);
-  }
+  using fields = Fields<&ShaftLines::left, &ShaftLines::right, &ShaftLines::width_mm, &ShaftLines::width_deviation_mm,
+                        &ShaftLines::log_likelihood, &ShaftLines::rejected>;
 };
 
 }  // namespace marrow

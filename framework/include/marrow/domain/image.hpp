@@ -2,7 +2,8 @@
 #pragma once
 #include <opencv2/core.hpp>
 #include <string>
-#include <tuple>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -15,13 +16,13 @@ struct Image {
   int width() const { return pixels.cols; }
   int height() const { return pixels.rows; }
 
-  static constexpr auto fields() { return std::make_tuple(&Image::pixels); }
+  using fields = Fields<&Image::pixels>;
 };
 
 /// A picture for people: CV_8UC3 in RGB order.
 struct Picture {
   cv::Mat pixels;
-  static constexpr auto fields() { return std::make_tuple(&Picture::pixels); }
+  using fields = Fields<&Picture::pixels>;
 };
 
 }  // namespace marrow

@@ -2,8 +2,9 @@
 #pragma once
 #include <Eigen/Core>
 #include <string>
-#include <tuple>
 #include <vector>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -14,24 +15,24 @@ struct Landmarks {
   struct Point {
     std::string name;
     Eigen::Vector3d model_mm = Eigen::Vector3d::Zero();
-    static constexpr auto fields() { return std::make_tuple(&Point::name, &Point::model_mm); }
+    using fields = Fields<&Point::name, &Point::model_mm>;
   };
   /// A point as a view shows it.
   struct Seen {
     std::string name, view;
     Eigen::Vector2d pixel = Eigen::Vector2d::Zero();
-    static constexpr auto fields() { return std::make_tuple(&Seen::name, &Seen::view, &Seen::pixel); }
+    using fields = Fields<&Seen::name, &Seen::view, &Seen::pixel>;
   };
   /// A point as a tracking system measured it, in world coordinates.
   struct Tracked {
     std::string name;
     Eigen::Vector3d world_mm = Eigen::Vector3d::Zero();
-    static constexpr auto fields() { return std::make_tuple(&Tracked::name, &Tracked::world_mm); }
+    using fields = Fields<&Tracked::name, &Tracked::world_mm>;
   };
   std::vector<Point> points;
   std::vector<Seen> seen;
   std::vector<Tracked> tracked;
-  static constexpr auto fields() { return std::make_tuple(&Landmarks::points, &Landmarks::seen, &Landmarks::tracked); }
+  using fields = Fields<&Landmarks::points, &Landmarks::seen, &Landmarks::tracked>;
 };
 
 }  // namespace marrow

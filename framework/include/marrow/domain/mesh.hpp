@@ -4,8 +4,9 @@
 #include <array>
 #include <cstdint>
 #include <string>
-#include <tuple>
 #include <vector>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -15,7 +16,7 @@ struct Mesh {
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::string frame = "ct";
 
-  static constexpr auto fields() { return std::make_tuple(&Mesh::vertices_mm, &Mesh::triangles, &Mesh::frame); }
+  using fields = Fields<&Mesh::vertices_mm, &Mesh::triangles, &Mesh::frame>;
 };
 
 /// Throws Error if there are no triangles, an index is out of range, or a vertex is not finite or has a coordinate of
@@ -42,7 +43,7 @@ std::vector<Eigen::Vector3d> sample_surface(const Mesh& mesh, std::size_t count)
 struct FragmentFrame {
   Eigen::Vector3d origin_mm = Eigen::Vector3d::Zero();
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-  static constexpr auto fields() { return std::make_tuple(&FragmentFrame::origin_mm, &FragmentFrame::axes); }
+  using fields = Fields<&FragmentFrame::origin_mm, &FragmentFrame::axes>;
 };
 /// Throws Error as check_mesh() does.
 FragmentFrame fragment_frame(const Mesh& mesh);

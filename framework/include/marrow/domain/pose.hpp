@@ -3,9 +3,9 @@
 #include <Eigen/Core>
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/transform.hpp"
 
@@ -27,14 +27,12 @@ struct Pose {
   struct Progress {
     int evaluations = 0;
     double cost = 0;
-    static constexpr auto fields() { return std::make_tuple(&Progress::evaluations, &Progress::cost); }
+    using fields = Fields<&Progress::evaluations, &Progress::cost>;
   };
   std::vector<Progress> convergence;  ///< may be empty
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Pose::world_from_model, &Pose::frame, &Pose::covariance, &Pose::warnings, &Pose::cost,
-                           &Pose::evaluations, &Pose::convergence);
-  }
+  using fields = Fields<&Pose::world_from_model, &Pose::frame, &Pose::covariance, &Pose::warnings, &Pose::cost,
+                        &Pose::evaluations, &Pose::convergence>;
 };
 
 /// The pose after a small motion (r [rad], t [mm]) as defined at Pose.
@@ -47,7 +45,7 @@ Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, co
 /// nodes of kinds that may see the truth, such as `evaluate` and `render`.
 struct Truth {
   RigidTransform world_from_model{"world", "ct"};
-  static constexpr auto fields() { return std::make_tuple(&Truth::world_from_model); }
+  using fields = Fields<&Truth::world_from_model>;
 };
 
 /// One figure of merit with its unit ("deg", "mm", "px", "").
@@ -55,11 +53,11 @@ struct Metric {
   std::string name;
   double value = 0;
   std::string unit;
-  static constexpr auto fields() { return std::make_tuple(&Metric::name, &Metric::value, &Metric::unit); }
+  using fields = Fields<&Metric::name, &Metric::value, &Metric::unit>;
 };
 struct Metrics {
   std::vector<Metric> items;
-  static constexpr auto fields() { return std::make_tuple(&Metrics::items); }
+  using fields = Fields<&Metrics::items>;
 };
 
 }  // namespace marrow

@@ -3,10 +3,10 @@
 // What reports show interactively: models in their poses together with the X-ray views, and the cost around a pose.
 #include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/mesh.hpp"
 
 namespace marrow {
@@ -16,27 +16,25 @@ struct Scene {
   struct Model {
     std::string name;
     Mesh mesh;  ///< may be coarser than the mesh that was registered
-    static constexpr auto fields() { return std::make_tuple(&Model::name, &Model::mesh); }
+    using fields = Fields<&Model::name, &Model::mesh>;
   };
   /// A pose of a model. `name` is "result", "start" or "truth".
   struct Placement {
     std::string model, name;
     RigidTransform world_from_model{"world", "ct"};
-    static constexpr auto fields() {
-      return std::make_tuple(&Placement::model, &Placement::name, &Placement::world_from_model);
-    }
+    using fields = Fields<&Placement::model, &Placement::name, &Placement::world_from_model>;
   };
   /// A view's camera and its image as it is shown: 8 bit, grey, with the size that the camera gives.
   struct Backdrop {
     std::string name;
     Camera camera;
     Picture picture;
-    static constexpr auto fields() { return std::make_tuple(&Backdrop::name, &Backdrop::camera, &Backdrop::picture); }
+    using fields = Fields<&Backdrop::name, &Backdrop::camera, &Backdrop::picture>;
   };
   std::vector<Model> models;
   std::vector<Placement> placements;
   std::vector<Backdrop> views;
-  static constexpr auto fields() { return std::make_tuple(&Scene::models, &Scene::placements, &Scene::views); }
+  using fields = Fields<&Scene::models, &Scene::placements, &Scene::views>;
 };
 
 /// The cost around a pose, along each of the six axes of the fragment (the chapter's Fig. 7b).
@@ -46,12 +44,10 @@ struct Landscape {
     std::string unit;  ///< unit of the offsets: "deg" or "mm"
     std::vector<double> offsets, costs;
     std::optional<double> truth;  ///< offset of the exact pose along this axis
-    static constexpr auto fields() {
-      return std::make_tuple(&Profile::axis, &Profile::unit, &Profile::offsets, &Profile::costs, &Profile::truth);
-    }
+    using fields = Fields<&Profile::axis, &Profile::unit, &Profile::offsets, &Profile::costs, &Profile::truth>;
   };
   std::vector<Profile> profiles;
-  static constexpr auto fields() { return std::make_tuple(&Landscape::profiles); }
+  using fields = Fields<&Landscape::profiles>;
 };
 
 }  // namespace marrow

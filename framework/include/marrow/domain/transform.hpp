@@ -3,7 +3,8 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <string>
-#include <tuple>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -23,12 +24,14 @@ struct RigidTransform {
   Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
   Eigen::Vector3d translation_mm = Eigen::Vector3d::Zero();
 
-  Eigen::Vector3d operator*(const Eigen::Vector3d& point_mm) const { return rotation * point_mm + translation_mm; }
-
-  static constexpr auto fields() {
-    return std::make_tuple(&RigidTransform::target, &RigidTransform::source, &RigidTransform::rotation,
-                           &RigidTransform::translation_mm);
+  /// A template only so that it is compiled where it is used, not wherever this header is included.
+  template <class = void>
+  Eigen::Vector3d operator*(const Eigen::Vector3d& point_mm) const {
+    return rotation * point_mm + translation_mm;
   }
+
+  using fields = Fields<&RigidTransform::target, &RigidTransform::source, &RigidTransform::rotation,
+                        &RigidTransform::translation_mm>;
 };
 
 /// c_from_a = c_from_b * b_from_a. Throws Error with the names of the frames if the two frames b differ.

@@ -4,8 +4,9 @@
 #include <array>
 #include <cstddef>
 #include <string>
-#include <tuple>
 #include <vector>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow {
 
@@ -25,16 +26,17 @@ struct Grid {
   bool contains(int x, int y, int z) const {
     return x >= 0 && y >= 0 && z >= 0 && x < size[0] && y < size[1] && z < size[2];
   }
+  /// A template only so that it is compiled where it is used, not wherever this header is included.
+  template <class = void>
   Eigen::Vector3d point_from_index(const Eigen::Vector3d& index) const {
     return origin_mm + direction * index.cwiseProduct(spacing_mm);
   }
+  template <class = void>
   Eigen::Vector3d index_from_point(const Eigen::Vector3d& point_mm) const {
     return (direction.transpose() * (point_mm - origin_mm)).cwiseQuotient(spacing_mm);
   }
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Grid::size, &Grid::spacing_mm, &Grid::origin_mm, &Grid::direction, &Grid::frame);
-  }
+  using fields = Fields<&Grid::size, &Grid::spacing_mm, &Grid::origin_mm, &Grid::direction, &Grid::frame>;
 };
 
 /// A CT volume in Hounsfield units. values.size() == grid.count(). NaN is never valid: readers refuse it.
@@ -42,7 +44,7 @@ struct Volume {
   Grid grid;
   std::vector<float> values;
   float at(int x, int y, int z) const { return values[grid.offset(x, y, z)]; }
-  static constexpr auto fields() { return std::make_tuple(&Volume::grid, &Volume::values); }
+  using fields = Fields<&Volume::grid, &Volume::values>;
 };
 
 /// A level set: signed distance in mm to the surface of one fragment, negative inside, sampled on the CT's grid. Away
@@ -51,7 +53,7 @@ struct SignedField {
   Grid grid;
   std::vector<float> values_mm;
   float at(int x, int y, int z) const { return values_mm[grid.offset(x, y, z)]; }
-  static constexpr auto fields() { return std::make_tuple(&SignedField::grid, &SignedField::values_mm); }
+  using fields = Fields<&SignedField::grid, &SignedField::values_mm>;
 };
 
 /// Trilinear interpolation at a fractional index. The index is clamped to the grid.
@@ -67,7 +69,7 @@ struct Seeds {
   std::vector<Eigen::Vector3d> points_mm;
   /// False for a fragment that is segmented only to separate it from the others. It is not passed on.
   bool wanted = true;
-  static constexpr auto fields() { return std::make_tuple(&Seeds::fragment, &Seeds::points_mm, &Seeds::wanted); }
+  using fields = Fields<&Seeds::fragment, &Seeds::points_mm, &Seeds::wanted>;
 };
 
 }  // namespace marrow

@@ -13,7 +13,6 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <tuple>
 #include <type_traits>
 #include <vector>
 
@@ -48,7 +47,7 @@ void use_large_pages(void* data, std::size_t size);
 }  // namespace detail
 
 /// Receives values as bytes. Values may be arithmetic types, enums with is_valid(), strings, containers of these, Eigen
-/// matrices, cv::Mat and structs with fields(). Lengths are included, so that the ends of neighbouring values are
+/// matrices, cv::Mat and structs with `fields`. Lengths are included, so that the ends of neighbouring values are
 /// known. Unpacker reads the values back.
 class Archive {
  public:
@@ -60,7 +59,7 @@ class Archive {
     if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {
-      std::apply([&](auto... member) { (add(value.*member), ...); }, detail::fields_of<T>());
+      detail::for_each_field<T>([&](auto member) { add(value.*member); });
     } else {
       add_container(value);
     }
@@ -145,7 +144,7 @@ class Unpacker {
     } else if constexpr (detail::Plain<T>) {
       bytes(&value, sizeof value);
     } else if constexpr (detail::HasFields<T>) {
-      std::apply([&](auto... member) { (read(value.*member), ...); }, detail::fields_of<T>());
+      detail::for_each_field<T>([&](auto member) { read(value.*member); });
     } else {
       read_container(value);
     }

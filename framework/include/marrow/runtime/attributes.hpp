@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Attributes of ports and options in a declaration.
+#include <initializer_list>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -9,33 +11,31 @@
 
 namespace marrow {
 
+/// The axis of a list port. The text must live until the port is declared.
 struct Over {
-  std::string axis;
+  std::string_view axis;
 };
-struct Unit {
-  std::string text;
+/// A property of an option. The texts must live until the option is declared.
+struct Attribute {
+  enum class Type { minimum, maximum, unit, choices, required };
+  Type type = Type::required;
+  double number = 0;
+  std::string_view text = {};
+  std::initializer_list<std::string_view> names = {};
 };
-struct Minimum {
-  double value;
-};
-struct Maximum {
-  double value;
-};
-struct Choices {
-  std::vector<std::string> names;
-};
-struct Required {};
 
 /// The axis along which a list port runs.
-inline Over over(std::string axis) { return {std::move(axis)}; }
+inline Over over(std::string_view axis) { return {axis}; }
 /// The unit of an option whose name does not end in one. The endings _mm, _deg, _rad, _px, _s, _hu, _kev and _percent
 /// already give the unit.
-inline Unit unit(std::string text) { return {std::move(text)}; }
-inline Minimum at_least(double value) { return {value}; }
-inline Maximum at_most(double value) { return {value}; }
-inline Choices one_of(std::vector<std::string> names) { return {std::move(names)}; }
+inline Attribute unit(std::string_view text) { return {.type = Attribute::Type::unit, .text = text}; }
+inline Attribute at_least(double value) { return {.type = Attribute::Type::minimum, .number = value}; }
+inline Attribute at_most(double value) { return {.type = Attribute::Type::maximum, .number = value}; }
+inline Attribute one_of(std::initializer_list<std::string_view> names) {
+  return {.type = Attribute::Type::choices, .names = names};
+}
 /// A pipeline must give this option.
-inline Required required() { return {}; }
+inline Attribute required() { return {}; }
 
 /// The number of option `low` must not be above that of option `high`.
 inline RelationInfo not_above(std::string low, std::string high) {

@@ -1,24 +1,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The members of a value type, as listed by its fields(). The number of members is checked, because a member that
-// fields() forgets would be neither hashed nor stored.
+// Visits the members of a value type that its `fields` list. Their number is checked, because a member that the list
+// forgets would be neither hashed nor stored.
 #include <cstddef>
-#include <tuple>
 #include <type_traits>
+
+#include "marrow/domain/fields.hpp"
 
 namespace marrow::detail {
 
 template <class T>
 concept HasFields = requires {
-  T::fields();
+  typename T::fields;
 };
 
 /// Compiles only if T has exactly `Count` members, 16 at most. If the compiler says that a structured binding has too
-/// few or too many names, then T::fields() leaves out a member or lists one twice.
+/// few or too many names, then T::fields leaves out a member or lists one twice.
 template <std::size_t Count, class T>
 void has_as_many_members([[maybe_unused]] const T& value) {
-  static_assert(Count >= 1 && Count <= 16,
-                "fields() lists 1 to 16 members; make a struct of some that belong together");
+  static_assert(Count >= 1 && Count <= 16, "fields lists 1 to 16 members; make a struct of some that belong together");
   if constexpr (Count == 1) {
     const auto& [a] = value;
     static_cast<void>(a);
@@ -85,14 +85,19 @@ void has_as_many_members([[maybe_unused]] const T& value) {
   }
 }
 
-/// fields() of a type, which must list every member. The members of a type with constructors or private members cannot
-/// be counted, so its fields() is not checked.
-template <HasFields T>
-constexpr auto fields_of() {
+template <class T, class Function, auto... Members>
+void for_each_field(Fields<Members...>, const Function& function) {
   if constexpr (std::is_aggregate_v<T>) {
-    [[maybe_unused]] constexpr auto check = &has_as_many_members<std::tuple_size_v<decltype(T::fields())>, T>;
+    [[maybe_unused]] constexpr auto check = &has_as_many_members<sizeof...(Members), T>;
   }
-  return T::fields();
+  (function(Members), ...);
+}
+
+/// Calls function(pointer to member) for each member of T, which `fields` must list completely. The members of a type
+/// with constructors or private members cannot be counted, so its list is not checked.
+template <HasFields T, class Function>
+void for_each_field(const Function& function) {
+  for_each_field<T>(typename T::fields(), function);
 }
 
 }  // namespace marrow::detail

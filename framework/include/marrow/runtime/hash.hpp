@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/runtime/archive.hpp"
 
 namespace marrow {
@@ -12,7 +13,7 @@ struct Digest {
   std::uint64_t low = 0, high = 0;
   auto operator<=>(const Digest&) const = default;
   std::string hex() const;
-  static constexpr auto fields() { return std::make_tuple(&Digest::low, &Digest::high); }
+  using fields = Fields<&Digest::low, &Digest::high>;
 };
 
 /// Streaming 128-bit hash (XXH3) of everything that is added. So the hash of a value is the hash of its packed bytes.

@@ -34,47 +34,32 @@ class KindBuilder {
   explicit KindBuilder(KindDefinition& kind) : kind_(kind) {}
   KindBuilder(const KindBuilder&) = delete;
   KindBuilder& operator=(const KindBuilder&) = delete;
-  ~KindBuilder() { detail::check_declaration(kind_); }
+  ~KindBuilder();
 
-  KindBuilder& summary(std::string text) {
-    kind_.info.summary = std::move(text);
-    return *this;
-  }
+  KindBuilder& summary(std::string text);
   /// An input that nodes of the kind may have. If several types are given, a node takes one of them.
   template <Registered... T>
-  KindBuilder& in(std::string name, std::string help, Over axis = {}) {
-    kind_.info.inputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
-    return *this;
+  KindBuilder& in(std::string name, std::string help, const Over& axis = {}) {
+    return add_input({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::string(axis.axis)});
   }
   /// An output that each node of the kind has, of one of the types.
   template <Registered... T>
-  KindBuilder& out(std::string name, std::string help, Over axis = {}) {
-    kind_.info.outputs.push_back({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::move(axis.axis)});
-    return *this;
+  KindBuilder& out(std::string name, std::string help, const Over& axis = {}) {
+    return add_output({std::move(name), std::move(help), {TypeInfo::of<T>()...}, std::string(axis.axis)});
   }
   /// A property that nodes may declare with NodeBuilder::trait().
-  KindBuilder& trait(std::string name, std::string help) {
-    kind_.info.traits.push_back({std::move(name), std::move(help)});
-    return *this;
-  }
+  KindBuilder& trait(std::string name, std::string help);
   /// Its nodes judge or show results, so they may be given the truth.
-  KindBuilder& sees_truth() {
-    kind_.info.sees_truth = true;
-    return *this;
-  }
+  KindBuilder& sees_truth();
   /// Its nodes are called in their own process if their options name files.
-  KindBuilder& runs_apart(Apart apart) {
-    kind_.info.apart = apart;
-    return *this;
-  }
+  KindBuilder& runs_apart(Apart apart);
   /// The checks that every node of the kind must pass in `marrow conformance`.
-  KindBuilder& suite(conformance::Suite suite) {
-    kind_.suite = std::move(suite);
-    for (const conformance::Check& check : conformance::checks_of(kind_.suite)) kind_.info.checks.push_back(check);
-    return *this;
-  }
+  KindBuilder& suite(conformance::Suite suite);
 
  private:
+  KindBuilder& add_input(KindPort port);
+  KindBuilder& add_output(KindPort port);
+
   KindDefinition& kind_;
 };
 

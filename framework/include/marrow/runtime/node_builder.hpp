@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Declares a node. Plugin::node() returns this builder.
+// Declares a node. Plugin::node() returns this builder. Each plugin compiles its templates, so they hold only what
+// depends on the function's type.
 #include <array>
-#include <functional>
+#include <cstddef>
+#include <initializer_list>
 #include <memory>
-#include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -16,30 +18,51 @@
 namespace marrow {
 namespace detail {
 
-/// The part of a NodeBuilder that does not depend on the function's type. It is compiled once, not in each plugin.
+/// An output as a part of what a node's function returns.
+struct ReturnedPart {
+  TypeInfo type;
+  bool is_list = false;
+  bool is_optional = false;
+  std::ptrdiff_t offset = 0;  ///< in bytes from the beginning of the returned object
+  Value (*value)(const TypeInfo& type, const std::shared_ptr<const void>& part, std::string_view axis) = nullptr;
+  std::string axis = {};
+};
+
+/// The part of a NodeBuilder that does not depend on the function's type.
 class NodeDeclaration {
  public:
-  explicit NodeDeclaration(NodeDefinition& node) : node_(node) {}
+  using Function = void (*)();
+  /// Calls `function` with inputs and options, and returns what it returned.
+  using Call = std::shared_ptr<const void> (*)(Function function, const std::vector<Value>& inputs, const void* options,
+                                               Context& context);
+
+  NodeDeclaration(NodeDefinition& node, Function function, Call call, std::shared_ptr<void> (*make_options)());
   NodeDeclaration(const NodeDeclaration&) = delete;
+  NodeDeclaration& operator=(const NodeDeclaration&) = delete;
   /// Checks the declaration itself (names are well formed, texts are given, defaults are within their range, relations
   /// fit) and fills `faults`. It does not check the contract of the kind.
   ~NodeDeclaration();
 
   NodeInfo& info() { return node_.info; }
+  std::size_t outputs() const;
   void add_input(const TypeInfo& type, bool is_list, bool is_optional);
-  void name_input(std::string name, std::string help, Over axis);
-  void add_output(std::string name, std::string help, const TypeInfo& type, const Over& axis, bool is_list,
-                  bool is_optional);
-  /// An option with the unit that the suffix of its name gives ("mm" for "sigma_mm").
-  static OptionInfo option(std::string name, std::string help, OptionType type, std::size_t length,
-                           OptionValue default_value);
-  void add_option(OptionInfo info, std::function<void(void* options, const OptionValue&)> set);
-  void output_fault(const std::string& name, const char* fault);
+  void name_input(std::string_view name, std::string_view help, const Over& axis);
+  void add_output(std::string_view name, std::string_view help, const Over& axis, ReturnedPart part);
+  void output_fault(std::string_view name, const char* fault);
+  /// An option whose member is `offset` bytes from the beginning of the options struct. It has the unit that the suffix
+  /// of its name gives ("mm" for "sigma_mm").
+  void add_option(std::string_view name, std::string_view help, const MemberType& type, std::ptrdiff_t offset,
+                  const void* default_value, std::initializer_list<Attribute> attributes);
 
  private:
   NodeDefinition& node_;
+  std::shared_ptr<std::vector<ReturnedPart>> parts_;
   std::size_t named_inputs_ = 0;
 };
+
+inline std::ptrdiff_t bytes_between(const void* begin, const void* part) {
+  return static_cast<const std::byte*>(part) - static_cast<const std::byte*>(begin);
+}
 
 }  // namespace detail
 
@@ -49,22 +72,25 @@ class NodeBuilder {
   using Options = std::conditional_t<std::is_void_v<typename detail::OptionsOf<Args...>::type>, detail::NoOptions,
                                      typename detail::OptionsOf<Args...>::type>;
 
-  NodeBuilder(NodeDefinition& node, R (*function)(Args...)) : declaration_(node) {
+  NodeBuilder(NodeDefinition& node, R (*function)(Args...))
+      : declaration_(
+            node, reinterpret_cast<detail::NodeDeclaration::Function>(function),
+            [](detail::NodeDeclaration::Function called, const std::vector<Value>& inputs, const void* options,
+               Context& context) {
+              return call(reinterpret_cast<R (*)(Args...)>(called), inputs, options, context,
+                          std::index_sequence_for<Args...>{});
+            },
+            []() -> std::shared_ptr<void> { return std::make_shared<Options>(); }) {
     (add_port<Args>(), ...);
-    node.make_options = [] { return std::make_shared<Options>(); };
-    node.call = [function, outputs = outputs_](const std::vector<Value>& inputs, const void* options,
-                                               Context& context) {
-      return call(function, *outputs, inputs, options, context, std::index_sequence_for<Args...>{});
-    };
   }
 
-  NodeBuilder& summary(std::string text) {
-    declaration_.info().summary = std::move(text);
+  NodeBuilder& summary(std::string_view text) {
+    declaration_.info().summary = text;
     return *this;
   }
   /// The node has this trait of its kind.
-  NodeBuilder& trait(std::string name) {
-    declaration_.info().traits.push_back(std::move(name));
+  NodeBuilder& trait(std::string_view name) {
+    declaration_.info().traits.emplace_back(name);
     return *this;
   }
   /// A condition on options: not_above, below, same_length, as_many_or_none, exactly_one, at_least_one or distinct. A
@@ -79,20 +105,17 @@ class NodeBuilder {
     return *this;
   }
 
-  NodeBuilder& in(std::string name, std::string help, Over axis = {}) {
-    declaration_.name_input(std::move(name), std::move(help), std::move(axis));
+  NodeBuilder& in(std::string_view name, std::string_view help, const Over& axis = {}) {
+    declaration_.name_input(name, help, axis);
     return *this;
   }
 
   /// Names the returned value, or the next item of a returned tuple.
-  NodeBuilder& out(const std::string& name, const std::string& help, const Over& axis = {}) {
-    const std::size_t index = outputs_->size();
+  NodeBuilder& out(std::string_view name, std::string_view help, const Over& axis = {}) {
     if constexpr (detail::IsTuple<R>::value) {
-      add_tuple_output(index, name, help, axis, std::make_index_sequence<std::tuple_size_v<R>>{});
+      add_tuple_output(declaration_.outputs(), name, help, axis, std::make_index_sequence<std::tuple_size_v<R>>{});
     } else if constexpr (Registered<typename detail::Returned<R>::Item>) {
-      add_output<R>(name, help, axis, [axis = axis.axis](const std::shared_ptr<const R>& whole) {
-        return detail::Returned<R>::value(whole, *whole, axis);
-      });
+      add_output<R>(name, help, axis, 0);
     } else {
       declaration_.output_fault(name, "the returned type is not registered with MARROW_VALUE_TYPE");
     }
@@ -100,30 +123,29 @@ class NodeBuilder {
   }
   /// Names a member of the returned struct.
   template <class M, class S>
-  NodeBuilder& out(const std::string& name, M S::*member, const std::string& help, const Over& axis = {}) {
+  NodeBuilder& out(std::string_view name, M S::*member, std::string_view help, const Over& axis = {}) {
     static_assert(std::is_base_of_v<S, R>, "the output is not a member of the struct that the node returns");
-    return add_output<M>(name, help, axis, [member, axis = axis.axis](const std::shared_ptr<const R>& whole) {
-      return detail::Returned<M>::value(whole, (*whole).*member, axis);
-    });
+    add_output<M>(name, help, axis, detail::bytes_between(&place(), &(place().*member)));
+    return *this;
   }
 
   /// An option, bound to a member of the options struct. Its default is the value of the member in a
   /// default-constructed struct. Attributes: at_least, at_most, one_of, unit, required.
   template <class M, class O, class... Attributes>
-  NodeBuilder& option(const std::string& name, M O::*member, const std::string& help, const Attributes&... attributes) {
+  NodeBuilder& option(std::string_view name, M O::*member, std::string_view help, const Attributes&... attributes) {
     static_assert(std::is_base_of_v<O, Options>, "the option is not a member of the node's options struct");
-    OptionInfo info = detail::NodeDeclaration::option(name, help, detail::option_type<M>(), detail::option_length<M>(),
-                                                      detail::to_option_value<M>(Options{}.*member));
-    (apply(info, attributes), ...);
-    detail::narrow_range<M>(info);
-    declaration_.add_option(std::move(info), [member](void* options, const OptionValue& value) {
-      detail::from_option_value<M>(static_cast<Options*>(options)->*member, value);
-    });
+    const M& value = defaults_.*member;
+    declaration_.add_option(name, help, *detail::member_type<M>(), detail::bytes_between(&defaults_, &value), &value,
+                            {attributes...});
     return *this;
   }
 
  private:
-  using Output = std::function<Value(const std::shared_ptr<const R>&)>;
+  /// Where an R could be. It only serves to find where the members of an R are; there is none.
+  static const R& place() {
+    alignas(R) static const std::byte bytes[sizeof(R)]{};
+    return *reinterpret_cast<const R*>(bytes);
+  }
 
   template <class A>
   void add_port() {
@@ -139,33 +161,22 @@ class NodeBuilder {
   }
 
   template <class M>
-  NodeBuilder& add_output(const std::string& name, const std::string& help, const Over& axis, Output output) {
+  void add_output(std::string_view name, std::string_view help, const Over& axis, std::ptrdiff_t offset) {
     using Returned = detail::Returned<M>;
-    declaration_.add_output(name, help, TypeInfo::of<typename Returned::Item>(), axis, Returned::kList,
-                            Returned::kOptional);
-    outputs_->push_back(std::move(output));
-    return *this;
+    declaration_.add_output(
+        name, help, axis,
+        {TypeInfo::of<typename Returned::Item>(), Returned::kList, Returned::kOptional, offset, Returned::value});
   }
 
   template <std::size_t... I>
-  void add_tuple_output(std::size_t index, const std::string& name, const std::string& help, const Over& axis,
+  void add_tuple_output(std::size_t index, std::string_view name, std::string_view help, const Over& axis,
                         std::index_sequence<I...>) {
     const bool found = ((I == index && (add_output<std::tuple_element_t<I, R>>(
-                                            name, help, axis,
-                                            [axis = axis.axis](const std::shared_ptr<const R>& whole) {
-                                              return detail::Returned<std::tuple_element_t<I, R>>::value(
-                                                  whole, std::get<I>(*whole), axis);
-                                            }),
+                                            name, help, axis, detail::bytes_between(&place(), &std::get<I>(place()))),
                                         true)) ||
                         ...);
     if (!found) declaration_.output_fault(name, "the returned tuple has fewer items");
   }
-
-  static void apply(OptionInfo& info, const Minimum& minimum) { info.minimum = minimum.value; }
-  static void apply(OptionInfo& info, const Maximum& maximum) { info.maximum = maximum.value; }
-  static void apply(OptionInfo& info, const Unit& unit) { info.unit = unit.text; }
-  static void apply(OptionInfo& info, const Choices& choices) { info.choices = choices.names; }
-  static void apply(OptionInfo& info, const Required&) { info.required = true; }
 
   /// Index of the port that argument `I` stands for.
   template <std::size_t I>
@@ -208,18 +219,14 @@ class NodeBuilder {
   };
 
   template <std::size_t... I>
-  static std::vector<Value> call(R (*function)(Args...), const std::vector<Output>& outputs,
-                                 const std::vector<Value>& inputs, [[maybe_unused]] const void* options,
-                                 Context& context, std::index_sequence<I...>) {
-    std::tuple<Holder<Args>...> holders{Holder<Args>(inputs, port_index<I>(), options, context)...};
-    const auto whole = std::make_shared<const R>(function(std::get<I>(holders).get()...));
-    std::vector<Value> values;
-    for (const Output& output : outputs) values.push_back(output(whole));
-    return values;
+  static std::shared_ptr<const void> call(R (*function)(Args...), [[maybe_unused]] const std::vector<Value>& inputs,
+                                          [[maybe_unused]] const void* options, [[maybe_unused]] Context& context,
+                                          std::index_sequence<I...>) {
+    return std::make_shared<const R>(function(Holder<Args>(inputs, port_index<I>(), options, context).get()...));
   }
 
   detail::NodeDeclaration declaration_;
-  std::shared_ptr<std::vector<Output>> outputs_ = std::make_shared<std::vector<Output>>();
+  const Options defaults_{};
 };
 
 }  // namespace marrow

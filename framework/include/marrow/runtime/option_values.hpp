@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // Converts members of an options struct to option values, and back.
+#include <Eigen/Core>
 #include <algorithm>
 #include <filesystem>
 #include <limits>
@@ -101,5 +102,35 @@ void narrow_range(OptionInfo& info) {
   if constexpr (kWhole && sizeof(M) < sizeof(std::int64_t))
     info.maximum = std::min(info.maximum.value_or(double(Limits::max())), double(Limits::max()));
 }
+
+/// How a member of an options struct is described, read and set.
+struct MemberType {
+  OptionType type;
+  std::size_t length;
+  OptionValue (*get)(const void* member);
+  void (*set)(void* member, const OptionValue& value);
+  void (*narrow)(OptionInfo& info);
+};
+
+/// The MemberType of M. For the usual types it is compiled once, in marrow's library.
+template <class M>
+__attribute__((visibility("default"))) const MemberType* member_type() {
+  static constexpr MemberType kType{
+      option_type<M>(), option_length<M>(),
+      [](const void* member) { return to_option_value<M>(*static_cast<const M*>(member)); },
+      [](void* member, const OptionValue& value) { from_option_value<M>(*static_cast<M*>(member), value); },
+      narrow_range<M>};
+  return &kType;
+}
+extern template const MemberType* member_type<bool>();
+extern template const MemberType* member_type<int>();
+extern template const MemberType* member_type<float>();
+extern template const MemberType* member_type<double>();
+extern template const MemberType* member_type<std::string>();
+extern template const MemberType* member_type<std::filesystem::path>();
+extern template const MemberType* member_type<std::vector<double>>();
+extern template const MemberType* member_type<std::vector<std::string>>();
+extern template const MemberType* member_type<std::vector<std::filesystem::path>>();
+extern template const MemberType* member_type<Eigen::Vector3d>();
 
 }  // namespace marrow::detail

@@ -4,8 +4,11 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <tuple>
 #include <type_traits>
+#include <utility>
+#include <vector>
 
 #include "marrow/domain/list.hpp"
 #include "marrow/runtime/context.hpp"
@@ -70,6 +73,12 @@ struct OptionsOf<A, Rest...> {
 
 struct NoOptions {};
 
+/// A value that holds one item; absent if `item` is null.
+Value value_of_item(const TypeInfo& type, std::shared_ptr<const void> item);
+/// A value that holds a list; absent if it is empty.
+Value value_of_list(const TypeInfo& type, const std::vector<std::string>& names,
+                    std::vector<std::shared_ptr<const void>> items, std::string_view axis);
+
 /// The item type of a returned type: the item of a list, of an optional or of a shared pointer, else the type itself.
 template <class M>
 struct Returned {
@@ -90,19 +99,19 @@ struct Returned {
   }
   using Item = typename decltype(item())::type;
 
-  /// The value of `member`, which is a part of `whole`. The value keeps its data alive.
-  template <class Whole>
-  static Value value(const std::shared_ptr<const Whole>& whole, const M& member, const std::string& axis) {
-    Value none;
-    none.type = TypeInfo::of<Item>();
+  /// The value of a member of type M of what a node returned. The value keeps that alive.
+  static Value value(const TypeInfo& type, const std::shared_ptr<const void>& member, std::string_view axis) {
+    const M& returned = *static_cast<const M*>(member.get());
     if constexpr (kList) {
-      return Value::of(member, axis);
+      std::vector<std::shared_ptr<const void>> items;
+      for (std::size_t i = 0; i < returned.size(); ++i) items.push_back(returned.shared(i));
+      return value_of_list(type, returned.names(), std::move(items), axis);
     } else if constexpr (kOptional) {
-      return member ? Value::of<Item>(std::shared_ptr<const Item>(whole, &*member)) : none;
+      return value_of_item(type, {member, returned ? &*returned : nullptr});
     } else if constexpr (kShared) {
-      return member ? Value::of<Item>(member) : none;
+      return value_of_item(type, returned);
     } else {
-      return Value::of<Item>(std::shared_ptr<const Item>(whole, &member));
+      return value_of_item(type, member);
     }
   }
 };

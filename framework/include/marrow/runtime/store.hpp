@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/runtime/value.hpp"
 
 namespace marrow {
@@ -26,10 +27,8 @@ struct Provenance {
   double seconds = 0;                 ///< time that the call took
   std::vector<std::string> warnings;  ///< warnings of the node; repeated when the result is read back
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Provenance::node, &Provenance::build_id, &Provenance::options, &Provenance::inputs,
-                           &Provenance::random, &Provenance::seed, &Provenance::seconds, &Provenance::warnings);
-  }
+  using fields = Fields<&Provenance::node, &Provenance::build_id, &Provenance::options, &Provenance::inputs,
+                        &Provenance::random, &Provenance::seed, &Provenance::seconds, &Provenance::warnings>;
 };
 
 /// A result read back from the store. The outputs know their keys; their data are read when they are first needed.
@@ -102,7 +101,7 @@ class Store {
   struct Last {
     Digest key;
     Provenance provenance;
-    static constexpr auto fields() { return std::make_tuple(&Last::key, &Last::provenance); }
+    using fields = Fields<&Last::key, &Last::provenance>;
   };
   void remember(const std::string& place, const Last& last) const;
   std::optional<Last> last(const std::string& place) const;

@@ -3,9 +3,9 @@
 // Values that the simulation nodes exchange: a bone as closed surfaces, and the fragments that a fracture makes of it.
 #include <Eigen/Core>
 #include <string>
-#include <tuple>
 #include <vector>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/transform.hpp"
 #include "marrow/runtime/value.hpp"
@@ -26,10 +26,8 @@ struct Bone {
   double thigh_radius_mm = 0;
   double fat_mm = 0;
 
-  static constexpr auto fields() {
-    return std::make_tuple(&Bone::outer, &Bone::inner, &Bone::fill_z_mm, &Bone::fill_fraction, &Bone::thigh_centre_mm,
-                           &Bone::thigh_radius_mm, &Bone::fat_mm);
-  }
+  using fields = Fields<&Bone::outer, &Bone::inner, &Bone::fill_z_mm, &Bone::fill_fraction, &Bone::thigh_centre_mm,
+                        &Bone::thigh_radius_mm, &Bone::fat_mm>;
 };
 
 /// One piece of a bone, and its poses in the CT and in the images. The soft tissue keeps its place: its world frame is
@@ -44,17 +42,15 @@ struct Fragment {
   Mesh outer;  ///< its part of the bone's outer surface, in CT coordinates; open at the fracture
 
   RigidTransform world_from_bone() const { return world_from_ct * ct_from_bone; }
-  static constexpr auto fields() {
-    return std::make_tuple(&Fragment::name, &Fragment::side, &Fragment::ct_from_bone, &Fragment::world_from_ct,
-                           &Fragment::frame, &Fragment::seeds_mm, &Fragment::outer);
-  }
+  using fields = Fields<&Fragment::name, &Fragment::side, &Fragment::ct_from_bone, &Fragment::world_from_ct,
+                        &Fragment::frame, &Fragment::seeds_mm, &Fragment::outer>;
 };
 
 struct Phantom {
   Bone bone;
   Mesh fracture;  ///< closed surface around the distal side, in frame "bone"; without triangles if the bone is whole
   std::vector<Fragment> fragments;
-  static constexpr auto fields() { return std::make_tuple(&Phantom::bone, &Phantom::fracture, &Phantom::fragments); }
+  using fields = Fields<&Phantom::bone, &Phantom::fracture, &Phantom::fragments>;
 };
 
 /// Throw Error, naming `what`, unless the surfaces are closed and oriented outward and the other values are finite and

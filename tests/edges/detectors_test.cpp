@@ -1,54 +1,41 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
-// What every edge detector must do, on images whose edges are known exactly. A test program defines `find_edges(view)`
-// before it includes this header.
+// What every edge detector must do, on images whose edges are known exactly.
 #include <gtest/gtest.h>
 #include <tbb/global_control.h>
 
 #include <chrono>
 #include <cmath>
+#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <limits>
-#include <marrow/domain/error.hpp>
 #include <marrow/domain/features.hpp>
+#include <numeric>
 #include <opencv2/imgcodecs.hpp>
-#include <random>
+#include <string>
 
-#include "edges/radiograph.hpp"
+#include "domain/message_of.hpp"
+#include "edges/drawn.hpp"
+#include "shipped.hpp"
 
-namespace {
+namespace detectors_test {
 
-/// A view of an image whose brightness at a point is function(u, v); each pixel is the mean over 8 x 8 points.
-template <class Function>
-marrow::View drawn(int size, Function function, double noise = 0, unsigned seed = 1) {
-  marrow::View view;
-  view.name = "frontal";
-  view.camera = radiograph::camera(0, size);
-  view.image.pixels.create(size, size, CV_16U);
-  std::mt19937 random(seed);
-  std::normal_distribution<double> normal(0, noise > 0 ? noise : 1);
-  for (int v = 0; v < size; ++v)
-    for (int u = 0; u < size; ++u) {
-      double sum = 0;
-      for (int k = 0; k < 64; ++k) sum += function(u + (k % 8 - 3.5) / 8, v + (k / 8 - 3.5) / 8);
-      view.image.pixels.at<std::uint16_t>(v, u) =
-          cv::saturate_cast<std::uint16_t>(sum / 64 + (noise > 0 ? normal(random) : 0));
-    }
-  return view;
-}
+using edges::drawn;
+using marrow::test::message_of;
 
-template <class Function>
-std::string error_of(Function function) {
-  try {
-    function();
-  } catch (const marrow::Error& error) {
-    return error.what();
+class Edges : public testing::TestWithParam<std::string> {
+ protected:
+  marrow::EdgeMap find_edges(const marrow::View& view) const {
+    return shipped::call("edges." + GetParam(), {{"view", shipped::item(view)}}).at("edges").as<marrow::EdgeMap>();
   }
-  return "no error";
-}
+};
 
-TEST(Edges, LieOnAStraightStepAtAnyOrientation) {
+INSTANTIATE_TEST_SUITE_P(, Edges,
+                         testing::Values("adaptive_relaxation", "canny", "laplacian_of_gaussian", "prewitt", "roberts",
+                                         "sobel"),
+                         [](const auto& node) { return node.param; });
+
+TEST_P(Edges, LieOnAStraightStepAtAnyOrientation) {
   double largest = 0, sum = 0, largest_turn_deg = 0;
   int count = 0;
   for (double angle_deg = 0; angle_deg < 360; angle_deg += 15) {
@@ -74,7 +61,7 @@ TEST(Edges, LieOnAStraightStepAtAnyOrientation) {
   EXPECT_LT(largest_turn_deg, 1.0);
 }
 
-TEST(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
+TEST_P(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
   const auto view =
       drawn(200, [](double u, double v) { return std::hypot(u - 101.3, v - 98.6) < 60.4 ? 28500.0 : 30000.0; });
   const marrow::EdgeMap edges = find_edges(view);
@@ -99,7 +86,7 @@ TEST(Edges, OfADarkDiscPointOutwardsAndComeInRowOrder) {
   EXPECT_LT(largest, 0.15);
 }
 
-TEST(Edges, AreScarceInPureNoise) {
+TEST_P(Edges, AreScarceInPureNoise) {
   const auto view = drawn(
       256, [](double, double) { return 20000.0; }, 300);
   const double fraction = double(find_edges(view).pixels.size()) / (256 * 256);
@@ -107,8 +94,8 @@ TEST(Edges, AreScarceInPureNoise) {
   EXPECT_LT(fraction, 0.001);
 }
 
-TEST(Edges,
-     AreFoundInTheDarkAsInTheLight) {  // the exposure falls tenfold from left to right, the bar takes 10 % everywhere
+TEST_P(Edges,
+       AreFoundInTheDarkAsInTheLight) {  // the exposure falls tenfold from left to right, the bar takes 10 % everywhere
   const auto view = drawn(
       256, [](double u, double v) { return 50000 * std::pow(0.1, u / 255) * (std::abs(v - 128) < 20 ? 0.9 : 1.0); },
       30);
@@ -140,7 +127,7 @@ int largest_gap(const marrow::EdgeMap& edges, const marrow::View& view, const ra
   return largest;
 }
 
-TEST(Edges, OfANoisyHollowBoneInAThighAreContinuous) {
+TEST_P(Edges, OfANoisyHollowBoneInAThighAreContinuous) {
   for (const double photons : {3000.0, 20000.0}) {
     const auto scene = radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1});
     const auto view = radiograph::image("frontal", radiograph::camera(0), scene, photons, 7);
@@ -151,7 +138,7 @@ TEST(Edges, OfANoisyHollowBoneInAThighAreContinuous) {
   }
 }
 
-TEST(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
+TEST_P(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
   const auto disc = [](double u, double v) { return std::hypot(u - 127.5, v - 127.5); };
   auto view = drawn(
       256, [&](double u, double v) { return disc(u, v) > 120  ? 100.0
@@ -178,7 +165,7 @@ TEST(Edges, KeepAwayFromMaskCollimatorAndImageBorder) {
 
 // Real frames of a knee (Brown University, see the data folder's README): an intensifier's round field with scatter
 // beyond it, in the first one cut by the collimator.
-TEST(Edges, KeepInsideTheFieldOfRealFrames) {
+TEST_P(Edges, KeepInsideTheFieldOfRealFrames) {
   const std::string folder = MARROW_SOURCE_DIR "/../shared/data/knee/images/";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << "the real knee is not here: " << folder;
   for (const auto& [name, u, v] : {std::tuple<std::string, double, double>{"L_Hop_Cam1_001_UND.0138.tif", 852, 868},
@@ -197,7 +184,7 @@ TEST(Edges, KeepInsideTheFieldOfRealFrames) {
   }
 }
 
-TEST(Edges, AreTheSameBytesWithOneAndTwoThreads) {
+TEST_P(Edges, AreTheSameBytesWithOneAndTwoThreads) {
   const auto view =
       radiograph::image("frontal", radiograph::camera(0), radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
   const auto with_threads = [&](int threads) {
@@ -209,37 +196,37 @@ TEST(Edges, AreTheSameBytesWithOneAndTwoThreads) {
   EXPECT_EQ(std::memcmp(one.pixels.data(), two.pixels.data(), one.pixels.size() * sizeof(marrow::EdgePixel)), 0);
 }
 
-TEST(Edges, SayWhatIsWrongWithAnImage) {
+TEST_P(Edges, SayWhatIsWrongWithAnImage) {
   marrow::View view = drawn(64, [](double u, double) { return u < 30 ? 500.0 : 900.0; });
   const marrow::View good = view;
   view.image.pixels = cv::Mat(64, 64, CV_16U, cv::Scalar(1234));
-  EXPECT_EQ(error_of([&] { find_edges(view); }),
+  EXPECT_EQ(message_of([&] { find_edges(view); }),
             "view 'frontal': all pixels have the same value 1234, so there is no edge; check the image file");
   good.image.pixels.convertTo(view.image.pixels, CV_32F);
   view.image.pixels.at<float>(3, 3) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_EQ(error_of([&] { find_edges(view); }),
+  EXPECT_EQ(message_of([&] { find_edges(view); }),
             "view 'frontal': the image holds pixels that are not finite (NaN or infinity)");
   good.image.pixels.convertTo(view.image.pixels, CV_32F, -1);
-  EXPECT_EQ(error_of([&] { find_edges(view); }),
+  EXPECT_EQ(message_of([&] { find_edges(view); }),
             "view 'frontal': the image has no positive grey value, so its logarithm cannot be taken");
   view = good;
   view.mask = cv::Mat(64, 64, CV_8U, cv::Scalar(0));
   EXPECT_EQ(
-      error_of([&] { find_edges(view); }),
+      message_of([&] { find_edges(view); }),
       "view 'frontal': no pixel is left to search for edges (mask, image border and smoothing take all of 64 x 64)");
   view = good;
   view.image.pixels = cv::Mat(64, 64, CV_8UC3, cv::Scalar(1, 2, 3));
-  EXPECT_EQ(error_of([&] { find_edges(view); }),
+  EXPECT_EQ(message_of([&] { find_edges(view); }),
             "view 'frontal': the image must have one channel of 8 or 16 bit whole numbers or 32 bit floats");
   view = good;
   view.camera.width_px = 65;
-  EXPECT_NE(error_of([&] { find_edges(view); }).find("64 x 64 pixels, but its camera is for 65 x 64"),
+  EXPECT_NE(message_of([&] { find_edges(view); }).find("64 x 64 pixels, but its camera is for 65 x 64"),
             std::string::npos);
   view.image.pixels = cv::Mat();
-  EXPECT_EQ(error_of([&] { find_edges(view); }), "view 'frontal': the image is empty");
+  EXPECT_EQ(message_of([&] { find_edges(view); }), "view 'frontal': the image is empty");
 }
 
-TEST(Edges, AreFoundInReasonableTime) {
+TEST_P(Edges, AreFoundInReasonableTime) {
   for (const int size : {512, 1024}) {
     const auto view = radiograph::image("frontal", radiograph::camera(0, size),
                                         radiograph::shaft({5, 3, 0}, {0.08, 0.05, 1}), 5000, 7);
@@ -255,4 +242,8 @@ TEST(Edges, AreFoundInReasonableTime) {
   }
 }
 
-}  // namespace
+TEST(Canny, DeclaresTheOrderOfItsThresholds) {
+  EXPECT_TRUE(shipped::declares("edges.canny", marrow::not_above("low", "high")));
+}
+
+}  // namespace detectors_test

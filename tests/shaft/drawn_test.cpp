@@ -1,18 +1,30 @@
 // SPDX-License-Identifier: Apache-2.0
-#pragma once
 // What the nodes must do that find their lines in the edge map alone: exact lines, drawn.
+#include <gtest/gtest.h>
+
+#include <cstdio>
+
+#include "domain/message_of.hpp"
 #include "shaft/scenes.hpp"
 
-namespace {
+namespace drawn_test {
 
-/// Lines that are drawn exactly are not those of a round bone.
-ShaftLines find_drawn(const marrow::EdgeMap& edges, const marrow::View& view) {
-  LineOptions options;
-  options.outline = false;
-  return find_shaft(edges, view, options);
-}
+using namespace scenes;
+using marrow::ShaftLines;
+using marrow::test::message_of;
 
-TEST(Shaft, EndsWhereOneBorderEnds) {
+class DrawnShaft : public Shaft {
+ protected:
+  /// Lines that are drawn exactly are not those of a round bone.
+  ShaftLines find_drawn(const marrow::EdgeMap& edges, const marrow::View& view) const {
+    return find_shaft(edges, view, {{"outline", false}});
+  }
+};
+
+INSTANTIATE_TEST_SUITE_P(, DrawnShaft, testing::Values("hough_pairs", "ransac"),
+                         [](const auto& node) { return node.param; });
+
+TEST_P(DrawnShaft, EndsWhereOneBorderEnds) {
   marrow::EdgeMap edges = no_edges();  // 85 px are 29.9 mm; condyles bend away below v = 300 on one side
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 300}, kRight);
@@ -25,7 +37,7 @@ TEST(Shaft, EndsWhereOneBorderEnds) {
   EXPECT_NEAR(lines.width_mm, 85 * 0.6 * 300 / 512, 0.01);
 }
 
-TEST(Shaft, AllowsATaperAndPrefersTheLikelierWidth) {
+TEST_P(DrawnShaft, AllowsATaperAndPrefersTheLikelierWidth) {
   marrow::EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {195, 400}, kLeft);
   draw(edges, {283, 20}, {290, 400}, kRight);
@@ -44,7 +56,7 @@ TEST(Shaft, AllowsATaperAndPrefersTheLikelierWidth) {
 }
 
 // A bowed shaft has many lines; their pairs must not crowd the shaft of a second fragment out of the list.
-TEST(Shaft, ListsTheShaftOfASecondFragment) {
+TEST_P(DrawnShaft, ListsTheShaftOfASecondFragment) {
   marrow::EdgeMap edges = no_edges();
   const auto bow = [](double v) { return 0.0008 * (v - 150) * (v - 150); };
   for (double v = 10; v < 300; v += 10)
@@ -65,7 +77,7 @@ TEST(Shaft, ListsTheShaftOfASecondFragment) {
   EXPECT_LE(candidates, 3);
 }
 
-TEST(Shaft, ToleratesGapsUpToTheLimit) {
+TEST_P(DrawnShaft, ToleratesGapsUpToTheLimit) {
   marrow::EdgeMap edges = no_edges();
   for (double v = 20; v < 400; v += 60) {  // gaps of 20 px = 7 mm
     draw(edges, {200, v}, {200, v + 40}, kLeft);
@@ -75,7 +87,7 @@ TEST(Shaft, ToleratesGapsUpToTheLimit) {
 }
 
 // A ridge of the bone lies outside the border of what is behind it.
-TEST(Shaft, EndsWhereItRunsOnInsideARidge) {
+TEST_P(DrawnShaft, EndsWhereItRunsOnInsideARidge) {
   marrow::EdgeMap edges = no_edges();
   draw(edges, {200, 20}, {200, 480}, kLeft);
   draw(edges, {285, 20}, {285, 480}, kRight);
@@ -85,12 +97,12 @@ TEST(Shaft, EndsWhereItRunsOnInsideARidge) {
   EXPECT_NEAR(lines.left.to_px.y(), 480, 4);
 }
 
-TEST(Shaft, SaysWhyThereIsNoPair) {
+TEST_P(DrawnShaft, SaysWhyThereIsNoPair) {
   const std::string advice = "; look at the edges, and set the edge detector's thresholds or this bone's width_mm";
   marrow::EdgeMap edges = no_edges();
   draw(edges, {240, 20}, {240, 400}, kRight);  // the canal's polarity
   draw(edges, {275, 20}, {275, 400}, kLeft);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, empty_view()); }),
+  EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is darker outside than "
             "inside, as a canal or "
             "a gap between bones is (12.3 mm wide)" +
@@ -98,7 +110,7 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   edges = no_edges();
   draw(edges, {40, 20}, {40, 400}, kLeft);  // the thigh's outline
   draw(edges, {440, 20}, {440, 400}, kRight);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, empty_view()); }),
+  EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its width of 140.6 mm is "
             "too large for a shaft (17.2 to 49.9 mm), as the limb's is" +
                 advice);
@@ -106,7 +118,7 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   draw(edges, {200, 20}, {200, 400}, kLeft);  // of a shaft's width, but the dark is elsewhere
   draw(edges, {285, 20}, {285, 400}, kRight);
   EXPECT_EQ(
-      error_of([&] { find_shaft(edges, dark_between(270, 330)); }),
+      message_of([&] { find_shaft(edges, dark_between(270, 330)); }),
       "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because a border is too faint for bone "
       "but for 0 mm, of 25 mm wanted, as muscle's is (29.9 mm wide)" +
           advice);
@@ -114,7 +126,7 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   rims.image.pixels.colRange(200, 212) = 800;
   rims.image.pixels.colRange(212, 273) = 1500;
   rims.image.pixels.colRange(273, 285) = 800;
-  EXPECT_EQ(error_of([&] { find_shaft(edges, rims); }),
+  EXPECT_EQ(message_of([&] { find_shaft(edges, rims); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because it is not darker than what "
             "lies beside it (mean grey value 1267 inside, 1000 and 1000 outside)" +
                 advice);
@@ -122,22 +134,22 @@ TEST(Shaft, SaysWhyThereIsNoPair) {
   draw(edges, {200, 20}, {200, 110}, kLeft);
   draw(edges, {262, 20}, {262, 110}, kRight);
   EXPECT_EQ(
-      error_of([&] { find_shaft(edges, dark_between(200, 262)); }),
+      message_of([&] { find_shaft(edges, dark_between(200, 262)); }),
       "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its log-likelihood of 1.7 is "
       "below 2.0, the least that is taken (21.8 mm wide)" +
           advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
   draw(edges, {285, 380}, {285, 500}, kRight);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, empty_view()); }),
+  EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 2 lines, best candidate rejected because its borders run side by "
             "side for 7 mm only, of 25 mm "
             "wanted" +
                 advice);
   edges = no_edges();
   draw(edges, {200, 20}, {200, 400}, kLeft);
-  EXPECT_EQ(error_of([&] { find_shaft(edges, empty_view()); }),
+  EXPECT_EQ(message_of([&] { find_shaft(edges, empty_view()); }),
             "view 'frontal': no shaft pair found: 1 lines, none of which run side by side" + advice);
 }
 
-}  // namespace
+}  // namespace drawn_test

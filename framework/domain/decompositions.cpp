@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/domain/decompositions.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <Eigen/SVD>
+
+namespace marrow {
+
+template <int Size>
+SymmetricEigen<Size> eigen_of_symmetric(const Eigen::Matrix<double, Size, Size>& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, Size, Size>> solver(matrix);
+  return {solver.eigenvalues(), solver.eigenvectors()};
+}
+
+template <int Size>
+Eigen::Matrix<double, Size, 1> solve_symmetric(const Eigen::Matrix<double, Size, Size>& matrix,
+                                               const Eigen::Matrix<double, Size, 1>& right) {
+  return matrix.ldlt().solve(right);
+}
+
+Eigen::Matrix<double, 6, 6> inverse_of_symmetric(const Eigen::Matrix<double, 6, 6>& matrix) {
+  return matrix.ldlt().solve(Eigen::Matrix<double, 6, 6>::Identity());
+}
+
+Eigen::Matrix3d nearest_orthogonal(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  return svd.matrixU() * svd.matrixV().transpose();
+}
+
+Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const Eigen::Matrix3d orthogonal = svd.matrixU() * svd.matrixV().transpose();
+  const Eigen::Vector3d signs(1, 1, orthogonal.determinant() < 0 ? -1 : 1);
+  return svd.matrixU() * signs.asDiagonal() * svd.matrixV().transpose();
+}
+
+template SymmetricEigen<2> eigen_of_symmetric<2>(const Eigen::Matrix<double, 2, 2>&);
+template SymmetricEigen<3> eigen_of_symmetric<3>(const Eigen::Matrix<double, 3, 3>&);
+template SymmetricEigen<6> eigen_of_symmetric<6>(const Eigen::Matrix<double, 6, 6>&);
+template SymmetricEigen<8> eigen_of_symmetric<8>(const Eigen::Matrix<double, 8, 8>&);
+template SymmetricEigen<Eigen::Dynamic> eigen_of_symmetric<Eigen::Dynamic>(const Eigen::MatrixXd&);
+template Eigen::Vector3d solve_symmetric<3>(const Eigen::Matrix3d&, const Eigen::Vector3d&);
+template Eigen::Matrix<double, 6, 1> solve_symmetric<6>(const Eigen::Matrix<double, 6, 6>&,
+                                                        const Eigen::Matrix<double, 6, 1>&);
+template Eigen::VectorXd solve_symmetric<Eigen::Dynamic>(const Eigen::MatrixXd&, const Eigen::VectorXd&);
+
+}  // namespace marrow

@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// What a picture shows: colours of pixels, and texts, which are compared with the same text drawn on purpose.
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "marrow/toolbox/draw/canvas.hpp"
+
+namespace pictures {
+
+/// Whether a pixel has about this colour.
+inline bool has(const cv::Mat& picture, cv::Point pixel, const cv::Scalar& colour) {
+  const auto value = picture.at<cv::Vec3b>(pixel);
+  return std::abs(value[0] - colour[0]) < 40 && std::abs(value[1] - colour[1]) < 40 &&
+         std::abs(value[2] - colour[2]) < 40;
+}
+
+inline bool same(const cv::Mat& a, const cv::Mat& b) {
+  return a.size() == b.size() && a.type() == b.type() && cv::norm(a, b, cv::NORM_INF) == 0;
+}
+
+/// Whether below its first `height` rows the picture has this legend and nothing else.
+inline bool has_legend(const cv::Mat& picture, int height, const std::vector<marrow::draw::LegendItem>& items) {
+  const cv::Mat expected = marrow::draw::with_legend(cv::Mat(height, picture.cols, CV_8UC3, cv::Scalar()), items);
+  return same(expected.rowRange(height, expected.rows), picture.rowRange(height, picture.rows));
+}
+
+}  // namespace pictures
