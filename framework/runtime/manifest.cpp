@@ -74,9 +74,9 @@ json json_of(const WriterInfo& writer) {
 
 /// Reads an object of the manifest. Checks that it has the expected number of fields, and that each field is there with
 /// the right type.
-class Fields {
+class JsonObject {
  public:
-  Fields(const json& object, std::string name, std::size_t count) : object_(object), name_(std::move(name)) {
+  JsonObject(const json& object, std::string name, std::size_t count) : object_(object), name_(std::move(name)) {
     if (!object.is_object()) damaged(name_ + " is not an object");
     if (object.size() != count)
       damaged(name_ + " has " + std::to_string(object.size()) + " fields, expected " + std::to_string(count));
@@ -130,19 +130,19 @@ class Fields {
 };
 
 TypeInfo type_from(const json& j) {
-  const Fields fields(j, "a type", 4);
+  const JsonObject fields(j, "a type", 4);
   const auto version = int(fields.integer("version", 0, std::numeric_limits<int>::max()));
   return {fields.text("id"), version, std::size_t(fields.integer("size", 1, kMostBytes_of_value)),
           fields.boolean("function")};
 }
 
 PortInfo port_from(const json& j) {
-  const Fields fields(j, "a port", 5);
+  const JsonObject fields(j, "a port", 5);
   return {fields.text("name"), fields.text("help"), type_from(fields.at("type")), fields.boolean("optional"),
           fields.text("axis")};
 }
 
-OptionValue default_from(const Fields& fields, OptionType type) {
+OptionValue default_from(const JsonObject& fields, OptionType type) {
   switch (type) {
     case OptionType::boolean:
       return fields.boolean("default");
@@ -169,7 +169,7 @@ int one_of(const char* const (&names)[Count], const std::string& text, const std
 }
 
 OptionInfo option_from(const json& j) {
-  const Fields fields(j, "an option", 8 + j.contains("minimum") + j.contains("maximum"));
+  const JsonObject fields(j, "an option", 8 + j.contains("minimum") + j.contains("maximum"));
   OptionInfo option;
   option.name = fields.text("name");
   option.help = fields.text("help");
@@ -188,13 +188,13 @@ OptionInfo option_from(const json& j) {
 }
 
 RelationInfo relation_from(const json& j) {
-  const Fields fields(j, "a relation", 2);
+  const JsonObject fields(j, "a relation", 2);
   return {RelationType(one_of(kRelationTypes, fields.text("type"), "relation")), fields.texts("names")};
 }
 
 /// The node must obey the same rules as when a library registers it.
 NodeInfo node_from(const json& j) {
-  const Fields fields(j, "a node", 8);
+  const JsonObject fields(j, "a node", 8);
   NodeDefinition node;
   node.info.name = fields.text("name");
   node.info.summary = fields.text("summary");
@@ -210,7 +210,7 @@ NodeInfo node_from(const json& j) {
 }
 
 KindPort kind_port_from(const json& j) {
-  const Fields fields(j, "a port of a kind", 4);
+  const JsonObject fields(j, "a port of a kind", 4);
   KindPort port{fields.text("name"), fields.text("help"), {}, fields.text("axis")};
   for (const json& type : fields.list("types")) port.types.push_back(type_from(type));
   return port;
@@ -218,7 +218,7 @@ KindPort kind_port_from(const json& j) {
 
 /// The kind must obey the same rules as when a library registers it.
 KindInfo kind_from(const json& j) {
-  const Fields fields(j, "a kind", 8);
+  const JsonObject fields(j, "a kind", 8);
   KindDefinition kind;
   kind.info.name = fields.text("name");
   kind.info.summary = fields.text("summary");
@@ -227,11 +227,11 @@ KindInfo kind_from(const json& j) {
   for (const json& port : fields.list("inputs")) kind.info.inputs.push_back(kind_port_from(port));
   for (const json& port : fields.list("outputs")) kind.info.outputs.push_back(kind_port_from(port));
   for (const json& trait : fields.list("traits")) {
-    const Fields of_trait(trait, "a trait", 2);
+    const JsonObject of_trait(trait, "a trait", 2);
     kind.info.traits.push_back({of_trait.text("name"), of_trait.text("help")});
   }
   for (const json& check : fields.list("checks")) {
-    const Fields of_check(check, "a check", 4);
+    const JsonObject of_check(check, "a check", 4);
     kind.info.checks.push_back(
         {of_check.text("name"), of_check.text("what"), of_check.number("limit"), of_check.text("unit")});
   }
@@ -241,7 +241,7 @@ KindInfo kind_from(const json& j) {
 }
 
 WriterInfo writer_from(const json& j) {
-  const Fields fields(j, "a writer", 3);
+  const JsonObject fields(j, "a writer", 3);
   WriterInfo writer{type_from(fields.at("type")), fields.text("extension"), fields.text("help")};
   // The extension becomes the end of a file's path.
   const bool plain = std::all_of(writer.extension.begin(), writer.extension.end(),
@@ -252,7 +252,7 @@ WriterInfo writer_from(const json& j) {
 }
 
 LinkedLibrary linked_from(const json& j) {
-  const Fields fields(j, "a linked library", 2);
+  const JsonObject fields(j, "a linked library", 2);
   const std::string path = fields.text("path");
   if (path.empty() || path[0] != '/' || path.find('\0') != std::string::npos)
     damaged("'" + path + "' is not the full path of a library");
@@ -336,7 +336,7 @@ std::string manifest_text(const LibraryInfo& info) {
 LibraryInfo manifest_from_text(const std::string& text) {
   JsonDocument document(parsed(text));
   check(document.value());
-  const Fields fields(document.value(), "it", 7);
+  const JsonObject fields(document.value(), "it", 7);
   LibraryInfo info;
   const std::optional<Digest> digest = digest_of_hex(fields.text("library"));
   if (!digest) damaged("the library's digest is not 32 hexadecimal digits");

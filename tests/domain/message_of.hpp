@@ -5,7 +5,7 @@
 
 namespace marrow::test {
 
-/// The text of the Error that `function` throws, or "no error".
+/// The text of the Error that `function` throws; "" if it throws none.
 template <class Function>
 std::string message_of(Function function) {
   try {
@@ -13,7 +13,7 @@ std::string message_of(Function function) {
   } catch (const Error& error) {
     return error.what();
   }
-  return "no error";
+  return "";
 }
 
 }  // namespace marrow::test

@@ -10,6 +10,8 @@
 
 #include "marrow/domain/error.hpp"
 
+#include "domain/message_of.hpp"
+
 namespace marrow::test {
 
 /// A folder that is removed with its content.
@@ -52,17 +54,6 @@ inline std::string with(std::string text, const std::string& from, const std::st
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from;
   return at == std::string::npos ? text : text.replace(at, from.size(), to);
-}
-
-/// The message of the Error that `call` throws; "" when it throws none.
-template <class Call>
-std::string message_of(Call call) {
-  try {
-    call();
-  } catch (const marrow::Error& error) {
-    return error.what();
-  }
-  return "";
 }
 
 #define EXPECT_SAYS(call, text)                                                           \

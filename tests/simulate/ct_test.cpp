@@ -106,19 +106,19 @@ TEST(SimulateCt, FragmentsLieWhereTheCtHasThem) {
 TEST(SimulateCt, BadInputIsExplained) {
   Phantom open = tube();
   open.bone.outer.triangles.pop_back();
-  EXPECT_EQ(test::message_of([&] { simulated::ct(open, {}); }),
+  EXPECT_EQ(marrow::test::message_of([&] { simulated::ct(open, {}); }),
             "simulate.ct, outer surface: the surface is open or not consistently oriented, so it has no inside; close "
             "its holes "
             "(each edge must be shared by exactly two triangles)");
-  EXPECT_EQ(test::message_of([] {
+  EXPECT_EQ(marrow::test::message_of([] {
               simulated::ct(tube(), {{"range_mm", std::vector<double>{100, 200}}});
             }),
             "simulate.ct: range_mm 100.000000 to 200.000000 (from the distal end) holds no part of the bone");
-  EXPECT_EQ(test::message_of([] {
+  EXPECT_EQ(marrow::test::message_of([] {
               simulated::ct(tube(), {{"spacing_mm", std::vector<double>{0.8, 0, 1.0}}});
             }),
             "simulate.ct: spacing_mm must be positive, got 0.000000");
-  EXPECT_EQ(test::message_of([] {
+  EXPECT_EQ(marrow::test::message_of([] {
               simulated::ct(Phantom{tube().bone, {}, {}}, {});
             }),
             "simulate.ct: the phantom has no fragments; break the bone first");

@@ -84,7 +84,7 @@ TEST(SimulateFemur, ShapeSeedAndVariationGiveOtherBonesAndNothingElseDoes) {
 TEST(SimulateFemur, ThinShaftIsExplained) {
   shipped::Options options = coarse();
   options["canal_diameter_mm"] = 26.0;
-  EXPECT_EQ(test::message_of([&] { simulated::femur(options); }),
+  EXPECT_EQ(marrow::test::message_of([&] { simulated::femur(options); }),
             "simulate.femur: a canal of 26.000000 mm leaves less than 2 mm of cortex in a shaft of 28.000000 mm; make "
             "the canal narrower");
 }

@@ -154,14 +154,14 @@ TEST(SimulateFluoroscopy, BlurWidensAnEdgeByItsSpread) {
 TEST(SimulateFluoroscopy, BadInputIsExplained) {
   Phantom phantom = test::whole(test::box({-10, -4, -10}, {10, 6, 10}));
   phantom.fragments[0].world_from_ct.translation_mm = {0, -600, 0};
-  const std::string message = test::message_of([&] { exposed(phantom, ideal()); });
+  const std::string message = marrow::test::message_of([&] { exposed(phantom, ideal()); });
   EXPECT_EQ(message,
             "simulate.fluoroscopy: fragment 'whole' reaches to -4.000000 mm from the X-ray source; it must lie in "
             "front of the "
             "source, so check the camera's distances and the fragment's translation");
   phantom = test::whole(test::box({-10, -4, -10}, {10, 6, 10}));
   phantom.fragments[0].world_from_ct.rotation *= 2;
-  EXPECT_NE(test::message_of([&] { exposed(phantom, ideal()); }), "no error");
+  EXPECT_NE(marrow::test::message_of([&] { exposed(phantom, ideal()); }), "");
 }
 
 }  // namespace

@@ -121,19 +121,19 @@ TEST(SimulateFracture, SeedsLieInTheirOwnFragmentsCortex) {
 TEST(SimulateFracture, BadInputIsExplained) {
   Bone open = shaft();
   open.outer.triangles.pop_back();
-  EXPECT_EQ(test::message_of([&] { simulated::fracture(open, {}); }),
+  EXPECT_EQ(marrow::test::message_of([&] { simulated::fracture(open, {}); }),
             "simulate.fracture, outer surface: the surface is open or not consistently oriented, so it has no inside; "
             "close its "
             "holes (each edge must be shared by exactly two triangles)");
   Bone inward = shaft();
   for (auto& triangle : inward.outer.triangles) std::swap(triangle[0], triangle[1]);
-  EXPECT_NE(test::message_of([&] { simulated::fracture(inward, {}); }).find("the triangles face inward"),
+  EXPECT_NE(marrow::test::message_of([&] { simulated::fracture(inward, {}); }).find("the triangles face inward"),
             std::string::npos);
   Bone few = shaft();
   few.fill_fraction = {0.1, 0.2};
-  EXPECT_EQ(test::message_of([&] { simulated::fracture(few, {}); }),
+  EXPECT_EQ(marrow::test::message_of([&] { simulated::fracture(few, {}); }),
             "simulate.fracture: the bone share needs as many positions as values, got 1 and 2");
-  EXPECT_EQ(test::message_of([] {
+  EXPECT_EQ(marrow::test::message_of([] {
               simulated::fracture(shaft(), {{"level", 1.2}});
             }),
             "simulate.fracture: the level 1.200000 must lie in 0.1 to 0.9 of the bone's length");

@@ -3,6 +3,7 @@
 // Bodies whose path lengths and volumes are known.
 #include <cmath>
 
+#include "domain/message_of.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
 #include "marrow/toolbox/phantom/polygonise.hpp"
 
@@ -65,16 +66,6 @@ inline Camera camera(double beta_deg = 0, int size_px = 512) {
       upright * Eigen::AngleAxisd(-radians(beta_deg), Eigen::Vector3d::UnitZ()).toRotationMatrix();
   camera.camera_from_world.translation_mm = {0, 0, 600};
   return camera;
-}
-
-template <class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
 }
 
 }  // namespace marrow::phantom::test

@@ -71,7 +71,9 @@ TEST(SimulateSurface, ReadsBinaryAndAsciiStlScalesAndTurns) {
 }
 
 TEST(SimulateSurface, BadFilesAreExplained) {
-  const auto message = [](const shipped::Options& options) { return test::message_of([&] { surface(options); }); };
+  const auto message = [](const shipped::Options& options) {
+    return marrow::test::message_of([&] { surface(options); });
+  };
   const fs::path folder = testing::TempDir();
   EXPECT_EQ(message(reading(folder / "missing.stl")), (folder / "missing.stl").string() + ": there is no such file");
   fs::create_directories(folder / "folder.stl");

@@ -17,8 +17,8 @@ struct SymmetricEigen {
 template <int Size>
 SymmetricEigen<Size> eigen_of_symmetric(const Eigen::Matrix<double, Size, Size>& matrix);
 
-/// Solves matrix * x = right by the LDL^T decomposition. The matrix is symmetric and not indefinite; only its lower half
-/// is read. Sizes: 3, 6 and Eigen::Dynamic.
+/// Solves matrix * x = right by the LDL^T decomposition. The matrix is symmetric and not indefinite; only its lower
+/// half is read. Sizes: 3, 6 and Eigen::Dynamic.
 template <int Size>
 Eigen::Matrix<double, Size, 1> solve_symmetric(const Eigen::Matrix<double, Size, Size>& matrix,
                                                const Eigen::Matrix<double, Size, 1>& right);
