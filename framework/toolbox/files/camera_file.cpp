@@ -103,7 +103,7 @@ Camera read_xmalab(const std::filesystem::path& path) {
   const Eigen::Matrix3d nearest = nearest_orthogonal(rotation);
   if ((nearest - rotation).cwiseAbs().maxCoeff() > 1e-4 || nearest.determinant() < 0)
     text.fail("the matrix under 'rotation' is not a rotation");
-  camera.camera_from_world.rotation = nearest_rotation;
+  camera.camera_from_world.rotation = nearest;
   text.title("translation");
   for (int i = 0; i < 3; ++i) camera.camera_from_world.translation_mm[i] = text.numbers(1)[0];
   text.end();
