@@ -94,7 +94,7 @@ class Strategy {
                   c_1_ * (path_c_ * path_c_.transpose() + (is_slow ? 0 : c_c_ * (2 - c_c_)) * covariance_) +
                   c_mu_ * rank_mu;
     sigma_ *= std::exp(std::min(1.0, c_s_ / damping_ * (path_s_.norm() / expected_ - 1)));
-    const SymmetricEigen<Eigen::Dynamic> eigen = eigen_of_symmetric(covariance_);
+    const marrow::SymmetricEigen<Eigen::Dynamic> eigen = marrow::eigen_of_symmetric(covariance_);
     axes_ = eigen.vectors;
     lengths_ = eigen.values.cwiseMax(1e-20).cwiseSqrt();
   }

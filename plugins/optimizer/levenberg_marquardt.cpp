@@ -31,7 +31,7 @@ Expansion by_differences(marrow::search::Evaluations& evaluate, const Eigen::Vec
     for (Eigen::Index j = 0; j < i; ++j)
       about.curvature(i, j) = about.curvature(j, i) =
           (evaluate(shifted(i, h, j, h)) - above[i] - above[j] + value) / (h * h);
-  const SymmetricEigen<Eigen::Dynamic> eigen = eigen_of_symmetric(about.curvature);
+  const marrow::SymmetricEigen<Eigen::Dynamic> eigen = marrow::eigen_of_symmetric(about.curvature);
   about.curvature = eigen.vectors * eigen.values.cwiseAbs().asDiagonal() * eigen.vectors.transpose();
   return about;
 }
@@ -81,7 +81,7 @@ class Search {
     for (; damping_ < kMostDamping; damping_ *= 8) {
       Eigen::MatrixXd damped = about_->curvature;
       damped.diagonal() += damping_ * steepness.cwiseMax(floor);
-      Eigen::VectorXd step = -solve_symmetric(damped, about_->gradient);
+      Eigen::VectorXd step = -marrow::solve_symmetric(damped, about_->gradient);
       if (!step.allFinite()) continue;
       if (step.norm() > kLongest) step *= kLongest / step.norm();
       const Eigen::VectorXd there = evaluate_.within(here_ + step);

@@ -108,7 +108,7 @@ Moments moments_of(double volume, const Vector3d& first, const Eigen::Matrix3d& 
   Moments moments;
   moments.centre = first / volume;
   const Eigen::Matrix3d spread = second / volume - moments.centre * moments.centre.transpose();
-  const SymmetricEigen<3> eigen = eigen_of_symmetric(spread);
+  const marrow::SymmetricEigen<3> eigen = marrow::eigen_of_symmetric(spread);
   moments.axes = eigen.vectors;
   if (moments.axes.determinant() < 0) moments.axes.col(0) *= -1;
   moments.size = std::sqrt(spread.trace());
