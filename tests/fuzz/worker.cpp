@@ -14,10 +14,12 @@ namespace {
 
 using namespace marrow;
 
+constexpr int kMostLines = 8;  // more would only make an input slower
+
 /// A worker that has ended already, at job 7.
 void understand(std::string_view text) {
   static Worker worker({{"/bin/true"}});
-  while (!text.empty()) {
+  for (int i = 0; i < kMostLines && !text.empty(); ++i) {
     const std::string line(text.substr(0, text.find('\n')));
     text.remove_prefix(std::min(text.size(), line.size() + 1));
     worker.close();
