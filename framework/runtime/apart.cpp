@@ -239,7 +239,7 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   const SharedMemory given, made;
   write_values(given.descriptor(), inputs, false);
   const CallLimits limits = limits_of(node, bytes_named_by(node) + double(bytes_in(given.descriptor())), settings);
-  Reader reader({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true, true}, hooks.cancelled);
+  Reader reader({{worker_program().string()}, {given.descriptor(), made.descriptor()}, true}, hooks.cancelled);
   Worker& worker = reader.worker();
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,

@@ -1,16 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/runtime/archive.hpp"
 
-#include <sys/mman.h>
-
 namespace marrow {
-
-void detail::use_large_pages(void* data, std::size_t size) {
-  constexpr std::uintptr_t kLargePage = 2 << 20;
-  const std::uintptr_t begin = (reinterpret_cast<std::uintptr_t>(data) + kLargePage - 1) / kLargePage * kLargePage;
-  const std::uintptr_t end = (reinterpret_cast<std::uintptr_t>(data) + size) / kLargePage * kLargePage;
-  if (size > 2 * kLargePage && end > begin) madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
-}
 
 void Archive::add(const cv::Mat& image) {
   add(std::int32_t(image.rows));

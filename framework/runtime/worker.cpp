@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstdio>
-#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <utility>
@@ -79,12 +78,11 @@ std::pair<Descriptor, Descriptor> make_pipe() {
 
 /// The environment, with the number of this process added. A worker that has another parent knows that it was left
 /// behind.
-std::vector<std::string> environment_of_worker(bool has_large_pages) {
+std::vector<std::string> environment_of_worker() {
   std::vector<std::string> texts;
   for (char** one = environ; one && *one; ++one)
     if (std::strncmp(*one, "MARROW_PARENT=", 14) != 0) texts.emplace_back(*one);
   texts.push_back("MARROW_PARENT=" + std::to_string(getpid()));
-  if (has_large_pages && !std::getenv("GLIBC_TUNABLES")) texts.push_back("GLIBC_TUNABLES=glibc.malloc.hugetlb=1");
   return texts;
 }
 
@@ -115,7 +113,7 @@ pid_t start(const WorkerSettings& settings, int input, int output) {
   posix_spawnattr_setsigdefault(&attributes, &all);
   posix_spawnattr_setpgroup(&attributes, 0);
   posix_spawnattr_setflags(&attributes, POSIX_SPAWN_SETSIGMASK | POSIX_SPAWN_SETSIGDEF | POSIX_SPAWN_SETPGROUP);
-  const std::vector<std::string> environment = environment_of_worker(settings.has_large_pages);
+  const std::vector<std::string> environment = environment_of_worker();
   pid_t process = -1;
   const int fault = posix_spawn(&process, settings.command.at(0).c_str(), &actions, &attributes,
                                 pointers_to(settings.command).data(), pointers_to(environment).data());

@@ -8,6 +8,7 @@
 #include "dicom_pixels.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/large_memory.hpp"
 
 namespace marrow::files {
 namespace {
@@ -327,7 +328,7 @@ VolumeSamples read_dicom_series(const std::filesystem::path& folder, const std::
   const std::size_t pixels = slices[0].samples.count();
   for (std::size_t k = 0; k < slices.size(); ++k) {
     const Samples slice = read_dicom_frame(slices[k].pixels, 1);
-    if (series.values.empty()) series.values.resize(pixels * slices.size());
+    if (series.values.empty()) resize_large(series.values, pixels * slices.size());
     scaled_values(slices[k].pixels, slice, series.values.data() + k * pixels);
     make_padding_air(slices[k].pixels, series.values.data() + k * pixels, pixels);
   }

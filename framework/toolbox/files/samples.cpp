@@ -9,6 +9,7 @@
 
 #include "byte_stream.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/large_memory.hpp"
 
 namespace marrow::files {
 namespace {
@@ -80,7 +81,7 @@ void read_plain(const InputFile& file, const StoredSamples& stored, std::vector<
                                              : "damaged, or its header tells of other samples than it holds: ") +
                 std::to_string(stored.count * width) + " bytes of samples expected, got " + std::to_string(held) +
                 "; copy or export it again");
-  values.resize(stored.count);
+  resize_large(values, stored.count);
   tbb::parallel_for(std::size_t(0), (stored.count + kPart - 1) / kPart, [&](std::size_t part) {
     const std::size_t first = part * kPart, count = std::min(kPart, stored.count - first);
     std::vector<std::byte> bytes(count * width);

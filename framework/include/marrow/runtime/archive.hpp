@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/large_memory.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/runtime/fields.hpp"
 
@@ -39,10 +40,6 @@ concept CheckedEnum = std::is_enum_v<T> && requires(T value) {
 };
 template <class T>
 concept Plain = std::is_arithmetic_v<T> || CheckedEnum<T>;
-
-/// Asks the kernel for large pages for memory that is about to be filled. Filling 800 MB for the first time then takes
-/// half as long.
-void use_large_pages(void* data, std::size_t size);
 
 }  // namespace detail
 
@@ -202,9 +199,7 @@ class Unpacker {
     if constexpr (detail::Bulk<T>::value) {
       const std::size_t count = length(sizeof(T));
       items.clear();
-      items.reserve(count);
-      detail::use_large_pages(items.data(), count * sizeof(T));
-      items.resize(count);
+      resize_large(items, count);
       bytes(items.data(), count * sizeof(T));
     } else {
       // An item may take fewer bytes here than in memory. So the vector reserves little and grows with the items that

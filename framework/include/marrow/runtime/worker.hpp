@@ -27,7 +27,6 @@ struct WorkerSettings {
   std::vector<std::string> command;  ///< program and its arguments
   std::vector<int> shared = {};      ///< open files that the worker gets as descriptors 3, 4, ...
   bool quiet = false;                ///< discard what it prints on its standard error
-  bool has_large_pages = false;      ///< use large memory pages: faster for jobs that take hundreds of megabytes
 };
 
 /// What one job may use.
