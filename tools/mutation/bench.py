@@ -61,6 +61,7 @@ class Test:
         self.name, self.command = name, command
         self.folder = properties.get("WORKING_DIRECTORY", ".")
         self.skipped = properties.get("SKIP_RETURN_CODE", 0)
+        self.expected = properties.get("PASS_REGULAR_EXPRESSION", [])
         self.seconds = None
 
     def limit_s(self):
@@ -133,7 +134,11 @@ class Bench:
             output.seek(0)
             text = output.read()
         shutil.rmtree(scratch, ignore_errors=True)
-        if code is not None and code in (0, test.skipped):
+        if test.expected:
+            good = any(re.search(pattern, text) for pattern in test.expected)
+        else:
+            good = code in (0, test.skipped)
+        if code is not None and good:
             return None
         failed = re.search(r"^\[  FAILED  \] ([\w./]+)|^(?:FAIL|ERROR): (\w+)", text, re.M)
         name = "%s (%s)" % (test.name, failed.group(1) or failed.group(2)) if failed else test.name
