@@ -10,6 +10,7 @@
 #include "marrow/toolbox/files/calibration_file.hpp"
 #include "read/files.hpp"
 #include "shipped.hpp"
+#include "write/writing.hpp"
 
 namespace bead_board_test {
 
@@ -134,11 +135,6 @@ Result calibrated(const List<Image>& images) {
           outputs.at("picture").as_list<Picture>()};
 }
 
-void write_calibration(const Calibration& calibration, const std::string& path) {
-  static const Catalogue catalogue;
-  catalogue.load_writer(TypeInfo::of<Calibration>()).write(&calibration, path);
-}
-
 TEST(BeadBoard, DeviceFromRenderedImages) {
   double focal = 0, principal = 0, worst_residual = 0;
   for (std::uint64_t seed = 1; seed <= 3; ++seed) {
@@ -224,7 +220,7 @@ TEST(BeadBoard, WritesWhatReadCalibrationReads) {
   calibration.principal_deviation_px = {0.1, 0.2};
   calibration.distortion_deviation = {0.01, 0.02, 0};
   calibration.residual_px = 0.21;
-  write_calibration(calibration, folder / "c.yaml");
+  writing::write(calibration, folder / "c.yaml");
   const Calibration back = files::read_calibration_file(folder / "c.yaml");
   EXPECT_EQ(back.intrinsics, calibration.intrinsics);
   EXPECT_EQ(back.distortion.k, calibration.distortion.k);
@@ -245,7 +241,7 @@ TEST(BeadBoard, TextOfTheCalibration) {
   calibration.principal_deviation_px = {0.1, 0.2};
   calibration.distortion_deviation = {0.01, 0.02, 0};
   calibration.residual_px = 0.21;
-  write_calibration(calibration, folder / "c.yaml");
+  writing::write(calibration, folder / "c.yaml");
   EXPECT_EQ(test::bytes_of(folder / "c.yaml"),
             "marrow-calibration: 1\nwidth_px: 640\nheight_px: 480\nintrinsics:\n  - [1000.5, 0, 320]\n"
             "  - [0, 1000, 240]\n  - [0, 0, 1]\nradial_distortion: [-0.1, 1e-09, 0]"
