@@ -10,12 +10,7 @@
 namespace experiment_limits_test {
 
 namespace fs = std::filesystem;
-using experiment_files::ExperimentFiles;
-using experiment_files::kCases;
-using experiment_files::kHead;
-using experiment_files::kMetrics;
-using experiment_files::kPipeline;
-using experiment_files::kVariants;
+using namespace experiment_files;
 using runtime_fixture::test_catalogue;
 
 const std::string kStart = std::string(kHead) + kCases;  // lines 1 to 3

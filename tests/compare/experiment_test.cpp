@@ -7,12 +7,7 @@
 
 namespace experiment_test {
 
-using experiment_files::ExperimentFiles;
-using experiment_files::kCases;
-using experiment_files::kHead;
-using experiment_files::kMetrics;
-using experiment_files::kPipeline;
-using experiment_files::kVariants;
+using namespace experiment_files;
 using marrow::compare::Experiment;
 using runtime_fixture::test_catalogue;
 
