@@ -66,16 +66,22 @@ bool Evaluation::makes_functions(std::size_t node) const {
                      [](const PortInfo& output) { return output.type.is_function && output.axis.empty(); });
 }
 
+/// A function is made when a node that runs needs it. But if the node may fail, those that use the function must know
+/// it before they run.
+bool Evaluation::is_deferred(std::size_t node) const {
+  return makes_functions(node) && !pipeline_.nodes[node].may_fail;
+}
+
 void Evaluation::evaluate(std::size_t node, Call& call) {
   Recipe key;
   try {
     key = noted_recipe(node, call);
     remember(node, call, key);
   } catch (const std::exception& error) {  // a file that its options name cannot be read
-    call.result = {Status::failed, error.what(), {}};
-    report(RunEvent::Kind::failed, node, call.item, failure_text(node, call.item, error.what()));
+    call.result = failure(node, call.item, error.what());
     return finished_(node, call);
   }
+  std::optional<CallResult> known;
   {
     const std::scoped_lock lock(mutex_);
     std::unique_ptr<Memo>& memo = memos_[key.key];
@@ -83,36 +89,48 @@ void Evaluation::evaluate(std::size_t node, Call& call) {
       memo->waiting.emplace_back(node, &call);
       return;
     }
-    if (memo) {
-      call.result = memo->result;
-    } else {
+    if (memo)
+      known = memo->result;
+    else
       memo = std::make_unique<Memo>();
-      call.result.status = Status::not_needed;  // not known yet
-    }
   }
-  if (call.result.status != Status::not_needed) return finished_(node, call);
-  if (makes_functions(node)) {
+  if (known) return take(node, call, *known);
+  if (is_deferred(node))
     defer(node, call, key);
-  } else if (!read_back(node, call, key)) {
-    int said = 0;
-    const auto on_wait = [&](bool waits) {
-      const bool is_long = waits ? said++ > 0 : said > 1;
-      const std::string text =
-          waits ? "waits for another run that is making the same result" : "goes on after waiting for another run";
-      report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item, is_long ? text : "");
-    };
-    const Store::Claim claim =
-        settings_.store ? settings_.store->claim(key.key, settings_.cancelled, on_wait) : Store::Claim();
-    // Another process may have made the result in the meantime.
-    if (!read_back(node, call, key)) call.result = perform(node, call.inputs, call.item, key);
-  }
+  else if (makes_functions(node))
+    call.result = perform(node, call.inputs, call.item, key);
+  else
+    read_or_make(node, call, key);
   share(key.key, call.result);
+  finished_(node, call);
+}
+
+void Evaluation::read_or_make(std::size_t node, Call& call, const Recipe& recipe) {
+  if (read_back(node, call, recipe)) return;
+  int said = 0;
+  const auto on_wait = [&](bool waits) {
+    const bool is_long = waits ? said++ > 0 : said > 1;
+    const std::string text =
+        waits ? "waits for another run that is making the same result" : "goes on after waiting for another run";
+    report(waits ? RunEvent::Kind::waiting : RunEvent::Kind::waited, node, call.item, is_long ? text : "");
+  };
+  const Store::Claim claim =
+      settings_.store ? settings_.store->claim(recipe.key, settings_.cancelled, on_wait) : Store::Claim();
+  // Another process may have made the result in the meantime.
+  if (!read_back(node, call, recipe)) call.result = perform(node, call.inputs, call.item, recipe);
+}
+
+/// Ends a call with the result of another call of the same recipe. That call may belong to a node that may fail, which
+/// this one may not.
+void Evaluation::take(std::size_t node, Call& call, const CallResult& result) {
+  const bool is_worse = result.status == Status::failed_alone && !pipeline_.nodes[node].may_fail;
+  call.result = is_worse ? failure(node, call.item, result.reason) : result;
   finished_(node, call);
 }
 
 bool Evaluation::find(std::size_t node, Call& call) {
   const Recipe key = recipe(node, call);
-  if (makes_functions(node)) {
+  if (is_deferred(node)) {
     defer(node, call, key);
     return true;
   }
@@ -128,10 +146,16 @@ void Evaluation::share(const Digest& key, const CallResult& result) {
     memo.result = result;
     waiting.swap(memo.waiting);
   }
-  for (const auto& [node, call] : waiting) {
-    call->result = result;
-    finished_(node, *call);
-  }
+  for (const auto& [node, call] : waiting) take(node, *call, result);
+}
+
+CallResult Evaluation::failure(std::size_t node, const std::string& item, const std::string& reason,
+                               bool is_own) const {
+  const bool alone = is_own && pipeline_.nodes[node].may_fail;
+  report(RunEvent::Kind::failed, node, item,
+         failure_text(node, item, reason) + (alone ? "; the run goes on without it" : ""), 0, 0,
+         alone ? LogLevel::warning : LogLevel::error);
+  return {alone ? Status::failed_alone : Status::failed, reason, {}};
 }
 
 std::string Evaluation::failure_text(std::size_t index, const std::string& item, const std::string& reason) const {
@@ -178,6 +202,7 @@ double Evaluation::seconds_last_time(std::size_t node, const Call& call) const {
 }
 
 std::string Evaluation::change_since_last(std::size_t node, const Call& call) const {
+  if (makes_functions(node)) return "it may fail, and a function is not kept";
   const auto last = settings_.store ? settings_.store->last(place(node, call.item)) : std::nullopt;
   if (!last) return "it has not run before";
   const std::string changes = difference(last->provenance, provenance(node, call.inputs));

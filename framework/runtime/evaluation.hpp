@@ -53,7 +53,9 @@ class Evaluation {
 
   void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0,
               double seconds = 0, LogLevel level = LogLevel::info) const;
-  std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
+  /// The result of a call that failed, which it reports. If the node may fail and `is_own`, this is a warning. A
+  /// failure is not the node's own if the system refused what any node needs.
+  CallResult failure(std::size_t node, const std::string& item, const std::string& reason, bool is_own = true) const;
 
  private:
   struct Memo;
@@ -68,7 +70,11 @@ class Evaluation {
   Provenance provenance(std::size_t node, const std::vector<Value>& inputs) const;
   std::string place(std::size_t node, const std::string& item) const;
   void remember(std::size_t node, const Call& call, const Recipe& recipe);
+  std::string failure_text(std::size_t node, const std::string& item, const std::string& reason) const;
   bool makes_functions(std::size_t node) const;
+  bool is_deferred(std::size_t node) const;
+  void read_or_make(std::size_t node, Call& call, const Recipe& recipe);
+  void take(std::size_t node, Call& call, const CallResult& result);
   void defer(std::size_t node, Call& call, const Recipe& recipe);
   bool read_back(std::size_t node, Call& call, const Recipe& recipe);
   void share(const Digest& key, const CallResult& result);

@@ -10,6 +10,7 @@
 #include "evaluation_values.hpp"
 #include "keys.hpp"
 #include "named_files.hpp"
+#include "no_process.hpp"
 #include "resident_memory.hpp"
 #include "stopwatch.hpp"
 
@@ -44,6 +45,7 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   std::vector<std::string> warnings;
   const Clock::time_point start = Clock::now();
   double seconds = 0;
+  bool is_own = true;
   try {
     if (settings_.cancelled && settings_.cancelled->load()) throw Cancelled();
     const Digest before = states_of_files(pipeline_.nodes[node]);
@@ -69,13 +71,16 @@ CallResult Evaluation::perform(std::size_t node, std::vector<Value> inputs, cons
   } catch (const cv::Exception& error) {
     result.status = Status::failed;
     result.reason = error.code == cv::Error::StsNoMem ? "out of memory" : error.what();
+  } catch (const NoProcess& error) {
+    is_own = false;
+    result.status = Status::failed;
+    result.reason = error.what();
   } catch (const std::exception& error) {
     result.status = Status::failed;
     result.reason = error.what();
   }
   working_folder_.go_back();  // also if the call failed
-  if (result.status == Status::failed)
-    report(RunEvent::Kind::failed, node, item, failure_text(node, item, result.reason));
+  if (result.status == Status::failed) result = failure(node, item, result.reason, is_own);
   if (result.status == Status::done) save(node, inputs, recipe, result, seconds, std::move(warnings));
   const std::scoped_lock lock(mutex_);
   NodeRecord& record = records_[node];

@@ -63,6 +63,8 @@ class Evaluation::DeferredSource : public Source {
       }
     }
     const CallResult& result = call_->result();
+    if (result.status == Status::failed_alone)
+      throw Error("node '" + call_->node_id() + "' failed, and its result in the store is damaged; run it again");
     if (result.status == Status::failed) throw MissingInput{Status::not_run, "node '" + call_->node_id() + "' failed"};
     if (result.status != Status::done) throw MissingInput{result.status, result.reason};
     std::size_t at = 0;

@@ -227,10 +227,10 @@ class Executor {
     } catch (const std::exception& error) {
       state.names.assign(pipeline_.nodes[index].mapped_axes.size(), {""});
       state.calls.assign(1, {});
-      state.calls[0].result.status = cancelled() ? Status::cancelled : Status::failed;
-      state.calls[0].result.reason = error.what();
-      if (!cancelled())
-        evaluation_.report(RunEvent::Kind::failed, index, "", evaluation_.failure_text(index, "", error.what()));
+      if (cancelled())
+        state.calls[0].result = {Status::cancelled, error.what(), {}};
+      else
+        state.calls[0].result = evaluation_.failure(index, "", error.what());
       finish_node(index);
       return;
     }
@@ -243,6 +243,7 @@ class Executor {
     Call& call = states_[index].calls[c];
     call.result.reason = obstacle(pipeline_.nodes[index], call, call.result.status);
     if (!call.result.reason.empty()) {
+      if (call.result.status == Status::failed) call.result = evaluation_.failure(index, call.item, call.result.reason);
       finish_call(index, call);
       return;
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "mapping.hpp"
+#include "may_fail.hpp"
 
 namespace marrow {
 namespace {
@@ -73,10 +74,12 @@ void spread(const PipelineNode& node, const std::vector<Value>& inputs, std::siz
 int rank(Status status) {
   switch (status) {
     case Status::failed:
-      return 4;
+      return 5;
     case Status::cancelled:
-      return 3;
+      return 4;
     case Status::not_run:
+      return 3;
+    case Status::failed_alone:
       return 2;
     case Status::skipped:
       return 1;
@@ -100,7 +103,8 @@ Value assembled(const PipelineNode& node, const NodeCalls& made, std::size_t out
   if (result.status == Status::done) return result.outputs[output];
   Value absent;
   absent.type = node.info.outputs[output].type;
-  if (result.status == Status::failed)
+  absent.may_be_missing = result.status == Status::failed_alone;
+  if (result.status == Status::failed || absent.may_be_missing)
     absent.missing = "node '" + node.id + "' failed";
   else if (result.status != Status::skipped)
     absent.missing = result.reason;
@@ -129,13 +133,17 @@ void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t i
                     "': the first has " + list_text(names) + ", the second " + list_text(along));
       }
     }
-    if (names.empty()) names = {""};  // the whole list is absent
+    if (names.empty()) {
+      expect_items(pipeline, node, inputs, axis);
+      names = {""};  // the whole list is absent
+    }
     made.names.push_back(std::move(names));
   }
   spread(node, inputs, 0, "", made);
 }
 
-std::string obstacle(const PipelineNode& node, const Call& call, Status& status) {
+std::string obstacle(const PipelineNode& node, Call& call, Status& status) {
+  bool may_be_missing = false;
   for (std::size_t i = 0; i < call.inputs.size(); ++i) {
     const PortInfo& port = node.info.inputs[i];
     std::vector<const Value*> leaves{&call.inputs[i]};
@@ -143,13 +151,18 @@ std::string obstacle(const PipelineNode& node, const Call& call, Status& status)
       const Value* value = leaves[k];
       for (const Value& item : value->items) leaves.push_back(&item);
       if (!value->is_absent()) continue;
+      may_be_missing |= value->may_be_missing;
+      if (value->may_be_missing) continue;
       status = Status::not_run;
       if (!value->missing.empty()) return value->missing;  // the first cause, however many nodes back
       status = Status::skipped;
       if (!port.optional) return "there is no '" + port.name + "'";
     }
   }
-  return "";
+  if (!may_be_missing) return "";
+  std::string reason = leave_out_failed(node, call.inputs);
+  if (!reason.empty()) status = Status::failed;
+  return reason;
 }
 
 void set_status(const std::vector<Call>& calls, NodeRecord& record) {
@@ -159,7 +172,8 @@ void set_status(const std::vector<Call>& calls, NodeRecord& record) {
   record.status = deferred ? Status::not_needed : Status::done;
   for (const Call& call : calls) {
     // The node gets the status of its worst call. `failed` is worse than what follows from failures of other nodes.
-    static constexpr Status kOrder[] = {Status::failed, Status::cancelled, Status::not_run, Status::skipped};
+    static constexpr Status kOrder[] = {Status::failed, Status::cancelled, Status::not_run, Status::failed_alone,
+                                        Status::skipped};
     for (Status status : kOrder)
       if (call.result.status == status && rank(status) > rank(record.status)) {
         record.status = status;

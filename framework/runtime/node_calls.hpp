@@ -18,8 +18,9 @@ struct NodeCalls {
 void make_calls(const Pipeline& pipeline, const RunResult& result, std::size_t index, NodeCalls& made);
 
 /// Why a call cannot be made, or an empty text. If it cannot be made, `status` is set: skipped if an input simply does
-/// not exist, not_run if it could not be made.
-std::string obstacle(const PipelineNode& node, const Call& call, NodeRecord::Status& status);
+/// not exist, not_run if it could not be made, failed if the node that was to make it may fail and did. Takes out such
+/// inputs where the call can do without them.
+std::string obstacle(const PipelineNode& node, Call& call, NodeRecord::Status& status);
 
 /// Sets the status of the node from its calls, with the reason if it is not done.
 void set_status(const std::vector<Call>& calls, NodeRecord& record);

@@ -58,6 +58,7 @@ class Resolver {
     PipelineNode node;
     node.id = written.id;
     node.place = written.place;
+    node.may_fail = written.may_fail;
     if (const NodeInfo* info = catalogue_.find(written.uses)) {
       node.info = *info;
       if (const KindInfo* kind = catalogue_.find_kind(info->kind())) node.apart = kind->apart;

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "marrow/domain/printable.hpp"
+#include "may_fail.hpp"
 #include "pipeline_names.hpp"
 #include "pipeline_order.hpp"
 
@@ -74,6 +75,7 @@ void order_and_find_axes(Pipeline& pipeline, Diagnostics& diagnostics) {
   for (std::size_t i = 0; i < pipeline.nodes.size() && diagnostics.empty(); ++i) find_axes(pipeline, i, diagnostics);
   if (!diagnostics.empty()) return;
   for (const PipelineOutput& output : pipeline.outputs) check_picks(pipeline, output.source, diagnostics);
+  check_may_fail(pipeline, diagnostics);
 }
 
 }  // namespace marrow

@@ -53,6 +53,7 @@ std::string resolved_yaml(const Pipeline& pipeline) {
   for (const PipelineNode& node : pipeline.nodes) {
     out << YAML::Key << node.id << YAML::Value << YAML::BeginMap << YAML::Key << "uses" << YAML::Value
         << node.info.name;
+    if (node.may_fail) out << YAML::Key << "may_fail" << YAML::Value << true;
     if (!node.wires.empty()) {
       out << YAML::Key << "in" << YAML::Value << YAML::Flow << YAML::BeginMap;
       for (const Wire& wire : node.wires) {

@@ -153,7 +153,7 @@ class PipelineReader {
   }
 
   void read_node(const YamlEntry& entry) {
-    static const std::vector<std::string> kKeys{"uses", "with", "in"};
+    static const std::vector<std::string> kKeys{"uses", "with", "in", "may_fail"};
     WrittenNode node;
     node.id = entry.key;
     node.place = entry.place;
@@ -168,6 +168,8 @@ class PipelineReader {
         has_uses = !part.value.IsScalar() || !part.value.Scalar().empty();
         node.uses_place = yaml_.place(part.value);
         node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
+      } else if (part.key == "may_fail") {
+        node.may_fail = yaml_.boolean(part.value, part.place, may_fail_of(node.id)).value_or(false);
       } else {
         auto& target = part.key == "with" ? node.options : node.wires;
         for (const YamlEntry& item :
@@ -180,6 +182,8 @@ class PipelineReader {
     pipeline_.nodes.push_back(std::move(node));
   }
 
+  static std::string may_fail_of(const std::string& node) { return "'may_fail' of node " + in_quotes(node); }
+
   void apply_override(const std::string& key, const std::string& text, const Place& written) {
     const Place place = written.file.empty() ? Place{"--set " + key + "=" + text} : written;
     StrictYaml yaml(place.file, diagnostics_);
@@ -189,7 +193,9 @@ class PipelineReader {
     const auto node = std::find_if(pipeline_.nodes.begin(), pipeline_.nodes.end(),
                                    [&](const WrittenNode& n) { return n.id == key.substr(0, dot); });
     if (dot == std::string::npos || dot + 1 == key.size()) {
-      diagnostics_.add(place, "an override is node.option=value, node.uses=kind.name or node.in.port=reference");
+      diagnostics_.add(place,
+                       "an override is node.option=value, node.uses=kind.name, node.may_fail=true or "
+                       "node.in.port=reference");
       return;
     }
     if (node == pipeline_.nodes.end()) {
@@ -213,6 +219,10 @@ class PipelineReader {
                                   " are not used by " + text);
       node->uses = text;
       node->uses_place = place;
+      return;
+    }
+    if (what == "may_fail") {
+      node->may_fail = yaml.boolean(value.value, place, may_fail_of(node->id)).value_or(false);
       return;
     }
     auto& target = what.starts_with("in.") ? node->wires : node->options;

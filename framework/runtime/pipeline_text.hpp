@@ -24,6 +24,7 @@ struct WrittenNode {
   Place place;
   std::string uses;
   Place uses_place;
+  bool may_fail = false;
   std::vector<std::pair<std::string, WrittenValue>> options;
   std::vector<std::pair<std::string, WrittenValue>> wires;
 };

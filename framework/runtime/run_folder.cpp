@@ -47,7 +47,10 @@ void write_value(const Value& value, const fs::path& stem, const fs::path& root,
     return;
   }
   if (value.is_absent()) {
-    if (!value.missing.empty()) written.fault = "not made: " + value.missing;
+    if (value.may_be_missing)
+      written.absent = value.missing;
+    else if (!value.missing.empty())
+      written.fault = "not made: " + value.missing;
     return;
   }
   const WriterInfo* writer = catalogue.find_writer(value.type);
@@ -256,7 +259,7 @@ std::vector<RunFolder::Written> RunFolder::write_outputs(const Pipeline& pipelin
                                                          const Catalogue& catalogue) {
   std::vector<Written> all;
   for (const PipelineOutput& output : pipeline.outputs) {
-    Written written{output.name, {}, ""};
+    Written written{output.name, {}, "", ""};
     try {
       write_value(value_of(result, output.source), folder_ / "outputs" / output.name, folder_, catalogue, written);
     } catch (const std::exception& error) {
@@ -300,6 +303,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
     json output = {{"name", written[i].output}, {"files", written[i].files}, {"items", json::array()}};
     output["digests"] = digests_of(folder_, written[i].files);
     if (!written[i].fault.empty()) output["fault"] = written[i].fault;
+    if (!written[i].absent.empty()) output["absent"] = written[i].absent;
     try {
       output["items"] = items_of(value_of(result, pipeline.outputs.at(i).source));
     } catch (const Error&) {  // the list does not have this item: `fault` says so

@@ -10,7 +10,8 @@ namespace marrow {
 using Status = NodeRecord::Status;
 
 const char* status_name(Status status) {
-  static constexpr const char* kNames[] = {"not needed", "done", "skipped", "failed", "not run", "cancelled"};
+  static constexpr const char* kNames[] = {"not needed", "done",      "skipped",     "failed",
+                                           "not run",    "cancelled", "failed alone"};
   return kNames[int(status)];
 }
 

@@ -242,6 +242,31 @@ TEST_F(RunFolderTest, RecordHoldsTheFilesAsTheyWereRead) {
   EXPECT_EQ(files_recorded("after"), before);
 }
 
+TEST_F(RunFolderTest, RecordTellsAFailureThatMayBeFromOneThatMayNot) {
+  const marrow::Pipeline pipeline = pipeline_of(
+      "  s: {uses: test.sides}\n  f: {uses: test.fail_above, in: {a: s.both}, with: {value: 15}, may_fail: true}\n"
+      "  g: {uses: test.fail_above, in: {a: s.left}, with: {value: 0}, may_fail: true}\n",
+      "f: f, g: g, s: s.left");
+  const marrow::RunResult result = marrow::run_pipeline(pipeline, writing_catalogue(), {});
+  RunFolder folder(scratch.path / "out", pipeline);
+  const auto written = folder.write_outputs(pipeline, result, writing_catalogue());
+  EXPECT_EQ(written[0].files, std::vector<std::string>{"outputs/f/a.json"});
+  EXPECT_EQ(written[0].absent, "node 'f' failed");
+  EXPECT_TRUE(written[1].files.empty());
+  EXPECT_EQ(written[1].absent, "node 'g' failed");
+  EXPECT_EQ(written[0].fault + written[1].fault + written[2].absent, "");
+  folder.write_record(pipeline, result, {}, writing_catalogue(), {}, written);
+  const nlohmann::json record = nlohmann::json::parse(text_of(folder.path() / "run.json"));
+  EXPECT_EQ(record["status"], "done");
+  EXPECT_EQ(record["nodes"][0]["status"], "done");
+  EXPECT_EQ(record["nodes"][1]["status"], "failed alone");
+  EXPECT_EQ(record["nodes"][1]["reason"], "b: the number is too large; give a smaller one");
+  EXPECT_EQ(record["outputs"][0]["absent"], "node 'f' failed");
+  EXPECT_EQ(record["outputs"][1]["absent"], "node 'g' failed");
+  EXPECT_FALSE(record["outputs"][2].contains("absent"));
+  EXPECT_NE(text_of(folder.path() / "pipeline.yaml").find("may_fail: true"), std::string::npos);
+}
+
 TEST_F(RunFolderTest, OneOutputDoesNotReplaceAnother) {
   const marrow::Pipeline pipeline =
       pipeline_of("  c: {uses: test.constant}\n  s: {uses: test.sides}\n", "x: c, x.json: s.both");

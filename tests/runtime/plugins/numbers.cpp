@@ -92,6 +92,10 @@ Metrics say(marrow::Context& context) {
   return number(1);
 }
 Metrics apply(const numbers::Adder& adder, const Metrics& to) { return number(adder(value_of(to))); }
+Metrics any(const List<Metrics>* items, const numbers::Adder* adder) {
+  const double total = items ? value_of(sum(*items)) : 0;
+  return number(adder ? (*adder)(total) : total);
+}
 Metrics judge(const Metrics& of, const marrow::Truth*) { return of; }
 marrow::Truth truth() { return {}; }
 struct DisplacedOptions {
@@ -147,6 +151,12 @@ MARROW_PLUGIN(plugin) {
       .in("adder", "function")
       .in("to", "number")
       .out("number", "result");
+  plugin.node("test.any", any)
+      .summary("Adds a list and applies a function, where they are there")
+      .in("items", "numbers", marrow::over("side"))
+      .in("adder", "function")
+      .out("number", "result")
+      .relation(marrow::at_least_one({"in.items", "in.adder"}));
   plugin.node("test.displaced", displaced)
       .summary("Takes a displacement")
       .out("number", "its first part")

@@ -18,14 +18,14 @@ namespace marrow {
 /// What a run reports while it is running. `item` names the place along the mapped axes ("lateral", "distal/final").
 /// `seconds` is the time of a call; for a cached call, the time that it took when its result was made. `waiting`:
 /// another run is making the same result; the event has a text only if the wait is longer than 5 s. `waited`: the wait
-/// is over and the call goes on.
+/// is over and the call goes on. `failed`: of level warning if the node may fail, else of level error.
 struct RunEvent {
   enum class Kind { started, progress, finished, failed, skipped, message, warning, cached, waiting, waited };
   Kind kind = Kind::message;
   std::string node, item, text;
   double fraction = 0;
   double seconds = 0;
-  LogLevel level = LogLevel::info;  ///< level of a message or a warning
+  LogLevel level = LogLevel::info;  ///< level of a message, a warning or a failure
 };
 
 /// Limits of one call that reads files in its own process. 0 means a limit that depends on the size of the files.
@@ -52,7 +52,8 @@ struct RunSettings {
 
 /// What happened to one node in a run.
 struct NodeRecord {
-  enum class Status { not_needed, done, skipped, failed, not_run, cancelled };
+  /// `failed_alone`: it failed, and it may (PipelineNode::may_fail). This is a warning and no fault of the run.
+  enum class Status { not_needed, done, skipped, failed, not_run, cancelled, failed_alone };
   Status status = Status::not_needed;
   std::string reason;          ///< why it is not done
   int stopped = 0;             ///< if it failed or was cancelled: how many nodes were not run because of it
@@ -81,8 +82,9 @@ struct RunResult {
 };
 
 /// Runs the nodes that the pipeline's outputs need. Independent nodes run in parallel on one thread pool. If a node
-/// fails, the nodes that depend on it are not run, and the others go on. The same pipeline and seed give the same bytes
-/// with any number of threads. Throws Error if no thread can be started.
+/// fails, the nodes that depend on it are not run, and the others go on. If the node may fail, its outputs are absent
+/// instead: a node that can do without them runs, and one that needs them fails too. The same pipeline and seed give
+/// the same bytes with any number of threads. Throws Error if no thread can be started.
 RunResult run_pipeline(const Pipeline& pipeline, const Catalogue& catalogue, const RunSettings& settings);
 
 /// What a run would do with one node.

@@ -33,6 +33,7 @@ struct PipelineNode {
   Place place;
   NodeInfo info;
   Apart apart = Apart::no;           ///< as its kind says
+  bool may_fail = false;             ///< if it fails, its outputs are absent, and the run goes on
   std::vector<OptionValue> options;  ///< in the order of info.options
   std::vector<Wire> wires;
   std::vector<std::string> mapped_axes;  ///< the node is called for each item along these, outermost first
@@ -66,7 +67,7 @@ struct InputValue {
   Place place = {};
 };
 
-/// A change of the pipeline: node.option=value, node.uses=kind.name or node.in.port=reference.
+/// A change of the pipeline: node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference.
 struct Override {
   std::string key, value;
   Place place = {};  ///< as InputValue::place

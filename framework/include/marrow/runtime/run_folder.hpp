@@ -24,6 +24,7 @@ class RunFolder {
     std::string output;
     std::vector<std::string> files;  ///< relative to the folder
     std::string fault;               ///< why it was not written; empty if it was
+    std::string absent;              ///< "node 'x' failed", which may fail: why it is not there, or not as a whole
   };
   /// Writes those outputs of the pipeline that were made.
   std::vector<Written> write_outputs(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue);

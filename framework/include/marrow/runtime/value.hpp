@@ -95,6 +95,8 @@ struct Value {
 
   /// Why an absent item could not be made ("node 'edges' failed"). Empty if the item simply does not exist.
   std::string missing;
+  /// The item is missing because a node failed that may fail: who can do without it goes on as if nothing were wired.
+  bool may_be_missing = false;
   /// Identifies the value: the content hash of data, or the recipe key of a function. Set by the executor.
   Digest key;
 
