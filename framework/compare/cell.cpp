@@ -46,8 +46,10 @@ std::string reason_of(const Pipeline& pipeline, const RunResult& result) {
   return "";
 }
 
-/// The figure that a path names. Throws Error if it is missing or is not a finite number.
-marrow::Metric figure(const Pipeline& pipeline, const RunResult& result, const std::string& path) {
+/// The figure that a path names. Nothing if a node failed that may fail; `absent` then gets a sentence about it. Throws
+/// Error if it is missing for another reason or is not a finite number.
+std::optional<marrow::Metric> figure(const Pipeline& pipeline, const RunResult& result, const std::string& path,
+                                     std::string& absent) {
   const std::vector<std::string> parts = split(path);
   const auto output = std::find_if(pipeline.outputs.begin(), pipeline.outputs.end(),
                                    [&](const PipelineOutput& one) { return one.name == parts[0]; });
@@ -63,6 +65,10 @@ marrow::Metric figure(const Pipeline& pipeline, const RunResult& result, const s
     }
     const Value picked = value.items[std::size_t(item - value.names.begin())];
     value = picked;
+  }
+  if (value.is_absent() && value.may_be_missing) {
+    absent += (absent.empty() ? "'" : "; '") + path + "' is not there because " + value.missing;
+    return std::nullopt;
   }
   if (value.is_absent())
     throw Error("'" + path + "' was not made" +
@@ -201,7 +207,8 @@ void CellRunner::simulate(std::size_t index, const fs::path& folder) const {
   const TemporaryFolder temporary(folder);
   RunFolder written(temporary.path, pipeline);
   for (const RunFolder::Written& output : written.write_outputs(pipeline, result, catalogue_))
-    if (!output.fault.empty()) throw Error("case '" + one.name + "' cannot be written: " + output.fault);
+    if (const std::string fault = output.fault + output.absent; !fault.empty())
+      throw Error("case '" + one.name + "' cannot be written: " + fault);
   const fs::path outputs = fs::path("outputs") / experiment_.simulation.output;
   write_text_file(temporary.path / "content.txt", content_of_case(temporary.path / outputs) + "\n");
   std::error_code error;
@@ -276,14 +283,17 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   } catch (const std::exception& error) {
     row.failed = error.what();
   }
-  if (!row.failed.empty()) row.values.clear();
+  if (!row.failed.empty()) {
+    row.values.clear();
+    row.absent.clear();
+  }
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
   name_row(row, experiment_, cell);
   return row;
 }
 
-/// Throws Error if a figure is missing.
+/// Throws Error if a figure is missing, unless a node failed that may fail.
 void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) const {
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& node = done.result.nodes[i];
@@ -295,12 +305,15 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
     row.evaluations += evaluations_in(value_of(done.result, output.source));
   if (!row.failed.empty()) return;
   for (const MetricChoice& metric : experiment_.metrics) {
-    const marrow::Metric found = figure(pipeline, done.result, metric.path);
-    row.values.push_back(metric.better == MetricChoice::Better::nearest_zero ? std::abs(found.value) : found.value);
-    row.units.push_back(found.unit);
+    const auto found = figure(pipeline, done.result, metric.path, row.absent);
+    row.values.emplace_back();
+    row.units.push_back(found ? found->unit : "");
+    if (found)
+      row.values.back() = metric.better == MetricChoice::Better::nearest_zero ? std::abs(found->value) : found->value;
   }
-  if (!experiment_.initial_error.empty())
-    row.initial_error = figure(pipeline, done.result, experiment_.initial_error).value;
+  if (experiment_.initial_error.empty()) return;
+  if (const auto found = figure(pipeline, done.result, experiment_.initial_error, row.absent))
+    row.initial_error = found->value;
 }
 
 fs::path CellRunner::pictures_of(const CellIndex& cell) const {

@@ -54,6 +54,7 @@ std::string to_json(const CellRow& row) {
             {"nodes", json::object()},
             {"key", row.key}};
   if (!row.failed.empty()) j["reason"] = row.failed;
+  if (!row.absent.empty()) j["absent"] = row.absent;
   for (const auto& value : row.values) j["values"].push_back(of(value));
   for (const auto& [name, calls] : row.nodes)
     j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
@@ -66,16 +67,18 @@ CellRow row_from_json(const std::string& text, const Experiment& experiment) {
     const std::size_t metrics = experiment.metrics.size();
     CellRow row;
     if (j.contains("reason")) row.failed = j.at("reason");
+    if (j.contains("absent")) row.absent = j.at("absent");
     if (row.failed.empty() != (j.at("status") == "done")) throw Error("'status' and 'reason' do not agree");
     row.tries = count(j.at("tries"), "'tries'");
     for (const json& value : list_of(j, "values", metrics)) {
       row.values.push_back(number(value, "an item of 'values'"));
-      if (row.failed.empty() != row.values.back().has_value())
+      if (row.values.back() ? !row.failed.empty() : row.failed.empty() && row.absent.empty())
         throw Error("a cell that is done has all values, one that failed has none");
     }
     for (const json& unit : list_of(j, "units", metrics)) row.units.push_back(unit);
     row.initial_error = number(j.at("initial_error"), "'initial_error'");
-    if (row.failed.empty() && row.initial_error.has_value() == experiment.initial_error.empty())
+    const bool is_as_wanted = row.initial_error.has_value() != experiment.initial_error.empty();
+    if (row.failed.empty() && !is_as_wanted && (row.initial_error || row.absent.empty()))
       throw Error("'initial_error' is there where the experiment has none, or is not there");
     row.seconds = number(j.at("seconds"), "'seconds'");
     row.evaluations = count(j.at("evaluations"), "'evaluations'");

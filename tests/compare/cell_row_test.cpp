@@ -55,6 +55,21 @@ TEST(CellRowText, ComesBackAsItWas) {
   EXPECT_EQ(marrow::compare::row_from_json(to_json(failed), experiment()).failed, "it broke");
 }
 
+TEST(CellRowText, AFigureMayBeAbsentForAReason) {
+  CellRow row = good_row();
+  row.values[1].reset();
+  row.initial_error.reset();
+  row.absent = "'errors.axial_deg' is not there because node 'x' failed";
+  const CellRow again = marrow::compare::row_from_json(to_json(row), experiment());
+  EXPECT_EQ(again.absent, row.absent);
+  EXPECT_EQ(again.values, row.values);
+  EXPECT_TRUE(again.failed.empty());
+  EXPECT_FALSE(again.initial_error);
+  json without = json::parse(to_json(row));
+  without.erase("absent");
+  EXPECT_EQ(fault_of(without), "not a cell's row: a cell that is done has all values, one that failed has none");
+}
+
 TEST(CellRowText, SaysNotWhichCellItIsOf) {
   json forged = json::parse(to_json(good_row()));
   for (const char* part : {"id", "variant", "case", "start"}) forged[part] = "../../elsewhere";

@@ -105,7 +105,8 @@ TEST_F(ExperimentFaults, Patches) {
   expect_fault(set("c.numbers: [1,\n    two]"), 10, "option 'numbers' of test.constant: expected a number, got 'two'");
   expect_fault(set("n.in.a: [c, d]"), 10, "input 'a' of test.add takes one metrics, not a list");
   expect_fault(set("n.in.a: d"), 10, "there is no node 'd'", "did you mean 'c'?");
-  expect_fault(set("n: 1"), 10, "an override is node.option=value, node.uses=kind.name or node.in.port=reference");
+  expect_fault(set("n: 1"), 10,
+               "an override is node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference");
   expect_fault_of("set: [c.value]", "'set' must be a map, got a list of 1", kMapHint);
 }
 

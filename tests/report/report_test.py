@@ -170,6 +170,20 @@ class ReportTest(PageTest):
             "return document.documentElement.dataset.ready === 'true' && document.getElementById('cell').open"
         )
 
+    def test_what_is_not_there_because_a_node_failed_that_may(self):
+        run, why = synthetic.run(with_cube=False), "node 'f' (test.fail) failed: too large"
+        run["cells"][0]["absent"] = why
+        self.browser.open(self.write("absent_run", run))
+        shown = self.browser.js("return document.getElementById('summary').innerText")
+        self.assertIn("What is not there\n" + why, shown)
+        self.assertNotIn("Why it failed", shown)
+        data = synthetic.comparison(cases=2, starts=1)
+        cell = next(cell for cell in data["cells"] if cell["status"] == "done")
+        cell.update(values=[None] * len(cell["values"]), absent=why, success=False)
+        self.browser.open(self.write("absent_cell", data))
+        self.press(cell["id"], "#cells")
+        self.assertIn(why, self.browser.js("return document.getElementById('cell').innerText"))
+
     def test_run_page_leaves_out_comparisons(self):
         self.browser.open(self.run_page)
         self.assertEqual(

@@ -8,7 +8,7 @@ void add_pipeline_arguments(CLI::App* command, PipelineRequest& request) {
   command->add_option("inputs", request.inputs, "values of the pipeline's inputs, as name=value");
   command
       ->add_option("--set", request.overrides,
-                   "override, as node.option=value, node.uses=kind.name or node.in.port=reference")
+                   "override, as node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference")
       ->take_all()
       ->expected(1)
       ->type_name("NODE.OPTION=VALUE");

@@ -28,9 +28,9 @@ void print_text(const Pipeline& pipeline) {
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const PipelineNode& node = pipeline.nodes[i];
-    std::printf("%s  (%s)%s%s\n", node.id.c_str(), node.info.name.c_str(),
+    std::printf("%s  (%s)%s%s%s\n", node.id.c_str(), node.info.name.c_str(),
                 node.mapped_axes.empty() ? "" : ("  for each " + axes_text(node.mapped_axes)).c_str(),
-                needed[i] ? "" : "  [not needed]");
+                node.may_fail ? "  [may fail]" : "", needed[i] ? "" : "  [not needed]");
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
@@ -51,8 +51,8 @@ void print_dot(const Pipeline& pipeline) {
   for (const PipelineNode& node : pipeline.nodes) {
     const std::string axes = node.mapped_axes.empty() ? "" : "\\nfor each " + axes_text(node.mapped_axes);
     const std::string id = dot_text(node.id);
-    std::printf("  \"%s\" [label=\"%s\\n%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(),
-                axes.c_str());
+    std::printf("  \"%s\" [label=\"%s\\n%s%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(),
+                axes.c_str(), node.may_fail ? "\\nmay fail" : "");
   }
   const auto edge = [&](const Reference& source, const std::string& target, const std::string& port) {
     const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];

@@ -118,8 +118,9 @@ void add_list(CLI::App& app, int& code) {
       ->type_name("FILE NODE")
       ->expected(2);
   command
-      ->add_option("--set", request->overrides,
-                   "node.option=value, node.uses=kind.name or node.in.port=reference in that pipeline")
+      ->add_option(
+          "--set", request->overrides,
+          "node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference in that pipeline")
       ->allow_extra_args(false);
   command->add_flag("--json", request->as_json, "as JSON");
   command->callback(

@@ -39,7 +39,7 @@ class RunProgress {
         line(LogLevel::info, where, "skipped: " + event.text);
         break;
       case Kind::failed:
-        line(LogLevel::error, "", event.text);
+        line(event.level, "", event.text);
         break;
       case Kind::warning:
         line(LogLevel::warning, where, event.text);
@@ -96,7 +96,8 @@ class RunProgress {
     json j = {{"event", kNames[int(event.kind)]}, {"node", event.node}};
     if (!event.item.empty()) j["item"] = event.item;
     if (!event.text.empty()) j["text"] = event.text;
-    if (event.kind == Kind::message || event.kind == Kind::warning) j["level"] = level_name(event.level);
+    if (event.kind == Kind::message || event.kind == Kind::warning || event.kind == Kind::failed)
+      j["level"] = level_name(event.level);
     if (event.kind == Kind::progress) j["fraction"] = event.fraction;
     if (event.kind == Kind::finished || event.kind == Kind::cached) j["seconds"] = event.seconds;
     std::printf("%s\n", j.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
@@ -126,7 +127,9 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
     // The reason of a failure was printed when the node failed.
-    const std::string reason = record.status == NodeRecord::Status::failed ? "" : printable_lines(record.reason);
+    const bool is_told =
+        record.status == NodeRecord::Status::failed || record.status == NodeRecord::Status::failed_alone;
+    const std::string reason = is_told ? "" : printable_lines(record.reason);
     std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
                 record.seconds, record.calls, status_text(record).c_str(), reason.empty() ? "" : ": ", reason.c_str());
     if (record.stopped > 0) std::printf("%-16s %s\n", "", not_run_text(record.stopped).c_str());
@@ -137,20 +140,27 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
   for (const RunFolder::Written& output : written) {
     for (const std::string& file : output.files) std::printf("  %s\n", printable(file).c_str());
     if (!output.fault.empty()) std::printf("  %s: %s\n", output.output.c_str(), printable_lines(output.fault).c_str());
+    if (!output.absent.empty())
+      std::printf("  %s: %s because %s\n", output.output.c_str(),
+                  output.files.empty() ? "not there" : "not there as a whole", printable_lines(output.absent).c_str());
   }
 }
 
 void print_json_summary(const RunResult& result, const std::vector<RunFolder::Written>& written,
                         const RunFolder& folder) {
-  json files = json::object();
-  for (const RunFolder::Written& output : written) files[output.output] = output.files;
+  json files = json::object(), absent = json::object();
+  for (const RunFolder::Written& output : written) {
+    files[output.output] = output.files;
+    if (!output.absent.empty()) absent[output.output] = output.absent;
+  }
   const json end = {{"event", "ended"},
                     {"status", result.cancelled() ? "cancelled"
                                : result.failed()  ? "failed"
                                                   : "done"},
                     {"seconds", result.seconds},
                     {"folder", folder.path().string()},
-                    {"files", files}};
+                    {"files", files},
+                    {"absent", absent}};
   std::printf("%s\n", end.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
 }
 

@@ -89,7 +89,11 @@ Json pipeline_schema(const Catalogue& catalogue) {
                      {"properties",
                       {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
                        {"with", {{"type", "object"}, {"description", "options"}}},
-                       {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}}}},
+                       {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
+                       {"may_fail",
+                        {{"type", "boolean"},
+                         {"default", false},
+                         {"description", "whether the run goes on without the node's outputs if it fails"}}}}},
                      {"allOf", conditions}};
   const Json input = {{"type", "object"},
                       {"additionalProperties", false},

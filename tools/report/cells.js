@@ -53,8 +53,8 @@ const Cells = (() => {
     const rows = cells.map(
         (cell) =>
             [cell.id, data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start],
-             Data.outcome(cell), cell.reason, cell.initial_mtre_mm, ...data.metrics.map((_, i) => cell.values[i]),
-             cell.seconds, cell.evaluations, cell.folder]);
+             Data.outcome(cell), cell.reason || cell.absent, cell.initial_mtre_mm,
+             ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations, cell.folder]);
     return [head, ...rows].map((row) => row.map(quoted).join(',')).join('\n') + '\n';
   }
 

@@ -16,7 +16,8 @@
 //     high}]}}]       mm; may be missing
 //   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
 //   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
-//     initial_mtre_mm, seconds, evaluations, cached_nodes, values: [number | null per metric],
+//     absent (why values are missing: a node failed that may fail; may be missing itself), initial_mtre_mm, seconds,
+//     evaluations, cached_nodes, values: [number | null per metric],
 //     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,
 //     landscape: [{axis, unit, offsets: [...], costs: [...]}] | null, scene: id | null, folder}]
 //   pictures: {id: "data:image/webp;base64,..."}

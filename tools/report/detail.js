@@ -75,6 +75,10 @@ const Detail = (() => {
                                      el('pre', {class: 'reason'}, cell.reason || 'no reason given')) :
                                   null);
 
+  // What is not there because a node failed that may fail.
+  const absent = (cell) => (
+      cell.absent ? el('div', {}, el('h3', {}, 'What is not there'), el('pre', {class: 'reason'}, cell.absent)) : null);
+
   function plots(data, cell) {
     const convergence = Curves.convergence(data, [cell], false), landscapes = Curves.landscapes(data, [cell], false);
     return [
@@ -105,9 +109,9 @@ const Detail = (() => {
         el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, Data.cellName(data, cell)),
            el('div', {class: 'toolbar'}, step(-1), step(1), Dom.button('Close', () => dialog.close()))),
         el('p', {class: 'note'}, 'Cell ', el('code', {}, String(cell.id))),
-        ...[reason(cell), values(data, cell), el('h3', {}, 'Options of ' + data.variants[cell.variant].name),
-            options(data.variants[cell.variant]), command(data, cell),
-            cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
+        ...[reason(cell), absent(cell), values(data, cell),
+            el('h3', {}, 'Options of ' + data.variants[cell.variant].name), options(data.variants[cell.variant]),
+            command(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
             cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell),
             ...scene(data, cell)]
             .filter(Boolean));
@@ -144,5 +148,5 @@ const Detail = (() => {
   }
 
   // lookAt(cell) is set by the page: it shows the cell's case and start in the comparison of pictures.
-  return {open, values, figures, options, reason, lookAt: () => {}};
+  return {open, values, figures, options, reason, absent, lookAt: () => {}};
 })();

@@ -227,8 +227,10 @@ const Page = (() => {
     const {experiment} = data, cell = data.cells[0];
     const head = section(
         'summary', data.is_run ? 'Result' : 'Result', null,
-        ...(data.is_run ? (cell ? [Detail.reason(cell), Detail.values(data, cell), ...Detail.figures(data)] : []) :
-                          [Summary.verdicts(data), Summary.table(data)]),
+        ...(data.is_run ?
+                (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
+                        []) :
+                [Summary.verdicts(data), Summary.table(data)]),
         Summary.rules(data));
     return [
       el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),

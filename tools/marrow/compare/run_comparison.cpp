@@ -166,7 +166,8 @@ class Comparison {
       const CellIndex& cell = cells_[job.number];
       CellRow row = row_of(cell, end);
       runner_.write(cell, row);
-      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed));
+      progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed) +
+                                (row.absent.empty() ? "" : ": " + row.absent));
       rows_[job.number] = std::move(row);
     });
   }
@@ -251,11 +252,16 @@ class Comparison {
   }
 
   static void print_failures(const std::vector<CellRow>& rows) {
+    print_reasons(rows, "failed cells", &CellRow::failed);
+    print_reasons(rows, "cells in which a node failed that may fail", &CellRow::absent);
+  }
+
+  static void print_reasons(const std::vector<CellRow>& rows, const char* title, std::string CellRow::*reason) {
     std::size_t count = 0;
     for (const CellRow& row : rows)
-      if (!row.failed.empty() && ++count <= 20)
-        std::printf("%s  %s: %s\n", count == 1 ? "\nfailed cells\n" : "", printable(row.id).c_str(),
-                    printable(row.failed).c_str());
+      if (!(row.*reason).empty() && ++count <= 20)
+        std::printf("%s%s%s  %s: %s\n", count == 1 ? "\n" : "", count == 1 ? title : "", count == 1 ? "\n" : "",
+                    printable(row.id).c_str(), printable(row.*reason).c_str());
     if (count > 20) std::printf("  and %zu more, in cells.csv\n", count - 20);
   }
 

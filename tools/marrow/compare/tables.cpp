@@ -71,7 +71,7 @@ std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) 
   text += ",initial_error,seconds,evaluations\n";
   for (const CellRow& row : rows) {
     text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
-            (row.failed.empty() ? "done" : "failed") + "," + field(row.failed) + "," +
+            (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
             (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries);
     for (const std::string& option : options) text += "," + field(option_of(experiment, row.variant, option));
     for (const auto& value : row.values) text += "," + number_text(value);

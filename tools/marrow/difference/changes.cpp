@@ -93,7 +93,7 @@ class Comparer {
   /// Whether a node has another result. Functions have no content to compare; only their effect on data counts.
   static bool came_out_otherwise(const RecordedNode& before, const RecordedNode& now) {
     if (before.went_well() != now.went_well() || (!now.went_well() && before.status != now.status)) return true;
-    if (now.status == "failed" && before.reason != now.reason) return true;
+    if (now.has_failed() && before.reason != now.reason) return true;
     const auto a = before.data(), b = now.data();
     const bool went_well = before.went_well();
     if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // their names may differ

@@ -20,7 +20,8 @@ void print_fate(const char* which, const RecordedNode& node) {
   if (node.went_well())
     std::printf("  %s it was done\n", which);
   else
-    std::printf("  %s it %s%s%s\n", which, node.status == "failed" ? "failed" : ("is '" + node.status + "'").c_str(),
+    std::printf("  %s it %s%s%s\n", which,
+                node.has_failed() ? node.status.c_str() : ("is '" + node.status + "'").c_str(),
                 node.reason.empty() ? "" : ": ", printable_lines(node.reason).c_str());
 }
 

@@ -54,7 +54,8 @@ std::string build_id_of(const json& object, const char* name) {
 }
 
 std::string status_of(const json& object) {
-  static const std::set<std::string> kKnown{"not needed", "done", "skipped", "failed", "not run", "cancelled"};
+  static const std::set<std::string> kKnown{"not needed", "done",      "skipped",     "failed",
+                                            "not run",    "cancelled", "failed alone"};
   const std::string status = object.at("status");
   if (!kKnown.contains(status)) throw Error("it says 'status': " + in_quotes(printable(status)));
   return status;

@@ -41,6 +41,7 @@ struct RecordedNode {
       files;  ///< by option of type path: digest of the content that it names; nothing if that did not exist
   std::vector<RecordedOutput> outputs;
 
+  bool has_failed() const { return status.starts_with("failed"); }  ///< also if it may ("failed alone")
   bool went_well() const { return status == "done" || status == "not needed"; }
   bool makes_data() const { return !data().empty(); }
   /// Its outputs that are not functions.

@@ -78,6 +78,7 @@ json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, 
     cell["evaluations"] = row.evaluations;
   else
     cell["reason"] = row.failed;
+  if (!row.absent.empty()) cell["absent"] = row.absent;
   for (const auto& value : row.values) cell["values"].push_back(row.failed.empty() ? of(value) : json());
   int cached = 0;
   for (const auto& [name, calls] : row.nodes) cached += calls.made == 0 && calls.cached > 0;

@@ -47,6 +47,7 @@ std::string difference(const PipelineNode& base, const PipelineNode& other) {
     if (found == before.end() ? base.info.name == other.info.name : found->second != value) add(name + " = " + value);
   }
   if (wires_of(base) != wires_of(other)) add("other inputs");
+  if (base.may_fail != other.may_fail) add(other.may_fail ? "may fail" : "may not fail");
   return text;
 }
 

@@ -79,6 +79,16 @@ std::string reason_of(const json& record) {
   return "it was stopped before it was done";
 }
 
+/// A line for each node that failed and may: the run went on without it.
+std::string absent_of(const json& record) {
+  std::string text;
+  for (const json& node : record.value("nodes", json::array()))
+    if (node.value("status", "") == status_name(NodeRecord::Status::failed_alone))
+      text += (text.empty() ? "node '" : "\nnode '") + node.value("id", "") + "' (" + node.value("uses", "") +
+              ") failed: " + node.value("reason", "");
+  return text;
+}
+
 std::string pipeline_text_of(const fs::path& file) {
   try {
     return read_text_file(file, kMostSourceBytes);
@@ -100,6 +110,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
                {"success", nullptr},
                {"folder", plain_path(fs::absolute(folder)).string()}};
   if (cell["status"] == "failed") cell["reason"] = reason_of(record);
+  if (const std::string absent = absent_of(record); !absent.empty()) cell["absent"] = absent;
   json data = {{"marrow", record.value("marrow", "")},
                {"format", 1},
                {"kind", "run"},

@@ -17,6 +17,7 @@ namespace marrow::compare {
 struct CellRow {
   std::string id, variant, case_name, start;
   std::string failed;  ///< why it failed; empty for a cell that is done
+  std::string absent;  ///< why figures are missing in a cell that is done: a node failed that may fail
   int tries = 1;
   std::vector<std::optional<double>> values;  ///< values of the experiment's metrics, in their order
   std::optional<double> initial_error;
