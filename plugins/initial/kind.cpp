@@ -9,6 +9,10 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::View>("views", "X-ray views; only their cameras are used", marrow::over("view"))
       .in<marrow::Pose>("start", "nominal placement; none: CT coordinates are taken as world coordinates")
       .in<marrow::Landmarks>("landmarks", "points in the CT and where they were marked in views or tracked")
+      .in<marrow::Pose>("first", "a start to choose from")
+      .in<marrow::Pose>("second", "a start to choose from")
+      .in<marrow::Pose>("third", "a start to choose from")
+      .in<marrow::Pose>("fourth", "a start to choose from")
       .in<marrow::Cost>("cost", "cost of a pose")
       .in<marrow::Optimizer>("optimizer", "minimiser of the cost")
       .out<marrow::Pose>("pose", "pose to start from, with the fragment's axes");

@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/search/search.hpp"
+
+namespace {
+
+using marrow::Pose;
+
+struct Options {
+  double contour_spacing_px = 8;
+  double reach_px = 24;
+  int pixel_step = 0;
+  int max_evaluations = 150;
+};
+
+/// A start, after a short search from it.
+struct Way {
+  std::string name;  ///< of the input
+  Pose pose;
+};
+
+/// The first steps are those of the coarsest level of a registration with this reach.
+Pose refined(const Pose& start, const marrow::Cost& cost, const marrow::Optimizer& optimizer, const Options& options,
+             marrow::Context& context, double done, double share) {
+  marrow::search::SearchOptions search_options;
+  search_options.max_evaluations = options.max_evaluations;
+  marrow::search::Search search(optimizer, start, search_options, context);
+  const marrow::search::Steps steps{options.reach_px / 8, options.reach_px / 4, options.reach_px / 8, 0.1};
+  search.refine(cost, marrow::search::kAllAxes, steps, done, share);
+  return pose_of(search, start, cost);
+}
+
+/// "second is the best start, with a cost of 0.21; first 0.4, third 0.9".
+std::string comparison_of(const std::vector<Way>& ways, const Way& best) {
+  const auto cost_text = [](const Way& way) {
+    char text[32];
+    std::snprintf(text, sizeof text, "%.6g", way.pose.cost);
+    return std::string(text);
+  };
+  std::string text = best.name + " is the best start, with a cost of " + cost_text(best), separator = "; ";
+  for (const Way& way : ways) {
+    if (way.name == best.name) continue;
+    text += separator + way.name + " " + cost_text(way);
+    separator = ", ";
+  }
+  return text;
+}
+
+Pose best_of(const Pose* first, const Pose* second, const Pose* third, const Pose* fourth, const marrow::Cost& cost,
+             const marrow::Optimizer& optimizer, const Options& options, marrow::Context& context) {
+  std::vector<std::pair<std::string, const Pose*>> starts{
+      {"first", first}, {"second", second}, {"third", third}, {"fourth", fourth}};
+  std::erase_if(starts, [](const auto& start) { return !start.second; });
+  if (starts.empty())
+    throw marrow::Error(
+        "no way led to a start: none of the inputs first, second, third and fourth is there; see why the nodes that "
+        "they are wired to gave none");
+  for (const auto& [name, start] : starts) marrow::check_rigid(start->world_from_model, name);
+  const auto level = cost.at_level({options.contour_spacing_px, options.reach_px, options.pixel_step});
+  std::vector<Way> ways;
+  const double share = 1.0 / double(starts.size());
+  for (const auto& [name, start] : starts) {
+    const double done = share * double(ways.size());
+    ways.push_back({name, refined(*start, *level, optimizer, options, context, done, share)});
+  }
+  // Of equal ones, the first.
+  const auto best =
+      std::min_element(ways.begin(), ways.end(), [](const Way& a, const Way& b) { return a.pose.cost < b.pose.cost; });
+  context.info(comparison_of(ways, *best));
+  Pose pose = best->pose;
+  pose.evaluations = 0;
+  for (const Way& way : ways) pose.evaluations += way.pose.evaluations;
+  return pose;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("initial.best_of", best_of)
+      .summary("The best of several starts: each is refined for a moment, and the one of least cost is taken")
+      .in("first", "a start")
+      .in("second", "another start")
+      .in("third", "another start")
+      .in("fourth", "another start; starts that are not there are left out, but one must be there")
+      .in("cost", "cost of a pose")
+      .in("optimizer", "minimiser that refines each start")
+      .out("pose", "the start of least cost, refined; of equal ones, the first")
+      .option("contour_spacing_px", &Options::contour_spacing_px, "distance between two points of the outline",
+              marrow::at_least(0.1))
+      .option("reach_px", &Options::reach_px,
+              "a point with no edge within this distance counts as unmatched; the first steps are proportional to it",
+              marrow::at_least(0.1))
+      .option("pixel_step", &Options::pixel_step,
+              "for costs of grey values: only every n-th pixel is compared; 0: as the cost says", marrow::at_least(0))
+      .option("max_evaluations", &Options::max_evaluations, "largest number of evaluations of the cost for each start",
+              marrow::at_least(1));
+}
