@@ -80,6 +80,13 @@ class FewProcesses(Case):
                 result = self.marrow(most, "run", "p.yaml", "--threads", "2", "--out", "out-%d" % most)
                 self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
 
+    def test_a_node_that_may_fail_is_not_blamed_for_too_few(self):
+        self.write("p.yaml", PIPELINE.replace("ply}}", "ply}, may_fail: true}").replace("200}", "200}, may_fail: true"))
+        result = self.marrow(2, "run", "p.yaml", "--threads", "1", "--out", "out")
+        self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
+        self.assertIn("cannot start a process", result.stderr)
+        self.assertNotIn("the run goes on without it", result.stderr)
+
     def test_a_comparison_is_done_by_fewer_workers(self):
         for most in (4, 5, 6):
             with self.subTest(most):
