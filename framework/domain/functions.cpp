@@ -9,6 +9,8 @@ RadiographProjector::~RadiographProjector() = default;
 Cost::~Cost() = default;
 Optimizer::~Optimizer() = default;
 
+std::shared_ptr<const RadiographProjector> RadiographProjector::smoothed(double) const { return nullptr; }
+
 std::vector<double> Cost::values(const std::vector<RigidTransform>& poses) const {
   std::vector<double> results(poses.size());
   tbb::parallel_for(std::size_t(0), poses.size(), [&](std::size_t i) { results[i] = value(poses[i]); });
@@ -18,6 +20,10 @@ std::vector<double> Cost::values(const std::vector<RigidTransform>& poses) const
 std::optional<Cost::Expansion> Cost::expansion(const RigidTransform&, const FragmentFrame&) const {
   return std::nullopt;
 }
-std::optional<double> Cost::likelihood_factor(const RigidTransform&) const { return std::nullopt; }
+std::vector<double> Cost::without_each_block(const RigidTransform&) const { return {}; }
+std::size_t Cost::view_count() const { return 0; }
+double Cost::value_in_view(std::size_t, const RigidTransform& world_from_model) const {
+  return value(world_from_model);
+}
 
 }  // namespace marrow

@@ -45,6 +45,8 @@ void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& fram
   metrics.items.push_back({"predicted_axial_deg", degrees(deviation(2)), "deg"});
   metrics.items.push_back({"predicted_max_deg", degrees(largest_deviation(covariance.topLeftCorner<3, 3>())), "deg"});
   metrics.items.push_back({"predicted_along_mm", deviation(5), "mm"});
+  metrics.items.push_back({"predicted_along_frontal_mm", deviation(3), "mm"});
+  metrics.items.push_back({"predicted_along_lateral_mm", deviation(4), "mm"});
   metrics.items.push_back({"predicted_max_mm", largest_deviation(covariance.bottomRightCorner<3, 3>()), "mm"});
 }
 

@@ -27,6 +27,9 @@ class JosephProjector : public RayProjector {
   }
 
  protected:
+  std::shared_ptr<const marrow::RadiographProjector> of(marrow::rays::Attenuation attenuation) const override {
+    return std::make_shared<JosephProjector>(std::move(attenuation));
+  }
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
     return bricks_.integral(source, direction);
   }

@@ -21,6 +21,9 @@ class RayCastingProjector : public RayProjector {
       : RayProjector(std::move(attenuation)), step_mm_(step_mm) {}
 
  protected:
+  std::shared_ptr<const marrow::RadiographProjector> of(marrow::rays::Attenuation attenuation) const override {
+    return std::make_shared<RayCastingProjector>(std::move(attenuation), step_mm_);
+  }
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
     const Span span = marrow::rays::span_in_box(attenuation_.first, attenuation_.last, source, direction, 1);
     if (!(span.from < span.to)) return 0;

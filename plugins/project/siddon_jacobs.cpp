@@ -17,6 +17,9 @@ class SiddonProjector : public RayProjector {
   using RayProjector::RayProjector;
 
  protected:
+  std::shared_ptr<const marrow::RadiographProjector> of(marrow::rays::Attenuation attenuation) const override {
+    return std::make_shared<SiddonProjector>(std::move(attenuation));
+  }
   float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const override {
     const Span span = marrow::rays::span_in_box(attenuation_.first, attenuation_.last, source, direction, 0.5);
     if (!(span.from < span.to)) return 0;

@@ -25,7 +25,7 @@ Result multiresolution(const marrow::Cost& cost, const marrow::Optimizer& optimi
   search.go_to(best.axial);
   result.stages.add("axial", pose_of(search, initial, last));
   search.go_to(best.pose);
-  result.pose = final_pose_of(search, initial, last, options, context);
+  result.pose = final_pose_of(search, initial, last, search.steps_of(levels.size() - 1), options, context);
   result.stages.add("final", result.pose);
   return result;
 }

@@ -56,19 +56,21 @@ Result sequence(const marrow::Cost& cost, const marrow::Cost& finer_cost, const 
   Result result;
   result.stages.add("start", pose_of(coarse, initial, *levels.back()));
   coarse.go_to(coarse.find(levels).pose);
-  const marrow::Pose first = pose_of(coarse, initial, *levels.back());
+  const marrow::Pose first =
+      final_pose_of(coarse, initial, *levels.back(), coarse.steps_of(levels.size() - 1), options, context);
   result.stages.add("first", first);
   Search search(finer_optimizer ? *finer_optimizer : optimizer, first, options, context);
   std::shared_ptr<const marrow::Cost> level;
   const double share = 1.0 / double(options.finer_pixel_step.size());
+  marrow::search::Steps steps;
   for (std::size_t i = 0; i < options.finer_pixel_step.size(); ++i) {
-    const marrow::search::Steps steps{options.finer_step_deg.at(i), options.finer_step_axial_deg.at(i),
-                                      options.finer_step_mm.at(i), options.finer_step_tolerance.at(i)};
+    steps = {options.finer_step_deg.at(i), options.finer_step_axial_deg.at(i), options.finer_step_mm.at(i),
+             options.finer_step_tolerance.at(i)};
     level = finer_cost.at_level(
         {options.contour_spacing_px.back(), options.reach_px.back(), int(options.finer_pixel_step[i])});
     search.refine(*level, marrow::search::kAllAxes, steps, double(i) * share, share);
   }
-  result.pose = final_pose_of(search, first, *level, options, context);
+  result.pose = final_pose_of(search, first, *level, steps, options, context);
   result.pose.evaluations += first.evaluations;
   if (const std::string warning = disagreement(first, result.pose, options); !warning.empty()) {
     context.warn(warning);

@@ -2,13 +2,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/match/edge_loss.hpp"
-#include "marrow/toolbox/match/inputs.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/nearest_outline.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
 
@@ -19,7 +18,6 @@ struct Options {
   double direction_tolerance_deg = 40;
   double edge_offset_px = 0;
   bool estimate_offset = true;
-  double model_error_px = 0.4;
   bool symmetric = false;
   double others_reach_px = marrow::match::kOthersReach_px;
   std::vector<double> weights;
@@ -41,7 +39,8 @@ struct Residual {
 
 struct Matches {
   std::vector<Residual> residuals;
-  std::size_t points = 0;          ///< number of points compared, with or without an edge
+  std::vector<Eigen::Vector2f> unmatched_px;  ///< points compared that have no edge
+  std::size_t points() const { return residuals.size() + unmatched_px.size(); }
   std::vector<Residual> of_edges;  ///< from the edges near the outline to the outline; only if the cost is symmetric
 };
 
@@ -53,14 +52,18 @@ struct Scene {
   Options options;
 };
 
-class ContourDistance : public marrow::Cost {
+class ContourDistance : public marrow::match::ViewsCost {
  public:
   ContourDistance(std::shared_ptr<const Scene> scene, marrow::CostLevel level)
-      : scene_(std::move(scene)), level_(level), loss_(scene_->options.scale_px, level.reach_px) {}
+      : ViewsCost(scene->views.size(), scene->options.weights),
+        scene_(std::move(scene)),
+        level_(level),
+        loss_(scene_->options.scale_px, level.reach_px) {}
 
-  double value(const marrow::RigidTransform& world_from_model) const override {
-    const std::vector<Matches> views = match(world_from_model);
-    return value_of(views, offset_of(views));
+  /// With the offset that is best for this view alone.
+  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    const std::vector<Matches> matches{match(view, world_from_model)};
+    return value_of(matches[0], offset_of(matches));
   }
 
   /// Gauss-Newton with the weights of the loss. Each point keeps its edge and its normal and moves along this normal.
@@ -70,14 +73,14 @@ class ContourDistance : public marrow::Cost {
     const std::vector<Matches> views = match(world_from_model);
     const double offset = offset_of(views);
     Expansion about;
-    about.value = value_of(views, offset);
+    about.value = mean_of(values_of(views, offset));
     marrow::Vector6d mixed = marrow::Vector6d::Zero();
     double weights = 0, of_all = 0;
     for (std::size_t i = 0; i < views.size(); ++i) of_all += weight_of(scene_->options.weights, i);
     for (std::size_t i = 0; i < views.size(); ++i) {
       const marrow::RigidTransform camera_from_model = scene_->views[i].camera.camera_from_world * world_from_model;
       const double of_view = weight_of(scene_->options.weights, i) / of_all,
-                   points = std::max(double(views[i].points), least_points());
+                   points = std::max(double(views[i].points()), least_points());
       const auto add = [&](const std::vector<Residual>& residuals, double of_each) {
         for (const Residual& r : residuals) {
           const double weight = of_each * loss_.weight(distance2(r, offset));
@@ -104,53 +107,43 @@ class ContourDistance : public marrow::Cost {
     return std::make_shared<ContourDistance>(scene_, level);
   }
 
-  /// Ratio between the curvature of the cost and the variance of its slope, both from the residuals at this pose (the
-  /// sandwich estimator of M-estimation: Huber 1981, 6.3). Errors along the outline are correlated. So the slopes are
-  /// first summed over blocks of the image, and the sums are taken as independent. Each block also gets an error of
-  /// model and edges that is common to the whole block. The residuals do not show such errors, because the fit absorbs
-  /// much of them.
-  std::optional<double> likelihood_factor(const marrow::RigidTransform& world_from_model) const override {
-    constexpr float kBlock_px = 32;
-    constexpr double kLeastNoise_px = 0.05;  // no edge pixel is more accurate than this
-    const std::vector<Matches> views = match(world_from_model);
-    const double offset = offset_of(views);
-    double curvature = 0, variance = 0, weights = 0;
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const Matches& view = views[i];
-      const double weight = weight_of(scene_->options.weights, i);
-      const double points = std::max(double(view.points), least_points());
-      struct Block {
-        double slope = 0, weight = 0;
-      };
-      std::map<std::pair<int, int>, Block> blocks;
-      double squares = 0, least = 0;
-      for (const Residual& r : view.residuals) {
-        const double d2 = distance2(r, offset);
-        curvature += weight * loss_.second_derivative(d2) / points;
-        Block& block = blocks[{int(r.u / kBlock_px), int(r.v / kBlock_px)}];
-        block.slope += loss_.weight(d2) * (double(r.along_normal) - offset);
-        block.weight += loss_.weight(d2);
-        least += std::pow(kLeastNoise_px * loss_.weight(d2), 2);
-      }
-      for (const auto& [place, block] : blocks)
-        squares += block.slope * block.slope + std::pow(scene_->options.model_error_px * block.weight, 2);
-      variance += weight * weight * std::max(squares, least) / (points * points);
-      weights += weight;
-    }
-    if (curvature <= 0) return std::nullopt;
-    return curvature * weights / variance;
-  }
-
  private:
   /// If a view has fewer points than this, the missing ones count as unmatched.
   double least_points() const { return 60 / level_.contour_spacing_px; }
 
-  double value_of(const std::vector<Matches>& views, double offset) const {
-    std::vector<double> of_view;
-    for (const Matches& view : views)
-      of_view.push_back(scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset))
-                                                  : forward(view, offset));
-    return marrow::match::weighted_mean(of_view, scene_->options.weights);
+  double value_of(const Matches& view, double offset) const {
+    return scene_->options.symmetric ? 0.5 * (forward(view, offset) + backward(view, offset)) : forward(view, offset);
+  }
+  std::vector<double> values_of(const std::vector<Matches>& views, double offset) const {
+    std::vector<double> values;
+    for (const Matches& view : views) values.push_back(value_of(view, offset));
+    return values;
+  }
+
+  std::vector<double> values_of_views(const marrow::RigidTransform& world_from_model) const override {
+    const std::vector<Matches> views = match(world_from_model);
+    return values_of(views, offset_of(views));
+  }
+
+  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return splits(world_from_model)[view];
+  }
+  std::vector<Split> splits(const marrow::RigidTransform& world_from_model) const override {
+    const std::vector<Matches> views = match(world_from_model);
+    const double offset = offset_of(views);
+    std::vector<Split> splits;
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const auto blocks = marrow::match::Blocks::of(scene_->views[i].camera);
+      Split split{value_of(views[i], offset),
+                  forward_sums(views[i], offset, blocks).without_each([&](const auto& sums) { return forward(sums); })};
+      if (scene_->options.symmetric) {
+        const std::vector<double> back =
+            backward_sums(views[i], offset, blocks).without_each([&](const auto& sums) { return backward(sums); });
+        for (std::size_t k = 0; k < back.size(); ++k) split.without_block[k] = 0.5 * (split.without_block[k] + back[k]);
+      }
+      splits.push_back(std::move(split));
+    }
+    return splits;
   }
 
   /// Derivative of a point's motion along its normal in the image, with respect to the six parameters of the motion.
@@ -168,24 +161,47 @@ class ContourDistance : public marrow::Cost {
     return motion;
   }
 
-  /// The mean loss over the points of the outline.
+  using Sums = marrow::match::BlockSums::Sums;
+  marrow::match::BlockSums forward_sums(const Matches& view, double offset, const marrow::match::Blocks& blocks) const {
+    marrow::match::BlockSums sums(blocks);
+    for (const Residual& r : view.residuals) sums.add(r.u, r.v, loss_(distance2(r, offset)), 1);
+    for (const Eigen::Vector2f& at : view.unmatched_px) sums.add(at.x(), at.y(), loss_.worst(), 1);
+    return sums;
+  }
+  /// Gains of the edges near the outline, and the outline's points.
+  marrow::match::BlockSums backward_sums(const Matches& view, double offset,
+                                         const marrow::match::Blocks& blocks) const {
+    marrow::match::BlockSums sums(blocks);
+    for (const Residual& r : view.of_edges) sums.add(r.u, r.v, loss_.worst() - loss_(distance2(r, offset)), 0);
+    for (const Residual& r : view.residuals) sums.add(r.u, r.v, 0, 1);
+    for (const Eigen::Vector2f& at : view.unmatched_px) sums.add(at.x(), at.y(), 0, 1);
+    return sums;
+  }
+
+  /// The mean loss over the points of the outline. Parts of the outline outside the image cost nothing. But a view that
+  /// shows very little of the outline is no evidence.
+  double forward(const Sums& sums) const {
+    const double points = std::max(sums.weights, least_points());
+    return (sums.values + (points - sums.weights) * loss_.worst()) / points;
+  }
   double forward(const Matches& view, double offset) const {
-    double sum = 0;
-    for (const Residual& r : view.residuals) sum += loss_(distance2(r, offset));
-    // Parts of the outline outside the image cost nothing. But a view that shows very little of the outline is no
-    // evidence.
-    const double points = std::max(double(view.points), least_points());
-    return (sum + (points - double(view.residuals.size())) * loss_.worst()) / points;
+    Sums sums{0, double(view.points())};
+    for (const Residual& r : view.residuals) sums.values += loss_(distance2(r, offset));
+    sums.values += double(view.unmatched_px.size()) * loss_.worst();
+    return forward(sums);
   }
 
   /// The same in the other direction, from the edges to the outline: the worst loss minus the gain of each edge near
   /// the outline, divided by the length of the outline in pixels. (A perfect image has one edge for each of these
   /// pixels.) Edges farther away belong to something else and do not count.
+  double backward(const Sums& sums) const {
+    const double length_px = level_.contour_spacing_px * std::max(sums.weights, least_points());
+    return std::max(0.0, loss_.worst() - sums.values / length_px);
+  }
   double backward(const Matches& view, double offset) const {
-    double gain = 0;
-    for (const Residual& r : view.of_edges) gain += loss_.worst() - loss_(distance2(r, offset));
-    const double length_px = level_.contour_spacing_px * std::max(double(view.points), least_points());
-    return std::max(0.0, loss_.worst() - gain / length_px);
+    Sums sums{0, double(view.points())};
+    for (const Residual& r : view.of_edges) sums.values += loss_.worst() - loss_(distance2(r, offset));
+    return backward(sums);
   }
 
   static double distance2(const Residual& r, double offset) {
@@ -211,10 +227,11 @@ class ContourDistance : public marrow::Cost {
     for (const marrow::OutlinePoint& p : outline) {
       if (p.u_px < kMargin_px || p.v_px < kMargin_px || p.u_px > right || p.v_px > bottom) continue;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
-      ++matches.points;
       if (scene_->options.symmetric) compared.push_back(p);
       if (const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v))
         matches.residuals.push_back(residual(p, *edge));
+      else
+        matches.unmatched_px.emplace_back(p.u_px, p.v_px);
     }
     if (scene_->options.symmetric) matches.of_edges = match_edges(index, compared);
     return matches;
@@ -258,7 +275,7 @@ class ContourDistance : public marrow::Cost {
       double sum = 0, weights = 0;
       for (std::size_t i = 0; i < views.size(); ++i) {
         const Matches& view = views[i];
-        const double of_view = weight_of(scene_->options.weights, i) / std::max(double(view.points), least_points());
+        const double of_view = weight_of(scene_->options.weights, i) / std::max(double(view.points()), least_points());
         for (const Residual& r : view.residuals) {
           const double weight = of_view * loss_.weight(distance2(r, offset));
           sum += weight * double(r.along_normal);
@@ -331,9 +348,6 @@ MARROW_PLUGIN(plugin) {
               "of +-3 px that is tried")
       .option("estimate_offset", &Options::estimate_offset,
               "find the best edge offset at each pose; it is the same in all views")
-      .option("model_error_px", &Options::model_error_px,
-              "for the predicted deviation: common error of model and edges along 32 px of outline",
-              marrow::at_least(0))
       .option("symmetric", &Options::symmetric,
               "half of the cost comes from the distances in the other direction, from the edges near the outline to "
               "the outline")

@@ -3,15 +3,13 @@
 // blur moves both inside the bone's outline by about the same distance. This is not so for the outline of a surface
 // (docs/method.md, Stage 2). Gottesfeld Brown and Boult (MICCAI workshop 1996) and Penney et al. (IEEE Trans Med
 // Imaging 1998) compare the gradients of radiograph and image. Here the truncated distance of the contour cost is used.
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/toolbox/match/edge_loss.hpp"
-#include "marrow/toolbox/match/inputs.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
 
@@ -80,16 +78,16 @@ struct Scene {
   Options options;
 };
 
-class DrrEdges : public marrow::Cost {
+class DrrEdges : public marrow::match::ViewsCost {
  public:
   DrrEdges(std::shared_ptr<const Scene> scene, int pixel_step, double reach_px)
-      : scene_(std::move(scene)), step_(pixel_step), loss_(scene_->options.scale_px, reach_px) {}
+      : ViewsCost(scene->views.size(), scene->options.weights),
+        scene_(std::move(scene)),
+        step_(pixel_step),
+        loss_(scene_->options.scale_px, reach_px) {}
 
-  double value(const marrow::RigidTransform& world_from_model) const override {
-    std::vector<double> of_view(scene_->views.size());
-    tbb::parallel_for(std::size_t(0), of_view.size(),
-                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    return marrow::match::weighted_mean(of_view, scene_->options.weights);
+  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return value_of(sums(view, world_from_model).all());
   }
 
   std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
@@ -97,12 +95,25 @@ class DrrEdges : public marrow::Cost {
   }
 
  private:
-  double value_in(std::size_t index, const marrow::RigidTransform& world_from_model) const {
+  /// A view that shows very few edges of the radiograph is no evidence.
+  double value_of(const marrow::match::BlockSums::Sums& sums) const {
+    const double least = 60.0 / step_;
+    return (sums.values + std::max(0.0, least - sums.weights) * loss_.worst()) / std::max(sums.weights, least);
+  }
+
+  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    const marrow::match::BlockSums found = sums(view, world_from_model);
+    return {value_of(found.all()), found.without_each([&](const auto& left) { return value_of(left); })};
+  }
+
+  /// The loss of each edge of the radiograph.
+  marrow::match::BlockSums sums(std::size_t index, const marrow::RigidTransform& world_from_model) const {
     constexpr float kMargin_px = 3;  // edge detectors find nothing next to the border of an image
     const marrow::View& view = scene_->views[index];
     const marrow::Camera& camera = view.camera;
     const marrow::PixelGrid region = scene_->projector->region(camera, world_from_model);
-    if (region.count() == 0) return loss_.worst();
+    marrow::match::BlockSums found(marrow::match::Blocks::of(camera));
+    if (region.count() == 0) return found;
     const double margin = std::ceil(4 * scene_->options.blur_px / step_) * step_;
     const marrow::PixelGrid grid{region.u_px - margin, region.v_px - margin, double(step_),
                                  int((region.columns + 2 * margin) / step_) + 1,
@@ -113,18 +124,14 @@ class DrrEdges : public marrow::Cost {
     const double own2 = 0.5 * step_ * step_, blur2 = scene_->options.blur_px * scene_->options.blur_px - own2;
     if (const double blur = std::sqrt(std::max(blur2, 0.0)) / step_; blur > 0.2)
       cv::GaussianBlur(radiograph, radiograph, {}, blur);
-    double sum = 0, weights = 0;
     for (const DrawnEdge& edge : edges_of(radiograph, grid, scene_->options.threshold_percent)) {
       if (edge.u < kMargin_px || edge.v < kMargin_px || edge.u > float(camera.width_px - 1) - kMargin_px ||
           edge.v > float(camera.height_px - 1) - kMargin_px)
         continue;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(edge.v + 0.5f), int(edge.u + 0.5f))) continue;
-      weights += double(edge.weight);
-      sum += double(edge.weight) * loss_(distance2(index, edge));
+      found.add(edge.u, edge.v, double(edge.weight) * loss_(distance2(index, edge)), double(edge.weight));
     }
-    // A view that shows very few edges of the radiograph is no evidence.
-    const double least = 60.0 / step_;
-    return (sum + std::max(0.0, least - weights) * loss_.worst()) / std::max(weights, least);
+    return found;
   }
 
   /// Squared distance to the nearest edge of similar direction. The distance along the edge counts only beyond the

@@ -14,7 +14,7 @@ struct Options : marrow::match::IntensityOptions {
 
 /// Entropy of the whole image after scale * rendered is subtracted, divided by its entropy before. Bins cover the
 /// image's own range, and the same range below it for values of the difference.
-marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
+marrow::match::WholeMeasure measure_of(const Patch& whole, const Options& options) {
   const int bins = options.bins;
   marrow::match::Bins within = bins_of(whole.seen, whole.counts, bins);
   if (within.per_unit == 0) return [](const Patch&) { return 1.0; };

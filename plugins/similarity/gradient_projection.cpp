@@ -2,14 +2,12 @@
 // Compares gradients of the images, back-projected to the surface, with gradients of the CT (Tomazevic, Likar, Slivnik
 // and Pernus, IEEE Trans Med Imaging 22(11), 2003). It does so only where rays touch the surface, as Livyatan, Yaniv
 // and Joskowicz do (same issue). It needs no radiograph and no edges.
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
 #include "marrow/toolbox/image/line_integrals.hpp"
-#include "marrow/toolbox/match/intensity.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
 
@@ -102,7 +100,7 @@ GradientImage gradients_of(const marrow::View& view, double blur_px) {
   return image;
 }
 
-class GradientProjection : public marrow::Cost {
+class GradientProjection : public marrow::match::ViewsCost {
  public:
   struct Scene {
     marrow::List<marrow::View> views;
@@ -110,15 +108,13 @@ class GradientProjection : public marrow::Cost {
     Options options;
   };
   GradientProjection(std::shared_ptr<const Scene> scene, double blur_px, std::size_t point_step)
-      : scene_(std::move(scene)), point_step_(point_step) {
+      : ViewsCost(scene->views.size(), scene->options.weights), scene_(std::move(scene)), point_step_(point_step) {
     for (const marrow::View& view : scene_->views) images_.push_back(gradients_of(view, blur_px));
   }
 
-  double value(const marrow::RigidTransform& world_from_model) const override {
-    std::vector<double> of_view(images_.size());
-    tbb::parallel_for(std::size_t(0), of_view.size(),
-                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    return marrow::match::weighted_mean(of_view, scene_->options.weights);
+  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    const Sums found = sums(view, world_from_model);
+    return value_of(found.inside.all(), found.all);
   }
 
   /// Uses fewer points on levels with a wider contour spacing, and smoother images on levels with a larger pixel step.
@@ -128,32 +124,49 @@ class GradientProjection : public marrow::Cost {
   }
 
  private:
+  /// Of the points inside image and mask, and the weight of all points.
+  struct Sums {
+    marrow::match::BlockSums inside;
+    double all = 0;
+  };
+
+  static double value_of(const marrow::match::BlockSums::Sums& inside, double all) {
+    constexpr double kLeastShare = 0.1;  // least part of the whole weight that must lie inside image and mask
+    const double weight = std::max(inside.weights, kLeastShare * all);
+    return weight > 0 ? 1 - inside.values / weight : 1;
+  }
+
+  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    const Sums found = sums(view, world_from_model);
+    return {value_of(found.inside.all(), found.all),
+            found.inside.without_each([&](const auto& inside) { return value_of(inside, found.all); })};
+  }
+
   /// Tomazevic's criterion is the sum of |a| |b| f(angle) over the points, with f = cos^4 up to a right angle. Here it
   /// is divided by the sum of |a|. |b| is in units of the image's own steep gradients and at most 1, so that a few
   /// steep ones do not dominate. The weight of a point is exp(-s^2 / 2), where s is the sine of the angle between ray
   /// and surface, divided by the sine of touch_deg.
-  double value_in(std::size_t view, const marrow::RigidTransform& world_from_model) const {
-    constexpr double kLeastShare = 0.1;  // least part of the whole weight that must lie inside image and mask
+  Sums sums(std::size_t view, const marrow::RigidTransform& world_from_model) const {
     const marrow::Camera& camera = scene_->views[view].camera;
     const marrow::RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
     const Eigen::Vector3d source = inverse(camera_from_model).translation_mm;
     const double touch = std::sin(marrow::radians(scene_->options.touch_deg));
-    double sum = 0, inside = 0, all = 0;
+    Sums found{marrow::match::BlockSums(marrow::match::Blocks::of(camera)), 0};
     for (std::size_t i = 0; i < scene_->points.size(); i += point_step_) {
       const SurfacePoint& p = scene_->points[i];
       const double sine = p.normal.dot((p.point_mm - source).normalized()) / touch;
       if (sine * sine > 20) continue;
       const double weight = p.strength * std::exp(-0.5 * sine * sine);
-      all += weight;
+      found.all += weight;
       const Eigen::Vector3d at = camera_from_model * p.point_mm;
       if (!(at.z() > 0)) continue;
       Eigen::Vector2d g;
-      if (!sample(images_[view], (camera.intrinsics * at).hnormalized(), g)) continue;
-      inside += weight;
-      sum += weight * likeness(camera, at, camera_from_model.rotation * p.direction, g);
+      const Eigen::Vector2d pixel = (camera.intrinsics * at).hnormalized();
+      if (!sample(images_[view], pixel, g)) continue;
+      const double value = weight * likeness(camera, at, camera_from_model.rotation * p.direction, g);
+      found.inside.add(pixel.x(), pixel.y(), value, weight);
     }
-    inside = std::max(inside, kLeastShare * all);
-    return inside > 0 ? 1 - sum / inside : 1;
+    return found;
   }
 
   /// min(|b|, 1) cos^4(angle between the CT's gradient and the back-projected image gradient). The back-projected

@@ -6,12 +6,14 @@ namespace {
 using marrow::match::Patch;
 using marrow::match::PatchOptions;
 
-double value(const Patch& patch, const PatchOptions& options) {
-  return 1 -
-         marrow::match::mean_patch_correlation(patch, patch.rendered, patch.seen, patch.counts, options.patch_pixels);
+marrow::match::SumMeasure measure_of(const Patch&, const PatchOptions& options) {
+  const auto add = [side = options.patch_pixels](const Patch& patch, marrow::match::Tally& tally) {
+    marrow::match::add_patch_correlations(patch, patch.rendered, patch.seen, patch.counts, side, tally);
+  };
+  return {add, marrow::match::value_of_patch_correlations};
 }
 
-constexpr auto patch_correlation = marrow::match::intensity_node<value, PatchOptions>;
+constexpr auto patch_correlation = marrow::match::intensity_node<measure_of, PatchOptions>;
 
 }  // namespace
 

@@ -3,17 +3,20 @@
 
 namespace {
 
-using marrow::match::mean_patch_correlation;
 using marrow::match::Patch;
 using marrow::match::PatchOptions;
+using marrow::match::Tally;
 
-double value(const Patch& patch, const PatchOptions& options) {
-  const marrow::match::Gradients g = marrow::match::gradients_of(patch);
-  return 1 - 0.5 * (mean_patch_correlation(patch, g.rendered_u, g.seen_u, g.counts, options.patch_pixels) +
-                    mean_patch_correlation(patch, g.rendered_v, g.seen_v, g.counts, options.patch_pixels));
+marrow::match::SumMeasure measure_of(const Patch&, const PatchOptions& options) {
+  const auto add = [side = options.patch_pixels](const Patch& patch, Tally& tally) {
+    const marrow::match::Gradients g = marrow::match::gradients_of(patch);
+    marrow::match::add_patch_correlations(patch, g.rendered_u, g.seen_u, g.counts, side, tally);
+    marrow::match::add_patch_correlations(patch, g.rendered_v, g.seen_v, g.counts, side, tally);
+  };
+  return {add, marrow::match::value_of_patch_correlations};
 }
 
-constexpr auto patch_gradient_correlation = marrow::match::intensity_node<value, PatchOptions>;
+constexpr auto patch_gradient_correlation = marrow::match::intensity_node<measure_of, PatchOptions>;
 
 }  // namespace
 

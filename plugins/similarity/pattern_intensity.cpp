@@ -32,24 +32,24 @@ void each_pair(const Patch& patch, int radius, const Of& of) {
 /// without the model. D = seen - scale * rendered, and s is the given fraction of the image's standard deviation.
 /// Except for constants, this is the sum of Weese and of Penney over a fixed region, the image. A mean over the
 /// surroundings of the model would be lowest where the image is flat.
-marrow::match::Measure measure_of(const Patch& whole, const Options& options) {
+marrow::match::SumMeasure measure_of(const Patch& whole, const Options& options) {
   const double deviation = marrow::match::deviation(whole.seen, whole.counts),
-               s2 = std::pow(options.sigma * deviation, 2);
-  if (!(s2 > 1e-14)) return [](const Patch&) { return 1.0; };
+               s2 = std::max(1e-14, std::pow(options.sigma * deviation, 2));
   const auto structure = [s2](double d) { return d * d / (s2 + d * d); };
   double all = 0;
   each_pair(whole, options.radius_pixels,
             [&](std::size_t i, std::size_t j) { all += structure(whole.seen[i] - whole.seen[j]); });
-  return [=, radius = options.radius_pixels](const Patch& patch) {
+  const auto add = [=, radius = options.radius_pixels](const Patch& patch, marrow::match::Tally& tally) {
     const float scale = float(marrow::match::scale_of(marrow::match::gradients_of(patch)));
-    if (!(scale > 0) || !(all > 0)) return 1.0;
-    double less = 0;
+    if (!(scale > 0)) return;
     each_pair(patch, radius, [&](std::size_t i, std::size_t j) {
       const float seen = patch.seen[i] - patch.seen[j], rendered = patch.rendered[i] - patch.rendered[j];
-      if (rendered != 0) less += structure(seen) - structure(seen - scale * rendered);
+      if (rendered == 0) return;
+      const auto columns = std::size_t(patch.columns);
+      tally.add(double(i % columns), double(i / columns), structure(seen) - structure(seen - scale * rendered), 0);
     });
-    return std::min(2.0, 1 - less / all);
   };
+  return {add, [all](const auto& sums) { return all > 0 ? std::min(2.0, 1 - sums.values / all) : 1; }};
 }
 
 constexpr auto pattern_intensity = marrow::match::intensity_node<measure_of, Options>;

@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "marrow/toolbox/match/inputs.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace {
 
@@ -93,6 +93,7 @@ class Distance {
 
 /// The ray of an edge pixel in the camera's frame, and the direction of the edge in the image.
 struct Ray {
+  float u_px, v_px;
   Eigen::Vector3d direction;
   Eigen::Vector2d towards_brighter;
 };
@@ -114,7 +115,7 @@ struct Touch {
   Eigen::Vector3d point, normal;  ///< both in the model's frame
 };
 
-class RayToSurface : public marrow::Cost {
+class RayToSurface : public marrow::match::ViewsCost {
  public:
   struct Scene {
     marrow::List<marrow::View> views;
@@ -123,19 +124,13 @@ class RayToSurface : public marrow::Cost {
     Options options;
   };
   RayToSurface(std::shared_ptr<const Scene> scene, int step, double reach_mm)
-      : scene_(std::move(scene)),
+      : ViewsCost(scene->views.size(), scene->options.weights),
+        scene_(std::move(scene)),
         step_(std::size_t(step)),
         loss_{std::min(reach_mm, double(scene_->distance.most_mm()))} {}
 
-  double value(const marrow::RigidTransform& world_from_model) const override {
-    std::vector<double> of_view;
-    for (std::size_t i = 0; i < scene_->views.size(); ++i) {
-      double sum = 0;
-      const auto touches = touches_of(i, world_from_model);
-      for (const auto& touch : touches) sum += touch ? touch->like * (loss_(touch->distance_mm) - loss_.worst()) : 0;
-      of_view.push_back(loss_.worst() + (touches.empty() ? 0 : sum / double(touches.size())));
-    }
-    return marrow::match::weighted_mean(of_view, scene_->options.weights);
+  double value_in_view(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    return value_of(sums(view, world_from_model).all());
   }
 
   /// The derivative of the least distance along a ray. The shift of the touching point along the ray can be ignored,
@@ -178,6 +173,27 @@ class RayToSurface : public marrow::Cost {
   }
 
  private:
+  double value_of(const marrow::match::BlockSums::Sums& sums) const {
+    return loss_.worst() + (sums.weights > 0 ? sums.values / sums.weights : 0);
+  }
+
+  Split split(std::size_t view, const marrow::RigidTransform& world_from_model) const override {
+    const marrow::match::BlockSums found = sums(view, world_from_model);
+    return {value_of(found.all()), found.without_each([&](const auto& left) { return value_of(left); })};
+  }
+
+  /// The loss of each ray, less the worst.
+  marrow::match::BlockSums sums(std::size_t view, const marrow::RigidTransform& world_from_model) const {
+    marrow::match::BlockSums found(marrow::match::Blocks::of(scene_->views[view].camera));
+    const auto touches = touches_of(view, world_from_model);
+    for (std::size_t i = 0; i < touches.size(); ++i) {
+      const Ray& ray = scene_->rays[view][i * step_];
+      const auto& touch = touches[i];
+      found.add(ray.u_px, ray.v_px, touch ? touch->like * (loss_(touch->distance_mm) - loss_.worst()) : 0, 1);
+    }
+    return found;
+  }
+
   std::vector<std::optional<Touch>> touches_of(std::size_t view, const marrow::RigidTransform& world_from_model) const {
     const std::vector<Ray>& rays = scene_->rays[view];
     std::vector<std::optional<Touch>> touches((rays.size() + step_ - 1) / step_);
@@ -263,7 +279,9 @@ std::vector<Ray> rays_of(const marrow::View& view, const marrow::EdgeMap& edges)
     const int u = int(std::lround(edge.u_px)), v = int(std::lround(edge.v_px));
     const bool is_inside = u >= 0 && v >= 0 && u < edges.width_px && v < edges.height_px;
     if (!is_inside || (!view.mask.empty() && !view.mask.at<std::uint8_t>(v, u))) continue;
-    rays.push_back({(ray_from_pixel * Eigen::Vector3d(edge.u_px, edge.v_px, 1)).normalized(),
+    rays.push_back({edge.u_px,
+                    edge.v_px,
+                    (ray_from_pixel * Eigen::Vector3d(edge.u_px, edge.v_px, 1)).normalized(),
                     {edge.direction_u, edge.direction_v}});
   }
   return rays;

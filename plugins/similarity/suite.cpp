@@ -112,6 +112,18 @@ std::vector<RigidTransform> strange_poses() {
   return {truth(), out, behind, far, around};
 }
 
+void check_blocks(const Cost& cost, const std::vector<RigidTransform>& poses) {
+  const std::size_t blocks = cost.without_each_block(truth()).size();
+  for (const RigidTransform& pose : poses) {
+    const std::vector<double> without = cost.without_each_block(pose);
+    expect(without.size() == blocks, "without_each_block() gives " + std::to_string(blocks) +
+                                         " values at one pose and " + std::to_string(without.size()) + " at another");
+    for (const double value : without) expect(std::isfinite(value), "a value without a block is not finite");
+    for (std::size_t view = 0; view < cost.view_count(); ++view)
+      expect(std::isfinite(cost.value_in_view(view, pose)), "its value in one view is not finite");
+  }
+}
+
 void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vector<Value>& outputs) {
   for (std::size_t i = 0; i < outputs.size(); ++i) {
     if (ports[i].name != "cost") continue;
@@ -133,8 +145,7 @@ void validate(const Inputs&, const std::vector<PortInfo>& ports, const std::vect
       expect(value == together[k], "values() gives other values than value()");
     }
     expect(std::isfinite(cost.at_level({4, 10, 4})->value(truth())), "its value at another level is not finite");
-    const auto factor = cost.likelihood_factor(truth());
-    expect(!factor || (std::isfinite(*factor) && *factor > 0), "the factor of the likelihood is not above 0");
+    check_blocks(cost, poses);
   }
 }
 

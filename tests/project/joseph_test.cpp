@@ -11,6 +11,7 @@ std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& vo
 
 TEST(Joseph, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.03, 0.2); }
 TEST(Joseph, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
+TEST(Joseph, SmoothedCloud) { radiograph_behaviour::smoothed_cloud(make, 0.25); }
 TEST(Joseph, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
 TEST(Joseph, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 0.2); }
 TEST(Joseph, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }

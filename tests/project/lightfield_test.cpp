@@ -33,6 +33,10 @@ TEST(LightField, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_a
 TEST(LightField, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make_coarse); }
 TEST(LightField, SourceWithin) { radiograph_behaviour::source_within(make_coarse); }
 
+TEST(LightField, HasNoSmoothedModel) {
+  EXPECT_EQ(make_coarse(radiograph_behaviour::cloud(), nullptr)->smoothed(1), nullptr);
+}
+
 TEST(LightField, FinerStepsAreMoreAccurate) {
   const shipped::Inputs in = inputs(radiograph_behaviour::cloud(), nullptr);
   const marrow::Camera& camera = radiograph_behaviour::camera(0);

@@ -85,6 +85,29 @@ inline void integrals_of_a_cloud(const Make& make, double mean_limit_mm, double 
     }
 }
 
+/// A Gaussian cloud smoothed by a Gaussian is a wider and thinner one.
+inline void smoothed_cloud(const Make& make, double limit_mm) {
+  constexpr double kSigma_mm = 3;
+  const double width_mm = std::hypot(kWidth_mm, kSigma_mm);
+  const auto projector = make(cloud(), nullptr)->smoothed(kSigma_mm);
+  ASSERT_NE(projector, nullptr);
+  const RigidTransform pose = shapes::centred_at({3, -4, 6});
+  const PixelGrid grid = projector->region(camera(30), pose);
+  ASSERT_GT(grid.count(), 1000u);
+  const auto values = projector->radiograph(camera(30), pose, grid);
+  double worst = 0;
+  for (int row = 0; row < grid.rows; ++row)
+    for (int column = 0; column < grid.columns; ++column) {
+      const double distance =
+          distance_from_ray(camera(30), grid.pixel(column, row), pose * Eigen::Vector3d(0, 0, 0)) / width_mm;
+      const double expected = 2 * std::pow(kWidth_mm / width_mm, 3) * width_mm * std::sqrt(2 * marrow::kPi) *
+                              std::exp(-0.5 * distance * distance);
+      worst = std::max(worst,
+                       std::abs(values[std::size_t(row) * std::size_t(grid.columns) + std::size_t(column)] - expected));
+    }
+  EXPECT_LT(worst, limit_mm);
+}
+
 /// Where the rays run at right angles through an even block, the chord is its thickness.
 inline void chord_of_a_block(const Make& make) {
   const Volume block =

@@ -11,6 +11,7 @@ std::shared_ptr<const marrow::RadiographProjector> make(const marrow::Volume& vo
 
 TEST(SiddonJacobs, IntegralsOfACloud) { radiograph_behaviour::integrals_of_a_cloud(make, 0.07, 2); }
 TEST(SiddonJacobs, ChordOfABlock) { radiograph_behaviour::chord_of_a_block(make); }
+TEST(SiddonJacobs, SmoothedCloud) { radiograph_behaviour::smoothed_cloud(make, 1.2); }
 TEST(SiddonJacobs, RegionHoldsAll) { radiograph_behaviour::region_holds_all(make); }
 TEST(SiddonJacobs, GridsAndPixelsAgree) { radiograph_behaviour::grids_and_pixels_agree(make, 1e-5); }
 TEST(SiddonJacobs, AFieldLeavesTheRestOut) { radiograph_behaviour::a_field_leaves_the_rest_out(make); }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // A cost whose Hessian, derivatives and noise are known exactly, and an optimizer that only notes what it is asked.
+#include <marrow/domain/decompositions.hpp>
 #include <marrow/domain/functions.hpp>
 #include <vector>
 
@@ -12,11 +13,12 @@ namespace well {
 class Bowl : public marrow::Cost {
  public:
   Bowl(marrow::RigidTransform bottom, marrow::FragmentFrame frame, const marrow::Matrix6d& hessian,
-       double likelihood_factor = 1)
-      : bottom_(std::move(bottom)),
-        frame_(std::move(frame)),
-        hessian_(hessian),
-        likelihood_factor_(likelihood_factor) {}
+       double information = 1)
+      : bottom_(std::move(bottom)), frame_(std::move(frame)), hessian_(hessian) {
+    const marrow::SymmetricEigen<6> eigen = marrow::eigen_of_symmetric(hessian);
+    for (int i = 0; i < 6; ++i)
+      slopes_.push_back(std::sqrt(std::max(eigen.values[i], 0.0) / information) * eigen.vectors.col(i));
+  }
 
   double value(const marrow::RigidTransform& pose) const override {
     const marrow::Vector6d motion = way(bottom_, pose, frame_);
@@ -26,7 +28,14 @@ class Bowl : public marrow::Cost {
     levels.push_back(level);
     return std::make_shared<Bowl>(*this);
   }
-  std::optional<double> likelihood_factor(const marrow::RigidTransform&) const override { return likelihood_factor_; }
+  /// Six blocks. Without each of them the bowl is higher, and tilted along one of its eigenvectors, so much that its
+  /// covariance is the inverse of information * hessian.
+  std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+    const marrow::Vector6d motion = way(bottom_, pose, frame_);
+    std::vector<double> values;
+    for (const marrow::Vector6d& slope : slopes_) values.push_back(value(pose) + 0.1 + slope.dot(motion));
+    return values;
+  }
 
   mutable std::vector<marrow::CostLevel> levels;
 
@@ -34,7 +43,7 @@ class Bowl : public marrow::Cost {
   marrow::RigidTransform bottom_;
   marrow::FragmentFrame frame_;
   marrow::Matrix6d hessian_;
-  double likelihood_factor_;
+  std::vector<marrow::Vector6d> slopes_;
 };
 
 /// Notes every problem, and answers with its start, or with one step of it along its first coordinate.

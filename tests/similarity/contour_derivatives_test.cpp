@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The derivatives and the noise model of the contour's cost, against differences, numbers worked out by hand, and noise
+// The derivatives and the blocks of the contour's cost, against differences, numbers worked out by hand, and noise
 // itself.
 #include <gtest/gtest.h>
 
@@ -204,50 +204,35 @@ Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options opt
   return {new Line, views, edges, options};
 }
 
-double factor(const std::vector<marrow::EdgeMap>& maps, const shipped::Options& options) {
-  return cost_of_line(maps, options)->likelihood_factor(shifted(0)).value_or(-1);
-}
-
-TEST(ContourLikelihood, IsWhatOneComputesByHand) {
-  // All 100 edges lie 0.5 px off, in blocks of 14, 32, 32 and 22 points.
-  const double d = 0.5, root = std::sqrt(1 + d * d), blocks = 14 * 14 + 32 * 32 + 32 * 32 + 22 * 22;
-  const double curvature = 1 / (root * root * root);
-  const auto expected = [&](double model_error_px) {
-    return curvature * 100 * 100 / (blocks * (d * d + model_error_px * model_error_px) / (root * root));
-  };
-  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}}), expected(0), 1e-3 * expected(0));
-  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.7}}), expected(0.7), 1e-3 * expected(0.7));
-  // The offset is no error: with it, the edges lie where they should, and are known to 0.05 px each.
-  EXPECT_NEAR(factor({line_at(100.5)}, {{"model_error_px", 0.0}, {"edge_offset_px", -0.5}}), 100 / (0.05 * 0.05), 1);
-  // Two views tell twice as much, and less where one of them counts more.
-  EXPECT_NEAR(factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}}), 2 * expected(0), 2e-3 * expected(0));
-  EXPECT_NEAR(
-      factor({line_at(100.5), line_at(100.5)}, {{"model_error_px", 0.0}, {"weights", std::vector<double>{3, 1}}}),
-      1.6 * expected(0), 2e-3 * expected(0));
-}
-
-TEST(ContourLikelihood, PredictsTheScatterThatNoiseMakes) {
+TEST(ContourBlocks, PredictTheScatterThatNoiseMakes) {
   std::mt19937 random(5);
   std::normal_distribution<double> noise(0, 0.4);
   constexpr int kRuns = 120;
   double squares = 0, predicted = 0;
   for (int run = 0; run < kRuns; ++run) {
     // Of each edge and of what its block has in common.
-    marrow::EdgeMap map = line_at(100, 740);  // 20 blocks
+    marrow::EdgeMap map = line_at(100, 1850);  // 20 blocks
     double common = 0;
     for (std::size_t v = 0; v < map.pixels.size(); ++v) {
-      if (v % 32 == 0) common = 0.5 * noise(random);
+      if (v % 92 == 0) common = 0.5 * noise(random);
       map.pixels[v].u_px += float(common + noise(random));
     }
-    const auto cost = cost_of_line({map}, {{"model_error_px", 0.0}});
+    const auto cost = cost_of_line({map}, {});
     const auto value = [&](double x) { return cost->value(shifted(x)); };
     const double h = 0.2;
     double x = 0;
     for (int round = 0; round < 4; ++round)
       x -= 0.5 * h * (value(x + h) - value(x - h)) / (value(x + h) - 2 * value(x) + value(x - h));
     const double curvature = (value(x + h) - 2 * value(x) + value(x - h)) / (h * h);
+    const std::vector<double> after = cost->without_each_block(shifted(x + h)),
+                              before = cost->without_each_block(shifted(x - h));
+    double scatter = 0;
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      const double slope = (after[i] - value(x + h) - before[i] + value(x - h)) / (2 * h);
+      scatter += slope * slope;
+    }
     squares += x * x / kRuns;
-    predicted += 1 / (*cost->likelihood_factor(shifted(x)) * curvature) / kRuns;
+    predicted += scatter / (curvature * curvature) / kRuns;
   }
   std::printf("standard deviation %.4f px, predicted %.4f px\n", std::sqrt(squares), std::sqrt(predicted));
   EXPECT_LT(predicted, 1.4 * squares);

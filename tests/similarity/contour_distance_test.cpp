@@ -54,11 +54,7 @@ marrow::RigidTransform shifted(double x, double z = 0) {
 }
 
 shipped::Options fixed_offset(double offset_px = 0) {
-  return {{"estimate_offset", false},
-          {"edge_offset_px", offset_px},
-          {"contour_spacing_px", 1.0},
-          {"reach_px", 10.0},
-          {"model_error_px", 0.0}};
+  return {{"estimate_offset", false}, {"edge_offset_px", offset_px}, {"contour_spacing_px", 1.0}, {"reach_px", 10.0}};
 }
 
 const auto kLine = std::make_shared<const LineProjector>();
@@ -125,27 +121,23 @@ TEST(ContourDistance, PointsOutsideImageAndMaskDoNotPay) {
   EXPECT_NEAR(all->value(shifted(0, 500)), std::sqrt(101.0) - 1, 1e-5) << "nothing to compare is the worst";
 }
 
-TEST(ContourDistance, LevelsAndLikelihood) {
-  marrow::EdgeMap map = line_at(100, -1);
-  for (std::size_t i = 0; i < map.pixels.size(); ++i) map.pixels[i].u_px += (i / 40) % 2 ? 0.5f : -0.5f;
-  const auto cost = contour_distance(one_view(), edge_maps(map), fixed_offset());
-  const auto coarse = cost->at_level({5, 4});
+TEST(ContourDistance, LevelsHaveTheirOwnReach) {
+  const auto coarse = contour_distance(one_view(), edge_maps(line_at(100, -1)), fixed_offset())->at_level({5, 4});
   EXPECT_NEAR(coarse->value(shifted(30)), std::sqrt(17.0) - 1, 1e-5);
-  const auto factor = cost->likelihood_factor(shifted(0));
-  ASSERT_TRUE(factor.has_value());
-  // 100 points in 4 to 5 blocks that err together by 0.5 px: the mean is known to about 0.5 / sqrt(4.5) = 0.24 px.
-  const double h = 0.1,
-               curvature = (cost->value(shifted(h)) - 2 * cost->value(shifted(0)) + cost->value(shifted(-h))) / (h * h);
-  const double sd = 1 / std::sqrt(*factor * curvature);
-  EXPECT_GT(sd, 0.12);
-  EXPECT_LT(sd, 0.48);
-  // An error of 1 px that each block may have as a whole makes that about 1 / sqrt(4.5) = 0.5 px.
-  shipped::Options rough = fixed_offset();
-  rough["model_error_px"] = 1.0;
-  const auto rough_factor = contour_distance(one_view(), edge_maps(map), rough)->likelihood_factor(shifted(0));
-  EXPECT_GT(*factor / *rough_factor, 2);
-  EXPECT_LT(*factor / *rough_factor, 20);
-  EXPECT_FALSE(cost->likelihood_factor(shifted(50)).has_value()) << "nothing is near";
+}
+
+TEST(ContourDistance, WithoutEachBlockIsTheMeanOverTheOthers) {
+  // The 100 points lie in the third column of blocks of 48 px: 46 in the second row, 48 in the third, 6 in the fourth.
+  const auto cost = contour_distance(one_view(), edge_maps(line_at(101, -1)), fixed_offset());
+  const double each = std::sqrt(2.0) - 1, worst = std::sqrt(101.0) - 1;
+  EXPECT_NEAR(cost->value(shifted(0)), each, 1e-5);
+  const std::vector<double> without = cost->without_each_block(shifted(0));
+  ASSERT_EQ(without.size(), 5u * 5);
+  for (std::size_t i = 0; i < 25; ++i) {
+    // 60 points are the least that is evidence.
+    const double expected = i == 7 ? (54 * each + 6 * worst) / 60 : i == 12 ? (52 * each + 8 * worst) / 60 : each;
+    EXPECT_NEAR(without[i], expected, 1e-5) << i;
+  }
 }
 
 TEST(ContourDistance, SaysWhatIsWrong) {

@@ -11,6 +11,7 @@ TEST(NormalisedCrossCorrelation, IsBestAtTheTruth) { intensity_behaviour::is_bes
 TEST(NormalisedCrossCorrelation, IsUnmovedByBrightness) { intensity_behaviour::is_unmoved_by_brightness(kNode); }
 TEST(NormalisedCrossCorrelation, NothingIsTheWorst) { intensity_behaviour::nothing_is_the_worst(kNode, 2); }
 TEST(NormalisedCrossCorrelation, LevelsCompareFewerPixels) { intensity_behaviour::levels_compare_fewer_pixels(kNode); }
+TEST(NormalisedCrossCorrelation, BlocksAreMasks) { intensity_behaviour::blocks_are_masks(kNode); }
 TEST(NormalisedCrossCorrelation, RefusesNonsense) { intensity_behaviour::refuses_nonsense(kNode); }
 
 }  // namespace normalised_cross_correlation_test

@@ -111,15 +111,6 @@ void check_edges(const List<View>& views, const List<EdgeMap>& edges) {
   }
 }
 
-double weighted_mean(const std::vector<double>& of_view, const std::vector<double>& weights) {
-  double sum = 0, total = 0;
-  for (std::size_t i = 0; i < of_view.size(); ++i) {
-    sum += weight_of(weights, i) * of_view[i];
-    total += weight_of(weights, i);
-  }
-  return sum / total;
-}
-
 template <class Projector>
 std::vector<OtherDrawnBy<Projector>> others_of(const Projector* own, const List<Pose>* poses,
                                                const List<Projector>* projectors, const std::string& own_port) {

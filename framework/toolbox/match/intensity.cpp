@@ -1,36 +1,63 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/match/intensity.hpp"
 
-#include <tbb/parallel_for.h>
-
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "marrow/domain/decompositions.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/image/line_integrals.hpp"
 
 namespace marrow::match {
 namespace {
 
-class IntensityCost : public Cost {
+/// The point nearest to the middle rays of all views, where the bone is. For one view: the world's origin.
+Eigen::Vector3d middle_of(const List<View>& views) {
+  Eigen::Matrix3d across = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const View& view : views) {
+    const Eigen::Vector3d axis = view.camera.camera_from_world.rotation.row(2).transpose();
+    const Eigen::Matrix3d one = Eigen::Matrix3d::Identity() - axis * axis.transpose();
+    across += one;
+    sum += one * source_position_mm(view.camera);
+  }
+  const bool are_parallel = eigen_of_symmetric(across).values[0] < 1e-3;
+  return are_parallel ? Eigen::Vector3d(0, 0, 0) : Eigen::Vector3d(solve_symmetric(across, sum));
+}
+
+/// The length at the bone of this many pixels, the mean over the views. 0 if the bone's place is not known.
+double length_at_bone_mm(const List<View>& views, double pixels) {
+  const Eigen::Vector3d middle = middle_of(views);
+  double sum = 0;
+  for (const View& view : views) {
+    if (!((view.camera.camera_from_world * middle).z() > 0)) return 0;
+    sum += pixels * pixel_size_at_mm(view.camera, middle);
+  }
+  return sum / double(views.size());
+}
+
+class IntensityCost : public ViewsCost {
  public:
   IntensityCost(const RadiographProjector& projector, const List<View>& views, const IntensityOptions& options,
                 double worst, MeasureOf measure_of)
-      : projector_(projector), views_(views), options_(options), worst_(worst), measure_of_(std::move(measure_of)) {
+      : ViewsCost(views.size(), options.weights),
+        projector_(projector),
+        views_(views),
+        options_(options),
+        worst_(worst),
+        measure_of_(std::move(measure_of)) {
+    const double sigma_mm = length_at_bone_mm(views, options.blur_px * options.pixel_step);
+    if (sigma_mm > 0) smoothed_ = projector.smoothed(sigma_mm);
     for (const View& view : views) {
       images_.push_back(image_of(view));
       measures_.push_back(measure_of_(images_.back()));
     }
   }
 
-  double value(const RigidTransform& world_from_model) const override {
-    std::vector<double> of_view(views_.size());
-    tbb::parallel_for(std::size_t(0), views_.size(),
-                      [&](std::size_t i) { of_view[i] = value_in(i, world_from_model); });
-    for (double& value : of_view)
-      if (!std::isfinite(value)) value = worst_;
-    return weighted_mean(of_view, options_.weights);
+  double value_in_view(std::size_t view, const RigidTransform& world_from_model) const override {
+    const Patch patch = patch_of(view, world_from_model);
+    return patch.rendered.empty() ? worst_ : measured(view, patch);
   }
 
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
@@ -59,19 +86,65 @@ class IntensityCost : public Cost {
     return image;
   }
 
-  double value_in(std::size_t index, const RigidTransform& world_from_model) const {
-    const Camera& camera = views_[index].camera;
-    const Patch& image = images_[index];
-    const PixelGrid region = projector_.region(camera, world_from_model);
-    if (region.count() == 0) return worst_;
-    const int step = options_.pixel_step, margin = options_.margin_px;
+  Split split(std::size_t view, const RigidTransform& world_from_model) const override {
+    const Blocks blocks = Blocks::of(views_[view].camera);
+    const Patch patch = patch_of(view, world_from_model);
+    if (patch.rendered.empty()) return {worst_, std::vector<double>(std::size_t(blocks.count()), worst_)};
+    if (const auto* whole = std::get_if<WholeMeasure>(&measures_[view])) return split_by_masks(*whole, patch, blocks);
+    const auto& measure = std::get<SumMeasure>(measures_[view]);
+    BlockSums sums(blocks);
+    Tally tally(patch, options_.pixel_step, &sums);
+    measure.add(patch, tally);
+    return {finite(measure.value(tally.sums())),
+            sums.without_each([&](const BlockSums::Sums& left) { return finite(measure.value(left)); })};
+  }
+
+  /// Leaves out the pixels of one block after the other.
+  Split split_by_masks(const WholeMeasure& measure, Patch patch, const Blocks& blocks) const {
+    Split split;
+    split.value = finite(measure(patch));
+    split.without_block.assign(std::size_t(blocks.count()), split.value);
+    const std::vector<char> counts = patch.counts;
+    const int step = options_.pixel_step;
+    const auto side = [&](int block) { return (block * blocks.side_px + step - 1) / step; };
+    for (int row = 0; row < blocks.rows; ++row)
+      for (int column = 0; column < blocks.columns; ++column) {
+        const int left = std::max(side(column) - patch.left, 0), top = std::max(side(row) - patch.top, 0),
+                  right = std::min(side(column + 1) - patch.left, patch.columns),
+                  bottom = std::min(side(row + 1) - patch.top, patch.rows);
+        if (left >= right || top >= bottom) continue;
+        for (int y = top; y < bottom; ++y)
+          std::fill_n(patch.counts.begin() + std::ptrdiff_t(patch.at(left, y)), right - left, 0);
+        split.without_block[std::size_t(row * blocks.columns + column)] = finite(measure(patch));
+        patch.counts = counts;
+      }
+    return split;
+  }
+
+  double measured(std::size_t view, const Patch& patch) const {
+    if (const auto* whole = std::get_if<WholeMeasure>(&measures_[view])) return finite((*whole)(patch));
+    const auto& measure = std::get<SumMeasure>(measures_[view]);
+    Tally tally(patch, options_.pixel_step, nullptr);
+    measure.add(patch, tally);
+    return finite(measure.value(tally.sums()));
+  }
+  double finite(double value) const { return std::isfinite(value) ? value : worst_; }
+
+  /// The pixels of a view to compare. Empty if there are too few.
+  Patch patch_of(std::size_t view, const RigidTransform& world_from_model) const {
+    const Camera& camera = views_[view].camera;
+    const Patch& image = images_[view];
+    const RadiographProjector& projector = smoothed_ ? *smoothed_ : projector_;
+    const PixelGrid region = projector.region(camera, world_from_model);
+    if (region.count() == 0) return {};
+    const int step = options_.pixel_step, margin = std::max(options_.margin_px, options_.least_margin_steps * step);
     const int left = std::max(0, (int(region.u_px) - margin) / step),
               top = std::max(0, (int(region.v_px) - margin) / step);
     const int right = std::min(image.columns - 1, (int(region.u_px) + region.columns - 1 + margin) / step),
               bottom = std::min(image.rows - 1, (int(region.v_px) + region.rows - 1 + margin) / step);
-    if (right - left < 3 || bottom - top < 3) return worst_;
+    if (right - left < 3 || bottom - top < 3) return {};
     Patch patch{right - left + 1, bottom - top + 1, left, top, {}, {}, {}};
-    patch.rendered = projector_.radiograph(
+    patch.rendered = projector.radiograph(
         camera, world_from_model,
         PixelGrid{double(left) * step, double(top) * step, double(step), patch.columns, patch.rows});
     patch.seen.resize(patch.rendered.size());
@@ -81,10 +154,11 @@ class IntensityCost : public Cost {
       std::copy_n(image.seen.begin() + from, patch.columns, patch.seen.begin() + to);
       std::copy_n(image.counts.begin() + from, patch.columns, patch.counts.begin() + to);
     }
-    return measures_[index](patch);
+    return patch;
   }
 
   const RadiographProjector& projector_;
+  std::shared_ptr<const RadiographProjector> smoothed_;  ///< as much as the image; null if projector_ cannot
   const List<View> views_;
   const IntensityOptions options_;
   const double worst_;
@@ -103,14 +177,6 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
   check_weights(options.weights, views.size());
   const List<View> own = without_shadows(views, shadows_of(&projector, others, other_projectors, other_outlines));
   return std::make_shared<IntensityCost>(projector, own, options, worst, std::move(measure_of));
-}
-
-std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
-                                           const List<OutlineProjector>* other_outlines,
-                                           const IntensityOptions& options, double worst, Measure measure) {
-  return intensity_cost(projector, views, others, other_projectors, other_outlines, options, worst,
-                        [measure = std::move(measure)](const Patch&) { return measure; });
 }
 
 Gradients gradients_of(const Patch& patch) {

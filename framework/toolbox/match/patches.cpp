@@ -29,9 +29,8 @@ Correlation correlation_in(const Patch& patch, const std::vector<float>& a, cons
 
 }  // namespace
 
-double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                              const std::vector<char>& counts, int side) {
-  double sum = 0, weights = 0;
+void add_patch_correlations(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                            const std::vector<char>& counts, int side, Tally& tally) {
   const int step = std::max(1, side / 2);
   // The squares have fixed positions in the image. If they moved along with the compared region, each pixel of its
   // motion would change all squares, and the cost would be rough.
@@ -39,10 +38,12 @@ double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, c
   for (int top = first(patch.top); top + side <= patch.rows; top += step)
     for (int left = first(patch.left); left + side <= patch.columns; left += step) {
       const Correlation one = correlation_in(patch, a, b, counts, left, top, side);
-      weights += one.weight;
-      sum += one.weight * one.value;
+      tally.add(left + 0.5 * side, top + 0.5 * side, one.weight * one.value, one.weight);
     }
-  return weights > 0 ? sum / weights : -1;
+}
+
+double value_of_patch_correlations(const BlockSums::Sums& sums) {
+  return sums.weights > 0 ? 1 - sums.values / sums.weights : 2;
 }
 
 }  // namespace marrow::match

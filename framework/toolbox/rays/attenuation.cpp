@@ -36,7 +36,72 @@ void find_box(Attenuation& attenuation) {
   attenuation.last = last;
 }
 
+/// Weights of a sampled Gaussian from -reach to reach. Their sum is 1.
+std::vector<float> gaussian(double sigma, int reach) {
+  std::vector<float> weights;
+  double sum = 0;
+  for (int i = -reach; i <= reach; ++i) sum += std::exp(-0.5 * i * i / (sigma * sigma));
+  for (int i = -reach; i <= reach; ++i) weights.push_back(float(std::exp(-0.5 * i * i / (sigma * sigma)) / sum));
+  return weights;
+}
+
+/// The part of the volume that attenuates, with a border of `reach` voxels.
+std::vector<float> padded(const Attenuation& attenuation, const std::array<int, 3>& reach,
+                          const std::array<int, 3>& size) {
+  std::vector<float> values(std::size_t(size[0]) * std::size_t(size[1]) * std::size_t(size[2]), 0.0f);
+  const auto& [first, last] = std::pair(attenuation.first, attenuation.last);
+  for (int z = first[2]; z <= last[2]; ++z)
+    for (int y = first[1]; y <= last[1]; ++y) {
+      const std::int16_t* from = attenuation.thousandths.data() + attenuation.grid.offset(first[0], y, z);
+      const int row = (z - first[2] + reach[2]) * size[1] + y - first[1] + reach[1];
+      std::copy_n(from, last[0] - first[0] + 1, values.begin() + std::ptrdiff_t(row) * size[0] + reach[0]);
+    }
+  return values;
+}
+
+/// Smooths along one axis. Values beyond the ends are 0.
+void smooth(std::vector<float>& values, const std::array<int, 3>& size, std::size_t axis,
+            const std::vector<float>& weights) {
+  const std::array<std::ptrdiff_t, 3> strides{1, size[0], std::ptrdiff_t(size[0]) * size[1]};
+  const std::size_t a = axis == 0 ? 1 : 0, b = axis == 2 ? 1 : 2;
+  const int reach = int(weights.size()) / 2, length = size[axis];
+  tbb::parallel_for(0, size[b], [&](int j) {
+    std::vector<float> line(std::size_t(length) + 2 * std::size_t(reach), 0.0f);
+    for (int i = 0; i < size[a]; ++i) {
+      float* at = values.data() + i * strides[a] + j * strides[b];
+      for (int k = 0; k < length; ++k) line[std::size_t(k + reach)] = at[k * strides[axis]];
+      for (int k = 0; k < length; ++k) {
+        float sum = 0;
+        for (std::size_t w = 0; w < weights.size(); ++w) sum += weights[w] * line[std::size_t(k) + w];
+        at[k * strides[axis]] = sum;
+      }
+    }
+  });
+}
+
 }  // namespace
+
+Attenuation smoothed(const Attenuation& attenuation, double sigma_mm) {
+  if (attenuation.is_empty() || !(sigma_mm > 0)) return attenuation;
+  Attenuation result;
+  result.grid = attenuation.grid;
+  std::array<int, 3> reach;
+  Eigen::Vector3d first;
+  for (std::size_t k = 0; k < 3; ++k) {
+    reach[k] = int(std::ceil(3 * sigma_mm / attenuation.grid.spacing_mm[int(k)]));
+    result.grid.size[k] = attenuation.last[k] - attenuation.first[k] + 1 + 2 * reach[k];
+    first[int(k)] = attenuation.first[k] - reach[k];
+  }
+  result.grid.origin_mm = attenuation.grid.point_from_index(first);
+  std::vector<float> values = padded(attenuation, reach, result.grid.size);
+  for (std::size_t k = 0; k < 3; ++k)
+    smooth(values, result.grid.size, k, gaussian(sigma_mm / attenuation.grid.spacing_mm[int(k)], reach[k]));
+  result.thousandths.resize(values.size());
+  std::transform(values.begin(), values.end(), result.thousandths.begin(),
+                 [](float value) { return std::int16_t(std::lround(value)); });
+  find_box(result);
+  return result;
+}
 
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options) {
   check_volume(volume, "the volume to project");

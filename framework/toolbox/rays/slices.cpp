@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "resample_row.hpp"
@@ -23,13 +24,25 @@ struct Sheared {
   int columns = 0, rows = 0;
   std::vector<float> sums;
 
-  /// Bilinear interpolation. 0 outside the grid: the grid is one step larger than needed on each side.
+  /// Cubic convolution (Keys, IEEE Trans Acoust Speech Signal Process 1981). Bilinear values would be smoother half-way
+  /// between the grid's points than on them, and a cost that compares them would be rough. 0 near the border: the grid
+  /// is two steps larger than needed on each side.
   float at(double column, double row) const {
-    if (!(column >= 0 && row >= 0 && column < columns - 1 && row < rows - 1)) return 0;
+    if (!(column >= 1 && row >= 1 && column < columns - 2 && row < rows - 2)) return 0;
     const int c = int(column), r = int(row);
-    const float x = float(column - c), y = float(row - r);
-    const float *a = sums.data() + std::size_t(r) * std::size_t(columns) + std::size_t(c), *b = a + columns;
-    return (1 - y) * ((1 - x) * a[0] + x * a[1]) + y * ((1 - x) * b[0] + x * b[1]);
+    const std::array<float, 4> across = cubic(float(column - c)), down = cubic(float(row - r));
+    const float* at = sums.data() + std::size_t(r - 1) * std::size_t(columns) + std::size_t(c - 1);
+    float sum = 0;
+    for (std::size_t k = 0; k < 4; ++k, at += columns)
+      sum += down[k] * (across[0] * at[0] + across[1] * at[1] + across[2] * at[2] + across[3] * at[3]);
+    return std::max(sum, 0.0f);
+  }
+
+ private:
+  /// The weights of the four points around a position, which lies x after the second.
+  static std::array<float, 4> cubic(float x) {
+    const float y = 1 - x;
+    return {-0.5f * x * y * y, 1 + x * x * (1.5f * x - 2.5f), 1 + y * y * (1.5f * y - 2.5f), -0.5f * y * x * x};
   }
 };
 
@@ -141,10 +154,10 @@ std::optional<Sheared> sheared_grid(const Slices::Stack& stack, const Attenuatio
       std::max(step * std::sqrt(rays.spacing_mm[stack.axes[2]] / rays.spacing_mm[stack.axes[0]]), kFinest / middle);
   image.step_q =
       std::max(step * std::sqrt(rays.spacing_mm[stack.axes[0]] / rays.spacing_mm[stack.axes[2]]), kFinest / middle);
-  image.p = std::max(p.low, volume_p.low) - image.step_p;
-  image.q = std::max(q.low, volume_q.low) - image.step_q;
-  image.columns = std::max(0, int(std::ceil((std::min(p.high, volume_p.high) - image.p) / image.step_p)) + 2);
-  image.rows = std::max(0, int(std::ceil((std::min(q.high, volume_q.high) - image.q) / image.step_q)) + 2);
+  image.p = std::max(p.low, volume_p.low) - 2 * image.step_p;
+  image.q = std::max(q.low, volume_q.low) - 2 * image.step_q;
+  image.columns = std::max(0, int(std::ceil((std::min(p.high, volume_p.high) - image.p) / image.step_p)) + 3);
+  image.rows = std::max(0, int(std::ceil((std::min(q.high, volume_q.high) - image.q) / image.step_q)) + 3);
   return image;
 }
 

@@ -158,18 +158,44 @@ Pose pose_of(const Search& search, const Pose& initial, const Cost& cost) {
   return pose;
 }
 
-Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
-                   Context& context) {
+namespace {
+
+/// Goes to the best of the minima along the least certain direction, and predicts the covariance there.
+PredictedCovariance settle(Search& search, const FragmentFrame& frame, const Cost& cost, const Steps& steps,
+                           int& evaluations) {
+  constexpr int kRounds = 3;
+  for (int round = 1;; ++round) {
+    const RigidTransform here = search.pose();
+    PredictedCovariance predicted(cost, here, frame);
+    evaluations += predicted.evaluations();
+    RigidTransform best = here;
+    double least = predicted.value();
+    for (const RigidTransform& other : predicted.other_minima()) {
+      if (round == kRounds) break;
+      search.go_to(other);
+      const double value = search.refine(cost, kAllAxes, steps, 1, 0);
+      if (value >= least) continue;
+      least = value;
+      best = search.pose();
+    }
+    search.go_to(best);
+    if (least >= predicted.value()) return predicted;
+  }
+}
+
+}  // namespace
+
+Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
+                   const SearchOptions& options, Context& context) {
+  int evaluations = 0;
+  const PredictedCovariance predicted = settle(search, initial.frame, cost, steps, evaluations);
   Pose pose = pose_of(search, initial, cost);
   pose.convergence = search.convergence(cost);
-  if (const auto factor = cost.likelihood_factor(search.pose())) {
-    const PredictedCovariance predicted(cost, search.pose(), initial.frame, *factor);
-    pose.covariance = predicted.covariance();
-    pose.evaluations += predicted.evaluations();
-    for (const std::string& warning : predicted.warnings(options.warn_above_deg, options.warn_above_mm)) {
-      context.warn(warning);
-      pose.warnings.push_back(warning);
-    }
+  pose.covariance = predicted.covariance();
+  pose.evaluations += evaluations;
+  for (const std::string& warning : predicted.warnings(options.warn_above_deg, options.warn_above_mm)) {
+    context.warn(warning);
+    pose.warnings.push_back(warning);
   }
   return pose;
 }

@@ -56,6 +56,9 @@ class RadiographProjector {
                                         const std::vector<Eigen::Vector2f>& pixels) const = 0;
   /// A region of whole pixels, cut to the image, outside of which radiograph() is 0. Empty if the model is out of view.
   virtual PixelGrid region(const Camera& camera, const RigidTransform& world_from_model) const = 0;
+  /// A projector of the same model, smoothed by a Gaussian of this standard deviation: for radiographs that are
+  /// compared with a smoothed image, or computed at few pixels. Null if the projector has none, which is the default.
+  virtual std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const;
 };
 
 /// The resolution of a cost. For outlines: the spacing of their points (the chapter's contour sub-sampling) and the
@@ -89,9 +92,15 @@ class Cost {
   /// `frame` as defined at Pose. The call takes about as long as one value(). Absent if the cost has no derivatives,
   /// which is the default.
   virtual std::optional<Expansion> expansion(const RigidTransform& world_from_model, const FragmentFrame& frame) const;
-  /// The factor that makes value() a negative log-likelihood near this pose. The inverse of (factor * Hessian) then
-  /// predicts the covariance of the minimum. Absent if the cost has no noise model.
-  virtual std::optional<double> likelihood_factor(const RigidTransform& world_from_model) const;
+  /// The cost at a pose with each block of the images left out in turn. Blocks are squares of the views' images. They
+  /// are the same at every pose and always in the same order; a block that does not matter gives value(). How the
+  /// minimum moves without each block shows how uncertain it is (delete-a-group jackknife: Shao and Tu, The Jackknife
+  /// and Bootstrap, 1995). Empty if the cost cannot tell, which is the default.
+  virtual std::vector<double> without_each_block(const RigidTransform& world_from_model) const;
+  /// The number of views that the cost compares; 0, the default, if it cannot be split into views.
+  virtual std::size_t view_count() const;
+  /// The cost of a pose in one view alone, with view < view_count(). It has the range of value().
+  virtual double value_in_view(std::size_t view, const RigidTransform& world_from_model) const;
 };
 
 /// A function R^n -> R to minimise. It knows nothing about poses.

@@ -18,8 +18,7 @@ void check_weights(const std::vector<double>& weights, std::size_t views);
 /// and has the camera's size.
 void check_edges(const List<View>& views, const List<EdgeMap>& edges);
 
-/// The weighted mean over the views. Without weights all views count equally.
-double weighted_mean(const std::vector<double>& of_view, const std::vector<double>& weights);
+/// The weight of a view. Without weights all views count equally.
 inline double weight_of(const std::vector<double>& weights, std::size_t view) {
   return weights.empty() ? 1 : weights[view];
 }

@@ -4,10 +4,11 @@
 #include <functional>
 #include <memory>
 #include <type_traits>
+#include <variant>
 #include <vector>
 
 #include "marrow/plugin.hpp"
-#include "marrow/toolbox/match/inputs.hpp"
+#include "marrow/toolbox/match/views_cost.hpp"
 
 namespace marrow::match {
 
@@ -22,9 +23,35 @@ struct Patch {
   std::size_t at(int column, int row) const { return std::size_t(row) * std::size_t(columns) + std::size_t(column); }
 };
 
-/// How badly both agree; smaller is better. Must return its worst value if there is nothing to compare. Must be safe to
-/// call from several threads at once.
-using Measure = std::function<double(const Patch&)>;
+/// Adds up what each place of a patch contributes to a measure.
+class Tally {
+ public:
+  /// `blocks` also gets the sums of each block of the image, whose pixels are `step_px` times those compared. It may be
+  /// null.
+  Tally(const Patch& patch, double step_px, BlockSums* blocks) : patch_(patch), step_px_(step_px), blocks_(blocks) {}
+  void add(double column, double row, double value, double weight) {
+    sums_.values += value;
+    sums_.weights += weight;
+    if (blocks_) blocks_->add((patch_.left + column) * step_px_, (patch_.top + row) * step_px_, value, weight);
+  }
+  const BlockSums::Sums& sums() const { return sums_; }
+
+ private:
+  const Patch& patch_;
+  const double step_px_;
+  BlockSums* blocks_;
+  BlockSums::Sums sums_;
+};
+
+/// How badly radiograph and image agree; smaller is better. Must give its worst value if there is nothing to compare.
+/// Must be safe to call from several threads at once.
+using WholeMeasure = std::function<double(const Patch&)>;
+/// The same for a measure that follows from sums over places.
+struct SumMeasure {
+  std::function<void(const Patch&, Tally&)> add;
+  std::function<double(const BlockSums::Sums&)> value;
+};
+using Measure = std::variant<WholeMeasure, SumMeasure>;
 /// Makes the measure for one image at one level. `whole` is the whole image, without `rendered`.
 using MeasureOf = std::function<Measure(const Patch& whole)>;
 
@@ -34,6 +61,7 @@ struct IntensityOptions {
   int margin_px = 16;
   double blur_px = 0.5;
   std::vector<double> weights;
+  int least_margin_steps = 0;  ///< no option: the least margin that the measure needs, in compared pixels
 };
 
 /// A cost that is the weighted mean of a measure over the views. In each view only the region that may show the model
@@ -45,26 +73,26 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
                                            const List<Pose>* others, const List<RadiographProjector>* other_projectors,
                                            const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
-/// The same for a measure that does not need the whole image.
-std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector, const List<View>& views,
-                                           const List<Pose>* others, const List<RadiographProjector>* other_projectors,
-                                           const List<OutlineProjector>* other_outlines,
-                                           const IntensityOptions& options, double worst, Measure measure);
-
 /// The function of a node. Its cost is the mean of kMeasure over the views. kMeasure either takes a patch and returns
-/// the measure's value, or takes a whole image and returns a Measure. In both cases it may take the options as a second
-/// argument. A view that does not show the model counts as kWorst.
+/// the measure's value, or takes a whole image and returns a SumMeasure. In both cases it may take the options as a
+/// second argument. A view that does not show the model counts as kWorst.
 template <auto kMeasure, class Options = IntensityOptions, int kWorst = 2>
 std::shared_ptr<const Cost> intensity_node(const RadiographProjector& projector, const List<View>& views,
                                            const List<Pose>* others, const List<RadiographProjector>* other_projectors,
                                            const List<OutlineProjector>* other_outlines, const Options& options) {
-  const auto measure = [options](const Patch& patch) {
+  IntensityOptions own = options;
+  if constexpr (requires { options.patch_pixels; }) own.least_margin_steps = options.patch_pixels;
+  const auto called = [options](const Patch& patch) {
     if constexpr (std::is_invocable_v<decltype(kMeasure), const Patch&, const Options&>)
       return kMeasure(patch, options);
     else
       return kMeasure(patch);
   };
-  return intensity_cost(projector, views, others, other_projectors, other_outlines, options, kWorst, measure);
+  if constexpr (std::is_same_v<decltype(called(Patch())), double>)
+    return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst,
+                          [called](const Patch&) -> Measure { return called; });
+  else
+    return intensity_cost(projector, views, others, other_projectors, other_outlines, own, kWorst, called);
 }
 
 /// Gradients per pixel by Sobel's operator divided by 8; 0 at the border. A gradient counts if all nine pixels do.

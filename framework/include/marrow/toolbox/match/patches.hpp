@@ -6,16 +6,20 @@
 
 namespace marrow::match {
 
+/// The margin around the model is a square at least. Otherwise a square that shows its border would be left out or not,
+/// as the compared region moves from pixel to pixel, and the cost would jump.
 struct PatchOptions : IntensityOptions {
   int patch_pixels = 13;
 };
 
-/// Mean correlation of `a` (radiograph) and `b` (image) within squares of `side` pixels, half a square apart. Each
-/// square is weighted by the variance of `a` in it, so the image does not matter where the model shows nothing. A
-/// square in which the image is constant counts as 0. -1 if no square counts. Variance-weighted local correlation:
+/// Adds the correlations of `a` (radiograph) and `b` (image) within squares of `side` pixels, half a square apart, at
+/// the squares' middles. Each square is weighted by the variance of `a` in it, so the image does not matter where the
+/// model shows nothing. A square in which the image is constant counts as 0. Variance-weighted local correlation:
 /// LaRose (PhD thesis, Carnegie Mellon University 2001); Knaan and Joskowicz (MICCAI 2003).
-double mean_patch_correlation(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
-                              const std::vector<char>& counts, int side);
+void add_patch_correlations(const Patch& patch, const std::vector<float>& a, const std::vector<float>& b,
+                            const std::vector<char>& counts, int side, Tally& tally);
+/// 1 - the weighted mean of the correlations; 2 if no square counts.
+double value_of_patch_correlations(const BlockSums::Sums& sums);
 
 /// Declares inputs, output and options of the nodes that use patches.
 template <class Node>

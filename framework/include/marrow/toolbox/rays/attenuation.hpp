@@ -31,6 +31,9 @@ struct Attenuation {
 /// and volume differ.
 Attenuation attenuation_of(const Volume& volume, const SignedField* field, const AttenuationOptions& options);
 
+/// The same attenuation smoothed by a Gaussian, on a grid that holds all voxels that then attenuate.
+Attenuation smoothed(const Attenuation& attenuation, double sigma_mm);
+
 /// Declares the inputs, the output and the options that all projectors of radiographs share.
 template <class Options, class Node>
 Node& declare(Node&& node) {

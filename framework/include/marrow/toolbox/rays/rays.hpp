@@ -38,8 +38,13 @@ class RayProjector : public RadiographProjector {
   std::vector<float> radiograph(const Camera&, const RigidTransform& world_from_model,
                                 const std::vector<Eigen::Vector2f>& pixels) const override;
   PixelGrid region(const Camera&, const RigidTransform& world_from_model) const override;
+  std::shared_ptr<const RadiographProjector> smoothed(double sigma_mm) const override {
+    return of(rays::smoothed(attenuation_, sigma_mm));
+  }
 
  protected:
+  /// A projector of the same kind for another model; null, the default, if there is none.
+  virtual std::shared_ptr<const RadiographProjector> of(Attenuation) const { return nullptr; }
   /// The line integral along a ray, in mm of water. Source and direction are in fractional voxel indices. Must be safe
   /// to call from several threads at once.
   virtual float integral(const Eigen::Vector3d& source, const Eigen::Vector3d& direction) const = 0;

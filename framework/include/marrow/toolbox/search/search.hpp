@@ -76,6 +76,7 @@ class Search {
   /// and returns its cost. For the progress: `done` is the part of the whole search before this call, `share` that of
   /// this call. Throws when the context is cancelled.
   double refine(const Cost& cost, const std::vector<int>& axes, const Steps& steps, double done, double share);
+  Steps steps_of(std::size_t level) const;
 
  private:
   /// Evaluates poses around the current one and returns the best. None of them is a neighbour of a better one, because
@@ -88,7 +89,6 @@ class Search {
   Found best_of(const std::vector<RigidTransform>& candidates, const Levels& levels);
 
   void note(int evaluations, const RigidTransform& pose);
-  Steps steps_of(std::size_t level) const;
 
   const Optimizer& optimizer_;
   const FragmentFrame& frame_;
@@ -101,10 +101,12 @@ class Search {
 
 /// The search's pose with its cost and number of evaluations, without covariance. The rest is that of `initial`.
 Pose pose_of(const Search& search, const Pose& initial, const Cost& cost);
-/// The same with the convergence. If the cost has a noise model, also with the predicted covariance and with warnings
-/// about axes that the images hardly determine.
-Pose final_pose_of(const Search& search, const Pose& initial, const Cost& cost, const SearchOptions& options,
-                   Context& context);
+/// The same at the end of a search, with the convergence. If the cost can leave out blocks, also with the predicted
+/// covariance and with warnings about axes that the images hardly determine. Along the direction that they determine
+/// least, the cost may have several minima, and the start decides in which the search ends. So the others are refined
+/// with `steps`, and the search goes to the best of them.
+Pose final_pose_of(Search& search, const Pose& initial, const Cost& cost, const Steps& steps,
+                   const SearchOptions& options, Context& context);
 
 inline const std::vector<int> kAllAxes{0, 1, 2, 3, 4, 5};
 

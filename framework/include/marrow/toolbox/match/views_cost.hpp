@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The common part of costs that are a weighted mean over views.
+#include <algorithm>
+#include <vector>
+
+#include "marrow/toolbox/match/inputs.hpp"
+
+namespace marrow::match {
+
+/// The squares of an image that are left out one at a time to find how uncertain a minimum is. Errors of neighbouring
+/// pixels are alike; errors of different squares are taken as independent.
+struct Blocks {
+  int side_px = 1, columns = 1, rows = 1;
+
+  /// Blocks of at least 48 px, and about 8 along the longer side of the image.
+  static Blocks of(const Camera& camera);
+  int count() const { return columns * rows; }
+  /// The block of a pixel. Positions outside the image belong to the nearest block.
+  int at(double u_px, double v_px) const {
+    return std::clamp(int(v_px / side_px), 0, rows - 1) * columns + std::clamp(int(u_px / side_px), 0, columns - 1);
+  }
+};
+
+/// A sum of values and a sum of their weights, over a whole image and over each of its blocks.
+class BlockSums {
+ public:
+  struct Sums {
+    double values = 0, weights = 0;
+  };
+  explicit BlockSums(const Blocks& blocks) : blocks_(blocks), of_block_(std::size_t(blocks.count())) {}
+
+  void add(double u_px, double v_px, double value, double weight) {
+    all_.values += value;
+    all_.weights += weight;
+    Sums& block = of_block_[std::size_t(blocks_.at(u_px, v_px))];
+    block.values += value;
+    block.weights += weight;
+  }
+  const Sums& all() const { return all_; }
+  /// value_of(sums) for the sums without each block in turn.
+  template <class ValueOf>
+  std::vector<double> without_each(const ValueOf& value_of) const {
+    std::vector<double> values;
+    for (const Sums& block : of_block_)
+      values.push_back(value_of(Sums{all_.values - block.values, all_.weights - block.weights}));
+    return values;
+  }
+
+ private:
+  Blocks blocks_;
+  Sums all_;
+  std::vector<Sums> of_block_;
+};
+
+/// A cost that is the weighted mean over views of a cost in each view.
+class ViewsCost : public Cost {
+ public:
+  /// `weights` are as check_weights() wants them.
+  ViewsCost(std::size_t views, const std::vector<double>& weights);
+
+  double value(const RigidTransform& world_from_model) const override;
+  std::vector<double> without_each_block(const RigidTransform& world_from_model) const override;
+  std::size_t view_count() const override { return weights_.size(); }
+
+ protected:
+  /// The cost in a view, and the same without each block of the view in turn.
+  struct Split {
+    double value = 0;
+    std::vector<double> without_block;
+  };
+  virtual Split split(std::size_t view, const RigidTransform& world_from_model) const = 0;
+  /// The same for all views, and the values alone. A cost whose views depend on each other overrides both.
+  virtual std::vector<Split> splits(const RigidTransform& world_from_model) const;
+  virtual std::vector<double> values_of_views(const RigidTransform& world_from_model) const;
+  /// The weighted mean of a value for each view.
+  double mean_of(const std::vector<double>& of_view) const;
+
+ private:
+  std::vector<double> weights_;
+};
+
+}  // namespace marrow::match

@@ -1,0 +1,61 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/match/views_cost.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <numeric>
+
+namespace marrow::match {
+
+Blocks Blocks::of(const Camera& camera) {
+  constexpr int kLeastSide_px = 48, kAlongLongerSide = 8;
+  Blocks blocks;
+  blocks.side_px = std::max(kLeastSide_px, std::max(camera.width_px, camera.height_px) / kAlongLongerSide);
+  blocks.columns = std::max(1, (camera.width_px + blocks.side_px - 1) / blocks.side_px);
+  blocks.rows = std::max(1, (camera.height_px + blocks.side_px - 1) / blocks.side_px);
+  return blocks;
+}
+
+ViewsCost::ViewsCost(std::size_t views, const std::vector<double>& weights) {
+  for (std::size_t i = 0; i < views; ++i) weights_.push_back(weight_of(weights, i));
+}
+
+double ViewsCost::value(const RigidTransform& world_from_model) const {
+  return mean_of(values_of_views(world_from_model));
+}
+
+double ViewsCost::mean_of(const std::vector<double>& of_view) const {
+  double sum = 0, total = 0;
+  for (std::size_t i = 0; i < of_view.size(); ++i) {
+    sum += weights_[i] * of_view[i];
+    total += weights_[i];
+  }
+  return sum / total;
+}
+
+std::vector<double> ViewsCost::without_each_block(const RigidTransform& world_from_model) const {
+  const std::vector<Split> views = splits(world_from_model);
+  const double total = std::accumulate(weights_.begin(), weights_.end(), 0.0);
+  double all = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) all += weights_[i] / total * views[i].value;
+  std::vector<double> values;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    for (const double without : views[i].without_block)
+      values.push_back(all + weights_[i] / total * (without - views[i].value));
+  return values;
+}
+
+std::vector<ViewsCost::Split> ViewsCost::splits(const RigidTransform& world_from_model) const {
+  std::vector<Split> views(weights_.size());
+  tbb::parallel_for(std::size_t(0), views.size(), [&](std::size_t i) { views[i] = split(i, world_from_model); });
+  return views;
+}
+
+std::vector<double> ViewsCost::values_of_views(const RigidTransform& world_from_model) const {
+  std::vector<double> of_view(weights_.size());
+  tbb::parallel_for(std::size_t(0), of_view.size(),
+                    [&](std::size_t i) { of_view[i] = value_in_view(i, world_from_model); });
+  return of_view;
+}
+
+}  // namespace marrow::match

@@ -1,0 +1,228 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "predicted_covariance.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+
+#include "marrow/domain/decompositions.hpp"
+
+namespace marrow::search {
+namespace {
+
+constexpr double kMostStep = 16, kLeastStep = 1.0 / 256;          // degrees or mm
+constexpr double kLeastRise = 0.5, kGoodRise = 1, kMostRise = 3;  // in units of the wanted rise
+constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
+constexpr double kWantedRise = 10;  // of the cost by a step, in units of its noise
+constexpr int kMostRounds = 5;
+
+std::string number(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+/// The standard deviation of the cost's value by the jackknife.
+double deviation_of(double value, const std::vector<double>& without_block) {
+  double squares = 0;
+  for (const double without : without_block) squares += (without - value) * (without - value);
+  return std::sqrt(squares);
+}
+
+}  // namespace
+
+RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& frame, const Vector6d& deg_and_mm) {
+  Vector6d motion = deg_and_mm;
+  motion.head<3>() *= radians(1);
+  return moved(pose, frame, motion);
+}
+
+PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame)
+    : cost_(cost), pose_(pose), frame_(frame) {
+  value_ = cost.value(pose);
+  const std::vector<double> without_block = cost.without_each_block(pose);
+  if (without_block.empty()) return;
+  evaluations_ += 2;
+  wanted_rise_ = deviation_of(value_, without_block);
+  for (int round = 1;; ++round) {
+    choose_steps();
+    const Matrix6d h = hessian();
+    invert(h, scatter(), round == 1 ? kFlat : kFlatLater);
+    const double wanted_before = wanted_rise_;
+    wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
+    if (round == kMostRounds || (round > 1 && wanted_rise_ > 0.5 * wanted_before)) break;
+    turn_steps(h);
+  }
+  widen();
+}
+
+std::vector<std::string> PredictedCovariance::warnings(double most_deg, double most_mm) const {
+  static const std::array<const char*, 6> kAxes = {
+      "rotation about the frontal axis",    "rotation about the lateral axis",    "axial rotation",
+      "translation along the frontal axis", "translation along the lateral axis", "axial translation"};
+  std::vector<std::string> warnings;
+  for (int axis = 0; axis < 6 && covariance_; ++axis) {
+    const bool turn = axis < 3;
+    const double sd = std::sqrt((*covariance_)(axis, axis)), shown = turn ? degrees(sd) : sd;
+    if (shown <= (turn ? most_deg : most_mm)) continue;
+    if (undetermined_[std::size_t(axis)])
+      warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
+                         " is not determined by these images: the cost hardly changes within " + number(kMostStep) +
+                         (turn ? " degrees" : " mm"));
+    else
+      warnings.push_back(std::string(kAxes[std::size_t(axis)]) +
+                         " is poorly determined by these images: its predicted standard deviation is " + number(shown) +
+                         (turn ? " degrees" : " mm"));
+  }
+  return warnings;
+}
+
+void PredictedCovariance::choose_steps() {
+  std::array<int, 6> evaluations{};
+  tbb::parallel_for(0, 6, [&](int i) {
+    if (open_[std::size_t(i)]) return;
+    Vector6d step = steps_.col(i);
+    const auto rise = [&] {
+      evaluations[std::size_t(i)] += 2;
+      return 0.5 * (cost_.value(pose_at(step)) + cost_.value(pose_at(-step))) - value_;
+    };
+    double height = rise();
+    for (; height > kMostRise * wanted_rise_ && step.cwiseAbs().maxCoeff() > kLeastStep; height = rise()) step *= 0.5;
+    for (; height < kGoodRise * wanted_rise_ && step.cwiseAbs().maxCoeff() < kMostStep; height = rise()) step *= 2;
+    steps_.col(i) = step;
+    rises_[i] = height;
+    open_[std::size_t(i)] = height <= kLeastRise * wanted_rise_;
+  });
+  for (const int count : evaluations) evaluations_ += count;
+}
+
+/// The Hessian in units of the steps. A mixed second derivative is the mean rise along the diagonal of two axes, in
+/// both senses, minus the rises along the two axes.
+Matrix6d PredictedCovariance::hessian() {
+  std::vector<RigidTransform> poses;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < i; ++j)
+      for (const double sense : {1.0, -1.0}) poses.push_back(pose_at(sense * (steps_.col(i) + steps_.col(j))));
+  const std::vector<double> values = cost_.values(poses);
+  evaluations_ += int(values.size());
+  Matrix6d h;
+  auto value = values.begin();
+  for (int i = 0; i < 6; ++i) {
+    h(i, i) = 2 * rises_[i];
+    for (int j = 0; j < i; ++j, value += 2)
+      h(i, j) = h(j, i) = 0.5 * (value[0] + value[1]) - value_ - rises_[i] - rises_[j];
+  }
+  for (int i = 0; i < 6; ++i)
+    if (open_[std::size_t(i)]) h.row(i).setZero(), h.col(i).setZero();
+  return h;
+}
+
+/// The sum over the blocks of g g^T, in units of the steps.
+Matrix6d PredictedCovariance::scatter() {
+  std::array<std::vector<double>, 12> without;
+  std::array<double, 12> values{};
+  tbb::parallel_for(0, 12, [&](int i) {
+    const RigidTransform pose = pose_at((i % 2 ? -1 : 1) * steps_.col(i / 2));
+    values[std::size_t(i)] = cost_.value(pose);
+    without[std::size_t(i)] = cost_.without_each_block(pose);
+  });
+  evaluations_ += 24;
+  Matrix6d sum = Matrix6d::Zero();
+  for (std::size_t block = 0; block < without[0].size(); ++block) {
+    Vector6d gradient;
+    for (std::size_t axis = 0; axis < 6; ++axis)
+      gradient[int(axis)] = 0.5 * ((without[2 * axis][block] - values[2 * axis]) -
+                                   (without[2 * axis + 1][block] - values[2 * axis + 1]));
+    sum += gradient * gradient.transpose();
+  }
+  return sum;
+}
+
+/// The next steps go along the eigenvectors of the Hessian, which keep the directions that are open.
+void PredictedCovariance::turn_steps(const Matrix6d& hessian) {
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(hessian);
+  const std::array<bool, 6> were_open = open_;
+  Vector6d length;
+  for (int i = 0; i < 6; ++i) {
+    length[i] = std::sqrt(2 * wanted_rise_ / std::max(eigen.values[i], kFlat * wanted_rise_));
+    double share = 0;
+    for (int k = 0; k < 6; ++k) share += were_open[std::size_t(k)] ? eigen.vectors(k, i) * eigen.vectors(k, i) : 0;
+    open_[std::size_t(i)] = share > 0.5;
+  }
+  steps_ = (steps_ * eigen.vectors * length.asDiagonal()).eval();
+  for (int i = 0; i < 6; ++i)
+    steps_.col(i) *= std::clamp(steps_.col(i).cwiseAbs().maxCoeff(), kLeastStep, kMostStep) /
+                     steps_.col(i).cwiseAbs().maxCoeff();
+}
+
+/// After the first round the steps are nearly eigenvectors, so a smaller curvature than `flat` is roughness. Also sets the noise to the mean rise of the cost that the covariance stands for.
+void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatter, double flat) {
+  constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
+  Matrix6d open = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    if (open_[std::size_t(i)]) open(i, i) = kMostVariance;
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(hessian);
+  Matrix6d inverse = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    inverse += eigen.vectors.col(i) * eigen.vectors.col(i).transpose() / std::max(eigen.values[i], flat * wanted_rise_);
+  for (int i = 0; i < 6; ++i)
+    if (open_[std::size_t(i)]) inverse.row(i).setZero(), inverse.col(i).setZero();
+  noise_ = (inverse * scatter).trace() / 6;
+  in_units_ = steps_ * inverse * scatter * inverse * steps_.transpose();
+  const Matrix6d undetermined = steps_ * open * steps_.transpose();
+  Vector6d unit = Vector6d::Ones();
+  unit.head<3>() *= radians(1);
+  covariance_ = unit.asDiagonal() * (in_units_ + undetermined) * unit.asDiagonal();
+  for (int axis = 0; axis < 6; ++axis)
+    undetermined_[std::size_t(axis)] = undetermined(axis, axis) > in_units_(axis, axis);
+}
+
+/// The density exp(-cost / noise) along the eigenvector of the largest eigenvalue, out to twelve standard deviations.
+void PredictedCovariance::widen() {
+  constexpr int kSide = 24;
+  constexpr double kReach = 12;
+  constexpr double kLeastRatio = 2;  // of the variances; less is the roughness of the cost
+  const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
+  const double variance = eigen.values[5];
+  if (!(variance > 0) || !(noise_ > 0)) return;
+  const double step = std::min(kReach * std::sqrt(variance), kMostStep) / kSide;
+  std::vector<RigidTransform> poses;
+  for (int i = -kSide; i <= kSide; ++i) poses.push_back(pose_at(i * step * eigen.vectors.col(5)));
+  const std::vector<double> values = cost_.values(poses);
+  evaluations_ += int(values.size());
+  find_other_minima(poses, values);
+  double sum = 0, squares = 0;
+  for (int i = -kSide; i <= kSide; ++i) {
+    const double density = std::exp(-std::max(0.0, values[std::size_t(i + kSide)] - value_) / noise_);
+    sum += density;
+    squares += density * (i * step) * (i * step);
+  }
+  if (squares / sum < kLeastRatio * variance) return;
+  Vector6d unit = eigen.vectors.col(5);
+  unit.head<3>() *= radians(1);
+  *covariance_ += (squares / sum - variance) * unit * unit.transpose();
+}
+
+/// `poses` lie on a line through the pose, which is in the middle, half a standard deviation or less apart.
+void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
+                                            const std::vector<double>& values) {
+  constexpr std::size_t kMost = 2;
+  constexpr int kNear = 2;           // poses at both sides that belong to the pose's own minimum
+  constexpr double kMostRise = 10;   // in units of the cost's noise
+  const int count = int(values.size()), middle = count / 2;
+  std::vector<int> found;
+  for (int i = 1; i + 1 < count; ++i) {
+    const double here = values[std::size_t(i)];
+    if (std::abs(i - middle) > kNear && here < values[std::size_t(i - 1)] && here <= values[std::size_t(i + 1)] &&
+        here < value_ + kMostRise * noise_)
+      found.push_back(i);
+  }
+  std::sort(found.begin(), found.end(),
+            [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
+  for (std::size_t i = 0; i < std::min(kMost, found.size()); ++i) other_minima_.push_back(poses[std::size_t(found[i])]);
+}
+
+}  // namespace marrow::search

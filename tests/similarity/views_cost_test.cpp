@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// What costs of several views share: blocks, sums, the mean over views, and the cost without each block.
+#include "marrow/toolbox/match/views_cost.hpp"
+
+#include <gtest/gtest.h>
+
+#include "project/shapes.hpp"
+
+namespace views_cost_test {
+
+using marrow::match::Blocks;
+using marrow::match::BlockSums;
+
+TEST(Blocks, CoverTheImage) {
+  marrow::Camera camera = shapes::c_arm(0, 1000);
+  camera.height_px = 300;
+  const Blocks blocks = Blocks::of(camera);
+  EXPECT_EQ(blocks.side_px, 125) << "an eighth of the longer side";
+  EXPECT_EQ(blocks.columns, 8);
+  EXPECT_EQ(blocks.rows, 3);
+  EXPECT_EQ(blocks.count(), 24);
+  EXPECT_EQ(blocks.at(0, 0), 0);
+  EXPECT_EQ(blocks.at(124.9, 124.9), 0);
+  EXPECT_EQ(blocks.at(125, 0), 1);
+  EXPECT_EQ(blocks.at(0, 125), 8);
+  EXPECT_EQ(blocks.at(999, 299), 23);
+  EXPECT_EQ(blocks.at(2000, -5), 7) << "beyond the image counts as its border";
+  EXPECT_EQ(Blocks::of(shapes::c_arm(0, 200)).side_px, 48);
+}
+
+TEST(BlockSums, WithoutEachBlock) {
+  BlockSums sums(Blocks{10, 2, 1});
+  sums.add(3, 0, 1, 2);
+  sums.add(4, 0, 2, 2);
+  sums.add(15, 0, 10, 1);
+  EXPECT_EQ(sums.all().values, 13);
+  EXPECT_EQ(sums.all().weights, 5);
+  EXPECT_EQ(sums.without_each([](const auto& left) { return left.values / left.weights; }),
+            (std::vector<double>{10, 0.75}));
+}
+
+/// A cost whose views are 1 and 5 at the origin, and grow with x in the second. Without its single block a view is 0.
+class Two : public marrow::match::ViewsCost {
+ public:
+  explicit Two(const std::vector<double>& weights) : ViewsCost(2, weights) {}
+  double value_in_view(std::size_t view, const marrow::RigidTransform& pose) const override {
+    return view == 0 ? 1 : 5 + pose.translation_mm.x();
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
+
+ private:
+  Split split(std::size_t view, const marrow::RigidTransform& pose) const override {
+    return {value_in_view(view, pose), {0.0}};
+  }
+};
+
+TEST(ViewsCost, IsTheWeightedMean) {
+  marrow::RigidTransform pose{"world", "ct"};
+  pose.translation_mm.x() = 2;
+  EXPECT_EQ(Two({}).value(pose), 4);
+  EXPECT_EQ(Two({3, 1}).value(pose), 2.5);
+  EXPECT_EQ(Two({3, 1}).view_count(), 2u);
+  EXPECT_EQ(Two({}).without_each_block(pose), (std::vector<double>{3.5, 0.5}));
+  EXPECT_EQ(Two({3, 1}).without_each_block(pose), (std::vector<double>{1.75, 0.75}));
+}
+
+}  // namespace views_cost_test
