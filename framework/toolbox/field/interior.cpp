@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <queue>
 
@@ -46,68 +47,104 @@ Box box_of(const Grid& grid, const std::vector<std::uint8_t>& is_bone) {
   return box;
 }
 
-/// One family of parallel planes: w = plane + round(slope_u (u - middle) + slope_v (v - middle)), in voxels.
+/// Columns of voxels along the bone, one bit for each voxel of the box: word (block, pixel) holds 64 voxels of the
+/// column at a pixel.
+class Columns {
+ public:
+  explicit Columns(const Box& box)
+      : width_(box.last[(box.along + 1) % 3] - box.first[(box.along + 1) % 3] + 1),
+        height_(box.last[(box.along + 2) % 3] - box.first[(box.along + 2) % 3] + 1),
+        blocks_((box.last[box.along] - box.first[box.along]) / 64 + 1),
+        words_(std::size_t(blocks_) * width_ * height_, 0) {}
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int blocks() const { return blocks_; }
+  std::uint64_t& word(int block, int pixel) { return words_[std::size_t(block) * width_ * height_ + pixel]; }
+
+  /// The 64 voxels from `first` on. Beyond the box there is no bone.
+  std::uint64_t from(int first, int pixel) const {
+    const int block = first >> 6, skip = first & 63;
+    const auto word = [&](int b) {
+      return b < 0 || b >= blocks_ ? 0 : words_[std::size_t(b) * width_ * height_ + pixel];
+    };
+    return skip ? word(block) >> skip | word(block + 1) << (64 - skip) : word(block);
+  }
+  /// Sets these of the 64 voxels from `first` on. Threads may call this at the same time.
+  void set_from(int first, int pixel, std::uint64_t voxels) {
+    const int block = first >> 6, skip = first & 63;
+    const auto set = [&](int b, std::uint64_t bits) {
+      if (bits && b >= 0 && b < blocks_) std::atomic_ref(word(b, pixel)).fetch_or(bits, std::memory_order_relaxed);
+    };
+    set(block, voxels << skip);
+    if (skip) set(block + 1, voxels >> (64 - skip));
+  }
+
+ private:
+  int width_, height_, blocks_;
+  std::vector<std::uint64_t> words_;
+};
+
+/// Calls visit(voxel, block, bit, pixel) for each voxel of the box, for all blocks at the same time.
+template <class Visit>
+void for_bits(const Grid& grid, const Box& box, const Columns& columns, const Visit& visit) {
+  const std::size_t steps[3] = {1, std::size_t(grid.size[0]), std::size_t(grid.size[0]) * grid.size[1]};
+  const int w = box.along, u = (w + 1) % 3, v = (w + 2) % 3;
+  tbb::parallel_for(0, columns.blocks(), [&](int block) {
+    for (int bit = 0; bit < 64 && box.first[w] + 64 * block + bit <= box.last[w]; ++bit)
+      for (int j = 0, pixel = 0; j < columns.height(); ++j) {
+        const std::size_t row = (box.first[w] + 64 * block + bit) * steps[w] + (box.first[v] + j) * steps[v];
+        for (int i = 0; i < columns.width(); ++i, ++pixel)
+          visit(row + (box.first[u] + i) * steps[u], block, bit, pixel);
+      }
+  });
+}
+
+/// One family of parallel planes: w = plane + round(slope_u (u - middle) + slope_v (v - middle)), in voxels of the box.
 struct Planes {
-  const Grid& grid;
-  const Box& box;
-  int u, v, w;  // grid axes; w runs along the bone
-  double slope_u, slope_v;
+  double slope_u, slope_v, middle_u, middle_v;
 
   int shift(int i, int j) const {
     constexpr int kFar = 1 << 20;  // makes the number positive: then truncation rounds, faster than std::lround
-    return int(slope_u * (i - (box.first[u] + box.last[u]) / 2.0) + slope_v * (j - (box.first[v] + box.last[v]) / 2.0) +
-               (kFar + 0.5)) -
-           kFar;
+    return int(slope_u * (i - middle_u) + slope_v * (j - middle_v) + (kFar + 0.5)) - kFar;
   }
-  int reach() const {
-    return int(std::ceil(std::abs(slope_u) * (box.last[u] - box.first[u]) +
-                         std::abs(slope_v) * (box.last[v] - box.first[v]))) /
-               2 +
-           1;
-  }
+  int reach() const { return int(std::ceil(std::abs(slope_u) * middle_u + std::abs(slope_v) * middle_v)) + 1; }
 };
 
-/// Marks in `is_filled` what bone encloses in one plane: the pixels that a flood from the plane's border cannot reach.
-void fill_plane(const Planes& planes, int plane, const std::vector<std::uint8_t>& is_bone,
-                std::vector<std::uint8_t>& is_filled) {
-  const Box& box = planes.box;
-  const int width = box.last[planes.u] - box.first[planes.u] + 3, height = box.last[planes.v] - box.first[planes.v] + 3;
-  const std::size_t steps[3] = {1, std::size_t(planes.grid.size[0]),
-                                std::size_t(planes.grid.size[0]) * planes.grid.size[1]};
-  thread_local std::vector<std::uint8_t> closed;
-  thread_local std::vector<int> stack;
-  closed.assign(std::size_t(width) * height, 0);
-  // Offset of the voxel at a pixel. False if the plane lies outside the box there.
-  const auto source = [&](int i, int j, std::size_t& at) {
-    const int a = box.first[planes.u] + i - 1, b = box.first[planes.v] + j - 1, c = plane + planes.shift(a, b);
-    at = a * steps[planes.u] + b * steps[planes.v] + c * steps[planes.w];
-    return c >= box.first[planes.w] && c <= box.last[planes.w];
-  };
-  std::size_t at = 0;
+/// Marks in `filled` what bone encloses in each of 64 neighbouring planes: the pixels that a flood from the plane's
+/// border cannot reach. Each plane has its own bit, so all of them are flooded at once.
+void fill_planes(const Planes& planes, int first_plane, const Columns& bone, Columns& filled) {
+  const int width = bone.width() + 2, height = bone.height() + 2;  // with a border around the box
+  thread_local std::vector<std::uint64_t> open_of_thread, reached_of_thread;
+  open_of_thread.assign(std::size_t(width) * height, ~std::uint64_t(0));
+  reached_of_thread.assign(open_of_thread.size(), ~std::uint64_t(0));
+  std::uint64_t *open = open_of_thread.data(), *reached = reached_of_thread.data();
   bool any_bone = false;
-  for (int j = 1; j < height - 1; ++j)
-    for (int i = 1; i < width - 1; ++i) {
-      if (source(i, j, at)) any_bone |= closed[std::size_t(j) * width + i] = is_bone[at];
+  for (int j = 1, pixel = 0; j < height - 1; ++j)
+    for (int i = 1; i < width - 1; ++i, ++pixel) {
+      const std::uint64_t closed = bone.from(first_plane + planes.shift(i - 1, j - 1), pixel);
+      any_bone |= closed != 0;
+      open[j * width + i] = ~closed;
+      reached[j * width + i] = 0;
     }
   if (!any_bone) return;
-  stack.assign(1, 0);
-  closed[0] = 2;  // reached from outside
-  while (!stack.empty()) {
-    const int from = stack.back(), i = from % width, j = from / width;
-    stack.pop_back();
-    const auto visit = [&](bool exists, int next) {
-      if (!exists || closed[std::size_t(next)]) return;
-      closed[std::size_t(next)] = 2;
-      stack.push_back(next);
-    };
-    visit(i > 0, from - 1);
-    visit(i + 1 < width, from + 1);
-    visit(j > 0, from - width);
-    visit(j + 1 < height, from + width);
+  std::uint64_t changed = 1;
+  const auto visit = [&](int at) {
+    const std::uint64_t now =
+        (reached[at] | reached[at - 1] | reached[at + 1] | reached[at - width] | reached[at + width]) & open[at];
+    changed |= now ^ reached[at];
+    reached[at] = now;
+  };
+  while (changed) {
+    changed = 0;
+    for (int j = 1; j < height - 1; ++j)
+      for (int i = 1; i < width - 1; ++i) visit(j * width + i);
+    for (int j = height - 2; j > 0; --j)
+      for (int i = width - 2; i > 0; --i) visit(j * width + i);
   }
-  for (int j = 1; j < height - 1; ++j)
-    for (int i = 1; i < width - 1; ++i)
-      if (!closed[std::size_t(j) * width + i] && source(i, j, at)) is_filled[at] = 1;
+  for (int j = 1, pixel = 0; j < height - 1; ++j)
+    for (int i = 1; i < width - 1; ++i, ++pixel)
+      filled.set_from(first_plane + planes.shift(i - 1, j - 1), pixel, open[j * width + i] & ~reached[j * width + i]);
 }
 
 bool beside_zero(const Grid& grid, const std::vector<float>& values, int x, int y, int z) {
@@ -152,19 +189,25 @@ void fill_interior(const Grid& grid, std::vector<std::uint8_t>& is_bone, const s
   const Box box = box_of(grid, is_bone);
   if (box.empty) return;
   const int w = box.along, u = (w + 1) % 3, v = (w + 2) % 3;
-  std::vector<std::uint8_t> is_filled(grid.count(), 0);
-  for (double tilt_u : {0.0, 0.5, -0.5, 1.0, -1.0})
-    for (double tilt_v : {0.0, 0.5, -0.5, 1.0, -1.0}) {
-      // At most one voxel along the bone for one voxel across it. A steeper plane would have holes.
-      const auto slope = [&](double tilt, int axis) {
-        return std::clamp(tilt * grid.spacing_mm[axis] / grid.spacing_mm[w], -1.0, 1.0);
-      };
-      const Planes planes{grid, box, u, v, w, slope(tilt_u, u), slope(tilt_v, v)};
-      const int reach = planes.reach();
-      tbb::parallel_for(box.first[w] - reach, box.last[w] + reach + 1,
-                        [&](int plane) { fill_plane(planes, plane, is_bone, is_filled); });
-    }
-  for (std::size_t at = 0; at < is_bone.size(); ++at) is_bone[at] |= is_filled[at] & !is_other[at];
+  Columns bone(box), filled(box);
+  for_bits(grid, box, bone, [&](std::size_t voxel, int block, int bit, int pixel) {
+    bone.word(block, pixel) |= std::uint64_t(is_bone[voxel] != 0) << bit;
+  });
+  constexpr double kTilts[] = {0, 0.5, -0.5, 1, -1};
+  tbb::parallel_for(0, 25, [&](int tilt) {
+    // At most one voxel along the bone for one voxel across it. A steeper plane would have holes.
+    const auto slope = [&](double tangent, int axis) {
+      return std::clamp(tangent * grid.spacing_mm[axis] / grid.spacing_mm[w], -1.0, 1.0);
+    };
+    const Planes planes{slope(kTilts[tilt / 5], u), slope(kTilts[tilt % 5], v), (bone.width() - 1) / 2.0,
+                        (bone.height() - 1) / 2.0};
+    const int reach = planes.reach(), length = box.last[w] - box.first[w] + 1;
+    tbb::parallel_for(0, (length + 2 * reach) / 64 + 1,
+                      [&](int block) { fill_planes(planes, 64 * block - reach, bone, filled); });
+  });
+  for_bits(grid, box, filled, [&](std::size_t voxel, int block, int bit, int pixel) {
+    is_bone[voxel] |= std::uint8_t(filled.word(block, pixel) >> bit & 1) & std::uint8_t(!is_other[voxel]);
+  });
 }
 
 void march_distances(const Grid& grid, std::vector<float>& values_mm, double band_mm) {
