@@ -33,12 +33,12 @@ struct Options {
   double blur_mm = 0.7;
   double cortex_hu = 1200;
   double curvature_mm = 0.1;
-  double stop_speed = 0.02;
+  double stop_speed = 0.03;
   int steps = 32;
 };
 
 constexpr double kStepVoxels = 0.4;  // advection and curvature together stay stable (Courant-Friedrichs-Lewy condition)
-constexpr int kStepsPerCycle = 4;
+constexpr int kStepsPerCycle = 2;
 
 void keep_all_apart(std::vector<Front>& fronts) {
   for (std::size_t a = 0; a < fronts.size(); ++a)
@@ -84,7 +84,7 @@ void move(const Volume& volume, const List<Seeds>& seeds, const Options& options
   for (int step = 0; step < options.steps; step += kStepsPerCycle) {
     context.check_cancelled();
     context.progress(0.5 + 0.5 * step / options.steps, "moving");
-    if (options.cortex_hu > 0)
+    if (options.cortex_hu > 0 && step % (2 * kStepsPerCycle) == 0)
       for (Front& front : fronts) front.find_thin_cortex(volume, profile);
     for (int k = 0; k < kStepsPerCycle; ++k) {
       for (Front& front : fronts) {

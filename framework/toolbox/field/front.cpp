@@ -45,33 +45,46 @@ float upwind_gradient(const float* v, const Eigen::Vector3f& per_mm, float speed
 }
 
 /// Smallest solution of |grad u| = 1 given the neighbours' distances (Rouy and Tourin, SIAM J. Numer. Anal. 1992).
-float eikonal(const float* v, float sign, const Eigen::Vector3f& per_mm) {
-  std::array<std::pair<float, float>, 3> neighbours;  // distance, 1 / spacing^2
-  const int steps[3] = {kX, kY, kZ};
-  for (int k = 0; k < 3; ++k)
-    neighbours[k] = {std::max(0.f, std::min(sign * v[steps[k]], sign * v[-steps[k]])), per_mm[k] * per_mm[k]};
-  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
-  if (neighbours[2].first < neighbours[1].first) std::swap(neighbours[1], neighbours[2]);
-  if (neighbours[1].first < neighbours[0].first) std::swap(neighbours[0], neighbours[1]);
-  float a = 0, b = 0, c = -1, distance = 0;
-  for (int k = 0; k < 3; ++k) {
-    if (k && distance <= neighbours[k].first) break;
-    a += neighbours[k].second;
-    b += neighbours[k].second * neighbours[k].first;
-    c += neighbours[k].second * neighbours[k].first * neighbours[k].first;
-    distance = (b + std::sqrt(std::max(0.f, b * b - a * c))) / a;
-  }
-  return distance;
+/// Without branches, so that the compiler computes several voxels at once.
+inline float eikonal(const float* v, float sign, const Eigen::Vector3f& per_mm) {
+  const auto nearest = [&](int step) { return std::max(0.f, std::min(sign * v[step], sign * v[-step])); };
+  float a = nearest(kX), b = nearest(kY), c = nearest(kZ);
+  float of_a = per_mm.x() * per_mm.x(), of_b = per_mm.y() * per_mm.y(), of_c = per_mm.z() * per_mm.z();
+  const auto sort = [](float& p, float& q, float& of_p, float& of_q) {
+    const float least = q < p ? q : p, most = q < p ? p : q, of_least = q < p ? of_q : of_p,
+                of_most = q < p ? of_p : of_q;
+    p = least, q = most, of_p = of_least, of_q = of_most;
+  };
+  sort(a, b, of_a, of_b);
+  sort(b, c, of_b, of_c);
+  sort(a, b, of_a, of_b);
+  // The solution with one, two or three axes: a further axis counts if its neighbour is nearer than the solution so
+  // far.
+  const auto solution = [](float p, float q, float r) { return (q + std::sqrt(std::max(0.f, q * q - p * r))) / p; };
+  const float p1 = of_a, q1 = of_a * a, r1 = of_a * a * a - 1, first = solution(p1, q1, r1);
+  const float p2 = p1 + of_b, q2 = q1 + of_b * b, r2 = r1 + of_b * b * b, second = solution(p2, q2, r2);
+  const float third = solution(p2 + of_c, q2 + of_c * c, r2 + of_c * c * c);
+  const float further = second > c ? third : second;
+  return first > b ? further : first;
 }
 
 bool beside_surface(const float* v) {
-  for (int step : {kX, -kX, kY, -kY, kZ, -kZ})
-    if ((v[step] < 0) != (v[0] < 0)) return true;
-  return false;
+  const bool inside = v[0] < 0;
+  bool differs = false;
+  for (int step : {kX, -kX, kY, -kY, kZ, -kZ}) differs |= (v[step] < 0) != inside;
+  return differs;
 }
 
-bool beyond_band(const float* v, float band) {
-  return v[kX] == band && v[-kX] == band && v[kY] == band && v[-kY] == band && v[kZ] == band && v[-kZ] == band;
+/// The distances of a row of voxels from their neighbours'. A voxel with no neighbour within `reach_mm` keeps its own.
+template <int count>
+void redistance_row(const float* v, const Eigen::Vector3f& per_mm, float reach_mm, float band_mm, float* row) {
+  for (int x = 0; x < count; ++x, ++v) {
+    const float sign = *v < 0 ? -1.f : 1.f;
+    const auto nearest = [&](int step) { return std::min(sign * v[step], sign * v[-step]); };
+    const float around = std::min(std::min(nearest(kX), nearest(kY)), nearest(kZ));
+    const float distance = sign * std::min(eikonal(v, sign, per_mm), band_mm);
+    row[x] = around < reach_mm ? distance : *v;
+  }
 }
 
 }  // namespace
@@ -80,7 +93,10 @@ Front::Front(const marrow::Grid& grid, double band_mm, const Mask& mask)
     : grid_(grid),
       band_mm_(float(band_mm)),
       near_mm_(float(std::max(grid.spacing_mm.norm() / 2 * 1.2, grid.spacing_mm.maxCoeff()))),
+      reach_mm_(std::min(band_mm_, 3 * near_mm_)),
       voxels_per_mm_(grid.spacing_mm.cwiseInverse().cast<float>()) {
+  inside_tile_.fill(-band_mm_);
+  outside_tile_.fill(band_mm_);
   for (int k = 0; k < 3; ++k) tiles_[k] = (grid.size[k] + kTile - 1) / kTile;
   slots_.assign(std::size_t(tiles_[0]) * tiles_[1] * tiles_[2], kOutside);
   std::vector<std::uint8_t> is_mixed(slots_.size(), 0);
@@ -113,7 +129,7 @@ Front::Front(const marrow::Grid& grid, double band_mm, const Mask& mask)
               mask.at(e.first[0] + x, e.first[1] + y, e.first[2] + z) ? -band_mm_ : band_mm_;
   }
   for (float& value : values_mm_) value = value < 0 ? -half_voxel_mm : half_voxel_mm;
-  for (int pass = 0; pass < 3; ++pass) redistance_once(false);  // later each time step widens the band further
+  for (int pass = 0; pass < 3; ++pass) redistance_once(false, reach_mm_);
   values_before_ = values_mm_;
 }
 
@@ -140,41 +156,44 @@ void Front::provide(std::size_t tile) {
   shift_mm_.resize(values_mm_.size(), 0.f);
 }
 
-/// Copies a tile's values and one voxel around it. Outside the grid the border's values are repeated.
-void Front::load(std::size_t tile, Halo& halo) const {
-  const Extent e = extent(tile);
+/// Copies a tile's values and one voxel around it. Outside the grid the border's values are repeated. Returns whether
+/// any of them is nearer to the surface than `reach_mm`.
+bool Front::load(std::size_t tile, float reach_mm, Halo& halo) const {
   const auto t = place_of(tile);
-  for (int z = 0; z < e.size[2] + 2; ++z) {
-    const int k = std::clamp(e.first[2] + z - 1, 0, grid_.size[2] - 1);
-    for (int y = 0; y < e.size[1] + 2; ++y) {
-      const int j = std::clamp(e.first[1] + y - 1, 0, grid_.size[1] - 1);
-      const std::size_t tiles_row = tile_of(0, j / kTile, k / kTile),
-                        local_row = std::size_t((k % kTile) * kTile + j % kTile) * kTile;
-      const auto value = [&](int i) {
-        const std::int32_t slot = slots_[tiles_row + std::size_t(i / kTile)];
-        return slot < 0 ? (slot == kInside ? -band_mm_ : band_mm_)
-                        : values_mm_[std::size_t(slot) * kVoxels + local_row + std::size_t(i % kTile)];
-      };
-      float* out = halo.data() + z * kZ + y * kY;
-      const std::int32_t slot = slots_[tiles_row + std::size_t(t[0])];
-      if (slot >= 0)
-        std::copy_n(values_mm_.data() + std::size_t(slot) * kVoxels + local_row, e.size[0], out + 1);
-      else
-        std::fill_n(out + 1, e.size[0], slot == kInside ? -band_mm_ : band_mm_);
-      out[0] = value(std::max(e.first[0] - 1, 0));
-      out[e.size[0] + 1] = value(std::min(e.first[0] + e.size[0], grid_.size[0] - 1));
+  // For each axis and each place in the halo: the tile (before, this, after) and the place in that tile.
+  std::array<std::array<int, kHalo>, 3> of_tile, local;
+  int last[3];
+  for (int k = 0; k < 3; ++k) {
+    last[k] = std::min(kTile, grid_.size[k] - t[k] * kTile) + 1;
+    for (int i = 0; i <= last[k]; ++i) {
+      const int index = std::clamp(t[k] * kTile + i - 1, 0, grid_.size[k] - 1);
+      of_tile[k][i] = index / kTile - t[k] + 1;
+      local[k][i] = index % kTile;
     }
   }
+  for (int z = 0; z <= last[2]; ++z)
+    for (int y = 0; y <= last[1]; ++y) {
+      const std::size_t tiles_row = tile_of(t[0], t[1] + of_tile[1][y] - 1, t[2] + of_tile[2][z] - 1) - 1,
+                        local_row = std::size_t(local[2][z] * kTile + local[1][y]) * kTile;
+      const auto row_in = [&](int x) { return values_of(tiles_row + std::size_t(of_tile[0][x])) + local_row; };
+      float* out = halo.data() + z * kZ + y * kY;
+      std::copy_n(row_in(1), kTile, out + 1);
+      out[0] = row_in(0)[local[0][0]];
+      out[last[0]] = row_in(last[0])[local[0][last[0]]];
+    }
+  int near = 0;
+  for (const float value : halo) near |= std::abs(value) < reach_mm;
+  return near != 0;
 }
 
 /// Calls visit(pointer to the value in a halo, x, y, z, place in next_values_, place in the tiles' memory) for each
-/// voxel of an active tile.
+/// voxel of an active tile, unless all of them and their neighbours are at least `reach_mm` from the surface.
 template <class Visit>
-void Front::for_voxels(std::size_t position, const Visit& visit) {
+void Front::for_voxels(std::size_t position, float reach_mm, const Visit& visit) {
   const std::size_t tile = active_[position], slot = std::size_t(slots_[tile]);
   const Extent e = extent(tile);
-  Halo halo;
-  load(tile, halo);
+  Halo halo{};
+  if (!load(tile, reach_mm, halo)) return;
   for (int z = 0; z < e.size[2]; ++z)
     for (int y = 0; y < e.size[1]; ++y)
       for (int x = 0; x < e.size[0]; ++x) {
@@ -182,6 +201,10 @@ void Front::for_voxels(std::size_t position, const Visit& visit) {
         visit(halo.data() + (z + 1) * kZ + (y + 1) * kY + x + 1, e.first[0] + x, e.first[1] + y, e.first[2] + z,
               position * kVoxels + local, slot * kVoxels + local);
       }
+}
+
+void Front::keep_values(std::size_t position) {
+  std::copy_n(values_of(active_[position]), kVoxels, next_values_.data() + position * kVoxels);
 }
 
 void Front::write_back() {
@@ -217,7 +240,7 @@ void Front::choose_active() {
 
 void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& profile) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+    for_voxels(position, near_mm_, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
       if (std::abs(*v) > near_mm_) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
@@ -231,7 +254,7 @@ void Front::find_thin_cortex(const marrow::Volume& volume, const EdgeProfile& pr
 
 void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, const Force& force) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
+    for_voxels(position, near_mm_, [&](const float* v, int x, int y, int z, std::size_t, std::size_t at) {
       if (std::abs(*v) > near_mm_) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
@@ -250,11 +273,11 @@ void Front::evaluate(const marrow::Volume& volume, const EdgeProfile& profile, c
 }
 
 void Front::advance(double step_mm) {
-  // Only these voxels move. redistance() computes the rest of the band from them.
-  const float moving_mm = std::min(band_mm_, 3 * near_mm_);
+  // Only these voxels move. redistance() computes the distances around them.
+  const float moving_mm = std::min(band_mm_, 2 * near_mm_);
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
-      next_values_[place] = *v;
+    keep_values(position);
+    for_voxels(position, moving_mm, [&](const float* v, int x, int y, int z, std::size_t place, std::size_t) {
       if (std::abs(*v) >= moving_mm) return;
       const Eigen::Vector3f g = gradient(v, voxels_per_mm_);
       const float length = g.norm();
@@ -262,7 +285,7 @@ void Front::advance(double step_mm) {
       // A voxel of the band has the speed of the closest point of the surface.
       const Eigen::Vector3f closest = Eigen::Vector3f(x, y, z) - *v / length * g.cwiseProduct(voxels_per_mm_);
       int nearest[3];
-      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(std::floor(closest[k] + 0.5f)), 0, grid_.size[k] - 1);
+      for (int k = 0; k < 3; ++k) nearest[k] = std::clamp(int(closest[k] + 0.5f), 0, grid_.size[k] - 1);
       const std::int32_t slot = slots_[tile_of(nearest[0] / kTile, nearest[1] / kTile, nearest[2] / kTile)];
       if (slot < 0) return;
       const float speed =
@@ -275,34 +298,31 @@ void Front::advance(double step_mm) {
   write_back();
 }
 
-void Front::redistance_once(bool rescale) {
+void Front::redistance_once(bool rescale, float reach_mm) {
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
-    for_voxels(position, [&](const float* v, int, int, int, std::size_t place, std::size_t) {
-      const float sign = *v < 0 ? -1.f : 1.f;
-      if (beside_surface(v)) {
-        const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
-        const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
-        next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // a neighbour of the surface is no farther
-      } else if (beyond_band(v, sign * band_mm_)) {
-        next_values_[place] = sign * band_mm_;
-      } else {
-        next_values_[place] = sign * std::min(eikonal(v, sign, voxels_per_mm_), band_mm_);
-      }
+    keep_values(position);
+    for_voxels(position, reach_mm, [&](const float* v, int x, int, int, std::size_t place, std::size_t) {
+      if (x % kTile == 0) redistance_row<kTile>(v, voxels_per_mm_, reach_mm, band_mm_, &next_values_[place]);
+      if (!beside_surface(v)) return;
+      const float length = rescale ? gradient(v, voxels_per_mm_).norm() : 0.f;
+      const float rescaled = length > 0.3f ? *v / std::clamp(length, 0.7f, 1.4f) : *v;
+      next_values_[place] = std::clamp(rescaled, -near_mm_, near_mm_);  // a neighbour of the surface is no farther
     });
   });
   write_back();
 }
 
 void Front::redistance() {
-  redistance_once(true);
-  redistance_once(false);
+  redistance_once(true, reach_mm_);
+  redistance_once(false, reach_mm_);
 }
 
 void Front::finish() {
   active_ = tile_in_slot_;
   std::sort(active_.begin(), active_.end());
   next_values_.resize(active_.size() * kVoxels);
-  for (int pass = 0; pass < 4; ++pass) redistance_once(false);  // the parts that moved have widened the band already
+  const int passes = int(std::ceil((band_mm_ - reach_mm_) * voxels_per_mm_.maxCoeff())) + 2;
+  for (int pass = 0; pass < passes; ++pass) redistance_once(false, band_mm_);
 }
 
 std::vector<float> Front::values_mm() const {
@@ -337,7 +357,7 @@ bool Front::rest(double least_motion_mm) {
   std::vector<Tally> tallies(active_.size());
   tbb::parallel_for(std::size_t(0), active_.size(), [&](std::size_t position) {
     Tally& tally = tallies[position];
-    for_voxels(position, [&](const float* v, int, int, int, std::size_t, std::size_t at) {
+    for_voxels(position, reach_mm_, [&](const float* v, int, int, int, std::size_t, std::size_t at) {
       float& before = values_before_[at];
       tally.band += std::abs(*v) < band_mm_;
       if (beside_surface(v)) {

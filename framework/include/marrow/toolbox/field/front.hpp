@@ -67,18 +67,26 @@ class Front {
     return {int(tile % tiles_[0]), int(tile / tiles_[0] % tiles_[1]), int(tile / tiles_[0] / tiles_[1])};
   }
   Extent extent(std::size_t tile) const;
-  void load(std::size_t tile, Halo& halo) const;
+  const float* values_of(std::size_t tile) const {
+    const std::int32_t slot = slots_[tile];
+    return slot >= 0         ? values_mm_.data() + std::size_t(slot) * kVoxels
+           : slot == kInside ? inside_tile_.data()
+                             : outside_tile_.data();
+  }
+  bool load(std::size_t tile, float reach_mm, Halo& halo) const;
   void provide(std::size_t tile);
   void choose_active();
   template <class Visit>
-  void for_voxels(std::size_t position, const Visit& visit);
+  void for_voxels(std::size_t position, float reach_mm, const Visit& visit);
+  void keep_values(std::size_t position);
   void write_back();
-  void redistance_once(bool rescale);
+  void redistance_once(bool rescale, float reach_mm);
 
   marrow::Grid grid_;
-  float band_mm_, near_mm_;
+  float band_mm_, near_mm_, reach_mm_;
   Eigen::Vector3f voxels_per_mm_;
   std::array<int, 3> tiles_;
+  std::array<float, kVoxels> inside_tile_, outside_tile_;  // the values of all tiles without memory
   std::vector<std::int32_t> slots_;  // for each tile: its place in the arrays below, or kOutside or kInside
   std::vector<std::uint32_t> tile_in_slot_;
   std::vector<float> values_mm_, values_before_, speed_, shift_mm_;
