@@ -105,19 +105,23 @@ class Costs {
     return brightest >= race_.floor_hu;
   }
 
-  /// Filters along one axis by combine(result so far, value, tap). At the buffer's rim neighbouring rows mix. Only the
-  /// halo is affected, and it is not used afterwards.
+  /// Filters along one axis: combine(tap) is a function of the result so far and the value at that tap. At the buffer's
+  /// rim neighbouring rows mix. Only the halo is affected, and it is not used afterwards.
   template <class Combine>
   static void filter(std::vector<float>& values, std::vector<float>& out, std::size_t step, int reach, float start,
                      const Combine& combine) {
-    const std::size_t margin = step * std::size_t(reach), count = values.size();
-    out = values;
-    if (count <= 2 * margin) return;
-    std::fill(out.begin() + long(margin), out.end() - long(margin), start);
-    for (int tap = 0; tap <= 2 * reach; ++tap) {
-      const float* in = values.data() + std::size_t(tap) * step;
-      float* to = out.data() + margin;
-      for (std::size_t i = 0; i < count - 2 * margin; ++i) to[i] = combine(to[i], in[i], tap);
+    constexpr std::size_t kChunk = 2048;  // stays in the cache for all taps
+    const std::size_t margin = step * std::size_t(reach), end = values.size() - margin;
+    out.resize(values.size());
+    for (std::size_t first = margin; first < end; first += kChunk) {
+      const std::size_t count = std::min(kChunk, end - first);
+      float* to = out.data() + first;
+      std::fill_n(to, count, start);
+      for (int tap = 0; tap <= 2 * reach; ++tap) {
+        const float* in = values.data() + first - margin + std::size_t(tap) * step;
+        const auto combined = combine(tap);
+        for (std::size_t i = 0; i < count; ++i) to[i] = combined(to[i], in[i]);
+      }
     }
     values.swap(out);
   }
@@ -135,11 +139,12 @@ class Costs {
     if (!load(first, size, smooth)) return;
     for (int k = 0; k < 3; ++k) {
       const auto& weights = weights_[k];
-      filter(smooth, scratch, steps[k], int(weights.size() / 2), 0,
-             [&](float sum, float value, int tap) { return sum + weights[std::size_t(tap)] * value; });
+      filter(smooth, scratch, steps[k], int(weights.size() / 2), 0, [&](int tap) {
+        return [weight = weights[std::size_t(tap)]](float sum, float value) { return sum + weight * value; };
+      });
     }
-    const auto brightest = [](float most, float value, int) { return std::max(most, value); };
-    const auto darkest = [](float least, float value, int) { return std::min(least, value); };
+    const auto brightest = [](int) { return [](float most, float value) { return std::max(most, value); }; };
+    const auto darkest = [](int) { return [](float least, float value) { return std::min(least, value); }; };
     std::vector<float> around = smooth, least = smooth;
     for (int k = 0; k < 3; ++k) filter(around, scratch, steps[k], radius_[k], -1e9f, brightest);
     for (int k = 0; k < 3; ++k) filter(least, scratch, steps[k], 1, 1e9f, darkest);
