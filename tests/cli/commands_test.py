@@ -163,6 +163,25 @@ class Commands(Case):
         self.assertIn("value: 4", (out / "pipeline.yaml").read_text())
         self.assertEqual(marrow("check", out / "pipeline.yaml", plugins=[TEST_PLUGINS]).returncode, 0)
 
+    def test_only_the_outputs_that_are_asked_for(self):
+        path = self.write(
+            "two.yaml",
+            "marrow: 1\nnodes:\n  a: {uses: test.constant, with: {value: 30}}\n"
+            "  b: {uses: test.constant, with: {value: 40}}\noutputs: {first: a, second: b}\n",
+        )
+        out = self.scratch / "out"
+        result = marrow("run", path, "--out", out, "--only", "second", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 0, result.stderr)
+        record = json.loads((out / "run.json").read_text())
+        self.assertEqual([(node["id"], node["status"]) for node in record["nodes"]], [("b", "done")])
+        self.assertEqual([file.stem for file in (out / "outputs").iterdir()], ["second"])
+        self.assertNotIn("first", (out / "pipeline.yaml").read_text())
+        result = marrow("run", path, "--only", "secnd", plugins=[TEST_PLUGINS])
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(
+            "marrow: error: --only: the pipeline has no output 'secnd'; did you mean 'second'?\n", result.stderr
+        )
+
     def test_events_as_json(self):
         def events(*arguments):
             result = marrow("run", self.write("p.yaml", NUMBER), "--json", *arguments, plugins=[TEST_PLUGINS])

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <map>
@@ -9,6 +10,7 @@
 #include "command_options.hpp"
 #include "commands.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/names.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "process.hpp"
@@ -217,11 +219,28 @@ void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& fo
 
 namespace {
 
+/// Leaves only these outputs. Then only the nodes that they need run. False, with a message, if one is not known.
+bool keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names) {
+  std::vector<std::string> known;
+  for (const PipelineOutput& output : pipeline.outputs) known.push_back(output.name);
+  for (const std::string& name : names)
+    if (std::find(known.begin(), known.end(), name) == known.end()) {
+      std::fprintf(stderr, "marrow: error: --only: the pipeline has no output '%s'; %s\n", printable(name).c_str(),
+                   suggestion(name, known).c_str());
+      return false;
+    }
+  if (!names.empty())
+    std::erase_if(pipeline.outputs, [&](const PipelineOutput& output) {
+      return std::find(names.begin(), names.end(), output.name) == names.end();
+    });
+  return true;
+}
+
 int run(const RunRequest& request) {
   const std::atomic<bool>& is_stopped = stop_on_signals();
   const Catalogue catalogue;
   Pipeline pipeline;
-  if (!load(request.pipeline, catalogue, pipeline, true)) return 2;
+  if (!load(request.pipeline, catalogue, pipeline, true) || !keep_outputs(pipeline, request.only)) return 2;
   if (is_stopped) {
     std::fprintf(stderr, "marrow: %s before anything was made\n", stopped_text().c_str());
     return 130;
@@ -248,6 +267,10 @@ void add_run(CLI::App& app, int& code) {
   add_pipeline_arguments(command, request->pipeline);
   command->add_option("--out", request->folder,
                       "folder to write; new or empty (default: runs/NAME, or runs/NAME-2 ... where that is there)");
+  command->add_option("--only", request->only, "compute and write only this output; may be given several times")
+      ->take_all()
+      ->expected(1)
+      ->type_name("OUTPUT");
   show_default(add_whole_number(command, "--seed", request->seed, "seed of all randomness"), request->seed);
   add_whole_number(command, "--threads", request->threads, "threads to use (default: all)", 1, 1024);
   command->add_flag("--no-cache", request->no_cache, "neither read nor keep results of nodes");
