@@ -27,6 +27,11 @@ std::optional<std::size_t> place_of_name(const std::vector<Named>& all, const st
   return found == all.end() ? std::nullopt : std::optional(std::size_t(found - all.begin()));
 }
 
+void add_seeded(const SeededInputs& seeded, std::uint64_t seed, std::vector<InputValue>& inputs) {
+  for (InputValue& input : draw_inputs(seeded.drawn, seed)) inputs.push_back(std::move(input));
+  for (const auto& [name, place] : seeded.taking_seed) inputs.push_back({name, std::to_string(seed), place});
+}
+
 }  // namespace
 
 std::vector<CellIndex> cells_of(const Experiment& experiment) {
@@ -59,6 +64,8 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
   const ExperimentCase& one = experiment.cases[cell.case_index];
   if (one.is_simulated || !one.folder.empty())
     arguments.inputs.push_back({experiment.case_input, fs::absolute(case_folder).string(), experiment.cases_place});
+  else
+    add_seeded(experiment.seeded, one.seed, arguments.inputs);
   arguments.overrides = experiment.common;
   const std::vector<Override>& own = experiment.variants[cell.variant].overrides;
   arguments.overrides.insert(arguments.overrides.end(), own.begin(), own.end());
@@ -74,11 +81,8 @@ PipelineArguments arguments_of(const Experiment& experiment, const CellIndex& ce
 
 PipelineArguments simulation_arguments_of(const Experiment& experiment, std::size_t case_index) {
   const CaseSimulation& simulation = experiment.simulation;
-  const std::uint64_t seed = experiment.cases[case_index].seed;
   PipelineArguments arguments{simulation.inputs, simulation.changes};
-  for (InputValue& input : draw_inputs(simulation.drawn, seed)) arguments.inputs.push_back(std::move(input));
-  for (const auto& [name, place] : simulation.seed_inputs)
-    arguments.inputs.push_back({name, std::to_string(seed), place});
+  add_seeded(simulation.seeded, experiment.cases[case_index].seed, arguments.inputs);
   return arguments;
 }
 

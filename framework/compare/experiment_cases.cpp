@@ -33,12 +33,15 @@ class CaseReader {
       : yaml_(yaml), folder_(folder), written_(written), experiment_(written.experiment) {}
 
   void read(const YamlEntry& section) {
-    static const std::vector<std::string> kKeys{"input", "folders", "seeds", "simulate"};
+    static const std::vector<std::string> kKeys{"input", "folders", "seeds", "simulate", "draw", "seed_input"};
     experiment_.case_input = "case";
     experiment_.cases_place = section.place;
     const std::vector<YamlEntry> entries = yaml_.map(section.value, section.place, "'cases'", &kKeys);
+    const auto has = [&](std::string_view key) {
+      return std::any_of(entries.begin(), entries.end(), [&](const YamlEntry& entry) { return entry.key == key; });
+    };
     for (const YamlEntry& entry : entries) {
-      if (entry.key == "seeds" && entries.size() > 1)
+      if (entry.key == "seeds" && (has("input") || has("folders") || has("simulate")))
         yaml_.fault(
             entry.place, "'seeds' beside other cases",
             "by themselves they mean that the pipeline makes its data; those of a simulation stand in 'simulate'");
@@ -47,6 +50,9 @@ class CaseReader {
         for (const auto& [pattern, place] : texts_of(yaml_, entry)) add_folders(pattern, place);
       if (entry.key == "seeds") add_seeds(read_seeds(entry), false, entry.place);
       if (entry.key == "simulate") read_simulation(entry);
+      if (!read_seeded(entry, experiment_.seeded) || has("seeds")) continue;
+      yaml_.fault(entry.place, "'" + entry.key + "' without 'seeds'",
+                  "inputs of a simulation that differ between cases stand in 'simulate'");
     }
   }
 
@@ -126,16 +132,22 @@ class CaseReader {
       if (entry.key == "set") simulation.changes = patches_of(yaml_, entry, "'set'");
       if (entry.key == "seeds") seeds = read_seeds(entry);
       if (entry.key == "inputs") simulation.inputs = inputs_of(yaml_, entry);
-      if (entry.key == "draw")
-        for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'"))
-          simulation.drawn.push_back({range.key, read_range(range), range.place});
-      if (entry.key == "seed_input") simulation.seed_inputs = texts_of(yaml_, entry);
+      read_seeded(entry, simulation.seeded);
     }
     if (!section.value.IsMap()) return;
     if (!has_pipeline)
       yaml_.fault(section.place, "'simulate' does not name its pipeline", "add  pipeline: ../simulate.yaml");
     if (!has_seeds) yaml_.fault(section.place, "'simulate' does not say which seeds", "add  seeds: 1..20  or a list");
     add_seeds(seeds, true, section.place);
+  }
+
+  /// Whether an entry says which inputs differ between cases.
+  bool read_seeded(const YamlEntry& entry, SeededInputs& seeded) {
+    if (entry.key == "draw")
+      for (const YamlEntry& range : yaml_.map(entry.value, entry.place, "'draw'"))
+        seeded.drawn.push_back({range.key, read_range(range), range.place});
+    if (entry.key == "seed_input") seeded.taking_seed = texts_of(yaml_, entry);
+    return entry.key == "draw" || entry.key == "seed_input";
   }
 
   /// "1..20" or a list of integers.

@@ -30,7 +30,14 @@ std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::V
   return inside;
 }
 
-Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
+struct Assembled {
+  Case whole;
+  List<Seeds> seeds;
+  List<Pose> start;
+  List<Truth> truth;
+};
+
+Assembled assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
   phantom::check_phantom(phantom, "simulate.case");
   check_volume(ct, "simulate.case: CT");
   Case result;
@@ -62,7 +69,7 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
                   "' has no seed within the CT; let simulate.ct cover more of it (range_mm)");
     }
   }
-  return result;
+  return {result, result.seeds, result.start, result.truth};
 }
 
 }  // namespace
@@ -73,7 +80,10 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT of the phantom")
       .in("views", "X-ray images of the phantom", over("view"))
       .in("phantom", "bone and fragments, with their seeds and exact poses")
-      .out("case", "CT, views, seeds and truth")
+      .out("case", &Assembled::whole, "CT, views, seeds and truth")
+      .out("seeds", &Assembled::seeds, "points inside each fragment, as the case has them", over("fragment"))
+      .out("start", &Assembled::start, "the case's start, if it has one", over("fragment"))
+      .out("truth", &Assembled::truth, "exact pose of each fragment that is registered", over("fragment"))
       .option("register", &CaseOptions::wanted,
               "fragments whose pose is wanted; other fragments are only segmented, to keep them apart in the CT")
       .option("start", &CaseOptions::start,

@@ -9,11 +9,14 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/random.hpp"
+#include "marrow/toolbox/phantom/materials.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
+#include "marrow/toolbox/phantom/streaks.hpp"
 
 namespace {
 
 using namespace marrow;
+using phantom::ClutteredPhantom;
 using phantom::Interval;
 using phantom::Phantom;
 
@@ -27,6 +30,8 @@ struct CtOptions {
   double marrow_hu = -20;
   double muscle_hu = 50;
   double fat_hu = -100;
+  double slice_thickness_mm = 0;
+  double metal_streaks = 1;
 };
 
 constexpr double kAirHu = -1000;
@@ -73,67 +78,102 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   return grid;
 }
 
-Raster raster_under(const Grid& grid, double blur_mm) {
+Raster raster_under(const Grid& grid, const CtOptions& options) {
   Raster raster;
   for (int k = 0; k < 3; ++k) {
     const std::size_t i = std::size_t(k);
     raster.steps[i] = std::max(1, int(std::ceil(grid.spacing_mm[k] / kFinestMm)));
     raster.spacing_mm[k] = grid.spacing_mm[k] / raster.steps[i];
-    raster.halo[i] = int(std::ceil(4 * blur_mm / raster.spacing_mm[k]));
+    const double reach = 4 * options.blur_mm + (k == 2 ? 0.5 * options.slice_thickness_mm : 0);
+    raster.halo[i] = int(std::ceil(reach / raster.spacing_mm[k]));
     raster.size[i] = (grid.size[i] - 1) * raster.steps[i] + 1 + 2 * raster.halo[i];
     raster.origin_mm[k] = grid.origin_mm[k] - raster.halo[i] * raster.spacing_mm[k];
   }
   return raster;
 }
 
-/// Weights of a sampled Gaussian over the halo. Their sum is 1.
-std::vector<double> point_spread(double blur_mm, double spacing_mm, int halo) {
+/// Weights of a sampled Gaussian over the halo, or of a box of this thickness that is blurred by it. Their sum is 1.
+std::vector<double> point_spread(double blur_mm, double thickness_mm, double spacing_mm, int halo) {
   std::vector<double> weights;
   double sum = 0;
   for (int i = -halo; i <= halo; ++i) {
-    const double t = blur_mm > 0 ? i * spacing_mm / blur_mm : 0;
-    weights.push_back(std::exp(-0.5 * t * t));
+    const double at = i * spacing_mm, t = blur_mm > 0 ? at / blur_mm : 0, half = 0.5 * thickness_mm;
+    const auto below = [&](double x) {  // share of the Gaussian below x; without blur a step
+      return blur_mm > 0 ? 0.5 * std::erfc(-x / (blur_mm * std::sqrt(2.0))) : x > 1e-9 ? 1.0 : x < -1e-9 ? 0.0 : 0.5;
+    };
+    weights.push_back(thickness_mm > 0 ? below(at + half) - below(at - half) : std::exp(-0.5 * t * t));
     sum += weights.back();
   }
   for (double& weight : weights) weight /= sum;
   return weights;
 }
 
+std::vector<const phantom::Body*> bodies_in_ct(const std::vector<phantom::Body>& bodies) {
+  std::vector<const phantom::Body*> those;
+  for (const phantom::Body& body : bodies)
+    if (body.in_ct) those.push_back(&body);
+  return those;
+}
+
 class Scanner {
  public:
-  Scanner(const Phantom& phantom, const Grid& grid, const CtOptions& options)
-      : phantom_(phantom),
+  Scanner(const ClutteredPhantom& cluttered, const Grid& grid, const CtOptions& options)
+      : cluttered_(cluttered),
+        phantom_(cluttered.phantom),
         grid_(grid),
         options_(options),
-        raster_(raster_under(grid, options.blur_mm)),
-        fill_(phantom.bone),
-        rays_(phantom, raster_.size[1], raster_.size[2], [this](const phantom::Fragment& fragment) {
-          return [this, ct_from_bone = fragment.ct_from_bone](const Eigen::Vector3d& point) {
-            const Eigen::Vector3d fine = (ct_from_bone * point - raster_.origin_mm).cwiseQuotient(raster_.spacing_mm);
-            return phantom::RayVertex{fine.y(), fine.z(), fine.x()};
-          };
+        raster_(raster_under(grid, options)),
+        fill_(phantom_.bone),
+        rays_(phantom_, raster_.size[1], raster_.size[2],
+              [this](const phantom::Fragment& fragment) {
+                return [this, ct_from_bone = fragment.ct_from_bone](const Eigen::Vector3d& point) {
+                  const Eigen::Vector3d fine =
+                      (ct_from_bone * point - raster_.origin_mm).cwiseQuotient(raster_.spacing_mm);
+                  return phantom::RayVertex{fine.y(), fine.z(), fine.x()};
+                };
+              }),
+        // Tissue has no small parts, so it is cut once a slice only.
+        tissue_rays_(bodies_in_ct(cluttered.tissues), raster_.size[1], grid.size[2],
+                     [this](const phantom::Body& body) {
+                       return to_rays(body.ct_from_world, raster_.spacing_mm.x(), raster_.spacing_mm.y(),
+                                      grid_.spacing_mm.z(), grid_.origin_mm.z());
+                     }),
+        body_rays_(bodies_in_ct(cluttered.bodies), raster_.size[1], raster_.size[2], [this](const phantom::Body& body) {
+          return to_rays(body.ct_from_world, raster_.spacing_mm.x(), raster_.spacing_mm.y(), raster_.spacing_mm.z(),
+                         raster_.origin_mm.z());
         }) {
     for (int k = 0; k < 3; ++k)
-      spread_[std::size_t(k)] = point_spread(options.blur_mm, raster_.spacing_mm[k], raster_.halo[std::size_t(k)]);
-    background_fine_ = background();
-    background_.resize(std::size_t(grid.size[0]) * std::size_t(grid.size[1]));
-    blur(background_fine_, {0, raster_.size[0], 0, raster_.size[1]}, background_);
+      spread_[std::size_t(k)] = point_spread(options.blur_mm, k == 2 ? options.slice_thickness_mm : 0,
+                                             raster_.spacing_mm[k], raster_.halo[std::size_t(k)]);
+    for (const phantom::Body* body : bodies_in_ct(cluttered.tissues)) tissue_hu_.push_back(hu_of(*body));
+    for (const phantom::Body* body : bodies_in_ct(cluttered.bodies)) body_hu_.push_back(hu_of(*body));
+    if (cluttered.tissues.empty()) even_background_ = background();
   }
 
   /// Computes the slices first to last - 1, without noise.
   void scan(int first, int last, std::vector<float>& values) const {
-    const std::size_t slice = background_.size();
+    const std::size_t slice = std::size_t(grid_.size[0]) * std::size_t(grid_.size[1]);
     const int fine_first = first * raster_.steps[2],
               fine_last = (last - 1) * raster_.steps[2] + 2 * raster_.halo[2] + 1;
-    std::vector<double> sums;
-    for (int z = first; z < last; ++z) sums.insert(sums.end(), background_.begin(), background_.end());
+    const std::vector<std::vector<double>> backgrounds = backgrounds_of(first, last);
+    std::vector<double> sums, blurred(slice, 0.0);
+    for (int z = first; z < last; ++z) {
+      if (z == first || backgrounds.size() > 1)
+        blur(backgrounds[backgrounds.size() > 1 ? std::size_t(z - first) : 0], {0, raster_.size[0], 0, raster_.size[1]},
+             blurred);
+      sums.insert(sums.end(), blurred.begin(), blurred.end());
+    }
     const auto crossings = rays_.bundle().crossings(fine_first, fine_last);
-    std::vector<double> plane(background_fine_.size(), 0.0), blurred(slice, 0.0);
-    for (auto at = crossings.begin(); at != crossings.end();) {
-      const auto row_end =
-          std::find_if(at, crossings.end(), [&](const auto& crossing) { return crossing.row != at->row; });
-      const int row = int(at->row);
-      const Rectangle bone = draw({at, row_end}, row, plane);
+    const auto others = body_rays_.bundle().crossings(fine_first, fine_last);
+    std::vector<double> plane(backgrounds[0].size(), 0.0);
+    std::size_t next = 0, next_other = 0;
+    for (int row = fine_first; row < fine_last; ++row) {
+      const auto met = of_row(crossings, row, next), met_others = of_row(others, row, next_other);
+      if (met.empty() && met_others.empty()) continue;
+      const int nearest =
+          std::clamp((row - raster_.halo[2] + raster_.steps[2] / 2) / raster_.steps[2], first, last - 1);
+      const std::vector<double>& empty = backgrounds[backgrounds.size() > 1 ? std::size_t(nearest - first) : 0];
+      const Rectangle bone = draw(met, met_others, row, empty, plane);
       const Rectangle seen = blur(plane, bone, blurred);
       for (int z = first; z < last; ++z) {
         const int tap = row - z * raster_.steps[2];
@@ -149,12 +189,75 @@ class Scanner {
         double* line = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]);
         std::fill(line + bone.x0, line + bone.x1, 0.0);
       }
-      at = row_end;
     }
     std::copy(sums.begin(), sums.end(), values.begin() + std::ptrdiff_t(slice * std::size_t(first)));
   }
 
  private:
+  double hu_of(const phantom::Body& body) const {
+    if (body.material == "fat") return options_.fat_hu;
+    if (body.material == "muscle") return options_.muscle_hu;
+    if (body.material == "cortical bone") return options_.cortical_hu;
+    return phantom::material(body.material).hu;
+  }
+
+  phantom::BodyRays::Map to_rays(const RigidTransform& ct_from_world, double dx, double dy, double dz,
+                                 double first_z) const {
+    return [=, this](const Eigen::Vector3d& point) {
+      const Eigen::Vector3d x = ct_from_world * point;
+      return phantom::RayVertex{(x.y() - raster_.origin_mm.y()) / dy, (x.z() - first_z) / dz,
+                                (x.x() - raster_.origin_mm.x()) / dx};
+    };
+  }
+
+  static std::span<const phantom::Crossing> of_row(const std::vector<phantom::Crossing>& crossings, int row,
+                                                   std::size_t& next) {
+    const std::size_t begin = next;
+    while (next < crossings.size() && int(crossings[next].row) == row) ++next;
+    return {crossings.data() + begin, next - begin};
+  }
+  static std::span<const phantom::Crossing> of_column(std::span<const phantom::Crossing>& crossings, int column) {
+    std::size_t count = 0;
+    while (count < crossings.size() && int(crossings[count].column) == column) ++count;
+    const auto those = crossings.first(count);
+    crossings = crossings.subspan(count);
+    return those;
+  }
+
+  /// Adds a part of a ray to its bins, as the difference to what is there without bone and bodies.
+  void add(double from, double to, double hu, const double* empty, double* bins, int& x0, int& x1) const {
+    const int first = std::max(0, int(std::floor(from + 0.5)));
+    const int last = std::min(raster_.size[0] - 1, int(std::floor(to + 0.5)));
+    x0 = std::min(x0, first), x1 = std::max(x1, last + 1);
+    for (int x = first; x <= last; ++x) {
+      const double share = std::min(to, x + 0.5) - std::max(from, x - 0.5);
+      bins[x] += std::max(0.0, share) * (hu - empty[x]);
+    }
+  }
+
+  /// The slices first to last - 1 without bone and bodies, on the fine raster; one for all where all are the same.
+  std::vector<std::vector<double>> backgrounds_of(int first, int last) const {
+    if (cluttered_.tissues.empty()) return {even_background_};
+    const std::size_t width = std::size_t(raster_.size[0]);
+    const auto crossings = tissue_rays_.bundle().crossings(first, last);
+    std::vector<std::vector<double>> planes(std::size_t(last - first),
+                                            std::vector<double>(width * std::size_t(raster_.size[1]), kAirHu));
+    std::vector<phantom::BodyInterval> intervals;
+    std::vector<double> unused(width, 0.0);
+    phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
+      tissue_rays_.intervals(ray, intervals);
+      std::stable_sort(intervals.begin(), intervals.end(),
+                       [](const auto& a, const auto& b) { return a.body < b.body; });
+      double* bins = planes[std::size_t(int(ray.front().row) - first)].data() + ray.front().column * width;
+      for (const auto& interval : intervals) {
+        std::copy(bins, bins + width, unused.begin());
+        int x0 = raster_.size[0], x1 = 0;
+        add(interval.from, interval.to, tissue_hu_[std::size_t(interval.body)], unused.data(), bins, x0, x1);
+      }
+    });
+    return planes;
+  }
+
   /// Muscle, fat and air on the fine raster.
   std::vector<double> background() const {
     const auto& bone = phantom_.bone;
@@ -171,33 +274,50 @@ class Scanner {
 
   /// Adds the bone in one fine row of rays to the plane, as the difference to the background. Each bin counts by the
   /// length of bone in it. Returns the changed part of the plane.
-  Rectangle draw(std::span<const phantom::Crossing> crossings, int row, std::vector<double>& plane) const {
+  Rectangle draw(std::span<const phantom::Crossing> crossings, std::span<const phantom::Crossing> others, int row,
+                 const std::vector<double>& background, std::vector<double>& plane) const {
+    constexpr int kBoneRank = -1;
     Rectangle touched{raster_.size[0], 0, raster_.size[1], 0};
-    const double z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
     std::vector<Interval> intervals;
-    phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
-      rays_.intervals(ray, intervals);
-      const int y = int(ray.front().column);
+    std::vector<phantom::BodyInterval> bodies;
+    std::vector<phantom::Layer> layers;
+    while (!crossings.empty() || !others.empty()) {
+      const int y = std::min(crossings.empty() ? raster_.size[1] : int(crossings.front().column),
+                             others.empty() ? raster_.size[1] : int(others.front().column));
+      rays_.intervals(of_column(crossings, y), intervals);
+      body_rays_.intervals(of_column(others, y), bodies);
       double* bins = plane.data() + std::size_t(y) * std::size_t(raster_.size[0]);
-      const double* empty = background_fine_.data() + std::size_t(y) * std::size_t(raster_.size[0]);
-      for (const Interval& interval : intervals) {
-        const auto bone_from_ct = inverse(phantom_.fragments[std::size_t(interval.fragment)].ct_from_bone);
-        const double x_ct = raster_.origin_mm.x() + 0.5 * (interval.from + interval.to) * raster_.spacing_mm.x();
-        const Eigen::Vector3d middle =
-            bone_from_ct * Eigen::Vector3d(x_ct, raster_.origin_mm.y() + y * raster_.spacing_mm.y(), z_ct);
-        const double fraction = interval.cortical ? 1 : fill_.at(middle.z());
-        const double hu = fraction * options_.cortical_hu + (1 - fraction) * options_.marrow_hu;
-        const int first = std::max(0, int(std::floor(interval.from + 0.5)));
-        const int last = std::min(raster_.size[0] - 1, int(std::floor(interval.to + 0.5)));
-        touched = {std::min(touched.x0, first), std::max(touched.x1, last + 1), std::min(touched.y0, y),
-                   std::max(touched.y1, y + 1)};
-        for (int x = first; x <= last; ++x) {
-          const double share = std::min(interval.to, x + 0.5) - std::max(interval.from, x - 0.5);
-          bins[x] += std::max(0.0, share) * (hu - empty[x]);
-        }
+      const double* empty = background.data() + std::size_t(y) * std::size_t(raster_.size[0]);
+      if (!intervals.empty() || !bodies.empty())
+        touched.y0 = std::min(touched.y0, y), touched.y1 = std::max(touched.y1, y + 1);
+      if (bodies.empty()) {
+        for (const Interval& interval : intervals)
+          add(interval.from, interval.to, bone_hu(interval, interval.from, interval.to, y, row), empty, bins,
+              touched.x0, touched.x1);
+        continue;
       }
-    });
+      layers.clear();
+      for (std::size_t i = 0; i < intervals.size(); ++i)
+        layers.push_back({intervals[i].from, intervals[i].to, kBoneRank, i});
+      for (const auto& body : bodies) layers.push_back({body.from, body.to, body.body, std::size_t(body.body)});
+      phantom::visit_layers(layers, [&](const phantom::Layer& layer, double from, double to) {
+        const double hu =
+            layer.rank == kBoneRank ? bone_hu(intervals[layer.index], from, to, y, row) : body_hu_[layer.index];
+        add(from, to, hu, empty, bins, touched.x0, touched.x1);
+      });
+    }
     return touched;
+  }
+
+  /// The value in the middle of a part of a ray through bone.
+  double bone_hu(const Interval& interval, double from, double to, int y, int row) const {
+    const auto bone_from_ct = inverse(phantom_.fragments[std::size_t(interval.fragment)].ct_from_bone);
+    const double x_ct = raster_.origin_mm.x() + 0.5 * (from + to) * raster_.spacing_mm.x(),
+                 z_ct = raster_.origin_mm.z() + row * raster_.spacing_mm.z();
+    const Eigen::Vector3d middle =
+        bone_from_ct * Eigen::Vector3d(x_ct, raster_.origin_mm.y() + y * raster_.spacing_mm.y(), z_ct);
+    const double fraction = interval.cortical ? 1 : fill_.at(middle.z());
+    return fraction * options_.cortical_hu + (1 - fraction) * options_.marrow_hu;
   }
 
   /// Blurs a fine plane in x and y and samples it at the grid's positions. The plane must be zero outside `bone`.
@@ -230,22 +350,25 @@ class Scanner {
     return seen;
   }
 
+  const ClutteredPhantom& cluttered_;
   const Phantom& phantom_;
   const Grid& grid_;
   const CtOptions& options_;
   Raster raster_;
   phantom::Fill fill_;
   phantom::SolidRays rays_;
+  phantom::BodyRays tissue_rays_, body_rays_;
   std::array<std::vector<double>, 3> spread_;
-  std::vector<double> background_fine_, background_;  ///< slice without bone, the same for all z
+  std::vector<double> tissue_hu_, body_hu_;
+  std::vector<double> even_background_;  ///< a slice without bone, where all are the same
 };
 
-Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) {
+Volume cluttered_scan(const ClutteredPhantom& phantom, const CtOptions& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.ct");
   for (double spacing : options.spacing_mm)
     if (!(spacing > 0)) throw Error("simulate.ct: spacing_mm must be positive, got " + std::to_string(spacing));
   Volume volume;
-  volume.grid = grid_around(phantom, options);
+  volume.grid = grid_around(phantom.phantom, options);
   volume.values.resize(volume.grid.count());
   const Scanner scanner(phantom, volume.grid, options);
   const int slabs = (volume.grid.size[2] + kSlabSlices - 1) / kSlabSlices;
@@ -261,16 +384,22 @@ Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) 
     }
     context.progress(double(++done) / slabs, "slices");
   });
+  phantom::StreakOptions streaks;
+  streaks.strength = options.metal_streaks;
+  streaks.blur_mm = options.blur_mm;
+  streaks.tissue_centre_mm = phantom.phantom.bone.thigh_centre_mm;
+  streaks.tissue_radius_mm = phantom.phantom.bone.thigh_radius_mm;
+  phantom::add_metal_streaks(volume, bodies_in_ct(phantom.bodies), streaks, context.seed());
   return volume;
 }
 
-}  // namespace
+Volume scan(const Phantom& phantom, const CtOptions& options, Context& context) {
+  return cluttered_scan({phantom, {}, {}}, options, context);
+}
 
-MARROW_PLUGIN(plugin) {
-  plugin.node("simulate.ct", scan)
-      .summary("Simulates a CT of a bone, sampled from its continuous shape with blur and noise")
-      .random()
-      .in("phantom", "bone, fracture and fragments")
+/// What both nodes have.
+void declare(auto&& node) {
+  node.random()
       .out("volume", "CT in Hounsfield units, rounded to whole numbers")
       .option("spacing_mm", &CtOptions::spacing_mm, "voxel size along x, y, z")
       .option("margin_mm", &CtOptions::margin_mm, "space around the bone", at_least(0))
@@ -283,4 +412,20 @@ MARROW_PLUGIN(plugin) {
       .option("marrow_hu", &CtOptions::marrow_hu, "CT value of marrow", unit("HU"))
       .option("muscle_hu", &CtOptions::muscle_hu, "CT value of muscle", unit("HU"))
       .option("fat_hu", &CtOptions::fat_hu, "CT value of the fat under the skin", unit("HU"));
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare(plugin.node("simulate.ct", scan)
+              .summary("Simulates a CT of a bone, sampled from its continuous shape with blur and noise")
+              .in("phantom", "bone, fracture and fragments"));
+  declare(plugin.node("simulate.cluttered_ct", cluttered_scan)
+              .summary("Simulates a CT like simulate.ct, with the tissues and bodies that are in the patient")
+              .in("phantom", "phantom with tissues and bodies")
+              .option("slice_thickness_mm", &CtOptions::slice_thickness_mm,
+                      "thickness over which a slice is averaged; 0: only the blur", at_least(0), at_most(10))
+              .option("metal_streaks", &CtOptions::metal_streaks,
+                      "factor of the artefacts of metal; 0: metal is only cut to 3071 HU", at_least(0), at_most(3),
+                      unit("")));
 }

@@ -11,11 +11,13 @@
 #include <random>
 
 #include "marrow/domain/random.hpp"
+#include "marrow/toolbox/phantom/materials.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
 
 using namespace marrow;
+using phantom::ClutteredPhantom;
 using phantom::Interval;
 using phantom::Phantom;
 
@@ -31,24 +33,22 @@ constexpr int kBandRows = 8;           // image rows rendered by one task
 constexpr double kTissueGrey = 12000;  // grey value behind soft tissue alone; the largest is 65535
 constexpr double kNearestMm = 10;
 
-/// Linear attenuation per mm at 40, 50, 60, 70 keV (ICRP 110 materials of the MC-GPU tables), and the share of each
-/// energy in the detected signal, for a 70 kV beam behind 3.5 mm of aluminium with a mean of 49 keV.
-constexpr std::array<double, 4> kShare{0.40, 0.33, 0.20, 0.07};
-constexpr std::array<double, 4> kBone{0.1235, 0.07937, 0.05934, 0.04871};
-constexpr std::array<double, 4> kMarrow{0.02649, 0.02277, 0.02082, 0.01959};
-constexpr std::array<double, 4> kMuscle{0.02840, 0.02390, 0.02161, 0.02020};
-constexpr std::array<double, 4> kFat{0.02299, 0.02032, 0.01886, 0.01789};
+/// The share of each energy in the detected signal, for a 70 kV beam behind 3.5 mm of aluminium with a mean of 49 keV.
+constexpr phantom::Spectrum kShare{0.40, 0.33, 0.20, 0.07};
 
+/// Lengths in tissue, and the attenuation by everything else, as its exponent.
 struct Lengths {
   double bone = 0, marrow = 0, muscle = 0, fat = 0;
+  phantom::Spectrum others{};
 };
 
 /// Share of the beam that passes through these lengths.
 double transmission(const Lengths& mm) {
   double sum = 0;
   for (std::size_t e = 0; e < kShare.size(); ++e)
-    sum += kShare[e] *
-           std::exp(-(kBone[e] * mm.bone + kMarrow[e] * mm.marrow + kMuscle[e] * mm.muscle + kFat[e] * mm.fat));
+    sum +=
+        kShare[e] * std::exp(-(phantom::kBonePerMm[e] * mm.bone + phantom::kMarrowPerMm[e] * mm.marrow +
+                               phantom::kMusclePerMm[e] * mm.muscle + phantom::kFatPerMm[e] * mm.fat + mm.others[e]));
   return sum;
 }
 
@@ -60,14 +60,20 @@ struct Ray {
 
 class XRay {
  public:
-  XRay(const Phantom& phantom, const Camera& camera)
-      : phantom_(phantom),
+  XRay(const ClutteredPhantom& cluttered, const Camera& camera)
+      : cluttered_(cluttered),
+        phantom_(cluttered.phantom),
         camera_(camera),
-        fill_(phantom.bone),
+        fill_(phantom_.bone),
         detector_to_ray_(camera.intrinsics.inverse()),
-        rays_(phantom, camera.width_px * kSubsamples, camera.height_px * kSubsamples,
-              [&](const phantom::Fragment& fragment) { return map(fragment); }) {
-    for (const auto& fragment : phantom.fragments) bone_from_world_.push_back(inverse(fragment.world_from_bone()));
+        rays_(phantom_, camera.width_px * kSubsamples, camera.height_px * kSubsamples,
+              [&](const phantom::Fragment& fragment) { return map(fragment); }),
+        body_rays_(others_of(cluttered), rays_.bundle().columns(), rays_.bundle().rows(),
+                   [&](const phantom::Body& body) {
+                     return map(camera_.camera_from_world, "'" + body.name + "'", "where it is placed");
+                   }) {
+    for (const phantom::Body* body : others_of(cluttered)) materials_.push_back(phantom::material(body->material));
+    for (const auto& fragment : phantom_.fragments) bone_from_world_.push_back(inverse(fragment.world_from_bone()));
   }
 
   const phantom::SolidRays& rays() const { return rays_; }
@@ -93,62 +99,125 @@ class XRay {
 
   /// Adds the bone between the crossings of a ray, and subtracts its length from the muscle.
   void add_bone(const Ray& ray, const std::vector<Interval>& intervals, Lengths& lengths) const {
-    for (const Interval& interval : intervals) {
-      const double from = -1 / interval.from, to = -1 / interval.to;
-      const double length = (to - from) * ray.mm_per_depth;
-      double fraction = 1;
-      if (!interval.cortical) {
-        const RigidTransform& bone_from_world = bone_from_world_[std::size_t(interval.fragment)];
-        fraction = fill_.mean((bone_from_world * (ray.source + from * ray.direction)).z(),
-                              (bone_from_world * (ray.source + to * ray.direction)).z());
-      }
-      lengths.bone += fraction * length;
-      lengths.marrow += (1 - fraction) * length;
-    }
+    for (const Interval& interval : intervals) add_bone(ray, interval, -1 / interval.from, -1 / interval.to, lengths);
     lengths.muscle = std::max(0.0, lengths.muscle - lengths.bone - lengths.marrow);
+  }
+
+  /// What a ray meets that also crosses bodies or soft tissue of its own shape.
+  Lengths among_others(const Ray& ray, const std::vector<Interval>& bone,
+                       const std::vector<phantom::BodyInterval>& others) const {
+    constexpr int kBoneRank = 1000;
+    const std::size_t tissues = cluttered_.tissues.size();
+    std::vector<phantom::Layer> layers;
+    if (tissues == 0 && phantom_.bone.thigh_radius_mm > 0) {
+      const auto inside = [&](double radius, int rank) {
+        const auto [from, to] =
+            phantom::through_cylinder(phantom_.bone.thigh_centre_mm, radius, ray.source, ray.direction);
+        if (to > 0) layers.push_back({std::max(0.0, from), to, rank});
+      };
+      inside(phantom_.bone.thigh_radius_mm, -2);
+      if (phantom_.bone.thigh_radius_mm > phantom_.bone.fat_mm)
+        inside(phantom_.bone.thigh_radius_mm - phantom_.bone.fat_mm, -1);
+    }
+    for (std::size_t i = 0; i < bone.size(); ++i) layers.push_back({-1 / bone[i].from, -1 / bone[i].to, kBoneRank, i});
+    for (const phantom::BodyInterval& other : others) {
+      const std::size_t body = std::size_t(other.body);
+      layers.push_back({-1 / other.from, -1 / other.to, other.body + (body < tissues ? 0 : kBoneRank + 1), body});
+    }
+    Lengths lengths;
+    phantom::visit_layers(layers, [&](const phantom::Layer& layer, double from, double to) {
+      const double length = (to - from) * ray.mm_per_depth;
+      if (layer.rank == kBoneRank)
+        add_bone(ray, bone[layer.index], from, to, lengths);
+      else if (layer.rank < 0)
+        (layer.rank == -1 ? lengths.muscle : lengths.fat) += length;
+      else
+        for (std::size_t e = 0; e < kShare.size(); ++e) lengths.others[e] += materials_[layer.index].per_mm[e] * length;
+    });
+    return lengths;
   }
 
   /// Computes the mean transmission of each pixel's rays, for the rows first to last - 1.
   void render(int first, int last, cv::Mat1d& primary) const {
     const auto crossings = rays_.bundle().crossings(first * kSubsamples, last * kSubsamples);
-    std::size_t next = 0;
+    const auto others = body_rays_.bundle().crossings(first * kSubsamples, last * kSubsamples);
+    std::size_t next = 0, next_other = 0;
     std::vector<Interval> intervals;
+    std::vector<phantom::BodyInterval> body_intervals;
     for (int row = first * kSubsamples; row < last * kSubsamples; ++row)
       for (int column = 0; column < rays_.bundle().columns(); ++column) {
         const Ray line = ray(column, row);
-        Lengths lengths = soft_tissue(line);
-        const std::size_t begin = next;
-        while (next < crossings.size() && int(crossings[next].row) == row && int(crossings[next].column) == column)
-          ++next;
-        if (next > begin) {
-          rays_.intervals({crossings.data() + begin, next - begin}, intervals);
+        rays_.intervals(of_ray(crossings, column, row, next), intervals);
+        const auto met = of_ray(others, column, row, next_other);
+        Lengths lengths;
+        if (met.empty() && cluttered_.tissues.empty()) {
+          lengths = soft_tissue(line);
           add_bone(line, intervals, lengths);
+        } else {
+          body_rays_.intervals(met, body_intervals);
+          lengths = among_others(line, intervals, body_intervals);
         }
         primary(row / kSubsamples, column / kSubsamples) += transmission(lengths) / (kSubsamples * kSubsamples);
       }
   }
 
  private:
+  static std::vector<const phantom::Body*> others_of(const ClutteredPhantom& cluttered) {
+    std::vector<const phantom::Body*> others;
+    for (const auto* bodies : {&cluttered.tissues, &cluttered.bodies})
+      for (const phantom::Body& body : *bodies) others.push_back(&body);
+    return others;
+  }
+
+  /// The crossings of one ray, from `next` on, which is moved behind them.
+  static std::span<const phantom::Crossing> of_ray(const std::vector<phantom::Crossing>& crossings, int column, int row,
+                                                   std::size_t& next) {
+    const std::size_t begin = next;
+    while (next < crossings.size() && int(crossings[next].row) == row && int(crossings[next].column) == column) ++next;
+    return {crossings.data() + begin, next - begin};
+  }
+
+  void add_bone(const Ray& ray, const Interval& interval, double from, double to, Lengths& lengths) const {
+    const double length = (to - from) * ray.mm_per_depth;
+    double fraction = 1;
+    if (!interval.cortical) {
+      const RigidTransform& bone_from_world = bone_from_world_[std::size_t(interval.fragment)];
+      fraction = fill_.mean((bone_from_world * (ray.source + from * ray.direction)).z(),
+                            (bone_from_world * (ray.source + to * ray.direction)).z());
+    }
+    lengths.bone += fraction * length;
+    lengths.marrow += (1 - fraction) * length;
+  }
+
   phantom::SolidRays::Map map(const phantom::Fragment& fragment) const {
-    const RigidTransform camera_from_bone = camera_.camera_from_world * fragment.world_from_bone();
-    return [this, camera_from_bone, name = fragment.name](const Eigen::Vector3d& point) {
-      const Eigen::Vector3d x = camera_from_bone * point;
+    return map(camera_.camera_from_world * fragment.world_from_bone(), "fragment '" + fragment.name + "'",
+               "the fragment's translation");
+  }
+
+  /// From a body's frame to rays. `name` and `place` are for a message.
+  phantom::SolidRays::Map map(const RigidTransform& camera_from_body, const std::string& name,
+                              const std::string& place) const {
+    return [this, camera_from_body, name, place](const Eigen::Vector3d& point) {
+      const Eigen::Vector3d x = camera_from_body * point;
       if (!(x.z() >= kNearestMm))
-        throw Error(
-            "simulate.fluoroscopy: fragment '" + name + "' reaches to " + std::to_string(x.z()) +
-            " mm from the X-ray source; it must lie in front of the source, so check the camera's distances and the "
-            "fragment's translation");
+        throw Error("simulate.fluoroscopy: " + name + " reaches to " + std::to_string(x.z()) +
+                    " mm from the X-ray source; it must lie in front of the source, so check the camera's distances "
+                    "and " +
+                    place);
       const Eigen::Vector2d pixel = (camera_.intrinsics * x).hnormalized();
       return phantom::RayVertex{(pixel.x() + 0.5) * kSubsamples - 0.5, (pixel.y() + 0.5) * kSubsamples - 0.5,
                                 -1 / x.z()};
     };
   }
 
+  const ClutteredPhantom& cluttered_;
   const Phantom& phantom_;
   const Camera& camera_;
   phantom::Fill fill_;
   Eigen::Matrix3d detector_to_ray_;
   phantom::SolidRays rays_;
+  phantom::BodyRays body_rays_;
+  std::vector<phantom::Material> materials_;  ///< of each body that is not bone
   std::vector<RigidTransform> bone_from_world_;
 };
 
@@ -189,13 +258,14 @@ void add_quantum_noise(cv::Mat1d& expected, std::uint64_t seed) {
   });
 }
 
-View expose(const std::string& name, const Phantom& phantom, const Camera& camera, const FluoroscopyOptions& options,
-            std::uint64_t seed, Context& context) {
+View expose(const std::string& name, const ClutteredPhantom& cluttered, const Camera& camera,
+            const FluoroscopyOptions& options, std::uint64_t seed, Context& context) {
   check_camera(camera, "simulate.fluoroscopy: camera '" + name + "'");
-  const XRay xray(phantom, camera);
+  const XRay xray(cluttered, camera);
+  const phantom::Bone& bone = cluttered.phantom.bone;
   cv::Mat1d signal = primary_image(xray, camera, context);
   // Exposure control: the dose is such that the wanted number of photons arrives behind the thickest soft tissue.
-  const double radius = std::max(phantom.bone.thigh_radius_mm, 0.0), fat = std::min(phantom.bone.fat_mm, radius);
+  const double radius = std::max(bone.thigh_radius_mm, 0.0), fat = std::min(bone.fat_mm, radius);
   const double tissue = transmission({0, 0, 2 * (radius - fat), 2 * fat});
   signal += scatter_image(signal, options, tissue);
   const double behind_tissue = tissue * (1 + options.scatter_to_primary);
@@ -215,8 +285,8 @@ View expose(const std::string& name, const Phantom& phantom, const Camera& camer
   return view;
 }
 
-List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options,
-                       Context& context) {
+List<View> cluttered_fluoroscopy(const ClutteredPhantom& phantom, const List<Camera>& cameras,
+                                 const FluoroscopyOptions& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.fluoroscopy");
   List<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
@@ -227,14 +297,14 @@ List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, cons
   return views;
 }
 
-}  // namespace
+List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options,
+                       Context& context) {
+  return cluttered_fluoroscopy({phantom, {}, {}}, cameras, options, context);
+}
 
-MARROW_PLUGIN(plugin) {
-  plugin.node("simulate.fluoroscopy", fluoroscopy)
-      .summary(
-          "Simulates X-ray images of a bone from exact path lengths at several energies, with noise, scatter and blur")
-      .random()
-      .in("phantom", "bone, fracture and fragments")
+/// What both nodes have.
+void declare(auto&& node) {
+  node.random()
       .in("cameras", "camera of each view", over("view"))
       .out("views", "16-bit images, bright = air", over("view"))
       .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0: no noise",
@@ -245,4 +315,16 @@ MARROW_PLUGIN(plugin) {
               "ratio of scattered to primary radiation behind soft tissue", at_least(0), at_most(5))
       .option("scatter_px", &FluoroscopyOptions::scatter_px,
               "standard deviation of the Gaussian that spreads the scatter", at_least(8));
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  declare(plugin.node("simulate.fluoroscopy", fluoroscopy)
+              .summary("Simulates X-ray images of a bone from exact path lengths at several energies, with noise, "
+                       "scatter and blur")
+              .in("phantom", "bone, fracture and fragments"));
+  declare(plugin.node("simulate.cluttered_fluoroscopy", cluttered_fluoroscopy)
+              .summary("Simulates X-ray images like simulate.fluoroscopy, with what else is in the beam")
+              .in("phantom", "phantom with tissues and bodies"));
 }

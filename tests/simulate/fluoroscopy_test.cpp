@@ -45,7 +45,8 @@ TEST(SimulateFluoroscopy, MarrowAndMuscleFillTheRest) {
   phantom.bone.thigh_radius_mm = 80;
   phantom.bone.fat_mm = 10;
   const Camera camera = test::camera(0, 129);
-  const XRay xray(phantom, camera);
+  const ClutteredPhantom cluttered{phantom, {}, {}};
+  const XRay xray(cluttered, camera);
   cv::Mat1d primary(129, 129, 0.0);
   xray.render(0, 129, primary);
   // The pixel in the middle: 10 mm cortex, 30 mm filling, 140 - 40 mm muscle, 20 mm fat, to a slant of a quarter pixel.
@@ -58,7 +59,8 @@ TEST(SimulateFluoroscopy, TwoSidesOfAFractureAddUpToTheWholeBone) {
   const auto bone_lengths = [&](int side) {
     phantom.fragments[0].side = side;
     const Camera camera = test::camera(30, 128);
-    const XRay xray(phantom, camera);
+    const ClutteredPhantom cluttered{phantom, {}, {}};
+    const XRay xray(cluttered, camera);
     std::vector<double> result(256 * 256, 0.0);
     std::vector<Interval> intervals;
     const auto crossings = xray.rays().bundle().crossings(0, 256);

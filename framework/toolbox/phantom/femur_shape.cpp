@@ -1,61 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "marrow/toolbox/phantom/femur_shape.hpp"
 
-#include <algorithm>
 #include <cmath>
-#include <span>
-#include <utility>
 
 #include "marrow/domain/random.hpp"
+#include "marrow/toolbox/phantom/shape_functions.hpp"
 
 namespace marrow::phantom {
 namespace {
 
 using Eigen::Vector3d;
-using Node = std::pair<double, double>;
-
-/// Piecewise linear curve through nodes, constant beyond them.
-double along(std::span<const Node> nodes, double x) {
-  if (x <= nodes.front().first) return nodes.front().second;
-  for (std::size_t i = 1; i < nodes.size(); ++i)
-    if (x <= nodes[i].first) {
-      const double t = (x - nodes[i - 1].first) / (nodes[i].first - nodes[i - 1].first);
-      return nodes[i - 1].second + t * (nodes[i].second - nodes[i - 1].second);
-    }
-  return nodes.back().second;
-}
-
-/// The same with rounded corners, by averaging over +-0.025.
-double smooth_along(std::span<const Node> nodes, double x) {
-  constexpr double kHalfWidth = 0.025;
-  double sum = 0;
-  for (int i = -2; i <= 2; ++i) sum += along(nodes, x + i * kHalfWidth / 2);
-  return sum / 5;
-}
-
-/// Union and intersection with a fillet of about `fillet` mm (polynomial smooth minimum).
-double join(double a, double b, double fillet) {
-  const double h = std::max(fillet - std::abs(a - b), 0.0) / fillet;
-  return std::min(a, b) - h * h * fillet / 4;
-}
-double cut(double a, double b, double fillet) { return -join(-a, -b, fillet); }
-
-double ellipsoid(const Vector3d& p, const Vector3d& radii) {
-  const double k0 = p.cwiseQuotient(radii).norm(), k1 = p.cwiseQuotient(radii.cwiseProduct(radii)).norm();
-  return k1 > 1e-9 ? k0 * (k0 - 1) / k1 : -radii.minCoeff();
-}
-
-/// A disc with its axis along x and rounded rims.
-double disc(const Vector3d& p, double radius, double half_width, double rim) {
-  const double across = std::hypot(p.y(), p.z()) - (radius - rim), beside = std::abs(p.x()) - (half_width - rim);
-  return std::hypot(std::max(across, 0.0), std::max(beside, 0.0)) + std::min(std::max(across, beside), 0.0) - rim;
-}
-
-/// A cone with rounded ends between two points.
-double capsule(const Vector3d& p, const Vector3d& a, const Vector3d& b, double radius_a, double radius_b) {
-  const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
-  return (p - a - t * (b - a)).norm() - (radius_a + t * (radius_b - radius_a));
-}
 
 // Width and depth relative to the mid-shaft value, over the fraction of the length from the distal end (24 measured
 // femora, FACTS).

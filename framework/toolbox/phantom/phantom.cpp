@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/toolbox/phantom/materials.hpp"
 
 namespace marrow::phantom {
 namespace {
@@ -51,6 +52,21 @@ void check_phantom(const Phantom& phantom, const std::string& what) {
       throw Error(what + ": fragment '" + fragment.name +
                   "' lies on one side of a fracture, but there is no fracture surface");
   }
+}
+
+void check_phantom(const ClutteredPhantom& cluttered, const std::string& what) {
+  check_phantom(cluttered.phantom, what);
+  for (const auto* bodies : {&cluttered.tissues, &cluttered.bodies})
+    for (const Body& body : *bodies) {
+      const std::string name = what + ", '" + body.name + "'";
+      check_surface(body.surface, name);
+      check_rigid(body.ct_from_world, name + " in the CT");
+      try {
+        material(body.material);
+      } catch (const Error& error) {
+        throw Error(name + ": " + error.what());
+      }
+    }
 }
 
 void place_distal_end(Bone& bone, double depth_mm) {

@@ -45,6 +45,30 @@ void SolidRays::intervals(std::span<const Crossing> ray, std::vector<Interval>& 
   }
 }
 
+BodyRays::BodyRays(const std::vector<const Body*>& bodies, int columns, int rows,
+                   const std::function<Map(const Body&)>& place)
+    : bundle_(columns, rows) {
+  for (const Body* body : bodies) bundle_.add(mapped(body->surface, place(*body)), body->surface.triangles);
+}
+
+void BodyRays::intervals(std::span<const Crossing> ray, std::vector<BodyInterval>& found) const {
+  found.clear();
+  for (std::size_t first = 0; first < ray.size(); ++first) {
+    const int body = ray[first].surface;
+    bool is_first = true;
+    for (std::size_t i = 0; i < first; ++i) is_first = is_first && ray[i].surface != body;
+    if (!is_first) continue;
+    int winding = 0;
+    double from = 0;
+    for (const Crossing& crossing : ray.subspan(first)) {
+      if (crossing.surface != body) continue;
+      if (winding > 0 && crossing.depth > from) found.push_back({body, from, crossing.depth});
+      winding += crossing.sense;
+      from = crossing.depth;
+    }
+  }
+}
+
 std::pair<double, double> through_cylinder(const Eigen::Vector2d& centre, double radius, const Eigen::Vector3d& origin,
                                            const Eigen::Vector3d& direction) {
   const Eigen::Vector2d from = origin.head<2>() - centre, along = direction.head<2>();

@@ -34,14 +34,19 @@ struct DrawnInput {
   Place place;
 };
 
+/// Inputs of a pipeline that differ between cases with seeds.
+struct SeededInputs {
+  std::vector<DrawnInput> drawn;
+  std::vector<std::pair<std::string, Place>> taking_seed;  ///< inputs that take the case's seed
+};
+
 /// The pipeline that makes cases, and where the values of its inputs come from.
 struct CaseSimulation {
   std::filesystem::path pipeline;  ///< empty if there is none
   std::string output;
   std::vector<Override> changes;   ///< changes of the pipeline, for all cases
   std::vector<InputValue> inputs;  ///< the same for all cases
-  std::vector<DrawnInput> drawn;
-  std::vector<std::pair<std::string, Place>> seed_inputs;  ///< inputs that take the case's seed
+  SeededInputs seeded;
 };
 
 /// A displacement of the start pose: rotations about, and translations along, the fragment's frontal, lateral and long
@@ -91,6 +96,7 @@ struct Experiment {
   std::string case_input;          ///< the pipeline's input that gets the folder of the case, if it has one
   Place cases_place;
   CaseSimulation simulation;
+  SeededInputs seeded;  ///< of the pipeline itself, where it makes its data and the cases are seeds
   std::vector<ExperimentCase> cases;
   std::vector<Variant> variants;
   std::size_t baseline = 0;

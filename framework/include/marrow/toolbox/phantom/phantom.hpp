@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// Values that the simulation nodes exchange: a bone as closed surfaces, and the fragments that a fracture makes of it.
+// Values that the simulation nodes exchange: a bone as closed surfaces, the fragments that a fracture makes of it, and
+// what else is in the beam.
 #include <Eigen/Core>
 #include <string>
 #include <vector>
@@ -53,10 +54,33 @@ struct Phantom {
   using fields = Fields<&Phantom::bone, &Phantom::fracture, &Phantom::fragments>;
 };
 
+/// Anything else in the beam: a closed surface that is filled with one material.
+struct Body {
+  std::string name;
+  std::string material;                         ///< one of materials()
+  Mesh surface;                                 ///< in the images, frame "world"
+  bool in_ct = false;                           ///< whether the CT shows it too
+  RigidTransform ct_from_world{"ct", "world"};  ///< where it lies in the CT
+  std::string moves_with;                       ///< the fragment that it is fixed to; empty: none
+  using fields =
+      Fields<&Body::name, &Body::material, &Body::surface, &Body::in_ct, &Body::ct_from_world, &Body::moves_with>;
+};
+
+/// A phantom with what else is in the beam.
+struct ClutteredPhantom {
+  Phantom phantom;
+  /// Soft tissue. A later one counts where it overlaps another. Without any, the thigh is the bone's cylinder.
+  std::vector<Body> tissues;
+  /// Where bodies overlap, the later one counts. All of them replace bone and soft tissue.
+  std::vector<Body> bodies;
+  using fields = Fields<&ClutteredPhantom::phantom, &ClutteredPhantom::tissues, &ClutteredPhantom::bodies>;
+};
+
 /// Throw Error, naming `what`, unless the surfaces are closed and oriented outward and the other values are finite and
 /// consistent.
 void check_bone(const Bone& bone, const std::string& what);
 void check_phantom(const Phantom& phantom, const std::string& what);
+void check_phantom(const ClutteredPhantom& phantom, const std::string& what);
 
 /// Moves the surfaces, the thigh and the fill. Then the lowest point lies `depth_mm` below the origin, and the middle
 /// of the bone's lowest 100 mm lies on the z axis. The origin is the isocentre of the views.
@@ -79,3 +103,4 @@ class Fill {
 
 MARROW_VALUE_TYPE(marrow::phantom::Bone, "simulated_bone", 1)
 MARROW_VALUE_TYPE(marrow::phantom::Phantom, "phantom", 2)
+MARROW_VALUE_TYPE(marrow::phantom::ClutteredPhantom, "cluttered_phantom", 1)

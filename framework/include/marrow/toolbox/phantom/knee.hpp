@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The bones next to a femur's distal end.
+#include "marrow/toolbox/phantom/phantom.hpp"
+
+namespace marrow::phantom {
+
+/// Where a femur's distal end lies, in frame "bone", measured on its outer surface.
+struct DistalEnd {
+  double lowest_z, half_width_mm, front_y, back_y;
+  Eigen::Vector2d middle_mm;  ///< x and y of the middle of its bounds
+  double lateral_x;           ///< +1 or -1: the direction of x that leads away from the head
+};
+DistalEnd distal_end(const Mesh& outer);
+
+struct KneeShape {
+  double gap_mm = 4.5;          ///< between femur and tibia: cartilage
+  double flexion_rad = 0.2;     ///< in the images
+  double ct_flexion_rad = 0.1;  ///< in the CT
+  double patella_up_mm = 0;     ///< how far the patella sits above its usual height
+};
+
+/// Tibia, fibula and patella of the size that fits the femur. They move with the fragment, and bend about the middle of
+/// the condyles. Each is a body of cortical bone and one of cancellous bone inside.
+std::vector<Body> make_knee(const Mesh& femur_outer, const Fragment& fragment, const KneeShape& shape);
+
+/// A body that is fixed to a fragment, in the images and in the CT. `surface` is in the fragment's frame "bone".
+Body fixed_to(const Fragment& fragment, const std::string& name, const std::string& material, Mesh surface);
+
+}  // namespace marrow::phantom
