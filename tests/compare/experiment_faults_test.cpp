@@ -170,6 +170,13 @@ TEST_F(ExperimentFaults, Cases) {
       << diagnostics.text();
 }
 
+TEST_F(ExperimentFaults, InputsBySeedNeedSeeds) {
+  for (const std::string line : {"draw: {x: [0, 1]}", "seed_input: [x]"})
+    expect_fault(std::string(kHead) + "cases:\n  folders: [cases/*]\n  " + line + "\n" + kAfterCases, 5,
+                 "'" + line.substr(0, line.find(':')) + "' without 'seeds'",
+                 "inputs of a simulation that differ between cases stand in 'simulate'");
+}
+
 TEST_F(ExperimentFaults, Simulation) {
   expect_fault(std::string(kHead) + "cases:\n  simulate: s.yaml\n" + kAfterCases, 4,
                "'simulate' must be a map, got 's.yaml'", kMapHint);

@@ -157,6 +157,25 @@ TEST_F(ExperimentFiles, SeedsAloneAreThoseOfTheRuns) {
   EXPECT_EQ(runner.seed_of(1), 9u);
 }
 
+TEST_F(ExperimentFiles, APipelineThatMakesItsDataTakesItsInputsBySeed) {
+  scratch.write(
+      "p.yaml",
+      "marrow: 1\ninputs: {x: {type: number, default: 0}, shape: {type: integer, default: 1}}\nnodes:\n"
+      "  c: {uses: test.constant, with: {value: $x, count: $shape}}\n  n: {uses: test.add, in: {a: c, b: c}}\n"
+      "outputs: {number: n}\n");
+  const Experiment e = read(std::string(kHead) + "cases: {seeds: 3..5, draw: {x: [-2, 2]}, seed_input: [shape]}\n" +
+                            kVariants + kMetrics);
+  ASSERT_TRUE(diagnostics.empty()) << diagnostics.text();
+  const auto input = [&](std::size_t index, std::size_t i) {
+    return marrow::compare::arguments_of(e, {0, index, 0}, {}).inputs.at(i);
+  };
+  EXPECT_EQ(input(2, 1).name + "=" + input(2, 1).value, "shape=5");
+  EXPECT_EQ(input(1, 0).name, "x");
+  EXPECT_NE(input(1, 0).value, input(2, 0).value);
+  EXPECT_EQ(marrow::compare::arguments_of(e, {1, 2, 0}, {}).inputs.at(0).value, input(2, 0).value)
+      << "the same for each variant";
+}
+
 TEST_F(ExperimentFiles, PathsStartAtTheExperiment) {
   scratch.write("data.txt", "1");
   std::string pipeline = kPipeline;
