@@ -212,7 +212,9 @@ TEST(SimulateClutter, TheKneeHasTheFemursSizeAndNeitherTouchesIt) {
       EXPECT_NEAR((high - low).x(), 44 * end.half_width_mm / 41, 3);
       EXPECT_LT(0.5 * (low + high).y(), end.front_y);
     }
-    if (one.name == "fibula") EXPECT_GT(0.5 * (low + high).x(), end.middle_mm.x() + 25);
+    if (one.name == "fibula") {
+      EXPECT_GT(0.5 * (low + high).x(), end.middle_mm.x() + 25);
+    }
   }
 }
 
