@@ -30,14 +30,7 @@ std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::V
   return inside;
 }
 
-struct Assembled {
-  Case whole;
-  List<Seeds> seeds;
-  List<Pose> start;
-  List<Truth> truth;
-};
-
-Assembled assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
+Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
   phantom::check_phantom(phantom, "simulate.case");
   check_volume(ct, "simulate.case: CT");
   Case result;
@@ -69,8 +62,11 @@ Assembled assemble(const Volume& ct, const List<View>& views, const Phantom& pha
                   "' has no seed within the CT; let simulate.ct cover more of it (range_mm)");
     }
   }
-  return {result, result.seeds, result.start, result.truth};
+  return result;
 }
+
+/// For a pipeline that goes on from a simulated case as it would from one that read.case has read.
+Case parts_of(const Case& whole) { return whole; }
 
 }  // namespace
 
@@ -80,13 +76,18 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT of the phantom")
       .in("views", "X-ray images of the phantom", over("view"))
       .in("phantom", "bone and fragments, with their seeds and exact poses")
-      .out("case", &Assembled::whole, "CT, views, seeds and truth")
-      .out("seeds", &Assembled::seeds, "points inside each fragment, as the case has them", over("fragment"))
-      .out("start", &Assembled::start, "the case's start, if it has one", over("fragment"))
-      .out("truth", &Assembled::truth, "exact pose of each fragment that is registered", over("fragment"))
+      .out("case", "CT, views, seeds and truth")
       .option("register", &CaseOptions::wanted,
               "fragments whose pose is wanted; other fragments are only segmented, to keep them apart in the CT")
       .option("start", &CaseOptions::start,
               "none: the case has no start; exact: the start is the true pose, for experiments that displace it",
               one_of({"none", "exact"}));
+  plugin.node("simulate.case_parts", parts_of)
+      .summary("Gives the parts of a simulated case, with the names that read.case has for them")
+      .in("case", "case of simulate.case")
+      .out("ct", &Case::ct, "CT in Hounsfield units")
+      .out("seeds", &Case::seeds, "points inside each fragment", over("fragment"))
+      .out("views", &Case::views, "X-ray views with cameras", over("view"))
+      .out("start", &Case::start, "pose to start from, if the case has one", over("fragment"))
+      .out("truth", &Case::truth, "exact pose of each fragment that is registered", over("fragment"));
 }

@@ -146,7 +146,10 @@ class ExperimentSchema(Case):
         simulation = schema["cases"]["properties"]["simulate"]["properties"]
         for keys, known in (
             (file, schema),
-            (dict(file["cases"], seeds="by themselves"), schema["cases"]["properties"]),
+            (
+                dict(file["cases"], seeds="by themselves", draw="so too", seed_input="so too"),
+                schema["cases"]["properties"],
+            ),
             (file["cases"]["simulate"], simulation),
             (file["starts"], schema["starts"]["properties"]),
         ):

@@ -65,6 +65,16 @@ TEST(SimulateCase, HoldsSeedsTruthAndViewsAndNoStart) {
   }
 }
 
+TEST(SimulateCase, ItsPartsAreThoseOfTheCase) {
+  const Case whole = assemble({{"start", std::string("exact")}});
+  const shipped::Outputs parts = shipped::call("simulate.case_parts", {{"case", shipped::item(whole)}});
+  EXPECT_EQ(parts.at("ct").as<Volume>().values, whole.ct.values);
+  EXPECT_EQ(parts.at("seeds").as_list<Seeds>().names(), whole.seeds.names());
+  EXPECT_EQ(parts.at("views").as_list<View>().names(), whole.views.names());
+  EXPECT_EQ(parts.at("start").as_list<Pose>().names(), whole.start.names());
+  EXPECT_EQ(parts.at("truth").as_list<Truth>()[0].world_from_model.rotation, whole.truth[0].world_from_model.rotation);
+}
+
 TEST(SimulateCase, BothFragmentsCanBeWanted) {
   const Case result = assemble({{"register", std::vector<std::string>{"distal", "proximal"}}});
   EXPECT_EQ(result.truth.names(), (std::vector<std::string>{"proximal", "distal"}));
