@@ -4,6 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/image/blur.hpp"
 #include "marrow/toolbox/match/edge_loss.hpp"
 #include "marrow/toolbox/match/nearest_edges.hpp"
 #include "marrow/toolbox/match/nearest_outline.hpp"
@@ -293,6 +294,14 @@ class ContourDistance : public marrow::match::ViewsCost {
   const marrow::match::EdgeLoss loss_;
 };
 
+/// By how much the images' blur moves the edges of a round bone inwards, the mean over the views.
+double edges_inside_px(const marrow::List<marrow::View>& views, const marrow::List<marrow::EdgeMap>& edges) {
+  double sum = 0;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    sum += marrow::image::border_inside_px(marrow::image::blur_px(views[i].image.pixels, edges[i]));
+  return sum / double(views.size());
+}
+
 std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjector& projector,
                                                      const marrow::List<marrow::View>& views,
                                                      const marrow::List<marrow::EdgeMap>& edges,
@@ -308,6 +317,7 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjec
   scene->projector = &projector;
   scene->views = views;
   scene->options = options;
+  if (options.estimate_offset) scene->options.edge_offset_px -= edges_inside_px(views, edges);
   for (std::size_t i = 0; i < views.size(); ++i) {
     scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
     if (scene->edges.back().empty())
@@ -344,8 +354,8 @@ MARROW_PLUGIN(plugin) {
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
               "largest angle between the directions of edge and outline", marrow::at_least(10), marrow::at_most(180))
       .option("edge_offset_px", &Options::edge_offset_px,
-              "distance of the edges outside the model's outline; if estimate_offset is set, the middle of the range "
-              "of +-3 px that is tried")
+              "distance of the edges outside the model's outline; if estimate_offset is set, in addition to the "
+              "distance that the image's blur makes, and the middle of the range of +-3 px that is tried")
       .option("estimate_offset", &Options::estimate_offset,
               "find the best edge offset at each pose; it is the same in all views")
       .option("symmetric", &Options::symmetric,

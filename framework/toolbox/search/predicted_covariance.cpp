@@ -16,7 +16,7 @@ namespace {
 constexpr double kMostStep = 16, kLeastStep = 1.0 / 256;          // degrees or mm
 constexpr double kLeastRise = 0.5, kGoodRise = 1, kMostRise = 3;  // in units of the wanted rise
 constexpr double kFlat = 0.1, kFlatLater = 0.5;  // in units of the wanted rise: the least curvature along a step
-constexpr double kWantedRise = 10;  // of the cost by a step, in units of its noise
+constexpr double kWantedRise = 10;               // of the cost by a step, in units of its noise
 constexpr int kMostRounds = 5;
 
 std::string number(double value) {
@@ -134,8 +134,8 @@ Matrix6d PredictedCovariance::scatter() {
   for (std::size_t block = 0; block < without[0].size(); ++block) {
     Vector6d gradient;
     for (std::size_t axis = 0; axis < 6; ++axis)
-      gradient[int(axis)] = 0.5 * ((without[2 * axis][block] - values[2 * axis]) -
-                                   (without[2 * axis + 1][block] - values[2 * axis + 1]));
+      gradient[int(axis)] =
+          0.5 * ((without[2 * axis][block] - values[2 * axis]) - (without[2 * axis + 1][block] - values[2 * axis + 1]));
     sum += gradient * gradient.transpose();
   }
   return sum;
@@ -154,11 +154,12 @@ void PredictedCovariance::turn_steps(const Matrix6d& hessian) {
   }
   steps_ = (steps_ * eigen.vectors * length.asDiagonal()).eval();
   for (int i = 0; i < 6; ++i)
-    steps_.col(i) *= std::clamp(steps_.col(i).cwiseAbs().maxCoeff(), kLeastStep, kMostStep) /
-                     steps_.col(i).cwiseAbs().maxCoeff();
+    steps_.col(i) *=
+        std::clamp(steps_.col(i).cwiseAbs().maxCoeff(), kLeastStep, kMostStep) / steps_.col(i).cwiseAbs().maxCoeff();
 }
 
-/// After the first round the steps are nearly eigenvectors, so a smaller curvature than `flat` is roughness. Also sets the noise to the mean rise of the cost that the covariance stands for.
+/// After the first round the steps are nearly eigenvectors, so a smaller curvature than `flat` is roughness. Also sets
+/// the noise to the mean rise of the cost that the covariance stands for.
 void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatter, double flat) {
   constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
   Matrix6d open = Matrix6d::Zero();
@@ -210,8 +211,8 @@ void PredictedCovariance::widen() {
 void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
                                             const std::vector<double>& values) {
   constexpr std::size_t kMost = 2;
-  constexpr int kNear = 2;           // poses at both sides that belong to the pose's own minimum
-  constexpr double kMostRise = 10;   // in units of the cost's noise
+  constexpr int kNear = 2;          // poses at both sides that belong to the pose's own minimum
+  constexpr double kMostRise = 10;  // in units of the cost's noise
   const int count = int(values.size()), middle = count / 2;
   std::vector<int> found;
   for (int i = 1; i + 1 < count; ++i) {
@@ -220,8 +221,7 @@ void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& p
         here < value_ + kMostRise * noise_)
       found.push_back(i);
   }
-  std::sort(found.begin(), found.end(),
-            [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
+  std::sort(found.begin(), found.end(), [&](int a, int b) { return values[std::size_t(a)] < values[std::size_t(b)]; });
   for (std::size_t i = 0; i < std::min(kMost, found.size()); ++i) other_minima_.push_back(poses[std::size_t(found[i])]);
 }
 
