@@ -29,8 +29,8 @@ marrow::EdgeMap edges_at(double angle, double inside_px = 0) {
   marrow::EdgeMap edges{kSize_px, kSize_px, {}};
   const double du = std::cos(angle), dv = std::sin(angle);
   for (int along = -80; along <= 80; ++along)
-    edges.pixels.push_back({float(120 - inside_px * du - along * dv), float(120 - inside_px * dv + along * du),
-                            float(du), float(dv), 1});
+    edges.pixels.push_back(
+        {float(120 - inside_px * du - along * dv), float(120 - inside_px * dv + along * du), float(du), float(dv), 1});
   return edges;
 }
 

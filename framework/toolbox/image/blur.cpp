@@ -12,9 +12,9 @@
 namespace marrow::image {
 namespace {
 
-constexpr int kReach = 24;                              // samples to each side of an edge
-constexpr double kStep_px = 0.5;                        // between samples
-constexpr double kFine_px = 1.5, kCoarse_px = 3;        // standard deviations of the two smoothings
+constexpr int kReach = 24;                                // samples to each side of an edge
+constexpr double kStep_px = 0.5;                          // between samples
+constexpr double kFine_px = 1.5, kCoarse_px = 3;          // standard deviations of the two smoothings
 constexpr std::array<double, 3> kLines_px{-1.5, 0, 1.5};  // parallel profiles, along the edge
 
 /// The derivative of a Gaussian at the samples.
@@ -75,8 +75,7 @@ std::optional<double> blur_of(const std::vector<double>& profile) {
   }
   const double ratio2 = before * before / (after * after);
   if (!(before * after > 0) || !(ratio2 > 1)) return std::nullopt;
-  return std::sqrt(
-      std::max(0.0, (kCoarse_px * kCoarse_px - ratio2 * kFine_px * kFine_px) / (ratio2 - 1)));
+  return std::sqrt(std::max(0.0, (kCoarse_px * kCoarse_px - ratio2 * kFine_px * kFine_px) / (ratio2 - 1)));
 }
 
 }  // namespace
