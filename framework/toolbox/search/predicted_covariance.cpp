@@ -47,13 +47,15 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   if (without_block.empty()) return;
   evaluations_ += 2;
   wanted_rise_ = deviation_of(value_, without_block);
+  guess_steps();
   for (int round = 1;; ++round) {
     choose_steps();
     const Matrix6d h = hessian();
     invert(h, scatter(), round == 1 ? kFlat : kFlatLater);
     const double wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
-    if (round == kMostRounds || (round > 1 && wanted_rise_ > 0.5 * wanted_before)) break;
+    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature_ > kFlatLater);
+    if (steps_are_right || round == kMostRounds) break;
     turn_steps(h);
   }
   widen();
@@ -80,14 +82,30 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
   return warnings;
 }
 
+/// Steps that are nearly right save most of the search for them.
+void PredictedCovariance::guess_steps() {
+  const auto about = cost_.expansion(pose_, frame_);
+  if (!about) return;
+  ++evaluations_;
+  for (int axis = 0; axis < 6; ++axis) {
+    const double unit = axis < 3 ? radians(1) : 1, curvature = about->curvature(axis, axis) * unit * unit;
+    if (!(curvature > 0)) continue;
+    const double step = std::sqrt(2 * 1.5 * wanted_rise_ / curvature);
+    steps_(axis, axis) = std::clamp(step, kLeastStep, kMostStep);
+  }
+}
+
 void PredictedCovariance::choose_steps() {
   std::array<int, 6> evaluations{};
   tbb::parallel_for(0, 6, [&](int i) {
     if (open_[std::size_t(i)]) return;
     Vector6d step = steps_.col(i);
+    double* ends = ends_.data() + 2 * i;
     const auto rise = [&] {
       evaluations[std::size_t(i)] += 2;
-      return 0.5 * (cost_.value(pose_at(step)) + cost_.value(pose_at(-step))) - value_;
+      ends[0] = cost_.value(pose_at(step));
+      ends[1] = cost_.value(pose_at(-step));
+      return 0.5 * (ends[0] + ends[1]) - value_;
     };
     double height = rise();
     for (; height > kMostRise * wanted_rise_ && step.cwiseAbs().maxCoeff() > kLeastStep; height = rise()) step *= 0.5;
@@ -123,19 +141,16 @@ Matrix6d PredictedCovariance::hessian() {
 /// The sum over the blocks of g g^T, in units of the steps.
 Matrix6d PredictedCovariance::scatter() {
   std::array<std::vector<double>, 12> without;
-  std::array<double, 12> values{};
   tbb::parallel_for(0, 12, [&](int i) {
-    const RigidTransform pose = pose_at((i % 2 ? -1 : 1) * steps_.col(i / 2));
-    values[std::size_t(i)] = cost_.value(pose);
-    without[std::size_t(i)] = cost_.without_each_block(pose);
+    without[std::size_t(i)] = cost_.without_each_block(pose_at((i % 2 ? -1 : 1) * steps_.col(i / 2)));
   });
-  evaluations_ += 24;
+  evaluations_ += 12;
   Matrix6d sum = Matrix6d::Zero();
   for (std::size_t block = 0; block < without[0].size(); ++block) {
     Vector6d gradient;
     for (std::size_t axis = 0; axis < 6; ++axis)
       gradient[int(axis)] =
-          0.5 * ((without[2 * axis][block] - values[2 * axis]) - (without[2 * axis + 1][block] - values[2 * axis + 1]));
+          0.5 * ((without[2 * axis][block] - ends_[2 * axis]) - (without[2 * axis + 1][block] - ends_[2 * axis + 1]));
     sum += gradient * gradient.transpose();
   }
   return sum;
@@ -166,6 +181,7 @@ void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatte
   for (int i = 0; i < 6; ++i)
     if (open_[std::size_t(i)]) open(i, i) = kMostVariance;
   const SymmetricEigen<6> eigen = eigen_of_symmetric(hessian);
+  least_curvature_ = eigen.values[0] / wanted_rise_;
   Matrix6d inverse = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i)
     inverse += eigen.vectors.col(i) * eigen.vectors.col(i).transpose() / std::max(eigen.values[i], flat * wanted_rise_);
@@ -183,7 +199,7 @@ void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatte
 
 /// The density exp(-cost / noise) along the eigenvector of the largest eigenvalue, out to twelve standard deviations.
 void PredictedCovariance::widen() {
-  constexpr int kSide = 24;
+  constexpr int kSide = 12;
   constexpr double kReach = 12;
   constexpr double kLeastRatio = 2;  // of the variances; less is the roughness of the cost
   const SymmetricEigen<6> eigen = eigen_of_symmetric(in_units_);
@@ -207,11 +223,11 @@ void PredictedCovariance::widen() {
   *covariance_ += (squares / sum - variance) * unit * unit.transpose();
 }
 
-/// `poses` lie on a line through the pose, which is in the middle, half a standard deviation or less apart.
+/// `poses` lie on a line through the pose, which is in the middle, a standard deviation or less apart.
 void PredictedCovariance::find_other_minima(const std::vector<RigidTransform>& poses,
                                             const std::vector<double>& values) {
   constexpr std::size_t kMost = 2;
-  constexpr int kNear = 2;          // poses at both sides that belong to the pose's own minimum
+  constexpr int kNear = 1;          // poses at both sides that belong to the pose's own minimum
   constexpr double kMostRise = 10;  // in units of the cost's noise
   const int count = int(values.size()), middle = count / 2;
   std::vector<int> found;

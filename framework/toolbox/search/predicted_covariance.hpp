@@ -17,9 +17,9 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// The covariance is the sum of the squares of these motions. So it follows the residuals' own noise, and their
 /// correlation within a block.
 ///
-/// Derivatives are central differences along six directions. They are the axes first, then the eigenvectors of the
-/// Hessian, so that a direction in which the cost is flat gets a longer step than the others. A step is
-/// four to eight standard deviations long: enough that the roughness of the cost does not matter.
+/// Derivatives are central differences along six directions. They are the axes first. If the cost is flat in a
+/// direction between them, they are then the eigenvectors of the Hessian, with a longer step in this direction. A step
+/// is four to eight standard deviations long: enough that the roughness of the cost does not matter.
 ///
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
@@ -41,6 +41,7 @@ class PredictedCovariance {
 
  private:
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
+  void guess_steps();
   void choose_steps();
   Matrix6d hessian();
   Matrix6d scatter();
@@ -58,6 +59,8 @@ class PredictedCovariance {
   int evaluations_ = 0;
   Matrix6d steps_ = 0.5 * Matrix6d::Identity();  ///< a direction in each column, in degrees and mm
   Vector6d rises_;                               ///< mean rises of the cost at both ends of each step
+  std::array<double, 12> ends_{};                ///< the cost at both ends of each step
+  double least_curvature_ = 0;                   ///< of the Hessian, in units of the steps and the wanted rise
   std::array<bool, 6> open_{};                   ///< directions in which the cost hardly changes
   Matrix6d in_units_;                            ///< the covariance in degrees and mm, without open directions
   std::optional<Matrix6d> covariance_;
