@@ -14,9 +14,6 @@ class EdgeLoss {
   double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
   /// Derivative by the distance, divided by the distance.
   double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
-  double second_derivative(double distance2) const {
-    return distance2 < reach2_ ? scale2_ / std::pow(scale2_ + distance2, 1.5) : 0;
-  }
 
  private:
   double raw(double distance2) const { return std::sqrt(scale2_ + distance2) - scale_; }

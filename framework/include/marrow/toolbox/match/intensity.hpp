@@ -73,6 +73,7 @@ std::shared_ptr<const Cost> intensity_cost(const RadiographProjector& projector,
                                            const List<Pose>* others, const List<RadiographProjector>* other_projectors,
                                            const List<OutlineProjector>* other_outlines,
                                            const IntensityOptions& options, double worst, MeasureOf measure_of);
+
 /// The function of a node. Its cost is the mean of kMeasure over the views. kMeasure either takes a patch and returns
 /// the measure's value, or takes a whole image and returns a SumMeasure. In both cases it may take the options as a
 /// second argument. A view that does not show the model counts as kWorst.
