@@ -21,6 +21,10 @@ void shaft_lines(const marrow::ShaftLines& lines, const std::string& path) {
 
 void seeds(const marrow::Seeds& seeds, const std::string& path) { write_text(path, marrow::files::seeds(seeds)); }
 
+void verdict(const marrow::Verdict& verdict, const std::string& path) {
+  write_text(path, marrow::files::verdict(verdict));
+}
+
 void metrics(const marrow::Metrics& metrics, const std::string& path) {
   nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};
   for (const marrow::Metric& metric : metrics.items)
@@ -36,5 +40,6 @@ MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::Camera>(".yaml", camera, "camera with its matrices");
   plugin.writer<marrow::ShaftLines>(".yaml", shaft_lines, "the pair of borders, and the rejected pairs with reasons");
   plugin.writer<marrow::Seeds>(".yaml", seeds, "points of one fragment");
+  plugin.writer<marrow::Verdict>(".yaml", verdict, "judgement of a pose, with reasons, remedies and figures");
   plugin.writer<marrow::Metrics>(".json", metrics, "figures of merit with units");
 }

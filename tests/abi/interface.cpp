@@ -12,7 +12,7 @@ void plugin(Plugin&, PluginEntry&, NodeDefinition&, KindDefinition&, WriterDefin
 
 // The values that travel between plugins.
 void values(Value&, Image&, Picture&, Volume&, SignedField&, Seeds&, Mesh&, Camera&, View&, EdgeMap&, ShaftLines&,
-            Landmarks&, Pose&, Truth&, Metrics&, Scene&, Landscape&, Case&, Calibration&) {}
+            Landmarks&, Pose&, Truth&, Metrics&, Verdict&, Scene&, Landscape&, Case&, Calibration&) {}
 
 // The functions that do.
 void functions(OutlineProjector&, RadiographProjector&, Cost&, CostLevel&, Optimizer&, MinimisationProblem&,

@@ -78,6 +78,40 @@ TEST(WriteText, MetricsAreJson) {
   EXPECT_TRUE(json["metrics"][1]["value"].is_null());
 }
 
+TEST(WriteText, VerdictReadsBackTheSame) {
+  const TemporaryFolder folder;
+  marrow::Verdict verdict{marrow::Judgement::wrong,
+                          1.0 / 3,
+                          {"the rotation: \"unknown\"", "line\nbreak"},
+                          {"a third view"},
+                          {{"spread", 0.1, "mm"}, {"share", 2, ""}, {"nothing", std::nan(""), "deg"}}};
+  write(verdict, folder / "v.yaml");
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_verdict_file(folder / "v.yaml")), marrow::hash_of(verdict))
+      << bytes_of(folder / "v.yaml");
+  write(marrow::Verdict{}, folder / "v.yaml");
+  EXPECT_EQ(bytes_of(folder / "v.yaml"),
+            "marrow-verdict: 1\njudgement: doubtful\nfailure_probability: .nan\nreasons: []\nremedies: []\n"
+            "figures: []\n");
+  EXPECT_EQ(marrow::hash_of(marrow::files::read_verdict_file(folder / "v.yaml")), marrow::hash_of(marrow::Verdict{}));
+}
+
+TEST(WriteText, WhatIsNoVerdictIsRefused) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "v.yaml") << "marrow-verdict: 1\njudgement: splendid\nfailure_probability: 1.5\n"
+                                      "figures: [{name: a, value: much}]\n";
+  try {
+    marrow::files::read_verdict_file(folder / "v.yaml");
+    FAIL() << "it is read";
+  } catch (const marrow::Error& error) {
+    const std::string text = error.what();
+    for (const char* fault : {"v.yaml:2:12: verdict: judgement: expected trusted, doubtful or wrong, got 'splendid'",
+                              "v.yaml:3:22: verdict: failure_probability: expected a number from 0 to 1, or .nan if it "
+                              "is not known, got 1.5",
+                              "v.yaml:4:28: a figure: value: expected a number, got 'much'"})
+      EXPECT_NE(text.find(fault), std::string::npos) << text;
+  }
+}
+
 TEST(WriteText, ShaftLinesAndTruthAreYaml) {
   const TemporaryFolder folder;
   marrow::ShaftLines lines;

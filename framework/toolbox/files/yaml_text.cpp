@@ -41,6 +41,13 @@ void begin_list(YAML::Emitter& out, bool is_empty) {
   out << BeginSeq;
 }
 
+void put_texts(YAML::Emitter& out, const char* key, const std::vector<std::string>& texts) {
+  out << Key << key << Value;
+  begin_list(out, texts.empty());
+  for (const std::string& text : texts) out << DoubleQuoted << text;
+  out << EndSeq;
+}
+
 void put_segment(YAML::Emitter& out, const LineSegment& line) {
   out << Flow << BeginMap;
   put_vector(out << Key << "from_px" << Value, line.from_px);
@@ -140,10 +147,7 @@ std::string pose(const Pose& pose) {
   out << BeginMap << Key << "marrow-pose" << Value << 1;
   put_transform(out, pose.world_from_model);
   if (pose.covariance) put_deviations(out, *pose.covariance);
-  out << Key << "warnings" << Value;
-  begin_list(out, pose.warnings.empty());
-  for (const std::string& warning : pose.warnings) out << DoubleQuoted << warning;
-  out << EndSeq;
+  put_texts(out, "warnings", pose.warnings);
   if (std::isfinite(pose.cost)) out << Key << "cost" << Value << number(pose.cost);
   out << Key << "evaluations" << Value << pose.evaluations;
   put_frame(out, pose.frame);
@@ -161,6 +165,25 @@ std::string truth(const Truth& truth) {
   out << BeginMap << Key << "marrow-truth" << Value << 1;
   put_transform(out, truth.world_from_model);
   out << EndMap;
+  return text_of(out);
+}
+
+std::string verdict(const Verdict& verdict) {
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-verdict" << Value << 1;
+  out << Key << "judgement" << Value << name_of(verdict.judgement);
+  out << Key << "failure_probability" << Value << number(verdict.failure_probability);
+  put_texts(out, "reasons", verdict.reasons);
+  put_texts(out, "remedies", verdict.remedies);
+  out << Key << "figures" << Value;
+  begin_list(out, verdict.figures.empty());
+  for (const Metric& figure : verdict.figures) {
+    out << Flow << BeginMap << Key << "name" << Value << DoubleQuoted << figure.name;
+    out << Key << "value" << Value << number(figure.value);
+    if (!figure.unit.empty()) out << Key << "unit" << Value << DoubleQuoted << figure.unit;
+    out << EndMap;
+  }
+  out << EndSeq << EndMap;
   return text_of(out);
 }
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/toolbox/files/yaml_text.hpp"
 
 namespace marrow::files {
 namespace {
@@ -152,6 +153,61 @@ Pose read_pose_file(const std::filesystem::path& path) {
   if (map.has("convergence")) pose.convergence = convergence_from(map);
   file.finish();
   return pose;
+}
+
+namespace {
+
+/// A number, or what number() writes for one that is not finite.
+std::optional<double> any_number_from(const YamlMap& map, const std::string& key) {
+  const YAML::Node node = map.node(key);
+  const std::string text = node.IsDefined() && node.IsScalar() ? node.Scalar() : "";
+  for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL})
+    if (text == number(value)) return value;
+  return map.number(key);
+}
+
+std::vector<Metric> figures_from(const YamlMap& map) {
+  std::vector<Metric> figures;
+  const YAML::Node list = map.node("figures");
+  if (!list.IsSequence()) {
+    map.fault("figures", "figures: expected a list, got " + yaml_described(list));
+    return figures;
+  }
+  for (const YAML::Node& item : list) {
+    const YamlMap figure(map.file(), item, "a figure", {"name", "value", "unit"});
+    const auto name = figure.text("name");
+    const auto value = any_number_from(figure, "value");
+    const auto unit = figure.has("unit") ? figure.text("unit") : "";
+    if (name && value && unit) figures.push_back({*name, *value, *unit});
+  }
+  return figures;
+}
+
+}  // namespace
+
+Verdict read_verdict_file(const std::filesystem::path& path) {
+  YamlFile file(path);
+  const YamlMap map(file, file.root(), "verdict",
+                    {"marrow-verdict", "judgement", "failure_probability", "reasons", "remedies", "figures"});
+  check_version(map, "marrow-verdict");
+  Verdict verdict;
+  if (const auto name = map.text("judgement")) {
+    const auto judgement = judgement_named(*name);
+    if (!judgement) map.fault("judgement", "judgement: expected trusted, doubtful or wrong, got '" + *name + "'");
+    verdict.judgement = judgement.value_or(Judgement::doubtful);
+  }
+  if (const auto probability = any_number_from(map, "failure_probability")) {
+    if (!(std::isnan(*probability) || (*probability >= 0 && *probability <= 1)))
+      map.fault("failure_probability",
+                "failure_probability: expected a number from 0 to 1, or .nan if it is not known, got " +
+                    number(*probability));
+    verdict.failure_probability = *probability;
+  }
+  verdict.reasons = map.texts_or_none("reasons");
+  verdict.remedies = map.texts_or_none("remedies");
+  if (map.has("figures")) verdict.figures = figures_from(map);
+  file.finish();
+  return verdict;
 }
 
 List<Seeds> read_seeds_file(const std::filesystem::path& path) {

@@ -7,6 +7,7 @@
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
+#include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/value.hpp"
 
 MARROW_VALUE_TYPE(marrow::Image, "image", 1)
@@ -23,6 +24,7 @@ MARROW_VALUE_TYPE(marrow::Landmarks, "landmarks", 1)
 MARROW_VALUE_TYPE(marrow::Pose, "pose", 2)
 MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
 MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
+MARROW_VALUE_TYPE(marrow::Verdict, "verdict", 1)
 MARROW_VALUE_TYPE(marrow::Scene, "scene", 1)
 MARROW_VALUE_TYPE(marrow::Landscape, "landscape", 1)
 MARROW_VALUE_TYPE(marrow::Case, "case", 1)
@@ -47,6 +49,7 @@ extern template const Content* content_of<Landmarks>();
 extern template const Content* content_of<Pose>();
 extern template const Content* content_of<Truth>();
 extern template const Content* content_of<Metrics>();
+extern template const Content* content_of<Verdict>();
 extern template const Content* content_of<Scene>();
 extern template const Content* content_of<Landscape>();
 extern template const Content* content_of<Case>();

@@ -10,6 +10,7 @@
 #include "marrow/domain/features.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
+#include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
 
 namespace marrow::files {
@@ -33,6 +34,7 @@ std::string text_of(const YAML::Emitter& out);
 std::string camera(const Camera& camera);
 std::string pose(const Pose& pose);
 std::string truth(const Truth& truth);
+std::string verdict(const Verdict& verdict);
 std::string shaft_lines(const ShaftLines& lines);
 std::string seeds(const Seeds& seeds);
 

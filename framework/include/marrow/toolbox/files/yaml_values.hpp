@@ -5,6 +5,7 @@
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
+#include "marrow/domain/verdict.hpp"
 #include "marrow/domain/volume.hpp"
 #include "marrow/toolbox/files/strict_yaml.hpp"
 
@@ -28,6 +29,8 @@ void check_version(const YamlMap& map, const std::string& key);
 
 /// Reads a pose file in the format that marrow writes. Throws Error with all faults.
 Pose read_pose_file(const std::filesystem::path& path);
+/// Reads a verdict file in the format that marrow writes. Throws Error with all faults.
+Verdict read_verdict_file(const std::filesystem::path& path);
 /// Reads a file of seeds. Throws Error with all faults.
 List<Seeds> read_seeds_file(const std::filesystem::path& path);
 
