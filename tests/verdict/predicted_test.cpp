@@ -1,0 +1,140 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "shipped.hpp"
+
+namespace predicted_test {
+
+using marrow::Judgement, marrow::Verdict;
+using Texts = std::vector<std::string>;
+
+/// A box of 20 x 20 x 100 mm about the origin.
+marrow::Mesh box() {
+  marrow::Mesh mesh;
+  for (const double z : {-50, 50})
+    for (const double y : {-10, 10})
+      for (const double x : {-10, 10}) mesh.vertices_mm.emplace_back(x, y, z);
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+/// A pose with standard deviations about (degrees) and along (mm) the box's axes.
+marrow::Pose pose_with(const marrow::Vector6d& deviations) {
+  marrow::Pose pose;
+  pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, -0.7, 1.3});
+  pose.world_from_model.translation_mm = {10, -20, 800};
+  pose.covariance = marrow::Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    (*pose.covariance)(i, i) = std::pow(i < 3 ? marrow::radians(deviations[i]) : deviations[i], 2);
+  return pose;
+}
+
+Verdict verdict_of(const marrow::Pose& pose, const shipped::Options& options = {}) {
+  const auto outputs =
+      shipped::call("verdict.predicted", {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}}, options);
+  return outputs.at("verdict").as<Verdict>();
+}
+
+double figure(const Verdict& verdict, const std::string& name) {
+  for (const marrow::Metric& one : verdict.figures)
+    if (one.name == name) return one.value;
+  return std::nan("");
+}
+
+TEST(VerdictPredicted, APoseThatIsKnownWellIsTrusted) {
+  const Verdict verdict = verdict_of(pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1}));
+  EXPECT_EQ(verdict.judgement, Judgement::trusted);
+  EXPECT_EQ(verdict.failure_probability, 0);
+  ASSERT_EQ(verdict.reasons.size(), 1u);
+  EXPECT_EQ(verdict.reasons[0],
+            "the bone's surface is known to 0.2 mm, and the rotation about the long axis to 0.5 degrees");
+  EXPECT_EQ(verdict.remedies, Texts{});
+}
+
+TEST(VerdictPredicted, TheProbabilityIsThatOfTheNormalDistribution) {
+  // A rotation about the long axis with a deviation of 5 degrees is off by more than 5 degrees with probability 0.317.
+  // It moves the box's surface by less than 2 mm, unless it is above 8 degrees.
+  Verdict verdict = verdict_of(pose_with({0, 0, 5, 0, 0, 0}));
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_NEAR(verdict.failure_probability, 0.317, 0.015) << "10000 draws: three standard deviations";
+  EXPECT_NEAR(figure(verdict, "predicted_axial_deg"), 5, 0.5);
+  // A shift moves every point by as much: above 2 mm with the same probability.
+  verdict = verdict_of(pose_with({0, 0, 0, 0, 0, 2}));
+  EXPECT_NEAR(verdict.failure_probability, 0.317, 0.015);
+  EXPECT_NEAR(figure(verdict, "predicted_mtre_mm"), 2, 0.2);
+  EXPECT_EQ(figure(verdict, "predicted_axial_deg"), 0);
+}
+
+TEST(VerdictPredicted, SaysWhichDirectionIsNotKnownAndWhatWouldSettleIt) {
+  Verdict verdict = verdict_of(pose_with({0, 0, 5, 0, 0, 0}));
+  char axial[80];
+  std::snprintf(axial, sizeof axial, "the rotation about the long axis is known to %.1f degrees only",
+                figure(verdict, "predicted_axial_deg"));
+  EXPECT_EQ(verdict.reasons.at(0), axial);
+  EXPECT_EQ(verdict.remedies.at(0), "a third view, or a landmark off the long axis");
+  verdict = verdict_of(pose_with({0, 0, 0, 0, 0, 2}));
+  char shift[80];
+  std::snprintf(shift, sizeof shift, "the bone's surface is known to %.1f mm only",
+                figure(verdict, "predicted_mtre_mm"));
+  EXPECT_EQ(verdict.reasons, Texts{shift});
+  EXPECT_EQ(verdict.remedies, Texts{"a third view, from a direction between the others"});
+  verdict = verdict_of(pose_with({0, 0, 40, 0, 0, 0}));
+  EXPECT_EQ(verdict.reasons.size(), 2u) << "40 degrees move the surface, too";
+  EXPECT_TRUE(verdict.reasons.at(0).starts_with("the rotation about the long axis")) << "the weightier first";
+}
+
+TEST(VerdictPredicted, IsWrongAboveHalf) {
+  const marrow::Pose pose = pose_with({0, 0, 15, 0, 0, 0});  // above 5 degrees with probability 0.74
+  EXPECT_EQ(verdict_of(pose).judgement, Judgement::wrong);
+  EXPECT_EQ(verdict_of(pose, {{"wrong_above", 0.9}}).judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict_of(pose, {{"doubtful_above", 0.9}, {"wrong_above", 0.95}}).judgement, Judgement::trusted);
+  EXPECT_TRUE(shipped::declares("verdict.predicted", marrow::below("doubtful_above", "wrong_above")));
+}
+
+TEST(VerdictPredicted, WithoutPredictionItIsDoubtful) {
+  marrow::Pose pose = pose_with(marrow::Vector6d::Zero());
+  pose.covariance.reset();
+  const Verdict verdict = verdict_of(pose);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_TRUE(std::isnan(verdict.failure_probability));
+  EXPECT_EQ(verdict.reasons,
+            Texts{"the registration predicts no deviations, so nothing says how far the pose may be off"});
+  EXPECT_EQ(verdict.remedies, Texts{"a registration that predicts its deviations"});
+}
+
+TEST(VerdictPredicted, AnUndeterminedPoseIsWrong) {
+  const Verdict verdict = verdict_of(pose_with(marrow::Vector6d::Constant(HUGE_VAL)));
+  EXPECT_EQ(verdict.judgement, Judgement::wrong);
+  EXPECT_EQ(verdict.failure_probability, 1);
+  EXPECT_EQ(verdict.reasons, Texts{"the images do not determine the pose in every direction"});
+  EXPECT_EQ(verdict.remedies, Texts{"a third view, or a landmark"});
+}
+
+TEST(VerdictPredicted, AWarningMakesItDoubtful) {
+  marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  pose.warnings = {"the search ended at its limit"};
+  const Verdict verdict = verdict_of(pose);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.failure_probability, 0);
+  EXPECT_EQ(verdict.reasons.at(0), "the registration warns: the search ended at its limit");
+  EXPECT_EQ(verdict.remedies, Texts{"a look at the overlay of each view"});
+}
+
+TEST(VerdictPredicted, IsTheSameEachTime) {
+  const marrow::Pose pose = pose_with({1, 1, 4, 1, 1, 1});
+  EXPECT_EQ(marrow::hash_of(verdict_of(pose)), marrow::hash_of(verdict_of(pose)));
+}
+
+TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
+  marrow::Mesh mesh = box();
+  mesh.frame = "elsewhere";
+  EXPECT_EQ(shipped::refusal("verdict.predicted",
+                             {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"mesh", shipped::item(mesh)}}),
+            "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
+            "registered");
+}
+
+}  // namespace predicted_test
