@@ -20,6 +20,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "text_file.hpp"
+#include "verdict_json.hpp"
 #include "written_content.hpp"
 
 namespace marrow {
@@ -289,6 +290,7 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
                  {"nodes", json::array()},
                  {"plugins", plugins_used(pipeline, result, catalogue)},
                  {"outputs", json::array()}};
+  for (const NamedVerdict& one : verdicts_of(pipeline, result)) record["verdicts"].push_back(json_of(one));
   for (const InputValue& one : arguments.inputs) record["inputs"][one.name] = one.value;
   for (const Override& one : arguments.overrides) record["overrides"].push_back(one.key + "=" + one.value);
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The commands of the program, and what they share. Exit codes: 0 success, 1 a node or a library failed, 2 fault in the
-// request or in a file, 130 stopped by Ctrl-C.
+// request or in a file, 3 from `run` if nothing failed but a verdict is `wrong`, 130 stopped by Ctrl-C.
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -9,6 +9,7 @@
 #include "marrow/runtime/executor.hpp"
 #include "marrow/runtime/pipeline.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "marrow/runtime/verdicts.hpp"
 
 namespace CLI {
 class App;
@@ -90,6 +91,9 @@ RunOutcome execute(const Pipeline& pipeline, const Catalogue& catalogue, const R
 
 /// Throws Error if the pipeline reads a folder to which the run writes. An empty `folder` means a folder below runs/.
 void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& folder, const Store* store);
+
+/// Prints what is to be thought of each pose, with reasons and remedies; coloured on a terminal.
+void print_verdicts(const std::vector<NamedVerdict>& verdicts);
 
 /// Prints the most important results: poses and figures of merit.
 void print_results(const Pipeline& pipeline, const RunResult& result);

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <unistd.h>
+
 #include <algorithm>
+#include <cctype>
 #include <cstdio>
 
 #include "commands.hpp"
@@ -68,6 +71,23 @@ void print_value(const std::string& name, const Value& value) {
 }
 
 }  // namespace
+
+void print_verdicts(const std::vector<NamedVerdict>& verdicts) {
+  static constexpr const char* kColours[] = {"\033[32m", "\033[33m", "\033[31m"};  // green, yellow, red
+  const bool is_terminal = isatty(STDOUT_FILENO);
+  for (const NamedVerdict& one : verdicts) {
+    std::string judgement = name_of(one.verdict.judgement);
+    for (char& c : judgement) c = char(std::toupper(static_cast<unsigned char>(c)));
+    std::printf("%s%s: %s%s%s (failure %s)\n", printable(one.output).c_str(),
+                one.item.empty() ? "" : ("  " + printable(one.item)).c_str(),
+                is_terminal ? kColours[int(one.verdict.judgement)] : "", judgement.c_str(),
+                is_terminal ? "\033[0m" : "", probability_text(one.verdict.failure_probability).c_str());
+    for (const std::string& reason : one.verdict.reasons) std::printf("    %s\n", printable_lines(reason).c_str());
+    for (const std::string& remedy : one.verdict.remedies)
+      std::printf("    would settle it: %s\n", printable_lines(remedy).c_str());
+  }
+  if (!verdicts.empty()) std::printf("\n");
+}
 
 void print_results(const Pipeline& pipeline, const RunResult& result) {
   for (const PipelineOutput& output : pipeline.outputs) print_value(output.name, value_of(result, output.source));

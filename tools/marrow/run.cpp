@@ -15,6 +15,7 @@
 #include "marrow/runtime/run_folder.hpp"
 #include "process.hpp"
 #include "runtime/place_of_results.hpp"
+#include "runtime/verdict_json.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -124,7 +125,9 @@ std::string status_text(const NodeRecord& record) {
 
 void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
                    const RunFolder& folder) {
-  std::printf("\n%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
+  std::printf("\n");
+  print_verdicts(verdicts_of(pipeline, result));
+  std::printf("%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const NodeRecord& record = result.nodes[i];
     if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
@@ -148,8 +151,13 @@ void print_summary(const Pipeline& pipeline, const RunResult& result, const std:
   }
 }
 
-void print_json_summary(const RunResult& result, const std::vector<RunFolder::Written>& written,
-                        const RunFolder& folder) {
+void print_json_summary(const Pipeline& pipeline, const RunResult& result,
+                        const std::vector<RunFolder::Written>& written, const RunFolder& folder) {
+  for (const NamedVerdict& one : verdicts_of(pipeline, result)) {
+    json verdict = json_of(one);
+    verdict["event"] = "verdict";
+    std::printf("%s\n", verdict.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace).c_str());
+  }
   json files = json::object(), absent = json::object();
   for (const RunFolder::Written& output : written) {
     files[output.output] = output.files;
@@ -219,6 +227,11 @@ void expect_good_place(const Pipeline& pipeline, const std::filesystem::path& fo
 
 namespace {
 
+bool has_wrong_pose(const std::vector<NamedVerdict>& verdicts) {
+  return std::any_of(verdicts.begin(), verdicts.end(),
+                     [](const NamedVerdict& one) { return one.verdict.judgement == Judgement::wrong; });
+}
+
 /// Leaves only these outputs. Then only the nodes that they need run. False, with a message, if one is not known.
 bool keep_outputs(Pipeline& pipeline, const std::vector<std::string>& names) {
   std::vector<std::string> known;
@@ -253,10 +266,12 @@ int run(const RunRequest& request) {
   const RunOutcome outcome = execute(pipeline, catalogue, request, arguments_of(request.pipeline),
                                      request.no_cache ? nullptr : &store, folder);
   if (request.json)
-    print_json_summary(outcome.result, outcome.written, folder);
+    print_json_summary(pipeline, outcome.result, outcome.written, folder);
   else if (!request.quiet)
     print_summary(pipeline, outcome.result, outcome.written, folder);
-  return outcome.result.cancelled() ? 130 : outcome.is_faulty ? 1 : 0;
+  if (outcome.result.cancelled()) return 130;
+  if (outcome.is_faulty) return 1;
+  return has_wrong_pose(verdicts_of(pipeline, outcome.result)) ? 3 : 0;
 }
 
 }  // namespace

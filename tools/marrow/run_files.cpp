@@ -46,7 +46,7 @@ nlohmann::json read_record(const fs::path& folder) {
     refuse_record(folder, text.starts_with(file.string()) ? "it" + text.substr(file.string().size()) : text);
   }
   if (!record.is_object()) refuse_record(folder, "it holds no object");
-  for (const char* list : {"nodes", "outputs", "plugins"})
+  for (const char* list : {"nodes", "outputs", "plugins", "verdicts"})
     if (record.contains(list) && !record[list].is_array())
       refuse_record(folder, std::string("its '") + list + "' is no list");
   return record;

@@ -10,6 +10,7 @@
 
 #include "difference/numbers.hpp"
 #include "marrow/runtime/types.hpp"
+#include "marrow/runtime/verdicts.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -87,6 +88,18 @@ void compare_placement(const RigidTransform& a, const RigidTransform& b, const F
   amount.lines.push_back(angle_deg == 0 && distance_mm == 0 ? "at the same place" : line);
 }
 
+/// Adds the texts that only one of two lists has: `new_one` and `old_one` say so.
+void compare_texts(const std::vector<std::string>& a, const std::vector<std::string>& b, const std::string& new_one,
+                   const std::string& old_one, Amount& amount) {
+  const auto has = [](const std::vector<std::string>& texts, const std::string& text) {
+    return std::find(texts.begin(), texts.end(), text) != texts.end();
+  };
+  for (const std::string& one : b)
+    if (!has(a, one)) amount.lines.push_back(new_one + one);
+  for (const std::string& one : a)
+    if (!has(b, one)) amount.lines.push_back(old_one + one);
+}
+
 void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
   const bool has_frame = !a.frame.origin_mm.isZero();
   compare_placement(a.world_from_model, b.world_from_model, has_frame ? &a.frame : nullptr, amount);
@@ -100,12 +113,7 @@ void compare_poses(const Pose& a, const Pose& b, Amount& amount) {
   if (a.covariance.has_value() != b.covariance.has_value())
     amount.lines.push_back(b.covariance ? "its deviations are predicted, were not"
                                         : "its deviations are not predicted, were");
-  for (const std::string& warning : b.warnings)
-    if (std::find(a.warnings.begin(), a.warnings.end(), warning) == a.warnings.end())
-      amount.lines.push_back("it warns now: " + warning);
-  for (const std::string& warning : a.warnings)
-    if (std::find(b.warnings.begin(), b.warnings.end(), warning) == b.warnings.end())
-      amount.lines.push_back("it warned before: " + warning);
+  compare_texts(a.warnings, b.warnings, "it warns now: ", "it warned before: ", amount);
 }
 
 void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
@@ -138,6 +146,21 @@ void compare_metrics(const Metrics& a, const Metrics& b, Amount& amount) {
     amount.facts[before.name] = {{"before", before.value}, {"now", nullptr}, {"unit", before.unit}};
   }
   if (same) amount.lines.push_back(text("%zu other figure%s the same", same, same == 1 ? " is" : "s are"));
+}
+
+void compare_verdicts(const Verdict& a, const Verdict& b, Amount& amount) {
+  amount.facts = {{"judgement", {name_of(a.judgement), name_of(b.judgement)}},
+                  {"failure_probability", {a.failure_probability, b.failure_probability}}};
+  if (a.judgement != b.judgement)
+    amount.lines.push_back(std::string("it is ") + name_of(b.judgement) + ", was " + name_of(a.judgement));
+  const std::string before = probability_text(a.failure_probability), now = probability_text(b.failure_probability);
+  if (before != now) amount.lines.push_back("probability of a failure: " + now + ", was " + before);
+  compare_texts(a.reasons, b.reasons, "a reason now: ", "a reason before: ", amount);
+  compare_texts(a.remedies, b.remedies, "would settle it now: ", "would have settled it before: ", amount);
+  Amount figures;
+  compare_metrics({a.figures}, {b.figures}, figures);
+  amount.lines.insert(amount.lines.end(), figures.lines.begin(), figures.lines.end());
+  amount.facts["figures"] = figures.facts;
 }
 
 void compare_meshes(const Mesh& a, const Mesh& b, Amount& amount) {
@@ -273,6 +296,8 @@ void compare(const T& a, const T& b, Amount& amount) {
     compare_placement(a.world_from_model, b.world_from_model, nullptr, amount);
   } else if constexpr (std::is_same_v<T, Metrics>) {
     compare_metrics(a, b, amount);
+  } else if constexpr (std::is_same_v<T, Verdict>) {
+    compare_verdicts(a, b, amount);
   } else if constexpr (std::is_same_v<T, Mesh>) {
     compare_meshes(a, b, amount);
   } else if constexpr (std::is_same_v<T, Volume>) {
@@ -322,7 +347,7 @@ Amount amount_of(const Value& before, const Value& now) {
   Amount amount;
   if (before.type == now.type)
     compare_as_any_of<Image, Picture, Volume, SignedField, Seeds, Mesh, Camera, View, EdgeMap, ShaftLines, Pose, Truth,
-                      Metrics, Scene, Landscape, Case>(before, now, amount);
+                      Metrics, Verdict, Scene, Landscape, Case>(before, now, amount);
   return amount;
 }
 

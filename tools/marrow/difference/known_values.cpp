@@ -31,6 +31,15 @@ std::optional<Picture> picture_of(const fs::path& file) {
   return Picture{cv::Mat(pixels.height_px, pixels.width_px, CV_8UC3, pixels.bytes.data()).clone()};
 }
 
+/// A pose, or else a verdict. Throws Error for a file of another kind.
+Value value_of_yaml(const fs::path& file) {
+  try {
+    return Value::of(std::make_shared<const Pose>(files::read_pose_file(file)));
+  } catch (const Error&) {
+    return Value::of(std::make_shared<const Verdict>(files::read_verdict_file(file)));
+  }
+}
+
 /// The value in a file of outputs/, if this program can read it.
 std::optional<Value> value_of_file(const fs::path& file) {
   const std::string extension = file.extension().string();
@@ -38,7 +47,7 @@ std::optional<Value> value_of_file(const fs::path& file) {
     if (extension == ".json")
       return Value::of(std::make_shared<const Metrics>(
           metrics_of(parse_json(read_text_file(file, kMostRecordBytes), file.string()))));
-    if (extension == ".yaml") return Value::of(std::make_shared<const Pose>(files::read_pose_file(file)));
+    if (extension == ".yaml") return value_of_yaml(file);
     if (extension == ".png")
       if (auto picture = picture_of(file)) return Value::of(std::make_shared<const Picture>(std::move(*picture)));
   } catch (const std::exception&) {  // of another kind, or damaged; its bytes are compared instead
