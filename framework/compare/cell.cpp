@@ -10,6 +10,7 @@
 #include "marrow/domain/pose.hpp"
 #include "marrow/runtime/run_folder.hpp"
 #include "marrow/runtime/types.hpp"
+#include "marrow/runtime/verdicts.hpp"
 #include "runtime/folder_use.hpp"
 #include "runtime/keys.hpp"
 #include "runtime/remove_tree.hpp"
@@ -233,7 +234,8 @@ Pipeline CellRunner::pipeline_of(const CellIndex& cell, const fs::path& case_fol
         pipeline.nodes[std::size_t(output.source.node)].info.outputs[std::size_t(output.source.output)];
     const bool is_shown =
         depth == Depth::pictures && (port.type == TypeInfo::of<Scene>() || port.type == TypeInfo::of<Landscape>());
-    return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>();
+    return !wanted.contains(output.name) && !is_shown && port.type != TypeInfo::of<Pose>() &&
+           port.type != TypeInfo::of<Verdict>();
   });
   return pipeline;
 }
@@ -286,6 +288,8 @@ CellRow CellRunner::run(const CellIndex& cell, const std::function<void(const Ru
   if (!row.failed.empty()) {
     row.values.clear();
     row.absent.clear();
+    row.verdict.reset();
+    row.failure_probability.reset();
   }
   row.values.resize(experiment_.metrics.size());
   row.units.resize(experiment_.metrics.size());
@@ -304,6 +308,11 @@ void CellRunner::fill(CellRow& row, const Pipeline& pipeline, const Done& done) 
   for (const PipelineOutput& output : pipeline.outputs)
     row.evaluations += evaluations_in(value_of(done.result, output.source));
   if (!row.failed.empty()) return;
+  if (const std::vector<NamedVerdict> verdicts = verdicts_of(pipeline, done.result); !verdicts.empty()) {
+    const Verdict worst = worst_of(verdicts);
+    row.verdict = worst.judgement;
+    if (std::isfinite(worst.failure_probability)) row.failure_probability = worst.failure_probability;
+  }
   for (const MetricChoice& metric : experiment_.metrics) {
     const auto found = figure(pipeline, done.result, metric.path, row.absent);
     row.values.emplace_back();

@@ -28,6 +28,15 @@ const json& list_of(const json& row, const char* key, std::size_t size) {
   return list;
 }
 
+void read_verdict(const json& j, CellRow& row) {
+  const std::string name = j.at("verdict");
+  row.verdict = judgement_named(name);
+  if (!row.verdict || !row.failed.empty()) throw Error("'verdict' is no judgement, or of a cell that failed");
+  row.failure_probability = number(j.at("failure_probability"), "'failure_probability'");
+  if (row.failure_probability && !(*row.failure_probability >= 0 && *row.failure_probability <= 1))
+    throw Error("'failure_probability' is not from 0 to 1");
+}
+
 }  // namespace
 
 bool CellRow::is_success(const Experiment& experiment) const {
@@ -55,6 +64,8 @@ std::string to_json(const CellRow& row) {
             {"key", row.key}};
   if (!row.failed.empty()) j["reason"] = row.failed;
   if (!row.absent.empty()) j["absent"] = row.absent;
+  if (row.verdict) j["verdict"] = name_of(*row.verdict);
+  if (row.verdict) j["failure_probability"] = of(row.failure_probability);
   for (const auto& value : row.values) j["values"].push_back(of(value));
   for (const auto& [name, calls] : row.nodes)
     j["nodes"][name] = {{"made", calls.made}, {"cached", calls.cached}, {"seconds", calls.seconds}};
@@ -85,6 +96,7 @@ CellRow row_from_json(const std::string& text, const Experiment& experiment) {
     for (const auto& [name, calls] : j.at("nodes").items())
       row.nodes[name] = {count(calls.at("made"), "'made'"), count(calls.at("cached"), "'cached'"),
                          number(calls.at("seconds"), "'seconds'").value_or(0)};
+    if (j.contains("verdict")) read_verdict(j, row);
     row.key = j.at("key");
     return row;
   } catch (const std::exception& error) {

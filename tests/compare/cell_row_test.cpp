@@ -70,6 +70,24 @@ TEST(CellRowText, AFigureMayBeAbsentForAReason) {
   EXPECT_EQ(fault_of(without), "not a cell's row: a cell that is done has all values, one that failed has none");
 }
 
+TEST(CellRowText, MayHaveAVerdict) {
+  CellRow row = good_row();
+  row.verdict = marrow::Judgement::doubtful;
+  EXPECT_EQ(marrow::compare::row_from_json(to_json(row), experiment()).verdict, row.verdict);
+  EXPECT_FALSE(marrow::compare::row_from_json(to_json(row), experiment()).failure_probability);
+  row.failure_probability = 0.25;
+  EXPECT_EQ(marrow::compare::row_from_json(to_json(row), experiment()).failure_probability, 0.25);
+  json other = json::parse(to_json(row));
+  other["verdict"] = "splendid";
+  EXPECT_EQ(fault_of(other), "not a cell's row: 'verdict' is no judgement, or of a cell that failed");
+  other = json::parse(to_json(row));
+  other["failure_probability"] = 1.5;
+  EXPECT_EQ(fault_of(other), "not a cell's row: 'failure_probability' is not from 0 to 1");
+  other = json::parse(to_json(marrow::compare::failed_row(experiment(), {0, 0, 0}, "it broke", 2)));
+  other["verdict"] = "trusted";
+  EXPECT_EQ(fault_of(other), "not a cell's row: 'verdict' is no judgement, or of a cell that failed");
+}
+
 TEST(CellRowText, SaysNotWhichCellItIsOf) {
   json forged = json::parse(to_json(good_row()));
   for (const char* part : {"id", "variant", "case", "start"}) forged[part] = "../../elsewhere";

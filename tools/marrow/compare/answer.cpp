@@ -57,6 +57,7 @@ VariantSummary summary_of(const Experiment& experiment, const Rows& rows) {
     summary.figures.push_back(figure_of(values[i], experiment.metrics[i].higher_is_better()));
   summary.seconds = figure_of(seconds);
   summary.evaluations = figure_of(evaluations);
+  summary.verdicts = verdict_counts(experiment, rows);
   return summary;
 }
 
@@ -218,7 +219,7 @@ std::string table_text(const Experiment& experiment, const Answer& answer) {
       out << line;
     }
   }
-  out << capture_text(experiment, answer);
+  out << verdict_table(experiment, answer) << capture_text(experiment, answer);
   out << "\n* the baseline";
   if (experiment.variants.size() > 1)
     out << "; against it, with Holm's correction over all " << answer.findings.size() << ":\n";

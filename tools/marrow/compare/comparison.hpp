@@ -50,6 +50,17 @@ struct VariantFigure {
   std::size_t count = 0;
   compare::Summary summary;
 };
+/// What the verdicts of a variant are worth, over its completed cells that have one.
+struct VerdictCounts {
+  std::size_t cells = 0;
+  std::size_t misses = 0;        ///< cells that are no success
+  std::size_t silent = 0;        ///< silent failures: misses whose verdict is trusted. The other misses are caught.
+  std::size_t false_alarms = 0;  ///< successes whose verdict is doubtful or wrong
+  /// wilson_interval of the rates silent / misses and false_alarms / successes; 0 to 1 if there are none.
+  compare::Interval silent_rate{0, 1}, false_alarm_rate{0, 1};
+  std::size_t caught() const { return misses - silent; }
+  std::size_t successes() const { return cells - misses; }
+};
 struct VariantSummary {
   std::size_t runs = 0, failed = 0, successes = 0;
   compare::Interval success;
@@ -58,6 +69,7 @@ struct VariantSummary {
   std::size_t unknown_starts =
       0;  ///< failed runs whose start has no known error from any variant; they are not in `capture`
   VariantFigure seconds, evaluations;
+  VerdictCounts verdicts;
 };
 /// Comparison of a variant with the baseline in one figure.
 struct Finding {
@@ -75,6 +87,11 @@ struct Answer {
 /// `rows` may come from an unfinished comparison. Failed cells have no figures. The pairs of a finding are the cells
 /// that both variants completed.
 Answer answer_of(const compare::Experiment& experiment, const std::vector<compare::CellRow>& rows);
+/// Counts silent failures and false alarms.
+VerdictCounts verdict_counts(const compare::Experiment& experiment, const std::vector<const compare::CellRow*>& rows);
+/// The counts of all variants as a table for the terminal; empty if no cell has a verdict.
+std::string verdict_table(const compare::Experiment& experiment, const Answer& answer);
+
 /// The answer as a table for the terminal.
 std::string table_text(const compare::Experiment& experiment, const Answer& answer);
 /// The complete answer: {experiment, variants, comparisons}.

@@ -65,14 +65,15 @@ std::string option_of(const Experiment& experiment, const std::string& variant, 
 
 std::string csv(const Experiment& experiment, const std::vector<CellRow>& rows) {
   const std::vector<std::string> options = changed_options(experiment);
-  std::string text = "cell,variant,case,start,status,reason,success,tries";
+  std::string text = "cell,variant,case,start,status,reason,success,tries,verdict,failure_probability";
   for (const std::string& option : options) text += "," + field(option);
   for (const compare::MetricChoice& metric : experiment.metrics) text += "," + field(metric.path);
   text += ",initial_error,seconds,evaluations\n";
   for (const CellRow& row : rows) {
     text += field(row.id) + "," + field(row.variant) + "," + field(row.case_name) + "," + field(row.start) + "," +
             (row.failed.empty() ? "done" : "failed") + "," + field(row.failed + row.absent) + "," +
-            (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries);
+            (row.is_success(experiment) ? "1" : "0") + "," + std::to_string(row.tries) + "," +
+            (row.verdict ? name_of(*row.verdict) : "") + "," + number_text(row.failure_probability);
     for (const std::string& option : options) text += "," + field(option_of(experiment, row.variant, option));
     for (const auto& value : row.values) text += "," + number_text(value);
     text += "," + number_text(row.initial_error) + "," + number_text(row.seconds) + "," +
@@ -105,6 +106,17 @@ json of(const VariantFigure& figure) {
           {"p95", figure.summary.percentile_95},
           {"worst", figure.summary.worst},
           {"mean", figure.summary.mean}};
+}
+
+json of(std::size_t count, std::size_t total, const compare::Interval& rate) {
+  return {{"count", count}, {"of", total}, {"low", rate.lower}, {"high", rate.upper}};
+}
+
+json of(const VerdictCounts& counts) {
+  return {{"cells", counts.cells},
+          {"silent_failures", of(counts.silent, counts.misses, counts.silent_rate)},
+          {"caught", counts.caught()},
+          {"false_alarms", of(counts.false_alarms, counts.successes(), counts.false_alarm_rate)}};
 }
 
 json of(const compare::CaptureRange& capture, std::size_t unknown_starts) {
@@ -141,6 +153,7 @@ json answer_json(const Experiment& experiment, const Answer& answer) {
                         {"metrics", figures},
                         {"seconds", of(summary.seconds)},
                         {"evaluations", of(summary.evaluations)}});
+    if (summary.verdicts.cells) variants.back()["verdicts"] = of(summary.verdicts);
     if (!experiment.initial_error.empty()) variants.back()["capture"] = of(summary.capture, summary.unknown_starts);
   }
   for (const Finding& finding : answer.findings)

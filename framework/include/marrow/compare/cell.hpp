@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "marrow/compare/experiment.hpp"
+#include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/executor.hpp"
 
 namespace marrow::compare {
@@ -24,6 +25,9 @@ struct CellRow {
   std::vector<std::string> units;  ///< units of the metrics
   std::optional<double> seconds;   ///< measured with nothing else running, without what all variants share
   int evaluations = 0;             ///< number of cost evaluations, for all poses of the cell
+  /// The worst of the judgements that its pipeline's outputs have; nothing if there is no verdict among them.
+  std::optional<Judgement> verdict;
+  std::optional<double> failure_probability;  ///< the largest of the verdicts' that is known
   struct Calls {
     int made = 0, cached = 0;
     double seconds = 0;
@@ -102,8 +106,8 @@ class CellRunner {
   std::filesystem::path folder_of(const CellIndex& cell) const;
   const Experiment& experiment() const { return experiment_; }
   enum class Depth { figures, pictures };
-  /// The pipeline of a cell. It keeps the outputs that are poses or that the experiment's metrics need; with
-  /// Depth::pictures, also those that people look at.
+  /// The pipeline of a cell. It keeps the outputs that are poses or verdicts or that the experiment's metrics need;
+  /// with Depth::pictures, also those that people look at.
   Pipeline pipeline_of(const CellIndex& cell, const std::filesystem::path& case_folder, Depth depth) const;
 
  private:
