@@ -184,6 +184,51 @@ class ReportTest(PageTest):
         self.press(cell["id"], "#cells")
         self.assertIn(why, self.browser.js("return document.getElementById('cell').innerText"))
 
+    def test_a_run_shows_its_verdict_first(self):
+        run = synthetic.run(with_cube=False)
+        synthetic.add_verdict(run["cells"][0], "doubtful")
+        self.browser.open(self.write("judged_run", run))
+        self.assertEqual(self.texts("main > section > h2")[:2], ["Verdict", "Result"])
+        self.assertEqual(self.texts("#contents a"), self.texts("main > section > h2"))
+        self.assertEqual(self.texts(".verdict-head"), ["distal: doubtful failure 12 %"])
+        _, reasons, remedies = synthetic.VERDICTS["doubtful"]
+        self.assertEqual(self.texts(".verdict-list li"), reasons + remedies)
+        self.assertEqual(self.texts(".verdict h3"), ["Why", "What would settle it"])
+        self.assertEqual(self.texts(".verdict figcaption"), ["overlay/distal/frontal", "overlay/distal/lateral"])
+        self.assertEqual(self.texts(".verdict .pose caption"), ["pose/distal: world_from_ct"], "of this fragment alone")
+        self.assertEqual(self.texts(".verdict .pose tr:first-child td"), ["0.80000", "-0.60000", "0.00000", "12.50 mm"])
+        self.assertIn("0.100, 0.120, 7.10°; 0.200, 0.210, 0.400 mm", self.texts(".verdict .note")[0])
+        first = self.browser.js("return document.querySelector('main table').closest('section').id")
+        self.assertEqual(first, "verdict", "no other table comes before it")
+
+    def test_a_comparison_counts_what_verdicts_are_worth(self):
+        data = synthetic.comparison(cases=6, starts=5)
+        synthetic.add_verdicts(data)
+        self.browser.open(self.write("judged", data))
+        self.assertIn("A silent failure is a run that is no success", self.texts("#summary .note")[-1])
+        shown = self.browser.js(
+            "return [...document.querySelectorAll('#summary table')].pop().querySelectorAll('tbody tr')[2].innerText"
+        )
+        counts = data["summary"][2]["verdicts"]
+        for key in ("silent_failures", "false_alarms"):
+            self.assertIn("%d/%d" % (counts[key]["count"], counts[key]["of"]), shown)
+        self.press("Verdict", "#cells")
+        cell = next(cell for cell in data["cells"] if cell.get("verdict") == "wrong")
+        self.choose("Text", "wrong", "#cells")
+        self.assertIn(
+            cell["id"],
+            self.browser.js("return [...document.querySelectorAll('#cells tbody tr')].map((row) => row.dataset.id)"),
+        )
+        self.press(cell["id"], "#cells")
+        text = self.browser.js("return document.getElementById('cell').innerText")
+        self.assertIn("the contour leads to a pose 6 mm away", text)
+        self.assertRegex(text, r"Verdict\s+wrong failure 84 %")
+
+    def test_the_bar_stays_at_the_top(self):
+        self.browser.open(self.comparison)
+        self.browser.js("scrollTo(0, 2000)")
+        self.eventually(lambda: self.browser.js("return document.getElementById('bar').getBoundingClientRect().top"), 0)
+
     def test_run_page_leaves_out_comparisons(self):
         self.browser.open(self.run_page)
         self.assertEqual(

@@ -21,6 +21,12 @@ const Cells = (() => {
       one('Case', (c) => data.cases[c.case], (c) => data.cases[c.case]),
       one('Start', (c) => data.starts[c.start], (c) => data.starts[c.start]),
       one('Outcome', (c) => Data.outcome(c), badge),
+      ...(data.cells.some((c) => c.verdict) ?
+              [
+                one('Verdict', (c) => c.verdict || '', (c) => Verdict.badge(c.verdict)),
+                one('Failure', (c) => c.failure_probability, (c) => Dom.percent(c.failure_probability), true)
+              ] :
+              []),
       one('Start’s mTRE', (c) => c.initial_mtre_mm, (c) => number(c.initial_mtre_mm), true, 'mm'),
       ...data.metrics.map(
           (metric, i) => one(metric.label, (c) => c.values[i], (c) => number(c.values[i]), true, metric.unit)),
@@ -47,14 +53,15 @@ const Cells = (() => {
       return /[",\r\n]/.test(text) ? '"' + text.replaceAll('"', '""') + '"' : text;
     };
     const head = [
-      'id', 'variant', 'case', 'start', 'outcome', 'reason', 'initial_mtre_mm',
+      'id', 'variant', 'case', 'start', 'outcome', 'verdict', 'failure_probability', 'reason', 'initial_mtre_mm',
       ...data.metrics.map((metric) => metric.name), 'seconds', 'evaluations', 'folder'
     ];
     const rows = cells.map(
         (cell) =>
             [cell.id, data.variants[cell.variant].name, data.cases[cell.case], data.starts[cell.start],
-             Data.outcome(cell), cell.reason || cell.absent, cell.initial_mtre_mm,
-             ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations, cell.folder]);
+             Data.outcome(cell), cell.verdict, cell.failure_probability, cell.reason || cell.absent,
+             cell.initial_mtre_mm, ...data.metrics.map((_, i) => cell.values[i]), cell.seconds, cell.evaluations,
+             cell.folder]);
     return [head, ...rows].map((row) => row.map(quoted).join(',')).join('\n') + '\n';
   }
 
@@ -75,7 +82,7 @@ const Cells = (() => {
         page: 0
       });
       const words = (c) => [c.id, data.variants[c.variant].name, data.cases[c.case], data.starts[c.start], c.reason,
-                            Data.outcome(c)]
+                            Data.outcome(c), c.verdict]
                                .join(' ')
                                .toLowerCase();
       this.words = new Map(data.cells.map((cell) => [cell, words(cell)]));

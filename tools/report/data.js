@@ -13,11 +13,15 @@
 //   failed, success: {count, of, rate, low, high},
 //     metrics: {name: {count, median, q1, q3, p95, worst, mean}}, seconds: {median, q1, q3}, evaluations: {median},
 //     capture: {range, is_open (no bin fails), unknown_starts (runs left out), bins: [{from, to, count, of, low,
-//     high}]}}]       mm; may be missing
+//     high}]}}]       mm; may be missing, as may be
+//     verdicts: {cells, caught, silent_failures, false_alarms: {count, of, low, high}}
 //   comparisons: [{variant, metric, pairs, difference, low, high, p, p_holm, sentence}]   variant: name or index
 //   cells: [{id, variant, case, start (indices), status: "done" | "failed", reason, tries, success: bool | null,
 //     absent (why values are missing: a node failed that may fail; may be missing itself), initial_mtre_mm, seconds,
 //     evaluations, cached_nodes, values: [number | null per metric],
+//     verdict (the worst), failure_probability, verdicts: [{item, judgement: "trusted" | "doubtful" | "wrong",
+//     failure_probability: number | null, reasons: [text], remedies: [text]}],          may be missing, as may be
+//     poses: [{name, target, source, matrix: [16], deviations: [6: degrees, mm] | null}],
 //     pictures: [{name: "overlay/distal/frontal", picture: id}], convergence: [[evaluations, cost], ...] | null,
 //     landscape: [{axis, unit, offsets: [...], costs: [...]}] | null, scene: id | null, folder}]
 //   pictures: {id: "data:image/webp;base64,..."}
@@ -40,7 +44,7 @@ const Data = (() => {
     for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
     for (const variant of data.variants) variant.options = variant.options || {};
     for (const cell of data.cells) {
-      cell.values = cell.values || [];
+      for (const name of ['values', 'verdicts', 'poses']) cell[name] = cell[name] || [];
       cell.pictures = (cell.pictures || []).filter((entry) => data.pictures[entry.picture]);
       cell.scene = data.scenes[cell.scene] ? cell.scene : null;
     }

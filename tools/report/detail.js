@@ -17,6 +17,7 @@ const Detail = (() => {
   function values(data, cell) {
     return rows([
       ['Outcome', Cells.badge(cell)],
+      ['Verdict', cell.verdict ? [Verdict.badge(cell.verdict), ' ', Verdict.failure(cell.failure_probability)] : null],
       ...data.metrics.map(
           (metric, i) =>
               [metric.label,
@@ -109,7 +110,7 @@ const Detail = (() => {
         el('div', {class: 'dialog-head'}, el('h2', {tabindex: -1}, Data.cellName(data, cell)),
            el('div', {class: 'toolbar'}, step(-1), step(1), Dom.button('Close', () => dialog.close()))),
         el('p', {class: 'note'}, 'Cell ', el('code', {}, String(cell.id))),
-        ...[reason(cell), absent(cell), values(data, cell),
+        ...[reason(cell), Verdict.all(data, cell), absent(cell), values(data, cell),
             el('h3', {}, 'Options of ' + data.variants[cell.variant].name), options(data.variants[cell.variant]),
             command(data, cell), cell.pictures.length > 0 && el('h3', {}, 'Pictures'),
             cell.pictures.length > 0 && Pictures.gallery(data, cell), closer, ...plots(data, cell),

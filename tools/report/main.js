@@ -224,19 +224,20 @@ const Page = (() => {
   }
 
   function summary(data) {
-    const {experiment} = data, cell = data.cells[0];
+    const {experiment} = data, cell = data.cells[0], judged = data.is_run && cell && Verdict.all(data, cell);
+    const verdict = judged && section('verdict', 'Verdict', null, judged);
     const head = section(
         'summary', data.is_run ? 'Result' : 'Result', null,
         ...(data.is_run ?
                 (cell ? [Detail.reason(cell), Detail.absent(cell), Detail.values(data, cell), ...Detail.figures(data)] :
                         []) :
-                [Summary.verdicts(data), Summary.table(data)]),
+                [Summary.verdicts(data), Summary.table(data), Verdict.table(data)]),
         Summary.rules(data));
     return [
       el('div', {class: 'head'}, el('p', {class: 'kicker'}, data.is_run ? 'Run' : 'Comparison'),
          el('h1', {}, experiment.name || 'Unnamed'), experiment.help && el('p', {class: 'lead'}, experiment.help),
          !data.is_run && el('p', {class: 'facts'}, Summary.facts(data))),
-      head
+      verdict, head
     ];
   }
 

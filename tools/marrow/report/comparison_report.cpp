@@ -79,6 +79,10 @@ json cell_of_row(const Experiment& experiment, const compare::CellIndex& index, 
   else
     cell["reason"] = row.failed;
   if (!row.absent.empty()) cell["absent"] = row.absent;
+  if (row.verdict) {
+    cell["verdict"] = name_of(*row.verdict);
+    cell["failure_probability"] = of(row.failure_probability);
+  }
   for (const auto& value : row.values) cell["values"].push_back(row.failed.empty() ? of(value) : json());
   int cached = 0;
   for (const auto& [name, calls] : row.nodes) cached += calls.made == 0 && calls.cached > 0;

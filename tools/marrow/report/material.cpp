@@ -8,10 +8,12 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/hash.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
 #include "report/report.hpp"
 #include "run_files.hpp"
 #include "runtime/json_text.hpp"
 #include "runtime/text_file.hpp"
+#include "runtime/verdict_json.hpp"
 
 namespace marrow::cli {
 namespace {
@@ -25,6 +27,32 @@ std::string id_of(const std::string& content) {
   Hasher hasher;
   hasher.add(content);
   return hasher.digest().hex().substr(0, 16);
+}
+
+/// A file's name below outputs/, without its extension.
+std::string place_of(const std::string& name) {
+  return fs::path(name).lexically_relative("outputs").replace_extension().string();
+}
+
+/// The pose in a file. Throws Error for a file of another kind.
+json pose_of(const fs::path& path, const std::string& name) {
+  const Pose pose = files::read_pose_file(path);
+  const RigidTransform& t = pose.world_from_model;
+  json matrix = json::array(), deviations;
+  for (int row = 0; row < 3; ++row) {
+    for (int column = 0; column < 3; ++column) matrix.push_back(t.rotation(row, column));
+    matrix.push_back(t.translation_mm[row]);
+  }
+  for (const double last : {0, 0, 0, 1}) matrix.push_back(last);
+  if (pose.covariance) {
+    const Vector6d deviation = pose.covariance->diagonal().cwiseMax(0).cwiseSqrt();
+    for (int i = 0; i < 6; ++i) deviations.push_back(i < 3 ? degrees(deviation[i]) : deviation[i]);
+  }
+  return {{"name", place_of(name)},
+          {"target", t.target},
+          {"source", t.source},
+          {"matrix", matrix},
+          {"deviations", deviations}};
 }
 
 /// The rows "  - [evaluations, cost]" below "convergence:" in a pose file.
@@ -82,20 +110,23 @@ void ReportMaterial::add_file(const fs::path& path, const std::string& name, jso
   if (extension == ".png") {
     const std::string url = picture_url(path, kPictureSize), id = id_of(url);
     pictures[id] = url;
-    cell["pictures"].push_back(
-        {{"name", fs::path(name).lexically_relative("outputs").replace_extension().string()}, {"picture", id}});
+    cell["pictures"].push_back({{"name", place_of(name)}, {"picture", id}});
   } else if (extension == ".json") {
     add_json(parse_json(read_text_file(path, kMostRecordBytes), name), cell);
-  } else if (extension == ".yaml" && !cell.contains("convergence")) {
-    const json steps = convergence_of(read_text_file(path, kMostRecordBytes));
-    if (!steps.empty()) cell["convergence"] = steps;
+  } else if (extension == ".yaml") {
+    if (!cell.contains("convergence"))
+      if (const json steps = convergence_of(read_text_file(path, kMostRecordBytes)); !steps.empty())
+        cell["convergence"] = steps;
+    cell["poses"].push_back(pose_of(path, name));
   }
 }
 
 void ReportMaterial::add_run(const fs::path& run_folder, json& cell) {
   std::vector<std::string> names;
   try {
-    names = files_in(read_record(run_folder));
+    const json record = read_record(run_folder);
+    names = files_in(record);
+    for (const NamedVerdict& one : verdicts_in(record)) cell["verdicts"].push_back(json_of(one));
   } catch (const std::exception&) {  // the run was stopped, or its record is damaged
   }
   for (const std::string& name : names) {
