@@ -47,6 +47,8 @@ marrow::search::SearchOptions search_options(const Options& options) {
 
 marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, const marrow::Optimizer& optimizer,
                            const marrow::Pose* start, const Options& options, marrow::Context& context) {
+  if (options.poses == 0)
+    throw marrow::Error("it has no poses to try; give their number, such as 4000, and the ranges to search");
   marrow::check_mesh(model, "model");
   const marrow::search::SearchOptions settings = search_options(options);
   marrow::search::check_options(settings);
@@ -79,7 +81,8 @@ MARROW_PLUGIN(plugin) {
               "range of the shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
       .option("translation_axial_mm", &Options::translation_axial_mm,
               "range of the shift along the long axis, to either side", marrow::at_least(0))
-      .option("poses", &Options::poses, "number of poses to try, spread evenly over these ranges", marrow::at_least(1))
+      .option("poses", &Options::poses, "number of poses to try, spread evenly over these ranges; 0: it fails, where a pipeline has other ways",
+              marrow::at_least(0))
       .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
               marrow::at_least(1))
       .option("finalists", &Options::finalists,

@@ -9,6 +9,7 @@ struct Options {
   std::array<double, 3> rotation_deg{0, 0, 0};
   std::array<double, 3> translation_mm{0, 0, 0};
   double distance_mm = 0;
+  bool needs_start = false;
 };
 
 /// Mean distance by which the points of the surface move.
@@ -40,6 +41,10 @@ marrow::Vector6d scaled(const marrow::Vector6d& motion, const marrow::Pose& pose
 
 marrow::Pose manual(const marrow::Mesh& model, const marrow::Pose* start, const Options& options) {
   marrow::check_mesh(model, "model");
+  if (!start && options.needs_start)
+    throw marrow::Error(
+        "there is no start; give the approximate placement of the fragment, in case.yaml under 'start' "
+        "(docs/case.md)");
   marrow::Pose pose;
   if (start)
     pose.world_from_model = start->world_from_model;
@@ -68,5 +73,7 @@ MARROW_PLUGIN(plugin) {
       .option("rotation_deg", &Options::rotation_deg, "rotation vector about the frontal, lateral and long axis")
       .option("translation_mm", &Options::translation_mm, "shift along the frontal, lateral and long axis")
       .option("distance_mm", &Options::distance_mm,
-              "if above 0, both are scaled until the mean distance moved by the surface is this", marrow::at_least(0));
+              "if above 0, both are scaled until the mean distance moved by the surface is this", marrow::at_least(0))
+      .option("needs_start", &Options::needs_start,
+              "fail if there is no start, where a pipeline has other ways to one");
 }

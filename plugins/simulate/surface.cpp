@@ -5,8 +5,11 @@
 #include <filesystem>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/field/mesh_field.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/polygonise.hpp"
+#include "marrow/toolbox/phantom/shape_functions.hpp"
 
 namespace {
 
@@ -20,6 +23,8 @@ struct SurfaceOptions {
   std::array<double, 3> rotation_deg{0, 0, 0};
   std::vector<double> fill_at{0, 0.06, 0.16, 0.24, 0.74, 0.84, 1};
   std::vector<double> fill_fraction{0.30, 0.24, 0.15, 0, 0, 0.16, 0.30};
+  std::vector<double> cortex_mm;
+  bool long_bone = true;
   double isocentre_from_distal_end_mm = 70;
   double thigh_radius_mm = 80;
   double fat_mm = 12;
@@ -37,6 +42,28 @@ Mesh placed(const std::filesystem::path& path, const SurfaceOptions& options) {
   return mesh;
 }
 
+/// The surface inside the outer one at the thickness of the cortex, which is given at heights z.
+Mesh endosteum(const Mesh& outer, const Eigen::Vector3d& low, const Eigen::Vector3d& high,
+               const std::vector<phantom::Node>& cortex_mm) {
+  constexpr double kSpacingMm = 1;
+  double thickest = 0;
+  for (const auto& [z, thickness] : cortex_mm) thickest = std::max(thickest, thickness);
+  Grid grid;
+  grid.frame = outer.frame;
+  grid.origin_mm = low.array() - 3 * kSpacingMm;
+  for (int k = 0; k < 3; ++k) grid.size[std::size_t(k)] = int((high[k] - low[k]) / kSpacingMm) + 8;
+  const SignedField distance = field::field_of_mesh(grid, outer, thickest + 4 * kSpacingMm);
+  const auto inside = [&](const Eigen::Vector3d& p) {
+    return double(sample_trilinear(grid, distance.values_mm, grid.index_from_point(p))) +
+           phantom::along(cortex_mm, p.z());
+  };
+  Mesh inner = phantom::polygonise(inside, low.array() - 2 * kSpacingMm, high.array() + 2 * kSpacingMm, kSpacingMm, 3);
+  if (inner.triangles.empty())
+    throw Error("simulate.surface: the bone is nowhere thicker than twice its cortex; give a smaller cortex_mm");
+  inner.frame = outer.frame;
+  return inner;
+}
+
 Bone surface(const SurfaceOptions& options) {
   Bone bone;
   bone.outer = placed(options.outer, options);
@@ -47,10 +74,19 @@ Bone surface(const SurfaceOptions& options) {
     high = high.cwiseMax(vertex);
   }
   const Eigen::Vector3d extent = high - low;
-  if (extent.z() < std::max(extent.x(), extent.y()))
+  if (options.long_bone && extent.z() < std::max(extent.x(), extent.y()))
     throw Error("simulate.surface: the bone's long axis must lie along z with the distal end low, but it extends " +
                 std::to_string(extent.x()) + " x " + std::to_string(extent.y()) + " x " + std::to_string(extent.z()) +
                 " mm; turn it with rotation_deg");
+  if (!options.cortex_mm.empty()) {
+    if (!options.inner.empty())
+      throw Error("simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");
+    phantom::check_bone(bone, "simulate.surface");
+    std::vector<phantom::Node> cortex_mm;
+    for (std::size_t i = 0; i < options.cortex_mm.size(); ++i)
+      cortex_mm.emplace_back(low.z() + options.fill_at[i] * extent.z(), options.cortex_mm[i]);
+    bone.inner = endosteum(bone.outer, low, high, cortex_mm);
+  }
   bone.fill_z_mm.clear();
   for (double at : options.fill_at) bone.fill_z_mm.push_back(low.z() + at * extent.z());
   bone.fill_fraction = options.fill_fraction;
@@ -66,10 +102,15 @@ Bone surface(const SurfaceOptions& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.surface", surface)
-      .summary("Makes a bone from closed surfaces in STL files")
+      .summary("Makes a bone from closed surfaces in files (STL or PLY)")
       .out("bone", "bone with a closed outer and a closed inner surface")
-      .option("outer", &SurfaceOptions::outer, "STL file of the outer surface", required())
-      .option("inner", &SurfaceOptions::inner, "STL file of the endosteal surface; empty: solid cortical bone")
+      .option("outer", &SurfaceOptions::outer, "file of the outer surface, STL or PLY", required())
+      .option("inner", &SurfaceOptions::inner, "file of the endosteal surface; empty: solid cortical bone, or as cortex_mm says")
+      .option("cortex_mm", &SurfaceOptions::cortex_mm,
+              "thickness of the cortical bone at the heights of fill_at, for a bone whose endosteal surface is not "
+              "known; empty: none")
+      .option("long_bone", &SurfaceOptions::long_bone,
+              "whether the bone has a long axis, which must lie along z; false for one like a vertebra or a pelvis")
       .option("scale", &SurfaceOptions::scale, "factor that converts the file's unit to mm: 1000 for metres",
               at_least(1e-6), unit(""))
       .option("rotation_deg", &SurfaceOptions::rotation_deg,
@@ -80,6 +121,7 @@ MARROW_PLUGIN(plugin) {
       .option("fill_fraction", &SurfaceOptions::fill_fraction,
               "share of bone inside the inner surface at these heights; the rest is marrow", unit(""))
       .relation(same_length({"fill_at", "fill_fraction"}))
+      .relation(as_many_or_none("cortex_mm", "fill_at"))
       .option("isocentre_from_distal_end_mm", &SurfaceOptions::isocentre_from_distal_end_mm,
               "height of the isocentre (origin) above the distal end")
       .option("thigh_radius_mm", &SurfaceOptions::thigh_radius_mm, "radius of the soft tissue around the bone; 0: none",

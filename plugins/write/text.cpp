@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
 #include <marrow/plugin.hpp>
 #include <nlohmann/json.hpp>
 
@@ -25,6 +26,11 @@ void verdict(const marrow::Verdict& verdict, const std::string& path) {
   write_text(path, marrow::files::verdict(verdict));
 }
 
+/// A file holds the landmarks of one fragment, and is named after it.
+void landmarks(const marrow::Landmarks& landmarks, const std::string& path) {
+  write_text(path, marrow::files::landmarks(landmarks, std::filesystem::path(path).stem().string()));
+}
+
 void metrics(const marrow::Metrics& metrics, const std::string& path) {
   nlohmann::ordered_json json = {{"metrics", nlohmann::ordered_json::array()}};
   for (const marrow::Metric& metric : metrics.items)
@@ -41,5 +47,6 @@ MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::ShaftLines>(".yaml", shaft_lines, "the pair of borders, and the rejected pairs with reasons");
   plugin.writer<marrow::Seeds>(".yaml", seeds, "points of one fragment");
   plugin.writer<marrow::Verdict>(".yaml", verdict, "judgement of a pose, with reasons, remedies and figures");
+  plugin.writer<marrow::Landmarks>(".yaml", landmarks, "landmarks of the fragment that the file is named after");
   plugin.writer<marrow::Metrics>(".json", metrics, "figures of merit with units");
 }

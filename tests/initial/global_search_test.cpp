@@ -78,6 +78,8 @@ TEST(GlobalSearch, SaysWhatIsWrong) {
   Trial trial;
   EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"reach_px", std::vector<double>{60, 24, 0}}}),
             "reach_px: each number must be positive");
+  EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"poses", std::int64_t(0)}}),
+            "it has no poses to try; give their number, such as 4000, and the ranges to search");
   trial.inputs["model"] = shipped::item(marrow::Mesh{});
   EXPECT_NE(shipped::refusal("initial.global_search", trial.inputs).find("model"), std::string::npos);
 }

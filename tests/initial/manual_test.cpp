@@ -53,6 +53,12 @@ TEST(Manual, RefusesADistanceWithoutAMotion) {
       "translation, or a shorter distance");
 }
 
+TEST(Manual, FailsWithoutAStartIfItNeedsOne) {
+  EXPECT_EQ(
+      shipped::refusal("initial.manual", {{"model", shipped::item(tube::cylinder(14, 90))}}, {{"needs_start", true}}),
+      "there is no start; give the approximate placement of the fragment, in case.yaml under 'start' (docs/case.md)");
+}
+
 TEST(Manual, RefusesAnEmptyModel) {
   EXPECT_EQ(shipped::refusal("initial.manual", {{"model", shipped::item(marrow::Mesh{})}}),
             "model: the surface has no triangles");

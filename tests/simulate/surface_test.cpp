@@ -102,8 +102,40 @@ TEST(SimulateSurface, BadFilesAreExplained) {
             "10.000000 mm; turn it with rotation_deg");
 }
 
+TEST(SimulateSurface, ABoneWithoutALongAxisMayLieAnyhow) {
+  shipped::Options options = reading(write_stl("flat.stl", test::box({0, 0, 0}, {100, 10, 20}), false));
+  options["long_bone"] = false;
+  EXPECT_NEAR(enclosed_volume_mm3(surface(options).outer), 100.0 * 10 * 20, 1e-3);
+}
+
+// A box whose cortex is 3 mm in its lower half, 6 mm in its upper half, and changes within 1 mm.
+TEST(SimulateSurface, TheCortexMayBeGivenByItsThickness) {
+  shipped::Options options = reading(write_stl("box.stl", test::box({0, 0, 0}, {40, 30, 100}), false));
+  options["fill_at"] = std::vector<double>{0, 0.495, 0.505, 1};
+  options["fill_fraction"] = std::vector<double>{0.2, 0.2, 0.1, 0.1};
+  options["cortex_mm"] = std::vector<double>{3, 3, 6, 6};
+  options["isocentre_from_distal_end_mm"] = 0.0;
+  const Bone bone = surface(options);
+  EXPECT_TRUE(is_closed(bone.inner));
+  // The distance field has corners, which trilinear interpolation rounds a little.
+  EXPECT_NEAR(enclosed_volume_mm3(bone.inner), 34.0 * 24 * 47 + 28.0 * 18 * 44, 0.01 * 34 * 24 * 94);
+  Eigen::Vector3d low = bone.inner.vertices_mm.front(), high = low;
+  for (const auto& p : bone.inner.vertices_mm) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  EXPECT_NEAR(low.z(), 3, 0.1);
+  EXPECT_NEAR(high.z(), 94, 0.1);
+  EXPECT_NEAR(high.x() - low.x(), 34, 0.2);
+
+  options["cortex_mm"] = std::vector<double>{20, 20, 20, 20};
+  EXPECT_EQ(marrow::test::message_of([&] { surface(options); }),
+            "simulate.surface: the bone is nowhere thicker than twice its cortex; give a smaller cortex_mm");
+  options["inner"] = options["outer"];
+  EXPECT_EQ(marrow::test::message_of([&] { surface(options); }),
+            "simulate.surface: the inner surface is given by a file and by cortex_mm; give one of them");
+}
+
 TEST(SimulateSurface, DeclaresAShareOfBoneForEachHeight) {
   EXPECT_TRUE(shipped::declares("simulate.surface", same_length({"fill_at", "fill_fraction"})));
+  EXPECT_TRUE(shipped::declares("simulate.surface", as_many_or_none("cortex_mm", "fill_at")));
 }
 
 TEST(SimulateSurface, RealFemurIsAHollowBone) {

@@ -38,6 +38,35 @@ matrix:  # world_from_ct, mm
 )");
 }
 
+TEST(YamlText, Landmarks) {
+  marrow::Landmarks landmarks;
+  landmarks.points = {{"a", {1, 2, 3}}, {"b", {0.1, 0, -1}}};
+  EXPECT_EQ(marrow::files::landmarks(landmarks, "bone"), R"(marrow-landmarks: 1
+fragments:
+  "bone":
+    points:  # mm, in CT coordinates
+      "a": [1, 2, 3]
+      "b": [0.1, 0, -1]
+)");
+  landmarks.seen = {{"a", "left", {10, 20.5}}, {"a", "right", {11, 21}}, {"b", "left", {12, 22}}};
+  landmarks.tracked = {{"b", {7, 8, 9}}};
+  EXPECT_EQ(marrow::files::landmarks(landmarks, "yes"), R"(marrow-landmarks: 1
+fragments:
+  "yes":
+    points:  # mm, in CT coordinates
+      "a": [1, 2, 3]
+      "b": [0.1, 0, -1]
+    seen:  # px, [u, v] by view
+      "left":
+        "a": [10, 20.5]
+        "b": [12, 22]
+      "right":
+        "a": [11, 21]
+    tracked:  # mm, in the world
+      "b": [7, 8, 9]
+)");
+}
+
 TEST(YamlText, OddNamesAreQuotedAndReadBack) {
   const std::string long_name(2000, 'w');
   const std::pair<std::string, std::string> names[] = {{"Left-1_b", "Left-1_b"},

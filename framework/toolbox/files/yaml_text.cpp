@@ -213,4 +213,33 @@ std::string seeds(const Seeds& seeds) {
   return text_of(out);
 }
 
+std::string landmarks(const Landmarks& landmarks, const std::string& fragment) {
+  YAML::Emitter out;
+  out << BeginMap << Key << "marrow-landmarks" << Value << 1;
+  out << Key << "fragments" << Value << BeginMap << Key << DoubleQuoted << fragment << Value << BeginMap;
+  out << Key << "points" << Value << Comment("mm, in CT coordinates") << BeginMap;
+  for (const auto& point : landmarks.points)
+    put_vector(out << Key << DoubleQuoted << point.name << Value, point.model_mm);
+  out << EndMap;
+  std::vector<std::string> views;
+  for (const auto& seen : landmarks.seen)
+    if (std::find(views.begin(), views.end(), seen.view) == views.end()) views.push_back(seen.view);
+  if (!views.empty()) out << Key << "seen" << Value << Comment("px, [u, v] by view") << BeginMap;
+  for (const std::string& view : views) {
+    out << Key << DoubleQuoted << view << Value << BeginMap;
+    for (const auto& seen : landmarks.seen)
+      if (seen.view == view) put_vector(out << Key << DoubleQuoted << seen.name << Value, seen.pixel);
+    out << EndMap;
+  }
+  if (!views.empty()) out << EndMap;
+  if (!landmarks.tracked.empty()) {
+    out << Key << "tracked" << Value << Comment("mm, in the world") << BeginMap;
+    for (const auto& tracked : landmarks.tracked)
+      put_vector(out << Key << DoubleQuoted << tracked.name << Value, tracked.world_mm);
+    out << EndMap;
+  }
+  out << EndMap << EndMap << EndMap;
+  return text_of(out);
+}
+
 }  // namespace marrow::files

@@ -8,6 +8,7 @@
 
 #include "marrow/domain/camera.hpp"
 #include "marrow/domain/features.hpp"
+#include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/list.hpp"
 #include "marrow/domain/pose.hpp"
 #include "marrow/domain/verdict.hpp"
@@ -37,5 +38,6 @@ std::string truth(const Truth& truth);
 std::string verdict(const Verdict& verdict);
 std::string shaft_lines(const ShaftLines& lines);
 std::string seeds(const Seeds& seeds);
+std::string landmarks(const Landmarks& landmarks, const std::string& fragment);
 
 }  // namespace marrow::files

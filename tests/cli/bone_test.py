@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: Apache-2.0
+"""pipelines/bone.yaml on a small simulated vertebra: each way to a start alone, none, and one to four views."""
+import pathlib
+import shutil
+import tempfile
+
+import yaml
+
+from cases import copy_case, metrics
+from marrow_cli import SOURCE, Case, main, marrow
+
+PIPELINES = SOURCE / "pipelines"
+SMALL = ["bone.resolution_mm=1.6", "ct.spacing_mm=[1.2, 1.2, 1.2]", "cameras.width_px=256", "cameras.height_px=256"]
+SMALL += ["cameras.pixel_mm=1.0"]
+VIEWS = ["cameras.names=[frontal, lateral, left, right]", "cameras.alpha_deg=[0, 0, 0, 0]"]
+VIEWS += ["cameras.beta_deg=[0, 90, 45, 135]"]
+
+
+def sets(texts):
+    return [part for text in texts for part in ("--set", text)]
+
+
+class Bone(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-bone-"))
+        made = marrow(
+            "run", PIPELINES / "simulate-vertebra.yaml", "--out", cls.shared / "made", "--quiet", *sets(SMALL + VIEWS)
+        )
+        assert made.returncode == 0, made.stderr
+        cls.case = cls.shared / "made" / "outputs" / "case"
+        cls.landmarks = cls.shared / "made" / "outputs" / "landmarks" / "bone.yaml"
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.shared, ignore_errors=True)
+
+    def copy(self, views=("frontal", "lateral"), start=None, landmarks=False):
+        def change(case):
+            case["views"] = [view for view in case["views"] if view["name"] in views]
+            if start:
+                case["fragments"]["bone"]["start"] = start(case["fragments"]["bone"]["truth"])
+
+        to = copy_case(self.case, self.scratch / "case", change)
+        if landmarks:
+            shutil.copy(self.landmarks, to / "landmarks.yaml")
+        return to
+
+    def registered(self, case, *arguments):
+        result = marrow("run", PIPELINES / "bone.yaml", "case=%s" % case, "--out", self.scratch / "run", *arguments)
+        self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+        return result, metrics(self.scratch / "run" / "outputs" / "errors" / "bone" / "final.json")
+
+    @staticmethod
+    def shifted(truth):
+        """3 mm beside the truth along each axis of the world."""
+        start = {"target": truth["target"], "source": truth["source"], "matrix": [list(row) for row in truth["matrix"]]}
+        for row in start["matrix"][:3]:
+            row[3] += 3
+        return start
+
+    def test_by_hand(self):
+        result, errors = self.registered(self.copy(start=self.shifted))
+        self.assertLess(errors["mtre_mm"], 1)
+        self.assertIn("node 'marks' (read.landmarks) failed", result.stderr)
+        self.assertIn("node 'by_search' (initial.global_search) failed: it has no poses to try", result.stderr)
+
+    def test_by_landmarks(self):
+        result, errors = self.registered(self.copy(landmarks=True))
+        self.assertLess(errors["mtre_mm"], 1)
+        self.assertIn("node 'by_hand' (initial.manual) failed: there is no start", result.stderr)
+
+    def test_by_a_global_search(self):
+        _, errors = self.registered(self.copy(), "search_poses=2000", "search_deg=10", "search_mm=10")
+        self.assertLess(errors["mtre_mm"], 1)
+
+    def test_all_ways_with_one_to_four_views(self):
+        views = ["frontal", "lateral", "left", "right"]
+        for count, limit_mm in ((1, 8), (3, 1), (4, 1)):
+            with self.subTest(views=count):
+                _, errors = self.registered(self.copy(views[:count], self.shifted, True))
+                self.assertLess(errors["mtre_mm"], limit_mm)
+                self.tearDown()
+                self.setUp()
+
+    def test_without_any_way_it_says_what_to_do(self):
+        result = marrow("run", PIPELINES / "bone.yaml", "case=%s" % self.copy(), "--out", self.scratch / "run")
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("there is no start; give the approximate placement of the fragment", result.stderr)
+        self.assertIn("it has no poses to try; give their number", result.stderr)
+        self.assertIn(
+            "no way led to a start: none of the inputs first, second, third and fourth is there; see why the nodes that"
+            " they are wired to gave none",
+            result.stderr,
+        )
+
+    def test_landmarks_are_written_as_they_are_read(self):
+        text = yaml.safe_load(self.landmarks.read_text())
+        self.assertEqual(list(text["fragments"]), ["bone"])
+        self.assertEqual(list(text["fragments"]["bone"]), ["points", "seen", "tracked"])
+        self.assertEqual(list(text["fragments"]["bone"]["seen"]), ["frontal", "lateral", "left", "right"])
+
+
+if __name__ == "__main__":
+    main()
