@@ -81,7 +81,8 @@ MARROW_PLUGIN(plugin) {
               "range of the shifts along the frontal and lateral axes, to either side", marrow::at_least(0))
       .option("translation_axial_mm", &Options::translation_axial_mm,
               "range of the shift along the long axis, to either side", marrow::at_least(0))
-      .option("poses", &Options::poses, "number of poses to try, spread evenly over these ranges; 0: it fails, where a pipeline has other ways",
+      .option("poses", &Options::poses,
+              "number of poses to try, spread evenly over these ranges; 0: it fails, where a pipeline has other ways",
               marrow::at_least(0))
       .option("candidates", &Options::candidates, "number of best poses to refine; no two of them are neighbours",
               marrow::at_least(1))

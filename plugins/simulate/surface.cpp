@@ -57,7 +57,7 @@ Mesh endosteum(const Mesh& outer, const Eigen::Vector3d& low, const Eigen::Vecto
     return double(sample_trilinear(grid, distance.values_mm, grid.index_from_point(p))) +
            phantom::along(cortex_mm, p.z());
   };
-  Mesh inner = phantom::polygonise(inside, low.array() - 2 * kSpacingMm, high.array() + 2 * kSpacingMm, kSpacingMm, 3);
+  Mesh inner = phantom::polygonise(inside, low.array() - 2 * kSpacingMm, high.array() + 2 * kSpacingMm, kSpacingMm, 5);
   if (inner.triangles.empty())
     throw Error("simulate.surface: the bone is nowhere thicker than twice its cortex; give a smaller cortex_mm");
   inner.frame = outer.frame;
@@ -105,7 +105,8 @@ MARROW_PLUGIN(plugin) {
       .summary("Makes a bone from closed surfaces in files (STL or PLY)")
       .out("bone", "bone with a closed outer and a closed inner surface")
       .option("outer", &SurfaceOptions::outer, "file of the outer surface, STL or PLY", required())
-      .option("inner", &SurfaceOptions::inner, "file of the endosteal surface; empty: solid cortical bone, or as cortex_mm says")
+      .option("inner", &SurfaceOptions::inner,
+              "file of the endosteal surface; empty: solid cortical bone, or as cortex_mm says")
       .option("cortex_mm", &SurfaceOptions::cortex_mm,
               "thickness of the cortical bone at the heights of fill_at, for a bone whose endosteal surface is not "
               "known; empty: none")

@@ -18,8 +18,8 @@ TEST(SimulateWhole, MovesTheBoneAboutItsOwnAxes) {
   phantom::Bone bone;
   bone.outer = test::box({10, 0, 0}, {30, 10, 100});
   bone.outer.frame = "bone";
-  const Phantom phantom = whole(
-      bone, {{"rotation_deg", std::vector<double>{0, 0, 90}}, {"translation_mm", std::vector<double>{1, 2, 3}}});
+  const Phantom phantom =
+      whole(bone, {{"rotation_deg", std::vector<double>{0, 0, 90}}, {"translation_mm", std::vector<double>{1, 2, 3}}});
   ASSERT_EQ(phantom.fragments.size(), 1u);
   const phantom::Fragment& fragment = phantom.fragments[0];
   EXPECT_EQ(fragment.name, "bone");
