@@ -17,6 +17,7 @@ struct Options {
   std::vector<double> reach_px{60, 24, 9};
   std::vector<double> pixel_step{16, 8, 4};
   int max_evaluations = 400;
+  bool needs_start = false;
 };
 
 /// The search of register.multiresolution, started from poses all over the ranges. The first step of each level is
@@ -49,6 +50,10 @@ marrow::Pose global_search(const marrow::Mesh& model, const marrow::Cost& cost, 
                            const marrow::Pose* start, const Options& options, marrow::Context& context) {
   if (options.poses == 0)
     throw marrow::Error("it has no poses to try; give their number, such as 4000, and the ranges to search");
+  if (!start && options.needs_start)
+    throw marrow::Error(
+        "there is no start to search around; give the approximate placement of the fragment, in case.yaml under "
+        "'start' (docs/case.md)");
   marrow::check_mesh(model, "model");
   const marrow::search::SearchOptions settings = search_options(options);
   marrow::search::check_options(settings);
@@ -98,5 +103,7 @@ MARROW_PLUGIN(plugin) {
               "per level, for costs of grey values: only every n-th pixel is compared")
       .relation(marrow::as_many_or_none("pixel_step", "contour_spacing_px"))
       .option("max_evaluations", &Options::max_evaluations,
-              "largest number of evaluations of the cost for each search of a level", marrow::at_least(1));
+              "largest number of evaluations of the cost for each search of a level", marrow::at_least(1))
+      .option("needs_start", &Options::needs_start,
+              "fail if there is no start, where a pipeline has other ways to one");
 }

@@ -63,12 +63,12 @@ class Bone(Case):
         result, errors = self.registered(self.copy(start=self.shifted))
         self.assertLess(errors["mtre_mm"], 1)
         self.assertIn("node 'marks' (read.landmarks) failed", result.stderr)
-        self.assertIn("node 'by_search' (initial.global_search) failed: it has no poses to try", result.stderr)
+        self.assertIn("node 'by_search' (initial.global_search) for bone failed: it has no poses to try", result.stderr)
 
     def test_by_landmarks(self):
         result, errors = self.registered(self.copy(landmarks=True))
         self.assertLess(errors["mtre_mm"], 1)
-        self.assertIn("node 'by_hand' (initial.manual) failed: there is no start", result.stderr)
+        self.assertIn("node 'placed' (initial.manual) for bone failed: there is no start", result.stderr)
 
     def test_by_a_global_search(self):
         _, errors = self.registered(self.copy(), "search_poses=2000", "search_deg=10", "search_mm=10")

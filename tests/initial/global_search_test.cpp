@@ -80,6 +80,9 @@ TEST(GlobalSearch, SaysWhatIsWrong) {
             "reach_px: each number must be positive");
   EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"poses", std::int64_t(0)}}),
             "it has no poses to try; give their number, such as 4000, and the ranges to search");
+  EXPECT_EQ(shipped::refusal("initial.global_search", trial.inputs, {{"needs_start", true}}),
+            "there is no start to search around; give the approximate placement of the fragment, in case.yaml under "
+            "'start' (docs/case.md)");
   trial.inputs["model"] = shipped::item(marrow::Mesh{});
   EXPECT_NE(shipped::refusal("initial.global_search", trial.inputs).find("model"), std::string::npos);
 }
