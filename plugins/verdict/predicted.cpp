@@ -2,62 +2,21 @@
 // Judges a pose by what its registration says about it: the predicted covariance and the warnings. It draws errors from
 // the normal distribution with this covariance, and counts those that are off.
 #include <algorithm>
-#include <cmath>
 #include <cstdio>
-#include <marrow/domain/decompositions.hpp>
-#include <marrow/domain/random.hpp>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/targets.hpp"
+#include "spread.hpp"
 
 namespace {
 
 using marrow::Judgement;
 using marrow::Verdict;
+using marrow::verdicts::Spread;
 
 struct Options {
   double doubtful_above = 0.05;
   double wrong_above = 0.5;
 };
-
-constexpr int kDraws = 10000, kTargets = 200;
-
-/// What the drawn errors come to.
-struct Spread {
-  int off = 0, off_mm = 0, off_axial = 0;  ///< draws that are off, and in which respect
-  double mtre_mm = 0, axial_deg = 0;       ///< root mean squares
-};
-
-/// A matrix whose product with six standard normal numbers has this covariance.
-marrow::Matrix6d root_of(const marrow::Matrix6d& covariance) {
-  const auto eigen = marrow::eigen_of_symmetric<6>(covariance);
-  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
-}
-
-Spread spread_of(const marrow::Pose& pose, const marrow::Mesh& mesh) {
-  const std::vector<Eigen::Vector3d> targets_mm =
-      marrow::geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets);
-  const marrow::Matrix6d root = root_of(*pose.covariance);
-  marrow::Random random(1);
-  Spread spread;
-  for (int draw = 0; draw < kDraws; ++draw) {
-    marrow::Vector6d motion;
-    for (double& one : motion) one = random.normal();
-    motion = (root * motion).eval();
-    const double axial_deg = std::abs(marrow::degrees(motion[2]));
-    const double mtre_mm = marrow::geometry::mean(marrow::geometry::target_errors_mm(
-        marrow::moved(pose.world_from_model, pose.frame, motion), pose.world_from_model, targets_mm));
-    const bool is_off_mm = mtre_mm > marrow::kMostError_mm, is_off_axial = axial_deg > marrow::kMostAxialError_deg;
-    spread.off += is_off_mm || is_off_axial;
-    spread.off_mm += is_off_mm;
-    spread.off_axial += is_off_axial;
-    spread.mtre_mm += mtre_mm * mtre_mm / kDraws;
-    spread.axial_deg += axial_deg * axial_deg / kDraws;
-  }
-  spread.mtre_mm = std::sqrt(spread.mtre_mm);
-  spread.axial_deg = std::sqrt(spread.axial_deg);
-  return spread;
-}
 
 /// With one decimal.
 std::string shown(double value) {
@@ -98,8 +57,8 @@ void judge_by_deviations(const marrow::Pose& pose, const marrow::Mesh& mesh, con
     verdict.remedies.emplace_back("a third view, or a landmark");
     return;
   }
-  const Spread spread = spread_of(pose, mesh);
-  verdict.failure_probability = double(spread.off) / kDraws;
+  const Spread spread = marrow::verdicts::spread_of(pose, mesh);
+  verdict.failure_probability = double(spread.off) / Spread::kDraws;
   verdict.judgement = verdict.failure_probability > options.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > options.doubtful_above ? Judgement::doubtful
                                                                              : Judgement::trusted;

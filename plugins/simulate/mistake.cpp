@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+// A mistake as people make it with a case. It gives registrations that end in a wrong pose, to see whether a verdict
+// notices.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <marrow/plugin.hpp>
+#include <opencv2/core.hpp>
+
+#include "marrow/domain/random.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  std::string mistake = "none";
+  double camera_deg = 8;
+  double camera_mm = 8;
+  int mistake_seed = 1;
+};
+
+/// No pose is right for a bone that the images do not show. So its truth is one metre away.
+void set_far(List<Truth>& truth) {
+  List<Truth> far;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    Truth one = truth[i];
+    one.world_from_model.translation_mm.x() += 1000;
+    far.add(truth.name(i), one);
+  }
+  truth = far;
+}
+
+/// The CT with its first axis reversed, and the seeds with it.
+void mirror_ct(Case& made) {
+  const Grid& grid = made.ct.grid;
+  for (int z = 0; z < grid.size[2]; ++z)
+    for (int y = 0; y < grid.size[1]; ++y) {
+      float* const row = made.ct.values.data() + grid.offset(0, y, z);
+      std::reverse(row, row + grid.size[0]);
+    }
+  List<Seeds> seeds;
+  for (std::size_t i = 0; i < made.seeds.size(); ++i) {
+    Seeds mirrored = made.seeds[i];
+    for (Eigen::Vector3d& point : mirrored.points_mm) {
+      Eigen::Vector3d index = grid.index_from_point(point);
+      index.x() = grid.size[0] - 1 - index.x();
+      point = grid.point_from_index(index);
+    }
+    seeds.add(made.seeds.name(i), mirrored);
+  }
+  made.seeds = seeds;
+}
+
+void mirror_images(List<View>& views) {
+  List<View> mirrored;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    View view = views[i];
+    cv::flip(views[i].image.pixels, view.image.pixels, 1);
+    if (!view.mask.empty()) cv::flip(views[i].mask, view.mask, 1);
+    mirrored.add(views.name(i), view);
+  }
+  views = mirrored;
+}
+
+/// The images of the first two views, each with the other's camera.
+void swap_images(List<View>& views) {
+  if (views.size() < 2) throw Error("swapped_views needs two views, got " + std::to_string(views.size()));
+  List<View> swapped;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    View view = views[i];
+    if (i < 2) view.camera = views[1 - i].camera;
+    swapped.add(views.name(i), view);
+  }
+  views = swapped;
+}
+
+/// The last view with the camera of another pose of the C-arm.
+void move_camera(List<View>& views, const Options& options) {
+  Random random{std::uint64_t(options.mistake_seed)};
+  const auto direction = [&] {
+    const double x = random.normal(), y = random.normal(), z = random.normal();
+    return Eigen::Vector3d(x, y, z).normalized();
+  };
+  RigidTransform off{"world", "world"};
+  off.rotation = rotation_from_vector(radians(options.camera_deg) * direction());
+  off.translation_mm = options.camera_mm * direction();
+  List<View> moved;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    View view = views[i];
+    if (i + 1 == views.size()) view.camera.camera_from_world = view.camera.camera_from_world * off;
+    moved.add(views.name(i), view);
+  }
+  views = moved;
+}
+
+Case mistaken(const Case& right, const Case* other, const Options& options) {
+  Case made = right;
+  if (options.mistake == "other_bone") {
+    if (!other) throw Error("the mistake other_bone needs the input 'other', the case of another patient");
+    made.ct = other->ct;
+    made.seeds = other->seeds;
+    set_far(made.truth);
+  } else if (options.mistake == "mirrored_ct") {
+    mirror_ct(made);
+    set_far(made.truth);
+  } else if (options.mistake == "mirrored_images") {
+    mirror_images(made.views);
+    set_far(made.truth);
+  } else if (options.mistake == "swapped_views") {
+    swap_images(made.views);
+  } else if (options.mistake == "wrong_camera") {
+    move_camera(made.views, options);
+  }
+  return made;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.mistake", mistaken)
+      .summary("A case with a mistake as people make it: another bone, the other side, another camera")
+      .in("case", "a case")
+      .in("other", "the case of another patient, for the mistake other_bone")
+      .out("case",
+           "the case with the mistake. If the images then do not show the bone of the CT, the true poses are one metre "
+           "away, so that every pose counts as wrong")
+      .option("mistake", &Options::mistake,
+              "other_bone: the CT of another patient; mirrored_ct, mirrored_images: a bone of the other side; "
+              "swapped_views: the first two images have each other's camera; wrong_camera: the last view has a camera "
+              "that was taken elsewhere",
+              one_of({"none", "other_bone", "mirrored_ct", "mirrored_images", "swapped_views", "wrong_camera"}))
+      .option("camera_deg", &Options::camera_deg, "wrong_camera: rotation about the world's origin", at_least(0),
+              at_most(180))
+      .option("camera_mm", &Options::camera_mm, "wrong_camera: shift", at_least(0))
+      .option("mistake_seed", &Options::mistake_seed, "seed of the directions of both", at_least(0));
+}

@@ -1,0 +1,186 @@
+// SPDX-License-Identifier: Apache-2.0
+// Judges a pose by evidence of many kinds: its cost against that of other poses, other minima, what each view alone
+// would have, where the outline lies on the images' edges, whether contour and grey values agree, and the predicted
+// deviations. The failure model, which tools/fit_verdict fits to poses whose errors are known, turns these figures into
+// the probability that the pose is off.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "failure_model.hpp"
+#include "judged.hpp"
+#include "marrow/toolbox/geometry/targets.hpp"
+#include "spread.hpp"
+
+namespace {
+
+using namespace marrow;
+using verdicts::Evidence, verdicts::FailureModel, verdicts::Judged;
+
+struct Options {
+  std::filesystem::path failure_model;
+  int pixel_step = 4;
+};
+
+/// What a figure means, in words for a reason, and what would settle it. The text has one place for the value.
+struct Words {
+  const char* figure;
+  const char* reason;
+  const char* remedy;
+};
+constexpr const char* kThirdView = "a third view, from a direction between the others";
+constexpr const char* kAxial = "a third view, or a landmark off the long axis";
+constexpr const char* kLook = "a look at the overlay of each view: is this the bone, the side and the camera?";
+constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
+constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or register.cameras";
+constexpr Words kWords[] = {
+    {"cost_of_decoys", "the pose costs %.2f times what random poses around it cost", kStart},
+    {"contour_cost_of_decoys", "by contour, the pose costs %.2f times what random poses around it cost", kStart},
+    {"best_decoy", "a random pose nearby explains the images %.2f times as well", kStart},
+    {"contour_best_decoy", "by contour, a random pose nearby explains the images %.2f times as well", kStart},
+    {"best_turned", "turned about its long axis, the bone explains the images %.2f times as well", kAxial},
+    {"contour_best_turned", "turned about its long axis, the bone's contour fits %.2f times as well", kAxial},
+    {"other_minimum", "a search from elsewhere ends at another pose that is %.2f times as good", kThirdView},
+    {"better_minimum", "a search from elsewhere ends at a pose that is better, by %.2f of the cost's rise", kStart},
+    {"restarts_mm", "searches from starts nearby end %.2f mm apart", kThirdView},
+    {"restarts_deg", "searches from starts nearby end %.1f degrees apart about the long axis", kAxial},
+    {"contour_apart_mm", "contour and grey values lead to poses %.2f mm apart", kLook},
+    {"contour_apart_deg", "contour and grey values lead to poses %.1f degrees apart about the long axis", kAxial},
+    {"view_pull_mm", "a view alone would move the bone by %.2f mm in its image", kCameras},
+    {"view_pull_deg", "a view alone would turn the bone by %.1f degrees about its long axis", kCameras},
+    {"contour_view_pull_mm", "the contour in a view alone would move the bone by %.2f mm in its image", kCameras},
+    {"contour_view_pull_deg", "the contour in a view alone would turn the bone by %.1f degrees", kCameras},
+    {"worst_view", "one view fits worse than the mean of all, by a factor of 1 + %.2f", kLook},
+    {"contour_worst_view", "the contour fits one view worse than the mean of all, by a factor of 1 + %.2f", kLook},
+    {"unexplained", "a share of %.2f of the outline has no edge in the worst view", kLook},
+    {"outline_part_mm", "a part of the outline lies %.2f mm off its edges", kLook},
+    {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
+    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm only", kThirdView},
+    {"predicted_axial_deg", "the rotation about the long axis is known to %.1f degrees only", kAxial},
+    {"warnings", "the registration gave %.0f warnings", kLook},
+};
+
+std::string filled(const char* text, double value) {
+  char filled[200];
+  std::snprintf(filled, sizeof filled, text, value);
+  return filled;
+}
+
+void add(Evidence& all, const Evidence& more) { all.insert(all.end(), more.begin(), more.end()); }
+
+void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
+  constexpr double kUnknown_mm = 50, kUnknown_deg = 90;
+  if (!pose.covariance) return;
+  verdicts::Spread spread;
+  spread.mtre_mm = kUnknown_mm, spread.axial_deg = kUnknown_deg;
+  if (pose.covariance->allFinite()) spread = verdicts::spread_of(pose, mesh);
+  evidence.push_back({"predicted_mtre_mm", std::min(spread.mtre_mm, kUnknown_mm), "mm"});
+  evidence.push_back({"predicted_axial_deg", std::min(spread.axial_deg, kUnknown_deg), "deg"});
+}
+
+Evidence gather(const Judged& judged, const Pose* contour_pose, const Cost& cost, const Cost* contour_cost,
+                const List<View>& views, const List<EdgeMap>* edges, const OutlineProjector* projector,
+                const Mesh& mesh, const Options& options, const Context& context) {
+  constexpr double kSpacing_px = 4, kReach_px = 16;
+  const auto fine = cost.at_level({kSpacing_px, kReach_px, options.pixel_step});
+  const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
+  Evidence evidence;
+  context.progress(0, "the cost of other poses");
+  add(evidence, verdicts::landscape(judged, *fine, ""));
+  context.progress(0.2, "other minima");
+  add(evidence, verdicts::other_minima(judged, *coarse, *fine));
+  context.progress(0.7, "each view alone");
+  add(evidence, verdicts::views_alone(judged, *fine, views, ""));
+  if (contour_cost) {
+    const auto contour = contour_cost->at_level({kSpacing_px, kReach_px, 0});
+    add(evidence, verdicts::landscape(judged, *contour, "contour_"));
+    add(evidence, verdicts::views_alone(judged, *contour, views, "contour_"));
+  }
+  context.progress(0.9, "the outline");
+  if (projector && edges) add(evidence, verdicts::outline_on_edges(judged, *projector, views, *edges));
+  if (contour_pose) {
+    evidence.push_back({"contour_apart_mm", judged.off_mm(contour_pose->world_from_model), "mm"});
+    evidence.push_back({"contour_apart_deg", judged.axial_deg(contour_pose->world_from_model), "deg"});
+  }
+  add_predicted(judged.pose, mesh, evidence);
+  evidence.push_back({"warnings", double(judged.pose.warnings.size()), ""});
+  return evidence;
+}
+
+/// The figures that speak most against the pose, each with what would settle it.
+void explain(std::vector<FailureModel::Contribution> contributions, Verdict& verdict) {
+  constexpr std::size_t kMostReasons = 3;
+  std::stable_sort(contributions.begin(), contributions.end(),
+                   [](const auto& a, const auto& b) { return a.log_odds > b.log_odds; });
+  for (const FailureModel::Contribution& one : contributions) {
+    if (verdict.reasons.size() == kMostReasons || !(one.log_odds > 0)) break;
+    if (!one.figure) continue;
+    const auto words = std::find_if(std::begin(kWords), std::end(kWords),
+                                    [&](const Words& words) { return one.figure->name == words.figure; });
+    if (words == std::end(kWords)) continue;
+    verdict.reasons.push_back(filled(words->reason, one.figure->value));
+    const bool is_new =
+        std::find(verdict.remedies.begin(), verdict.remedies.end(), words->remedy) == verdict.remedies.end();
+    if (verdict.judgement != Judgement::trusted && is_new) verdict.remedies.emplace_back(words->remedy);
+  }
+}
+
+/// Throws Error if the model names a figure that this node does not know.
+void check_figures(const FailureModel& model, const std::filesystem::path& path) {
+  for (const FailureModel::Term& term : model.terms)
+    if (std::none_of(std::begin(kWords), std::end(kWords),
+                     [&](const Words& words) { return term.figure == words.figure; }))
+      throw Error(path.string() + ": there is no figure '" + term.figure +
+                  "'; fit the model again with tools/fit_verdict");
+}
+
+Verdict judge(const Pose& pose, const Pose* contour_pose, const Cost& cost, const Cost* contour_cost,
+              const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
+              const OutlineProjector* projector, const Mesh& mesh, const Options& options, Context& context) {
+  constexpr int kTargets = 100;
+  check_rigid(pose.world_from_model, "pose");
+  FailureModel model;
+  if (!options.failure_model.empty()) {
+    model = verdicts::read_failure_model(options.failure_model);
+    check_figures(model, options.failure_model);
+  }
+  Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
+                &optimizer, &context};
+  Verdict verdict;
+  verdict.figures = gather(judged, contour_pose, cost, contour_cost, views, edges, projector, mesh, options, context);
+  if (model.terms.empty()) {
+    verdict.reasons.emplace_back("there is no failure model, so the figures are not judged");
+    verdict.remedies.emplace_back("the option failure_model");
+    return verdict;
+  }
+  const auto contributions = model.contributions(verdict.figures);
+  verdict.failure_probability = model.probability(contributions);
+  verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong
+                      : verdict.failure_probability > model.doubtful_above ? Judgement::doubtful
+                                                                           : Judgement::trusted;
+  explain(contributions, verdict);
+  return verdict;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("verdict.evidence", judge)
+      .summary("Judges a pose by evidence of many kinds, weighed by a failure model")
+      .in("pose", "pose to judge")
+      .in("contour_pose", "pose of the same bone by another cost, such as the stage before")
+      .in("cost", "cost whose minimum the pose is")
+      .in("contour_cost", "another cost of the same bone, such as that of the contour")
+      .in("optimizer", "minimiser of the cost")
+      .in("views", "X-ray views", over("view"))
+      .in("edges", "edge pixels of each view", over("view"))
+      .in("projector", "draws the bone's outline")
+      .in("mesh", "surface of the bone; it gives the axes, and 100 points as the targets of mTRE")
+      .out("verdict", "the judgement, the probability that the pose is off, and all figures of the evidence")
+      .option("failure_model", &Options::failure_model,
+              "file of tools/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
+      .option("pixel_step", &Options::pixel_step,
+              "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
+              at_least(1), at_most(32));
+}

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "judged.hpp"
+
+#include <cmath>
+
+#include "marrow/toolbox/geometry/targets.hpp"
+
+namespace marrow::verdicts {
+
+double Judged::off_mm(const RigidTransform& other) const {
+  return geometry::mean(geometry::target_errors_mm(other, pose.world_from_model, targets_mm));
+}
+
+double Judged::axial_deg(const RigidTransform& other) const {
+  return std::abs(degrees(motion_between(pose.world_from_model, other, frame)[2]));
+}
+
+RigidTransform Judged::moved_by(const RigidTransform& from, const Vector6d& deg_and_mm) const {
+  Vector6d motion = deg_and_mm;
+  motion.head<3>() *= radians(1);
+  return moved(from, frame, motion);
+}
+
+Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransform& from, const FirstSteps& steps,
+                     int max_evaluations) {
+  judged.context->check_cancelled();
+  MinimisationProblem problem;
+  const auto at = [&](const Eigen::VectorXd& x) { return judged.moved_by(from, Vector6d(x)); };
+  problem.function = [&](const Eigen::VectorXd& x) { return cost.value(at(x)); };
+  problem.start = Eigen::VectorXd::Zero(6);
+  problem.initial_step = Eigen::VectorXd::Constant(6, steps.mm);
+  problem.initial_step.head<3>() << steps.deg, steps.deg, steps.axial_deg;
+  problem.max_evaluations = max_evaluations;
+  problem.step_tolerance = steps.tolerance;
+  const MinimisationResult result = judged.optimizer->minimise(problem);
+  return {at(result.x), result.value};
+}
+
+}  // namespace marrow::verdicts

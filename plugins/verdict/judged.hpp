@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// A pose that is judged, and what the evidence for or against it has in common.
+#include <marrow/plugin.hpp>
+#include <memory>
+#include <vector>
+
+namespace marrow::verdicts {
+
+/// A pose with the points of the bone that say how far another pose is from it. Refers to the context.
+struct Judged {
+  Pose pose;
+  FragmentFrame frame;                      ///< of the bone's surface
+  std::vector<Eigen::Vector3d> targets_mm;  ///< in the model's frame
+  const Optimizer* optimizer = nullptr;
+  const Context* context = nullptr;
+
+  /// The mean distance of the targets between the pose and another one (mTRE).
+  double off_mm(const RigidTransform& other) const;
+  /// The angle about the bone's long axis between the pose and another one.
+  double axial_deg(const RigidTransform& other) const;
+  /// The pose after a motion about and along the bone's axes, in degrees and mm.
+  RigidTransform moved_by(const RigidTransform& from, const Vector6d& deg_and_mm) const;
+};
+
+/// A pose and its cost.
+struct Minimum {
+  RigidTransform pose;
+  double value = 0;
+};
+
+/// The first steps of a search, and the part of them at which it ends.
+struct FirstSteps {
+  double deg, axial_deg, mm, tolerance;
+};
+/// Minimises a cost from a pose over all six axes of the bone.
+Minimum minimum_near(const Judged& judged, const Cost& cost, const RigidTransform& from, const FirstSteps& steps,
+                     int max_evaluations);
+
+/// Figures for or against a pose: 0 speaks for it, a larger value against it.
+using Evidence = std::vector<Metric>;
+
+/// How the cost changes around the pose. `prefix` is put before each figure's name.
+Evidence landscape(const Judged& judged, const Cost& cost, const std::string& prefix);
+/// Other minima: searches from elsewhere that end in a cost about as low.
+Evidence other_minima(const Judged& judged, const Cost& coarse, const Cost& cost);
+/// What each view alone would have: a motion in its image, and a rotation about the long axis.
+Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& views, const std::string& prefix);
+/// How the outline lies on the images' edges.
+Evidence outline_on_edges(const Judged& judged, const OutlineProjector& projector, const List<View>& views,
+                          const List<EdgeMap>& edges);
+
+}  // namespace marrow::verdicts

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "spread.hpp"
+
+#include <cmath>
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/domain/random.hpp>
+
+#include "marrow/toolbox/geometry/targets.hpp"
+
+namespace marrow::verdicts {
+namespace {
+
+/// A matrix whose product with six standard normal numbers has this covariance.
+Matrix6d root_of(const Matrix6d& covariance) {
+  const auto eigen = eigen_of_symmetric<6>(covariance);
+  return eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+}
+
+}  // namespace
+
+Spread spread_of(const Pose& pose, const Mesh& mesh) {
+  constexpr int kTargets = 200;
+  const std::vector<Eigen::Vector3d> targets_mm = geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets);
+  const Matrix6d root = root_of(*pose.covariance);
+  Random random(1);
+  Spread spread;
+  for (int draw = 0; draw < Spread::kDraws; ++draw) {
+    Vector6d motion;
+    for (double& one : motion) one = random.normal();
+    motion = (root * motion).eval();
+    const double axial_deg = std::abs(degrees(motion[2]));
+    const double mtre_mm = geometry::mean(geometry::target_errors_mm(moved(pose.world_from_model, pose.frame, motion),
+                                                                     pose.world_from_model, targets_mm));
+    const bool is_off_mm = mtre_mm > kMostError_mm, is_off_axial = axial_deg > kMostAxialError_deg;
+    spread.off += is_off_mm || is_off_axial;
+    spread.off_mm += is_off_mm;
+    spread.off_axial += is_off_axial;
+    spread.mtre_mm += mtre_mm * mtre_mm / Spread::kDraws;
+    spread.axial_deg += axial_deg * axial_deg / Spread::kDraws;
+  }
+  spread.mtre_mm = std::sqrt(spread.mtre_mm);
+  spread.axial_deg = std::sqrt(spread.axial_deg);
+  return spread;
+}
+
+}  // namespace marrow::verdicts

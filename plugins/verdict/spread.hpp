@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <marrow/plugin.hpp>
+
+namespace marrow::verdicts {
+
+/// The errors that a pose's predicted covariance stands for: 10000 draws of the normal distribution, always the same.
+struct Spread {
+  static constexpr int kDraws = 10000;
+  int off = 0, off_mm = 0, off_axial = 0;  ///< draws that are off (kMostError_mm), and in which respect
+  double mtre_mm = 0, axial_deg = 0;       ///< root mean squares
+};
+/// `pose` has a finite covariance. The targets are 200 points of the mesh.
+Spread spread_of(const Pose& pose, const Mesh& mesh);
+
+}  // namespace marrow::verdicts

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: Apache-2.0
+// What each view alone would have. At the right pose every view agrees with it; the views of a wrong pose, of a wrong
+// camera or of another bone each pull in another direction.
+#include <algorithm>
+#include <cmath>
+
+#include "judged.hpp"
+
+namespace marrow::verdicts {
+namespace {
+
+/// The pose after a motion in the plane of a view's image: a turn about the line of sight through the bone, and shifts
+/// along the image's axes.
+RigidTransform moved_in_view(const Judged& judged, const Camera& camera, const Eigen::Vector3d& deg_and_mm) {
+  const RigidTransform& pose = judged.pose.world_from_model;
+  const Eigen::Matrix3d world_from_camera = camera.camera_from_world.rotation.transpose();
+  const Eigen::Vector3d centre = pose * judged.frame.origin_mm;
+  const Eigen::Matrix3d turn = rotation_from_vector(world_from_camera.col(2) * radians(deg_and_mm[0]));
+  RigidTransform result = pose;
+  result.rotation = turn * pose.rotation;
+  result.translation_mm = turn * (pose.translation_mm - centre) + centre + world_from_camera.col(0) * deg_and_mm[1] +
+                          world_from_camera.col(1) * deg_and_mm[2];
+  return result;
+}
+
+/// How far the view would move the bone in its image: mTRE.
+double pull_mm(const Judged& judged, const Cost& cost, std::size_t view, const Camera& camera) {
+  judged.context->check_cancelled();
+  MinimisationProblem problem;
+  problem.function = [&](const Eigen::VectorXd& x) {
+    return cost.value_in_view(view, moved_in_view(judged, camera, Eigen::Vector3d(x)));
+  };
+  problem.start = Eigen::VectorXd::Zero(3);
+  problem.initial_step = Eigen::VectorXd::Constant(3, 1);
+  problem.max_evaluations = 60;
+  problem.step_tolerance = 0.03;
+  return judged.off_mm(moved_in_view(judged, camera, Eigen::Vector3d(judged.optimizer->minimise(problem).x)));
+}
+
+/// How far the view would rotate the bone about its long axis, up to 16 degrees.
+double pull_deg(const Judged& judged, const Cost& cost, std::size_t view) {
+  constexpr int kSide = 8;
+  constexpr double kStep_deg = 2;
+  std::vector<double> values;
+  for (int i = -kSide; i <= kSide; ++i) {
+    Vector6d motion = Vector6d::Zero();
+    motion[2] = kStep_deg * i;
+    values.push_back(cost.value_in_view(view, judged.moved_by(judged.pose.world_from_model, motion)));
+  }
+  const int best = int(std::min_element(values.begin(), values.end()) - values.begin());
+  double between = 0;
+  if (best > 0 && best < 2 * kSide) {
+    const double before = values[std::size_t(best - 1)], here = values[std::size_t(best)],
+                 after = values[std::size_t(best + 1)], curvature = before - 2 * here + after;
+    if (curvature > 0) between = 0.5 * (before - after) / curvature;
+  }
+  return std::abs(best - kSide + between) * kStep_deg;
+}
+
+}  // namespace
+
+Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& views, const std::string& prefix) {
+  if (cost.view_count() != views.size() || views.size() < 2) return {};
+  double most_mm = 0, most_deg = 0, worst = 0, sum = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    most_mm = std::max(most_mm, pull_mm(judged, cost, i, views[i].camera));
+    most_deg = std::max(most_deg, pull_deg(judged, cost, i));
+    const double value = cost.value_in_view(i, judged.pose.world_from_model);
+    worst = std::max(worst, value);
+    sum += value;
+  }
+  return {{prefix + "view_pull_mm", most_mm, "mm"},
+          {prefix + "view_pull_deg", most_deg, "deg"},
+          {prefix + "worst_view", sum > 0 ? worst * double(views.size()) / sum - 1 : 3, ""}};
+}
+
+}  // namespace marrow::verdicts

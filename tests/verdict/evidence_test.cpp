@@ -1,0 +1,277 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <fstream>
+
+#include "shipped.hpp"
+
+namespace evidence_test {
+
+using marrow::Judgement, marrow::Pose, marrow::RigidTransform, marrow::Vector6d, marrow::Verdict;
+
+/// A box of 30 x 20 x 100 mm about the origin.
+marrow::Mesh box() {
+  marrow::Mesh mesh;
+  for (const double z : {-50, 50})
+    for (const double y : {-10, 10})
+      for (const double x : {-15, 15}) mesh.vertices_mm.emplace_back(x, y, z);
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+/// A cost with wells: in each view it is 1 - the deepest of depth * exp(-(distance / 10)^2), where the distance from a
+/// well's pose counts a degree as a millimetre.
+struct Wells : marrow::Cost {
+  struct Well {
+    RigidTransform pose;
+    double depth;
+  };
+  std::vector<std::vector<Well>> views;
+  marrow::FragmentFrame frame = marrow::fragment_frame(box());
+
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    double least = 1;
+    for (const Well& well : views[view]) {
+      Vector6d motion = motion_between(well.pose, pose, frame);
+      motion.head<3>() *= marrow::degrees(1);
+      least = std::min(least, 1 - well.depth * std::exp(-motion.squaredNorm() / 100));
+    }
+    return least;
+  }
+  double value(const RigidTransform& pose) const override {
+    double sum = 0;
+    for (std::size_t i = 0; i < views.size(); ++i) sum += value_in_view(i, pose);
+    return sum / double(views.size());
+  }
+  std::size_t view_count() const override { return views.size(); }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Wells>(*this);
+  }
+};
+
+/// Looks along an axis of the world from 800 mm, with a detector behind it.
+marrow::View view_along(const std::string& name, const Eigen::Vector3d& turn_deg) {
+  marrow::View view;
+  view.name = name;
+  view.camera.width_px = view.camera.height_px = 200;
+  view.camera.intrinsics << 1000, 0, 99.5, 0, 1000, 99.5, 0, 0, 1;
+  view.camera.camera_from_world = {"camera", "world", marrow::rotation_from_vector(marrow::radians(1) * turn_deg),
+                                   Eigen::Vector3d(0, 0, 800)};
+  view.image.pixels = cv::Mat(200, 200, CV_16UC1, cv::Scalar(1000));
+  return view;
+}
+
+struct Trial {
+  Wells cost;
+  Pose pose;
+  shipped::Inputs inputs;
+  marrow::List<marrow::View> views;
+
+  Trial() {
+    pose.world_from_model.rotation = marrow::rotation_from_vector({0.1, 0.3, -0.2});
+    pose.world_from_model.translation_mm = {4, -3, 6};
+    pose.frame = cost.frame;
+    cost.views = {{{pose.world_from_model, 0.9}}, {{pose.world_from_model, 0.9}}};
+    views.add("frontal", view_along("frontal", {0, 0, 0}));
+    views.add("lateral", view_along("lateral", {0, 90, 0}));
+    inputs = {{"pose", shipped::item(pose)},
+              {"optimizer", shipped::call("optimizer.bobyqa", {}).at("optimizer")},
+              {"views", shipped::list(views, "view")},
+              {"mesh", shipped::item(box())}};
+  }
+  RigidTransform moved_by(const std::array<double, 6>& deg_and_mm) const {
+    Vector6d motion = Vector6d::Map(deg_and_mm.data());
+    motion.head<3>() *= marrow::radians(1);
+    return moved(pose.world_from_model, cost.frame, motion);
+  }
+  Verdict verdict(const shipped::Options& options = {}) {
+    inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Wells>(cost));
+    return shipped::call("verdict.evidence", inputs, options).at("verdict").as<Verdict>();
+  }
+};
+
+double figure(const Verdict& verdict, const std::string& name) {
+  for (const marrow::Metric& one : verdict.figures)
+    if (one.name == name) return one.value;
+  return std::nan("");
+}
+
+TEST(VerdictEvidence, TheFiguresOfARightPoseAreSmall) {
+  Trial trial;
+  const Verdict verdict = trial.verdict();
+  EXPECT_LT(figure(verdict, "cost_of_decoys"), 0.2);
+  EXPECT_LT(figure(verdict, "best_turned"), 0.2);
+  EXPECT_LT(figure(verdict, "other_minimum"), 0.2);
+  EXPECT_LT(figure(verdict, "better_minimum"), 1e-3);
+  EXPECT_LT(figure(verdict, "restarts_mm"), 0.2);
+  EXPECT_LT(figure(verdict, "restarts_deg"), 0.3);
+  EXPECT_LT(figure(verdict, "view_pull_mm"), 0.2);
+  EXPECT_LT(figure(verdict, "view_pull_deg"), 0.01);
+  EXPECT_NEAR(figure(verdict, "worst_view"), 0, 1e-9);
+  EXPECT_EQ(figure(verdict, "warnings"), 0);
+}
+
+TEST(VerdictEvidence, SeesAnotherMinimumThatIsAsGood) {
+  Trial trial;
+  for (auto& wells : trial.cost.views) wells.push_back({trial.moved_by({0, 0, 40, 0, 0, 0}), 0.9});
+  const Verdict verdict = trial.verdict();
+  EXPECT_NEAR(figure(verdict, "other_minimum"), 1, 0.02);
+  EXPECT_LT(figure(verdict, "better_minimum"), 0.02);
+}
+
+TEST(VerdictEvidence, SeesABetterMinimum) {
+  Trial trial;
+  for (auto& wells : trial.cost.views) {
+    wells[0].depth = 0.5;
+    wells.push_back({trial.moved_by({0, 0, 0, 0, 0, 14}), 0.9});
+  }
+  const Verdict verdict = trial.verdict();
+  EXPECT_GT(figure(verdict, "other_minimum"), 1.5);
+  EXPECT_NEAR(figure(verdict, "better_minimum"), figure(verdict, "other_minimum") - 1, 1e-9);
+}
+
+TEST(VerdictEvidence, SeesViewsThatPullApart) {
+  // The lateral view shows the bone 2 mm further along the world's y, which lies in both images.
+  Trial trial;
+  trial.cost.views[1][0].pose.translation_mm.y() += 2;
+  EXPECT_NEAR(figure(trial.verdict(), "view_pull_mm"), 2, 0.1);
+  // Rotated about the long axis by 6 degrees.
+  trial.cost.views[1][0].pose = trial.moved_by({0, 0, 6, 0, 0, 0});
+  EXPECT_NEAR(figure(trial.verdict(), "view_pull_deg"), 6, 0.2);
+}
+
+TEST(VerdictEvidence, SeesAViewThatFitsWorse) {
+  Trial trial;
+  trial.cost.views[1][0].depth = 0.5;  // 0.1 and 0.5: the mean is 0.3
+  EXPECT_NEAR(figure(trial.verdict(), "worst_view"), 0.5 / 0.3 - 1, 1e-9);
+}
+
+TEST(VerdictEvidence, SaysHowFarTheOtherCostsPoseIs) {
+  Trial trial;
+  Pose contour = trial.pose;
+  contour.world_from_model = trial.moved_by({0, 0, 7, 0, 0, 0});
+  trial.inputs["contour_pose"] = shipped::item(contour);
+  EXPECT_NEAR(figure(trial.verdict(), "contour_apart_deg"), 7, 1e-6);
+  contour.world_from_model = trial.moved_by({0, 0, 0, 3, 0, 4});
+  trial.inputs["contour_pose"] = shipped::item(contour);
+  EXPECT_NEAR(figure(trial.verdict(), "contour_apart_mm"), 5, 1e-6);
+}
+
+/// An outline of two straight borders, each with an edge pixel beside each point.
+struct Borders : marrow::OutlineProjector {
+  std::vector<marrow::OutlinePoint> points;
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera&, const RigidTransform&, double) const override {
+    return points;
+  }
+};
+
+TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
+  Trial trial;
+  Borders borders;
+  marrow::List<marrow::EdgeMap> edges;
+  marrow::EdgeMap map;
+  map.width_px = map.height_px = 200;
+  // The right border lies 1 px off its edges on the upper half, and has none on the lowest tenth.
+  for (int v = 50; v < 150; ++v)
+    for (const int side : {-1, 1}) {
+      const float u = 99.5f + float(side) * 18;
+      borders.points.push_back({u, float(v), float(side), 0, {float(side) * 15, 0, float(v - 100)}});
+      if (side > 0 && v >= 140) continue;
+      const float off = side > 0 && v < 100 ? 1.f : 0.f;
+      map.pixels.push_back({u + off, float(v), float(side), 0, 100});
+    }
+  for (const char* name : {"frontal", "lateral"}) edges.add(name, map);
+  trial.inputs["edges"] = shipped::list(edges, "view");
+  trial.inputs["projector"] = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const Borders>(borders));
+  const Verdict verdict = trial.verdict();
+  // A pixel is 0.8 mm at 800 mm from the source, of which the bone is about 6 mm further away.
+  EXPECT_NEAR(figure(verdict, "outline_part_mm"), 0.8, 0.05);
+  EXPECT_LT(figure(verdict, "outline_spread_mm"), 0.05);
+  EXPECT_NEAR(figure(verdict, "unexplained"), 0.05, 0.015);
+  marrow::List<marrow::EdgeMap> of_others;
+  of_others.add("oblique", map);
+  trial.inputs["edges"] = shipped::list(of_others, "view");
+  trial.inputs["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Wells>(trial.cost));
+  EXPECT_EQ(shipped::refusal("verdict.evidence", trial.inputs),
+            "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
+}
+
+/// A file with this text, in a folder that goes with the test.
+struct ModelFile {
+  std::filesystem::path path;
+  explicit ModelFile(const std::string& text) {
+    path = std::filesystem::temp_directory_path() / ("marrow_failure_model_" + std::to_string(::getpid()) + ".yaml");
+    std::ofstream(path) << text;
+  }
+  ~ModelFile() { std::filesystem::remove(path); }
+  shipped::Options options() const { return {{"failure_model", path}}; }
+};
+
+std::string model_of(double bias, const std::string& terms) {
+  return "marrow-failure-model: 1\nrecord: made by hand\nbias: " + std::to_string(bias) +
+         "\ndoubtful_above: 0.1\nwrong_above: 0.5\nterms:\n" + terms;
+}
+
+TEST(VerdictEvidence, TheModelGivesTheProbability) {
+  Trial trial;
+  trial.pose.warnings = {"one", "two", "three"};
+  trial.inputs["pose"] = shipped::item(trial.pose);
+  // log odds = bias + 2 log(1 + 3 / 1), and 0.5 log(1 + 4 / 2) for a figure that is absent
+  const std::string terms =
+      "  - {figure: warnings, scale: 1, weight: 2, absent: 0}\n"
+      "  - {figure: contour_apart_mm, scale: 2, weight: 0.5, absent: 4}\n";
+  const double log_odds = 2 * std::log(4) + 0.5 * std::log(3);
+  struct Case {
+    double bias;
+    Judgement judgement;
+  };
+  for (const auto& [bias, judgement] : {Case{-log_odds + 1, Judgement::wrong}, Case{-log_odds - 1, Judgement::doubtful},
+                                        Case{-log_odds - 4, Judgement::trusted}}) {
+    const Verdict verdict = trial.verdict(ModelFile(model_of(bias, terms)).options());
+    EXPECT_NEAR(verdict.failure_probability, 1 / (1 + std::exp(-(bias + log_odds))), 1e-5);
+    EXPECT_EQ(verdict.judgement, judgement);
+    ASSERT_EQ(verdict.reasons.size(), 1u);
+    EXPECT_EQ(verdict.reasons[0], "the registration gave 3 warnings");
+    EXPECT_EQ(verdict.remedies.size(), judgement == Judgement::trusted ? 0u : 1u);
+  }
+}
+
+TEST(VerdictEvidence, WithoutAModelAPoseIsDoubtful) {
+  Trial trial;
+  const Verdict verdict = trial.verdict();
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_TRUE(std::isnan(verdict.failure_probability));
+  EXPECT_EQ(verdict.reasons, std::vector<std::string>{"there is no failure model, so the figures are not judged"});
+}
+
+std::string refusal(const std::string& text) {
+  Trial trial;
+  try {
+    trial.verdict(ModelFile(text).options());
+  } catch (const marrow::Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+TEST(VerdictEvidence, SaysWhatIsWrongWithAModel) {
+  const std::string good = "  - {figure: warnings, scale: 1, weight: 2, absent: 0}\n";
+  EXPECT_NE(refusal(model_of(0, "  - {figure: warnings, scale: 1, weight: -2, absent: 0}\n"))
+                .find("weight: expected a number from 0 to 1e+06, got -2"),
+            std::string::npos);
+  EXPECT_NE(refusal(model_of(0, "  - {figure: luck, scale: 1, weight: 1, absent: 0}\n"))
+                .find("there is no figure 'luck'; fit the model again with tools/fit_verdict"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal("marrow-failure-model: 2\nrecord: x\nbias: 0\ndoubtful_above: 0.6\nwrong_above: 0.5\nterms:\n" + good)
+          .find("doubtful_above: expected at most wrong_above"),
+      std::string::npos);
+  EXPECT_NE(refusal("marrow-failure-model: 1\nrecord: x\nbias: 0\ndoubtful_above: 0\nwrong_above: 0.5\nterms: []\n")
+                .find("terms: expected a list of terms, each with figure, scale, weight and absent"),
+            std::string::npos);
+}
+
+}  // namespace evidence_test
