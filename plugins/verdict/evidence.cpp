@@ -35,8 +35,8 @@ constexpr const char* kLook = "a look at the overlay of each view: is this the b
 constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
 constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or register.cameras";
 constexpr Words kWords[] = {
-    {"cost_of_decoys", "the pose costs %.2f times what random poses around it cost", kStart},
-    {"contour_cost_of_decoys", "by contour, the pose costs %.2f times what random poses around it cost", kStart},
+    {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
+    {"contour_decoys_scatter", "by contour, random poses scatter by %.2f of what they lie above this pose", kStart},
     {"best_decoy", "a random pose nearby explains the images %.2f times as well", kStart},
     {"contour_best_decoy", "by contour, a random pose nearby explains the images %.2f times as well", kStart},
     {"best_turned", "turned about its long axis, the bone explains the images %.2f times as well", kAxial},
@@ -51,8 +51,6 @@ constexpr Words kWords[] = {
     {"view_pull_deg", "a view alone would turn the bone by %.1f degrees about its long axis", kCameras},
     {"contour_view_pull_mm", "the contour in a view alone would move the bone by %.2f mm in its image", kCameras},
     {"contour_view_pull_deg", "the contour in a view alone would turn the bone by %.1f degrees", kCameras},
-    {"worst_view", "one view fits worse than the mean of all, by a factor of 1 + %.2f", kLook},
-    {"contour_worst_view", "the contour fits one view worse than the mean of all, by a factor of 1 + %.2f", kLook},
     {"unexplained", "a share of %.2f of the outline has no edge in the worst view", kLook},
     {"outline_part_mm", "a part of the outline lies %.2f mm off its edges", kLook},
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
@@ -135,8 +133,13 @@ void check_figures(const FailureModel& model, const std::filesystem::path& path)
                   "'; fit the model again with tools/fit_verdict");
 }
 
-Verdict judge(const Pose& pose, const Pose* contour_pose, const Cost& cost, const Cost* contour_cost,
-              const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
+/// Another pose of the bone, found by another cost; null if there is none.
+const Pose* other_pose(const Pose* contour_pose, const List<Pose>* stages) {
+  return contour_pose ? contour_pose : stages ? stages->find("first") : nullptr;
+}
+
+Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stages, const Cost& cost,
+              const Cost* contour_cost, const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
               const OutlineProjector* projector, const Mesh& mesh, const Options& options, Context& context) {
   constexpr int kTargets = 100;
   check_rigid(pose.world_from_model, "pose");
@@ -148,7 +151,8 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const Cost& cost, cons
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
                 &optimizer, &context};
   Verdict verdict;
-  verdict.figures = gather(judged, contour_pose, cost, contour_cost, views, edges, projector, mesh, options, context);
+  verdict.figures = gather(judged, other_pose(contour_pose, stages), cost, contour_cost, views, edges, projector, mesh,
+                           options, context);
   if (model.terms.empty()) {
     verdict.reasons.emplace_back("there is no failure model, so the figures are not judged");
     verdict.remedies.emplace_back("the option failure_model");
@@ -169,7 +173,9 @@ MARROW_PLUGIN(plugin) {
   plugin.node("verdict.evidence", judge)
       .summary("Judges a pose by evidence of many kinds, weighed by a failure model")
       .in("pose", "pose to judge")
-      .in("contour_pose", "pose of the same bone by another cost, such as the stage before")
+      .in("contour_pose", "pose of the same bone, found by its contour")
+      .in("stages", "without contour_pose: poses of the search, of which 'first' is by contour (register.sequence)",
+          over("stage"))
       .in("cost", "cost whose minimum the pose is")
       .in("contour_cost", "another cost of the same bone, such as that of the contour")
       .in("optimizer", "minimiser of the cost")

@@ -7,6 +7,7 @@ MARROW_PLUGIN(plugin) {
       .summary("whether a pose can be relied on: trusted, doubtful or wrong, with reasons")
       .in<marrow::Pose>("pose", "pose to judge")
       .in<marrow::Pose>("contour_pose", "another pose of the same bone, found by its contour")
+      .in<marrow::Pose>("stages", "poses of the search for the pose", marrow::over("stage"))
       .in<marrow::Cost>("cost", "cost of a pose, of grey values")
       .in<marrow::Cost>("contour_cost", "cost of a pose, of the contour")
       .in<marrow::Optimizer>("optimizer", "minimiser of the costs")

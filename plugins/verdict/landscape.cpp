@@ -56,10 +56,13 @@ Evidence landscape(const Judged& judged, const Cost& cost, const std::string& pr
   const std::vector<double> of_decoys(values.begin() + 1, values.begin() + 1 + kDecoys);
   const std::vector<double> of_turn(values.begin() + 1 + kDecoys, values.end());
   const double median = geometry::quantile(of_decoys, 0.5);
+  const double scatter = geometry::quantile(of_decoys, 0.84) - geometry::quantile(of_decoys, 0.16);
   const auto least = [](const std::vector<double>& of) { return *std::min_element(of.begin(), of.end()); };
-  return {{prefix + "cost_of_decoys", median > 0 ? std::clamp(own / median, 0.0, 3.0) : 3, ""},
-          {prefix + "best_decoy", closeness(least(of_decoys), own, median), ""},
-          {prefix + "best_turned", closeness(least(of_turn), own, median), ""}};
+  constexpr double kMostScatter = 10;
+  return {
+      {prefix + "decoys_scatter", median > own ? std::min(scatter / (median - own), kMostScatter) : kMostScatter, ""},
+      {prefix + "best_decoy", closeness(least(of_decoys), own, median), ""},
+      {prefix + "best_turned", closeness(least(of_turn), own, median), ""}};
 }
 
 }  // namespace marrow::verdicts

@@ -61,17 +61,12 @@ double pull_deg(const Judged& judged, const Cost& cost, std::size_t view) {
 
 Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& views, const std::string& prefix) {
   if (cost.view_count() != views.size() || views.size() < 2) return {};
-  double most_mm = 0, most_deg = 0, worst = 0, sum = 0;
+  double most_mm = 0, most_deg = 0;
   for (std::size_t i = 0; i < views.size(); ++i) {
     most_mm = std::max(most_mm, pull_mm(judged, cost, i, views[i].camera));
     most_deg = std::max(most_deg, pull_deg(judged, cost, i));
-    const double value = cost.value_in_view(i, judged.pose.world_from_model);
-    worst = std::max(worst, value);
-    sum += value;
   }
-  return {{prefix + "view_pull_mm", most_mm, "mm"},
-          {prefix + "view_pull_deg", most_deg, "deg"},
-          {prefix + "worst_view", sum > 0 ? worst * double(views.size()) / sum - 1 : 3, ""}};
+  return {{prefix + "view_pull_mm", most_mm, "mm"}, {prefix + "view_pull_deg", most_deg, "deg"}};
 }
 
 }  // namespace marrow::verdicts
