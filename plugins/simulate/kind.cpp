@@ -3,5 +3,5 @@
 #include <marrow/plugin.hpp>
 
 MARROW_PLUGIN(plugin) {
-  plugin.kind("simulate").summary("simulated data with exact truth").runs_apart(marrow::Apart::computes);
+  plugin.kind("simulate").summary("simulated data with exact truth").sees_truth().runs_apart(marrow::Apart::computes);
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// A mistake as people make it with a case. It gives registrations that end in a wrong pose, to see whether a verdict
-// notices.
+// A mistake as people make it with the data of a registration. It gives registrations that end in a wrong pose, to see
+// whether a verdict notices.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <marrow/plugin.hpp>
@@ -19,6 +19,14 @@ struct Options {
   int mistake_seed = 1;
 };
 
+/// What a registration is given.
+struct Given {
+  Volume volume;
+  List<Seeds> seeds;
+  List<View> views;
+  List<Truth> truth;
+};
+
 /// No pose is right for a bone that the images do not show. So its truth is one metre away.
 void set_far(List<Truth>& truth) {
   List<Truth> far;
@@ -31,11 +39,11 @@ void set_far(List<Truth>& truth) {
 }
 
 /// The CT with its first axis reversed, and the seeds with it.
-void mirror_ct(Case& made) {
-  const Grid& grid = made.ct.grid;
+void mirror_ct(Given& made) {
+  const Grid& grid = made.volume.grid;
   for (int z = 0; z < grid.size[2]; ++z)
     for (int y = 0; y < grid.size[1]; ++y) {
-      float* const row = made.ct.values.data() + grid.offset(0, y, z);
+      float* const row = made.volume.values.data() + grid.offset(0, y, z);
       std::reverse(row, row + grid.size[0]);
     }
   List<Seeds> seeds;
@@ -93,12 +101,14 @@ void move_camera(List<View>& views, const Options& options) {
   views = moved;
 }
 
-Case mistaken(const Case& right, const Case* other, const Options& options) {
-  Case made = right;
+Given mistaken(const Volume& volume, const List<Seeds>& seeds, const List<View>& views, const List<Truth>* truth,
+               const Volume* other_volume, const List<Seeds>* other_seeds, const Options& options) {
+  Given made{volume, seeds, views, truth ? *truth : List<Truth>()};
   if (options.mistake == "other_bone") {
-    if (!other) throw Error("the mistake other_bone needs the input 'other', the case of another patient");
-    made.ct = other->ct;
-    made.seeds = other->seeds;
+    if (!other_volume || !other_seeds)
+      throw Error("the mistake other_bone needs the inputs other_volume and other_seeds, the CT of another bone");
+    made.volume = *other_volume;
+    made.seeds = *other_seeds;
     set_far(made.truth);
   } else if (options.mistake == "mirrored_ct") {
     mirror_ct(made);
@@ -118,12 +128,21 @@ Case mistaken(const Case& right, const Case* other, const Options& options) {
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.mistake", mistaken)
-      .summary("A case with a mistake as people make it: another bone, the other side, another camera")
-      .in("case", "a case")
-      .in("other", "the case of another patient, for the mistake other_bone")
-      .out("case",
-           "the case with the mistake. If the images then do not show the bone of the CT, the true poses are one metre "
-           "away, so that every pose counts as wrong")
+      .summary(
+          "What a registration is given, with a mistake as people make it: another bone, another side, another camera")
+      .in("volume", "CT")
+      .in("seeds", "points inside each fragment", over("fragment"))
+      .in("views", "X-ray views", over("view"))
+      .in("truth", "exact pose of each fragment, where it is known", over("fragment"))
+      .in("other_volume", "the CT of another bone, for the mistake other_bone")
+      .in("other_seeds", "points inside each fragment of it", over("fragment"))
+      .out("volume", &Given::volume, "the CT, or the wrong one")
+      .out("seeds", &Given::seeds, "points inside each fragment of it", over("fragment"))
+      .out("views", &Given::views, "the views, or wrong ones", over("view"))
+      .out("truth", &Given::truth,
+           "the exact poses. If the images do not show the bone of the CT, they are one metre away, so that every pose "
+           "counts as wrong",
+           over("fragment"))
       .option("mistake", &Options::mistake,
               "other_bone: the CT of another patient; mirrored_ct, mirrored_images: a bone of the other side; "
               "swapped_views: the first two images have each other's camera; wrong_camera: the last view has a camera "

@@ -33,11 +33,28 @@ Case right() {
   return made;
 }
 
+shipped::Inputs inputs() {
+  const Case made = right();
+  return {{"volume", shipped::item(made.ct)},
+          {"seeds", shipped::list(made.seeds, "fragment")},
+          {"views", shipped::list(made.views, "view")},
+          {"truth", shipped::list(made.truth, "fragment")}};
+}
+
 Case with(const std::string& mistake, shipped::Options options = {}, const Case* other = nullptr) {
   options["mistake"] = mistake;
-  shipped::Inputs inputs{{"case", shipped::item(right())}};
-  if (other) inputs["other"] = shipped::item(*other);
-  return shipped::call("simulate.mistake", inputs, options).at("case").as<Case>();
+  shipped::Inputs given = inputs();
+  if (other) {
+    given["other_volume"] = shipped::item(other->ct);
+    given["other_seeds"] = shipped::list(other->seeds, "fragment");
+  }
+  const shipped::Outputs out = shipped::call("simulate.mistake", given, options);
+  Case made;
+  made.ct = out.at("volume").as<Volume>();
+  made.seeds = out.at("seeds").as_list<Seeds>();
+  made.views = out.at("views").as_list<View>();
+  made.truth = out.at("truth").as_list<Truth>();
+  return made;
 }
 
 int pixel(const Case& made, std::size_t view, int column) {
@@ -83,9 +100,8 @@ TEST(SimulateMistake, AnotherBoneComesWithItsSeeds) {
   Case other = right();
   other.ct.values.assign(24, 500.f);
   EXPECT_EQ(with("other_bone", {}, &other).ct.values, other.ct.values);
-  EXPECT_EQ(shipped::refusal("simulate.mistake", {{"case", shipped::item(right())}},
-                             {{"mistake", std::string("other_bone")}}),
-            "the mistake other_bone needs the input 'other', the case of another patient");
+  EXPECT_EQ(shipped::refusal("simulate.mistake", inputs(), {{"mistake", std::string("other_bone")}}),
+            "the mistake other_bone needs the inputs other_volume and other_seeds, the CT of another bone");
 }
 
 }  // namespace mistake_test
