@@ -54,8 +54,8 @@ constexpr Words kWords[] = {
     {"unexplained", "a share of %.2f of the outline has no edge in the worst view", kLook},
     {"outline_part_mm", "a part of the outline lies %.2f mm off its edges", kLook},
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
-    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm only", kThirdView},
-    {"predicted_axial_deg", "the rotation about the long axis is known to %.1f degrees only", kAxial},
+    {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kThirdView},
+    {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
     {"warnings", "the registration gave %.0f warnings", kLook},
 };
 

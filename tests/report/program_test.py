@@ -92,9 +92,8 @@ class Program(unittest.TestCase):
         self.marrow("run", SOURCE / "pipelines" / "femur.yaml", "case=%s" % self.case, "--out", run, "--quiet")
         page = self.marrow("show", run).strip()
         self.assertEqual(page, str(run / "report.html"))
-        self.assertEqual(
-            self.open(page), ["summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"]
-        )
+        sections = ["verdict", "summary", "pictures", "scene", "convergence", "landscape", "graph", "repeat"]
+        self.assertEqual(self.open(page), sections)
         headings = self.browser.js(
             "return Array.from(document.querySelectorAll('table.figures thead th')).map(cell => cell.textContent)"
         )
