@@ -21,6 +21,7 @@ using verdicts::Evidence, verdicts::FailureModel, verdicts::Judged;
 struct Options {
   std::filesystem::path failure_model;
   int pixel_step = 4;
+  double most_intersection_mm = 2;
 };
 
 /// What a figure means, in words for a reason, and what would settle it. The text has one place for the value.
@@ -56,6 +57,7 @@ constexpr Words kWords[] = {
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
     {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kThirdView},
     {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
+    {"intersection_mm", "the bone reaches %.1f mm into another bone", kLook},
     {"warnings", "the registration gave %.0f warnings", kLook},
 };
 
@@ -140,9 +142,11 @@ const Pose* other_pose(const Pose* contour_pose, const List<Pose>* stages) {
 
 Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stages, const Cost& cost,
               const Cost* contour_cost, const Optimizer& optimizer, const List<View>& views, const List<EdgeMap>* edges,
-              const OutlineProjector* projector, const Mesh& mesh, const Options& options, Context& context) {
+              const OutlineProjector* projector, const Mesh& mesh, const List<Pose>* others,
+              const List<SignedField>* other_bones, const Options& options, Context& context) {
   constexpr int kTargets = 100;
   check_rigid(pose.world_from_model, "pose");
+  if (!others != !other_bones) throw Error("others and other_bones belong together; wire both or none");
   FailureModel model;
   if (!options.failure_model.empty()) {
     model = verdicts::read_failure_model(options.failure_model);
@@ -153,6 +157,8 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   Verdict verdict;
   verdict.figures = gather(judged, other_pose(contour_pose, stages), cost, contour_cost, views, edges, projector, mesh,
                            options, context);
+  const double inside_mm = others ? verdicts::intersection_mm(judged, mesh, *others, *other_bones) : 0;
+  if (others) verdict.figures.push_back({"intersection_mm", inside_mm, "mm"});
   if (model.terms.empty()) {
     verdict.reasons.emplace_back("there is no failure model, so the figures are not judged");
     verdict.remedies.emplace_back("the option failure_model");
@@ -163,6 +169,10 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > model.doubtful_above ? Judgement::doubtful
                                                                            : Judgement::trusted;
+  if (inside_mm > options.most_intersection_mm && verdict.judgement == Judgement::trusted) {
+    verdict.judgement = Judgement::doubtful;
+    verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
+  }
   explain(contributions, verdict);
   return verdict;
 }
@@ -183,10 +193,14 @@ MARROW_PLUGIN(plugin) {
       .in("edges", "edge pixels of each view", over("view"))
       .in("projector", "draws the bone's outline")
       .in("mesh", "surface of the bone; it gives the axes, and 100 points as the targets of mTRE")
+      .in("others", "poses of other bones, and maybe of this one", over("fragment"))
+      .in("other_bones", "the bones of these poses", over("fragment"))
       .out("verdict", "the judgement, the probability that the pose is off, and all figures of the evidence")
       .option("failure_model", &Options::failure_model,
               "file of tools/fit_verdict; none: the figures alone, to fit one, and the pose is doubtful")
       .option("pixel_step", &Options::pixel_step,
               "for costs of grey values: only every n-th pixel is compared, and half as many far from the pose",
-              at_least(1), at_most(32));
+              at_least(1), at_most(32))
+      .option("most_intersection_mm", &Options::most_intersection_mm,
+              "a pose is doubtful if the bone reaches deeper into one of the others", at_least(0));
 }

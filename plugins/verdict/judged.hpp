@@ -50,4 +50,10 @@ Evidence views_alone(const Judged& judged, const Cost& cost, const List<View>& v
 Evidence outline_on_edges(const Judged& judged, const OutlineProjector& projector, const List<View>& views,
                           const List<EdgeMap>& edges);
 
+/// How deep the bone reaches into other bones: the largest depth of 2000 points of its surface. `others` are the poses
+/// of other bones, and maybe of this one; `other_bones` has a signed field of the same name for each. Throws Error if
+/// one is missing.
+double intersection_mm(const Judged& judged, const Mesh& mesh, const List<Pose>& others,
+                       const List<SignedField>& other_bones);
+
 }  // namespace marrow::verdicts

@@ -20,7 +20,9 @@ def comparison(folder, cells, seed):
     folder.mkdir()
     with open(folder / "cells.csv", "w", newline="") as stream:
         table = csv.writer(stream)
-        table.writerow(["cell", "variant", "case", "status", "errors.distal.final.mtre_mm", "errors.distal.final.axial_deg"])
+        table.writerow(
+            ["cell", "variant", "case", "status", "errors.distal.final.mtre_mm", "errors.distal.final.axial_deg"]
+        )
         for i in range(cells):
             doubt = chance.expovariate(0.5)
             failed = chance.random() < 1 / (1 + math.exp(4 - 4 * math.log1p(doubt)))
@@ -72,9 +74,18 @@ class FitVerdict(unittest.TestCase):
 
     def test_counts_what_a_model_is_worth(self):
         model_file = self.folder / "by_hand.yaml"
-        model_file.write_text(yaml.safe_dump({
-            "marrow-failure-model": 1, "record": "", "bias": -1, "doubtful_above": 0.5, "wrong_above": 0.9,
-            "terms": [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}]}))
+        model_file.write_text(
+            yaml.safe_dump(
+                {
+                    "marrow-failure-model": 1,
+                    "record": "",
+                    "bias": -1,
+                    "doubtful_above": 0.5,
+                    "wrong_above": 0.9,
+                    "terms": [{"figure": "doubt", "scale": 1, "weight": 1, "absent": 0}],
+                }
+            )
+        )
         done = self.run_tool("--check", self.folder / "unseen", "--model", model_file, "--roc", self.folder / "roc.svg")
         self.assertEqual(done.returncode, 0, done.stderr)
         # Probability 0.5 is at a doubt of e - 1.
@@ -85,7 +96,9 @@ class FitVerdict(unittest.TestCase):
                     continue
                 verdict = self.folder / "unseen/cells" / row["cell"] / "outputs/verdict/distal.yaml"
                 doubt = yaml.safe_load(verdict.read_text())["figures"][0]["value"]
-                failed = float(row["errors.distal.final.mtre_mm"]) > 2 or float(row["errors.distal.final.axial_deg"]) < -5
+                failed = (
+                    float(row["errors.distal.final.mtre_mm"]) > 2 or float(row["errors.distal.final.axial_deg"]) < -5
+                )
                 bad, good = bad + failed, good + (not failed)
                 silent, alarms = silent + (failed and doubt <= math.e - 1), alarms + (not failed and doubt > math.e - 1)
         last = next(line for line in done.stdout.splitlines() if line.startswith("all "))

@@ -199,6 +199,34 @@ TEST(VerdictEvidence, MeasuresTheOutlineAgainstTheEdges) {
             "view 'frontal': there is no edge map of that name; make the edges from the same list of views");
 }
 
+/// Everything below z = -40 mm of the model is bone.
+marrow::SignedField floor_of_bone() {
+  marrow::SignedField field;
+  field.grid.size = {3, 3, 3};
+  field.grid.spacing_mm = {100, 100, 100};
+  field.grid.origin_mm = {-100, -100, -100};
+  for (int z = 0; z < 3; ++z)
+    for (int i = 0; i < 9; ++i) field.values_mm.push_back(float(-100 + 100 * z + 40));
+  return field;
+}
+
+TEST(VerdictEvidence, SeesThatBonesIntersect) {
+  Trial trial;
+  Pose other = trial.pose;
+  other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});  // its bone ends at z = -34, and the box at -50
+  marrow::List<Pose> others;
+  marrow::List<marrow::SignedField> bones;
+  others.add("distal", trial.pose);
+  others.add("proximal", other);
+  bones.add("proximal", floor_of_bone());
+  trial.inputs["others"] = shipped::list(others, "fragment");
+  trial.inputs["other_bones"] = shipped::list(bones, "fragment");
+  EXPECT_NEAR(figure(trial.verdict(), "intersection_mm"), 16, 0.5);
+  trial.inputs.erase("other_bones");
+  EXPECT_EQ(shipped::refusal("verdict.evidence", trial.inputs),
+            "others and other_bones belong together; wire both or none");
+}
+
 /// A file with this text, in a folder that goes with the test.
 struct ModelFile {
   std::filesystem::path path;
@@ -237,6 +265,25 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
     EXPECT_EQ(verdict.reasons[0], "the registration gave 3 warnings");
     EXPECT_EQ(verdict.remedies.size(), judgement == Judgement::trusted ? 0u : 1u);
   }
+}
+
+TEST(VerdictEvidence, APoseInAnotherBoneIsDoubtful) {
+  Trial trial;
+  Pose other = trial.pose;
+  other.world_from_model = trial.moved_by({0, 0, 0, 0, 0, 6});
+  marrow::List<Pose> others;
+  marrow::List<marrow::SignedField> bones;
+  others.add("proximal", other);
+  bones.add("proximal", floor_of_bone());
+  trial.inputs["others"] = shipped::list(others, "fragment");
+  trial.inputs["other_bones"] = shipped::list(bones, "fragment");
+  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  shipped::Options options = model.options();
+  const Verdict verdict = trial.verdict(options);
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_EQ(verdict.reasons, std::vector<std::string>{"the bone reaches 16.0 mm into another bone"});
+  options["most_intersection_mm"] = 20.0;
+  EXPECT_EQ(trial.verdict(options).judgement, Judgement::trusted);
 }
 
 TEST(VerdictEvidence, WithoutAModelAPoseIsDoubtful) {
