@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A bone that is not broken: one fragment, moved by a known rigid transform between CT and images.
 #include <algorithm>
+#include <cstdlib>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -18,7 +19,9 @@ struct WholeOptions {
   std::array<double, 3> translation_mm{0, 0, 0};
 };
 
-/// At several heights, the middle of the longest part of a line along x that lies in cortical bone.
+/// At several heights, the middle of the longest part of a line along x that lies in cortical bone. Only lines through
+/// the middle half of the section count: a line beside the canal can be long, but its middle may lie on the canal's
+/// wall.
 std::vector<Eigen::Vector3d> seeds_of(const Bone& bone, const Fragment& fragment) {
   constexpr int kHeights = 14;
   Eigen::Vector3d low = bone.outer.vertices_mm.front(), high = low;
@@ -34,11 +37,20 @@ std::vector<Eigen::Vector3d> seeds_of(const Bone& bone, const Fragment& fragment
     };
   });
   std::array<double, kHeights> longest{};
+  std::array<std::array<int, 2>, kHeights> section;  // the first and the last line that meet the bone
+  section.fill({lines, -1});
   std::array<Eigen::Vector3d, kHeights> points;
   std::vector<phantom::Interval> intervals;
   const auto crossings = rays.bundle().crossings(0, kHeights);
   phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
+    auto& [first, last] = section[ray[0].row];
+    first = std::min(first, int(ray[0].column));
+    last = std::max(last, int(ray[0].column));
+  });
+  phantom::for_each_ray(crossings, [&](std::span<const phantom::Crossing> ray) {
     const std::size_t height = ray[0].row;
+    const auto [first, last] = section[height];
+    if (std::abs(2 * int(ray[0].column) - first - last) > (last - first) / 2) return;
     rays.intervals(ray, intervals);
     for (const auto& interval : intervals) {
       if (!interval.cortical || interval.to - interval.from <= longest[height]) continue;

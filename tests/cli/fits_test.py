@@ -78,9 +78,9 @@ class Fits(Case):
 
     def test_a_result_that_nothing_writes(self):
         fits = {fit["node"]: fit for fit in fits_of(SOURCE / "pipelines" / "simulate.yaml", "case")}
-        fault = "output 'case': no plugin writes values of type 'landmarks'"
-        self.assertEqual(fits["simulate.landmarks"]["faults"], [fault])
-        checked = check(SOURCE / "pipelines" / "simulate.yaml", "case", "simulate.landmarks")
+        fault = "output 'case': no plugin writes values of type 'simulated_bone'"
+        self.assertEqual(fits["simulate.femur"]["faults"], [fault])
+        checked = check(SOURCE / "pipelines" / "simulate.yaml", "case", "simulate.femur")
         self.assertEqual(checked.returncode, 2)
         self.assertIn(fault, checked.stderr)
         self.assertIn("leave it out, or name a result of another type", checked.stderr)

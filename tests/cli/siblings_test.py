@@ -46,7 +46,8 @@ class Siblings(Case):
     def run_femur(self, case, *arguments, out="out"):
         out = self.scratch / out
         result = marrow("run", FEMUR, "case=%s" % case, "--out", out, "--quiet", *arguments)
-        self.assertEqual(result.returncode, 0, result.stderr)
+        # Here only the errors count, and not what the verdict says of poses by one view or by a coarse segmentation.
+        self.assertIn(result.returncode, (0, 3), result.stderr)
         self.assertEqual(json.loads((out / "run.json").read_text())["status"], "done")
         return out
 
