@@ -1,0 +1,465 @@
+// SPDX-License-Identifier: Apache-2.0
+// Corrects cameras by the bones that their images show. A view whose camera is off by a motion sees each bone in a pose
+// that is off by the same motion, for all bones. So no image is projected anew: a cost that can be split into views
+// tells which pose each view alone would like. Sought are the poses of the bones and one motion for each view. They
+// minimise the sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations
+// expected of a calibration (a Gaussian prior). The minimum is found by Levenberg and Marquardt's steps. The curvature
+// there gives the covariance of all poses and motions together (Laplace's approximation).
+#include <tbb/parallel_for.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include <marrow/domain/decompositions.hpp>
+#include "marrow/toolbox/match/views_cost.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  double rotation_deg = 0.5;
+  double shift_mm = 1;
+  double focal_percent = 1;
+  double centre_px = 5;
+  double contour_spacing_px = 2;
+  double reach_px = 6;
+  int pixel_step = 2;
+  int max_rounds = 15;
+};
+
+struct Result {
+  List<View> views;
+  List<Pose> poses;
+  List<Metrics> motions;
+};
+
+Vector6d from_units(const Vector6d& deg_and_mm) {
+  Vector6d scaled = deg_and_mm;
+  scaled.head<3>() *= radians(1);
+  return scaled;
+}
+
+/// A camera's motion: rotations [deg] about the axes u, v and depth of its image, through `centre_mm`, and shifts [mm]
+/// along them.
+struct Sight {
+  Eigen::Vector3d centre_mm;
+  Eigen::Matrix3d axes;  ///< u, v and depth in columns, in the world
+  Vector6d deviation;    ///< expected of the six numbers
+
+  RigidTransform motion(const Vector6d& deg_and_mm) const {
+    const Vector6d motion = from_units(deg_and_mm);
+    RigidTransform moved{"world", "world"};
+    moved.rotation = rotation_from_vector(axes * motion.head<3>());
+    moved.translation_mm = centre_mm - moved.rotation * centre_mm + axes * motion.tail<3>();
+    return moved;
+  }
+  /// How a bone's pose moves along its own axes, for small motions of the camera; both in degrees and mm.
+  Matrix6d of_bone(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
+    const Eigen::Matrix3d to_bone = (world_from_model.rotation * frame.axes).transpose();
+    const Eigen::Vector3d arm = world_from_model * frame.origin_mm - centre_mm;
+    Matrix6d change = Matrix6d::Zero();
+    change.topLeftCorner<3, 3>() = change.bottomRightCorner<3, 3>() = to_bone * axes;
+    for (int i = 0; i < 3; ++i) change.block<3, 1>(3, i) = to_bone * axes.col(i).cross(arm) * radians(1);
+    return change;
+  }
+};
+
+Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const Options& options) {
+  const double depth_mm = (view.camera.camera_from_world * centre_mm).z();
+  if (!(depth_mm > 0))
+    throw Error("view '" + view.name + "': the bones do not lie in front of its camera; look at the overlays first");
+  const double each = 1 / std::sqrt(3.0), each_of_two = 1 / std::sqrt(2.0);
+  const double shift = each * options.shift_mm,
+               centre = each_of_two * options.centre_px * pixel_size_at_mm(view.camera, centre_mm),
+               depth = options.focal_percent / 100 * depth_mm, turn = each * options.rotation_deg;
+  Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Vector6d()};
+  const double across = std::hypot(shift, centre);
+  sight.deviation << turn, turn, turn, across, across, std::hypot(shift, depth);
+  return sight;
+}
+
+/// Quadratic model of a bone's cost in one view about the pose in which this view sees it, for motions in degrees and
+/// mm; and the scatter of the gradient over the blocks of this view's image.
+struct Model {
+  double value = 0;
+  Vector6d gradient = Vector6d::Zero();
+  Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
+};
+
+/// A bone's cost in one view.
+class InView {
+ public:
+  InView(const Cost& cost, const FragmentFrame& frame, std::size_t view, const List<View>& views)
+      : cost_(cost), frame_(frame), view_(view), share_(1.0 / double(views.size())) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const auto count = std::size_t(match::Blocks::of(views[i].camera).count());
+      (i < view ? before_ : i == view ? blocks_ : after_) += count;
+    }
+  }
+
+  double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
+
+  /// By central differences. A step is so long that the cost rises by about `wanted_rise`; 0: by the deviation of the
+  /// cost's value, from block to block.
+  Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
+    const auto moved_by = [&](const Vector6d& step) { return moved(pose, frame_, from_units(step)); };
+    Model model;
+    model.value = value(pose);
+    if (!(wanted_rise > 0)) wanted_rise = changes_without_blocks(pose).norm();
+    std::array<double, 12> ends{};
+    Vector6d rises;
+    tbb::parallel_for(0, 6, [&](int axis) {
+      const auto rise = [&] {
+        ends[std::size_t(2 * axis)] = value(moved_by(steps_[axis] * Vector6d::Unit(axis)));
+        ends[std::size_t(2 * axis + 1)] = value(moved_by(-steps_[axis] * Vector6d::Unit(axis)));
+        return 0.5 * (ends[std::size_t(2 * axis)] + ends[std::size_t(2 * axis + 1)]) - model.value;
+      };
+      for (rises[axis] = rise(); rises[axis] > 3 * wanted_rise && steps_[axis] > kLeastStep; rises[axis] = rise())
+        steps_[axis] *= 0.5;
+      for (; rises[axis] < wanted_rise && steps_[axis] < kMostStep; rises[axis] = rise()) steps_[axis] *= 2;
+    });
+    for (int axis = 0; axis < 6; ++axis)
+      model.gradient[axis] = 0.5 * (ends[std::size_t(2 * axis)] - ends[std::size_t(2 * axis + 1)]);
+    model.curvature = curvature(pose, model.value, rises);
+    if (with_scatter) model.scatter = scatter(pose);
+    const Vector6d per_step = steps_.cwiseInverse();
+    model.gradient = model.gradient.cwiseProduct(per_step);
+    model.curvature = per_step.asDiagonal() * model.curvature * per_step.asDiagonal();
+    model.scatter = per_step.asDiagonal() * model.scatter * per_step.asDiagonal();
+    return model;
+  }
+
+ private:
+  static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
+
+  RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {
+    return moved(pose, frame_, from_units(steps.cwiseProduct(steps_)));
+  }
+  /// In units of the steps, without its negative eigenvalues.
+  Matrix6d curvature(const RigidTransform& pose, double middle, const Vector6d& rises) const {
+    Matrix6d h = (2 * rises).asDiagonal();
+    tbb::parallel_for(0, 15, [&](int k) {
+      int i = 1, j = k;
+      for (; j >= i; ++i) j -= i;
+      const Vector6d both = Vector6d::Unit(i) + Vector6d::Unit(j);
+      h(i, j) = h(j, i) =
+          0.5 * (value(moved_by(pose, both)) + value(moved_by(pose, -both))) - middle - rises[i] - rises[j];
+    });
+    const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
+    return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
+  }
+  /// By how much each block of this view's image changes the cost in this view.
+  Eigen::VectorXd changes_without_blocks(const RigidTransform& pose) const {
+    const std::vector<double> without = cost_.without_each_block(pose);
+    if (without.size() != before_ + blocks_ + after_)
+      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
+    return (Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)).array() - cost_.value(pose)) / share_;
+  }
+  Matrix6d scatter(const RigidTransform& pose) const {
+    Eigen::MatrixXd gradients(6, Eigen::Index(blocks_));
+    tbb::parallel_for(0, 6, [&](int axis) {
+      gradients.row(axis) = 0.5 * (changes_without_blocks(moved_by(pose, Vector6d::Unit(axis))) -
+                                   changes_without_blocks(moved_by(pose, -Vector6d::Unit(axis))));
+    });
+    return gradients * gradients.transpose();
+  }
+
+  const Cost& cost_;
+  const FragmentFrame& frame_;
+  const std::size_t view_;
+  const double share_;  ///< of the view in the cost
+  std::size_t before_ = 0, blocks_ = 0, after_ = 0;
+  Vector6d steps_ = Vector6d::Constant(0.25);
+};
+
+/// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
+struct State {
+  std::vector<RigidTransform> poses;
+  std::vector<Vector6d> motions;
+};
+
+class Refinement {
+ public:
+  Refinement(const List<Cost>& costs, const List<Pose>& poses, const List<View>& views, const Options& options)
+      : poses_(poses), views_(views) {
+    Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+    for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
+    for (const View& view : views) sights_.push_back(sight_of(view, centre, options));
+    for (std::size_t f = 0; f < poses.size(); ++f) {
+      levels_.push_back(costs[f].at_level({options.contour_spacing_px, options.reach_px, options.pixel_step}));
+      for (std::size_t v = 0; v < views.size(); ++v) in_views_.emplace_back(*levels_[f], poses[f].frame, v, views);
+      state_.poses.push_back(poses[f].world_from_model);
+    }
+    state_.motions.assign(views.size(), Vector6d::Zero());
+    noise_.assign(poses.size(), 0.0);
+    models_.resize(in_views_.size());
+  }
+
+  /// Ends when a step makes the state hardly more probable, and the scale remains.
+  void run(int max_rounds, Context& context) {
+    for (int round = 0; round < max_rounds; ++round) {
+      context.check_cancelled();
+      context.progress(double(round) / max_rounds, "rounds");
+      expand(round < 2);
+      const double before = scale_;
+      if (round > 0) scale_ = most_probable_scale();
+      const double gain = step();
+      converged_ = gain < 0.05 && round > 0 && scale_ == before;
+      char text[96];
+      std::snprintf(text, sizeof text, "round %d: scale %.3g, log posterior density up by %.3g", round + 1, scale_, gain);
+      context.debug(text);
+      if (converged_) break;
+    }
+    expand(true);
+    covariance_ = inverse_of(equations(scale_).first);
+  }
+
+  bool converged() const { return converged_; }
+  /// How far off the cameras are, in units of what the options expect.
+  double scale() const { return scale_; }
+  const State& state() const { return state_; }
+  const Sight& sight(std::size_t view) const { return sights_[view]; }
+  /// The cost of a bone, as the mean over the views with their cameras corrected.
+  double cost(std::size_t bone) const {
+    double sum = 0;
+    for (std::size_t v = 0; v < views_.size(); ++v) sum += models_[bone * views_.size() + v].value;
+    return sum / double(views_.size());
+  }
+  Matrix6d covariance_of_pose(std::size_t bone) const { return covariance_.block<6, 6>(at_pose(bone), at_pose(bone)); }
+  Vector6d deviation_of_motion(std::size_t view) const {
+    return covariance_.diagonal().segment<6>(at_motion(view)).cwiseMax(0).cwiseSqrt();
+  }
+
+ private:
+  static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
+  Eigen::Index at_motion(std::size_t view) const { return 6 * Eigen::Index(poses_.size() + view); }
+
+  RigidTransform seen(const State& state, std::size_t bone, std::size_t view) const {
+    return sights_[view].motion(state.motions[view]) * state.poses[bone];
+  }
+
+  /// Minus the logarithm of the posterior density.
+  double energy(const State& state) const {
+    double sum = 0;
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      sum += 0.5 * state.motions[v].cwiseQuotient(scale_ * sights_[v].deviation).squaredNorm();
+      for (std::size_t f = 0; f < poses_.size(); ++f)
+        sum += in_views_[f * views_.size() + v].value(seen(state, f, v)) / noise_[f];
+    }
+    return sum;
+  }
+
+  /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six directions, where the
+  /// pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a registration), times 2.
+  void expand(bool with_noise) {
+    constexpr double kWantedRise = 5;  // in units of the noise
+    for (std::size_t f = 0; f < poses_.size(); ++f) {
+      Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
+      for (std::size_t v = 0; v < views_.size(); ++v) {
+        Model& model = models_[f * views_.size() + v];
+        model = in_views_[f * views_.size() + v].model_at(seen(state_, f, v), kWantedRise * noise_[f], with_noise);
+        curvature += model.curvature;
+        scatter += model.scatter;
+      }
+      if (!with_noise) continue;
+      const Matrix6d ridge = 1e-6 * curvature.trace() * Matrix6d::Identity();
+      noise_[f] = std::max(1e-12, (inverse_of_symmetric(curvature + ridge) * scatter).trace() / 6);
+    }
+  }
+
+  /// Curvature and gradient of the energy over all poses and motions.
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> equations(double scale) const {
+    const Eigen::Index n = at_motion(views_.size());
+    Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
+    for (std::size_t v = 0; v < views_.size(); ++v) {
+      const Eigen::Index m = at_motion(v);
+      const Vector6d weight = (scale * sights_[v].deviation).cwiseAbs2().cwiseInverse();
+      a.block<6, 6>(m, m) += weight.asDiagonal();
+      b.segment<6>(m) += weight.cwiseProduct(state_.motions[v]);
+      for (std::size_t f = 0; f < poses_.size(); ++f) {
+        const Model& model = models_[f * views_.size() + v];
+        const Matrix6d change = sights_[v].of_bone(state_.poses[f], poses_[f].frame), h = model.curvature / noise_[f];
+        const Vector6d g = model.gradient / noise_[f];
+        const Eigen::Index p = at_pose(f);
+        a.block<6, 6>(p, p) += h;
+        a.block<6, 6>(p, m) += h * change;
+        a.block<6, 6>(m, p) += change.transpose() * h;
+        a.block<6, 6>(m, m) += change.transpose() * h * change;
+        b.segment<6>(p) += g;
+        b.segment<6>(m) += change.transpose() * g;
+      }
+    }
+    return {a, b};
+  }
+
+  /// The scale with the largest marginal likelihood, by Laplace's approximation about the current state. So cameras that
+  /// are right stay as they are.
+  double most_probable_scale() const {
+    double best = 1, best_evidence = -INFINITY;
+    for (double scale = 1.0 / 64; scale <= 4; scale *= 2) {
+      const auto [a, b] = equations(scale);
+      double evidence = 0.5 * b.dot(solve_symmetric<Eigen::Dynamic>(a, b));
+      for (std::size_t v = 0; v < views_.size(); ++v)
+        evidence -= 0.5 * state_.motions[v].cwiseQuotient(scale * sights_[v].deviation).squaredNorm() +
+                    6 * std::log(scale);
+      for (const double value : eigen_of_symmetric<Eigen::Dynamic>(a).values)
+        evidence -= 0.5 * std::log(std::max(value, 1e-9));
+      if (evidence > best_evidence) best = scale, best_evidence = evidence;
+    }
+    return best;
+  }
+
+  State after(const Eigen::VectorXd& step) const {
+    State state = state_;
+    for (std::size_t f = 0; f < poses_.size(); ++f)
+      state.poses[f] = moved(state.poses[f], poses_[f].frame, from_units(step.segment<6>(at_pose(f))));
+    for (std::size_t v = 0; v < views_.size(); ++v) state.motions[v] += step.segment<6>(at_motion(v));
+    return state;
+  }
+
+  /// Goes to a state of less energy, and returns by how much less; 0 if there is none.
+  double step() {
+    const auto [a, b] = equations(scale_);
+    const double before = energy(state_);
+    for (double damping = 1e-6; damping < 1e4; damping *= 30) {
+      Eigen::MatrixXd damped = a;
+      damped.diagonal() *= 1 + damping;
+      damped.diagonal().array() += 1e-9;
+      const Eigen::VectorXd x = solve_symmetric<Eigen::Dynamic>(damped, -b);
+      if (!(x.cwiseAbs().maxCoeff() < 20)) continue;
+      const State next = after(x);
+      const double gain = before - energy(next);
+      if (!(gain > 0)) continue;
+      state_ = next;
+      return gain;
+    }
+    return 0;
+  }
+
+  static Eigen::MatrixXd inverse_of(Eigen::MatrixXd a) {
+    a.diagonal().array() += 1e-9;
+    Eigen::MatrixXd inverse(a.rows(), a.cols());
+    for (Eigen::Index i = 0; i < a.cols(); ++i)
+      inverse.col(i) = solve_symmetric<Eigen::Dynamic>(a, Eigen::VectorXd::Unit(a.rows(), i));
+    return inverse;
+  }
+
+  const List<Pose>& poses_;
+  const List<View>& views_;
+  std::vector<Sight> sights_;
+  std::vector<std::shared_ptr<const Cost>> levels_;
+  std::vector<InView> in_views_;  ///< of the first bone in each view, then of the next
+  std::vector<Model> models_;
+  std::vector<double> noise_;  ///< of each bone's cost in one view
+  State state_;
+  double scale_ = 1;  ///< of the deviations that the options expect
+  bool converged_ = false;
+  Eigen::MatrixXd covariance_;  ///< in degrees and mm
+};
+
+void check_inputs(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses) {
+  if (views.size() < 2)
+    throw Error("there is one view only; a camera is corrected by comparing it with others, so give two views or more");
+  for (const View& view : views) check_view(view);
+  if (poses.empty()) throw Error("there is no bone; wire the pose of at least one");
+  if (costs.names() != poses.names())
+    throw Error("costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
+  for (std::size_t f = 0; f < poses.size(); ++f) {
+    check_rigid(poses[f].world_from_model, "the pose of '" + poses.name(f) + "'");
+    if (costs[f].view_count() != views.size())
+      throw Error("the cost of '" + costs.name(f) + "' compares " + std::to_string(costs[f].view_count()) +
+                  " views, but there are " + std::to_string(views.size()) + "; make it of the same views");
+  }
+}
+
+Metrics metrics_of(const Vector6d& motion, const Vector6d& deviation) {
+  const std::array<const char*, 6> names{"rotation_u_deg", "rotation_v_deg", "rotation_depth_deg",
+                                         "shift_u_mm",     "shift_v_mm",     "shift_depth_mm"};
+  Metrics metrics;
+  for (const bool predicted : {false, true})
+    for (int i = 0; i < 6; ++i) {
+      const std::string name = names[std::size_t(i)];
+      metrics.items.push_back(
+          {(predicted ? "predicted_" : "") + name, (predicted ? deviation : motion)[i], i < 3 ? "deg" : "mm"});
+    }
+  return metrics;
+}
+
+void warn_of_large(const std::string& view, const Vector6d& in_deviations, Context& context) {
+  const double most = in_deviations.cwiseAbs().maxCoeff();
+  if (most <= 3) return;
+  char text[16];
+  std::snprintf(text, sizeof text, "%.1f", most);
+  context.warn("view '" + view + "': its camera is off by " + text +
+               " times what the options expect; is it the camera of this image, and are the poses right?");
+}
+
+Result refine(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
+              Context& context) {
+  check_inputs(views, costs, poses);
+  Refinement refinement(costs, poses, views, options);
+  refinement.run(options.max_rounds, context);
+  if (!refinement.converged())
+    context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
+  char text[96];
+  std::snprintf(text, sizeof text, "the cameras are off by about %.3g times what the options expect", refinement.scale());
+  context.info(text);
+  Result result;
+  for (std::size_t v = 0; v < views.size(); ++v) {
+    const Vector6d& motion = refinement.state().motions[v];
+    View view = views[v];
+    view.camera.camera_from_world = view.camera.camera_from_world * refinement.sight(v).motion(motion);
+    view.camera.camera_from_world.rotation = nearest_rotation(view.camera.camera_from_world.rotation);
+    result.views.add(views.name(v), view);
+    result.motions.add(views.name(v), metrics_of(motion, refinement.deviation_of_motion(v)));
+    warn_of_large(views.name(v), motion.cwiseQuotient(refinement.sight(v).deviation), context);
+  }
+  for (std::size_t f = 0; f < poses.size(); ++f) {
+    Pose pose = poses[f];
+    pose.world_from_model = refinement.state().poses[f];
+    const Vector6d unit = from_units(Vector6d::Ones());
+    pose.covariance = unit.asDiagonal() * refinement.covariance_of_pose(f) * unit.asDiagonal();
+    pose.cost = refinement.cost(f);
+    pose.convergence.clear();
+    result.poses.add(poses.name(f), pose);
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("camera.refine", refine)
+      .summary("Corrects cameras that are a little off by the bones that their images show, together with the poses")
+      .in("views", "X-ray views with the cameras that a calibration gives", over("view"))
+      .in("costs", "cost of each bone's pose in these views", over("fragment"))
+      .in("poses", "pose of each bone, from a registration", over("fragment"))
+      .out("views", &Result::views, "the same images with corrected cameras", over("view"))
+      .out("poses", &Result::poses,
+           "poses that go with these cameras; their covariance includes what is not known about the cameras",
+           over("fragment"))
+      .out("motions", &Result::motions,
+           "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",
+           over("view"))
+      .option("rotation_deg", &Options::rotation_deg, "root mean square of the cameras' rotations", at_least(1e-6))
+      .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
+      .option("focal_percent", &Options::focal_percent,
+              "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows the "
+              "bone in the same size",
+              at_least(0))
+      .option("centre_px", &Options::centre_px,
+              "root mean square error of the principal points; it is corrected by a shift across the depth", at_least(0))
+      .option("contour_spacing_px", &Options::contour_spacing_px,
+              "for costs of contours: distance between two points of the outline", at_least(0.1))
+      .option("reach_px", &Options::reach_px,
+              "for costs of contours: a point with no edge within this distance counts as unmatched", at_least(0.1))
+      .option("pixel_step", &Options::pixel_step, "for costs of grey values: only every n-th pixel is compared",
+              at_least(1))
+      .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1));
+}

@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// Metal makes streaks in the slices of a CT that show it. They are worst where a long piece lies within a slice, such as
+// a screw across a bone: what is left of the bone's border there leads every segmentation astray. A screw is seen in few
+// slices, and a bone hardly changes from one of its sides to the other. So these slices are replaced by what lies
+// between their neighbours. Slices that a plate crosses are kept.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+using marrow::Context;
+using marrow::Grid;
+using marrow::Volume;
+
+struct Options {
+  double metal_hu = 2500;
+  double times_median = 1.5;
+  double margin_mm = 1.2;
+  double longest_mm = 15;
+};
+
+/// The number of voxels of a slice that are metal, and whose four neighbours are. So noise does not count.
+int metal_voxels(const Volume& ct, int z, double metal_hu) {
+  const Grid& grid = ct.grid;
+  const auto is_metal = [&](int x, int y) { return double(ct.at(x, y, z)) > metal_hu; };
+  int count = 0;
+  for (int y = 1; y + 1 < grid.size[1]; ++y)
+    for (int x = 1; x + 1 < grid.size[0]; ++x)
+      count += is_metal(x, y) && is_metal(x - 1, y) && is_metal(x + 1, y) && is_metal(x, y - 1) && is_metal(x, y + 1);
+  return count;
+}
+
+/// The slices to replace: those with more metal than usual for the slices that show any, and their neighbours.
+std::vector<bool> slices_of_long_metal(const Volume& ct, const Options& options) {
+  const int slices = ct.grid.size[2], margin = int(std::ceil(options.margin_mm / ct.grid.spacing_mm.z() - 1e-9));
+  std::vector<int> counts, with_metal;
+  for (int z = 0; z < slices; ++z) {
+    counts.push_back(metal_voxels(ct, z, options.metal_hu));
+    if (counts.back() > 0) with_metal.push_back(counts.back());
+  }
+  std::vector<bool> bad(std::size_t(slices), false);
+  if (with_metal.empty()) return bad;
+  const auto middle = with_metal.begin() + std::ptrdiff_t(with_metal.size() / 2);
+  std::nth_element(with_metal.begin(), middle, with_metal.end());
+  for (int z = 0; z < slices; ++z)
+    if (counts[std::size_t(z)] > options.times_median * *middle)
+      std::fill(bad.begin() + std::max(z - margin, 0), bad.begin() + std::min(z + margin + 1, slices), true);
+  return bad;
+}
+
+/// Interpolates the slices between `below` and `above` linearly.
+void bridge(Volume& ct, int below, int above) {
+  const std::size_t slice = std::size_t(ct.grid.size[0]) * std::size_t(ct.grid.size[1]);
+  const float* low = ct.values.data() + slice * std::size_t(below);
+  const float* high = ct.values.data() + slice * std::size_t(above);
+  for (int z = below + 1; z < above; ++z) {
+    const float part = float(z - below) / float(above - below);
+    float* values = ct.values.data() + slice * std::size_t(z);
+    for (std::size_t i = 0; i < slice; ++i) values[i] = (1 - part) * low[i] + part * high[i];
+  }
+}
+
+std::string range(const Grid& grid, int below, int above) {
+  char text[96];
+  const auto height = [&](int z) { return (grid.origin_mm + grid.direction.col(2) * (z * grid.spacing_mm.z())).z(); };
+  std::snprintf(text, sizeof text, "slices %d to %d (z = %.1f to %.1f mm)", below + 1, above - 1, height(below + 1),
+                height(above - 1));
+  return text;
+}
+
+Volume bridge_metal(const Volume& volume, const Options& options, Context& context) {
+  marrow::check_volume(volume, "the CT");
+  Volume ct = volume;
+  const std::vector<bool> bad = slices_of_long_metal(volume, options);
+  const int slices = volume.grid.size[2];
+  for (int z = 0; z < slices; ++z) {
+    if (!bad[std::size_t(z)]) continue;
+    const int below = z - 1;
+    while (z < slices && bad[std::size_t(z)]) ++z;
+    const std::string where = range(volume.grid, below, z);
+    if (below < 0 || z == slices)
+      context.warn(where + " show long metal at the end of the CT, so there is nothing to bridge them from");
+    else if ((z - below) * volume.grid.spacing_mm.z() > options.longest_mm)
+      context.warn(where + " show long metal over more than longest_mm, so they stay as they are");
+    else {
+      bridge(ct, below, z);
+      context.info(where + " show long metal, and are bridged");
+    }
+  }
+  return ct;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("volume.bridge_metal", bridge_metal)
+      .summary("Replaces slices of a CT in which long metal lies, such as screws, by what lies between their neighbours")
+      .in("volume", "CT in Hounsfield units; its slices lie across the third axis of its grid")
+      .out("volume", "the CT with these slices interpolated; without metal, the same CT")
+      .option("metal_hu", &Options::metal_hu, "metal is above this value", marrow::unit("HU"))
+      .option("times_median", &Options::times_median,
+              "a slice is replaced if it shows this many times more metal than the median of the slices with metal",
+              marrow::at_least(1))
+      .option("margin_mm", &Options::margin_mm, "slices nearer than this to one of them are replaced too",
+              marrow::at_least(0))
+      .option("longest_mm", &Options::longest_mm, "longer gaps stay as they are, with a warning", marrow::at_least(0));
+}
