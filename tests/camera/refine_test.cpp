@@ -1,0 +1,211 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/domain/functions.hpp>
+
+#include "register/well.hpp"
+#include "shipped.hpp"
+
+namespace refine_test {
+
+using Eigen::Vector3d;
+using marrow::RigidTransform, marrow::Vector6d;
+
+/// Two cameras of a C-arm at right angles, 600 mm from the origin of the world, with images of 64 blocks.
+marrow::List<marrow::View> views(int count = 2) {
+  marrow::List<marrow::View> views;
+  for (int i = 0; i < count; ++i) {
+    marrow::View view;
+    view.name = i == 0 ? "frontal" : "lateral";
+    view.camera.width_px = view.camera.height_px = 512;
+    view.camera.intrinsics << 1700, 0, 256, 0, 1700, 256, 0, 0, 1;
+    view.camera.camera_from_world.rotation = marrow::rotation_from_vector(i * marrow::kPi / 2 * Vector3d::UnitY());
+    view.camera.camera_from_world.translation_mm = Vector3d(0, 0, 600);
+    view.image.pixels = cv::Mat(512, 512, CV_16U, cv::Scalar(1000));
+    views.add(view.name, view);
+  }
+  return views;
+}
+
+/// Each view likes one pose best. Its blocks say that the cost is known as well as `information` observations of noise
+/// 1 would make it: noise 1 / information.
+class Split : public marrow::Cost {
+ public:
+  Split(std::vector<RigidTransform> best, marrow::FragmentFrame frame, double information, double stiffness = 1)
+      : best_(std::move(best)), frame_(frame), information_(information), stiffness_(stiffness) {}
+  double value(const RigidTransform& pose) const override {
+    double sum = 0;
+    for (std::size_t v = 0; v < best_.size(); ++v) sum += value_in_view(v, pose) / double(best_.size());
+    return sum;
+  }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Split>(*this);
+  }
+  std::size_t view_count() const override { return best_.size(); }
+  double value_in_view(std::size_t view, const RigidTransform& pose) const override {
+    return 0.5 * stiffness_ * well::way(best_[view], pose, frame_).squaredNorm();
+  }
+  std::vector<double> without_each_block(const RigidTransform& pose) const override {
+    if (information_ == 0) return {};
+    std::vector<double> values;
+    for (std::size_t v = 0; v < best_.size(); ++v)
+      for (int block = 0; block < 64; ++block) {
+        const double slope = block < 6 ? well::way(best_[v], pose, frame_)[block] : 0;
+        values.push_back(value(pose) + std::sqrt(stiffness_ / information_) * slope / double(best_.size()));
+      }
+    return values;
+  }
+
+ private:
+  std::vector<RigidTransform> best_;
+  marrow::FragmentFrame frame_;
+  double information_, stiffness_;
+};
+
+/// A bone 40 mm above the origin of the world, seen by each camera as if it had moved.
+struct Bone {
+  explicit Bone(const std::vector<RigidTransform>& motions, double information = 1e4, double at_mm = 40) {
+    pose.frame.origin_mm = Vector3d(10, 0, 0);
+    pose.world_from_model.rotation = marrow::rotation_from_vector({0.3, -0.2, 0.5});
+    pose.world_from_model.translation_mm = Vector3d(0, at_mm, 0);
+    std::vector<RigidTransform> best;
+    for (const RigidTransform& motion : motions) best.push_back(motion * pose.world_from_model);
+    cost = std::make_shared<Split>(best, pose.frame, information);
+  }
+  marrow::Pose pose;
+  std::shared_ptr<const marrow::Cost> cost;
+};
+
+RigidTransform motion(const Vector3d& rotation_deg, const Vector3d& shift_mm) {
+  RigidTransform world_from_world{"world", "world"};
+  world_from_world.rotation = marrow::rotation_from_vector(marrow::radians(1) * rotation_deg);
+  world_from_world.translation_mm = shift_mm;
+  return world_from_world;
+}
+
+shipped::Inputs inputs(const std::vector<Bone>& bones, const marrow::List<marrow::View>& of = views()) {
+  marrow::List<marrow::Cost> costs;
+  marrow::List<marrow::Pose> poses;
+  for (std::size_t i = 0; i < bones.size(); ++i) {
+    costs.add_shared(i ? "proximal" : "distal", bones[i].cost);
+    poses.add(i ? "proximal" : "distal", bones[i].pose);
+  }
+  return {{"views", shipped::list(of, "view")},
+          {"costs", shipped::list(costs, "fragment")},
+          {"poses", shipped::list(poses, "fragment")}};
+}
+
+/// Which motion of the world the corrected camera of a view stands for.
+RigidTransform found(const shipped::Outputs& outputs, std::size_t view) {
+  return inverse(views()[view].camera.camera_from_world) *
+         outputs.at("views").as_list<marrow::View>()[view].camera.camera_from_world;
+}
+marrow::Metrics motions(const shipped::Outputs& outputs, std::size_t view) {
+  return outputs.at("motions").as_list<marrow::Metrics>()[view];
+}
+double figure(const marrow::Metrics& metrics, const std::string& name) {
+  return shipped::figure(shipped::item(metrics), name);
+}
+
+TEST(Refine, FindsHowTheCamerasAreOffAgainstEachOther) {
+  const RigidTransform frontal = motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}),
+                       lateral = motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6});
+  const auto outputs = shipped::call("camera.refine", inputs({Bone({frontal, lateral})}));
+  const RigidTransform wanted = inverse(frontal) * lateral, is = inverse(found(outputs, 0)) * found(outputs, 1);
+  EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
+  EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.1);
+}
+
+TEST(Refine, HalfOfAnErrorGoesToEachOfTwoViews) {
+  // v of both images is y of the world, so nothing tells which of the two cameras is too high by 2 mm.
+  const auto outputs =
+      shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 2, 0})})}));
+  EXPECT_NEAR(figure(motions(outputs, 0), "shift_v_mm"), -1, 0.02);
+  EXPECT_NEAR(figure(motions(outputs, 1), "shift_v_mm"), 1, 0.02);
+  EXPECT_NEAR(figure(motions(outputs, 0), "shift_u_mm"), 0, 0.02);
+  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_NEAR(pose.world_from_model.translation_mm.y(), 41, 0.02);
+  // The deviation of what nothing tells: that of each camera, divided by the root of two.
+  const double each = figure(motions(outputs, 0), "predicted_rotation_u_deg") * std::sqrt(2) / (0.5 / std::sqrt(3));
+  EXPECT_NEAR(std::log2(each), std::round(std::log2(each)), 0.05) << "a power of two times what is expected";
+  EXPECT_GT((*pose.covariance)(3, 3), 0.01) << "the pose is not known better than the cameras";
+}
+
+TEST(Refine, CamerasThatAreRightStay) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  std::vector<Bone> bones{Bone({none, none})};
+  const RigidTransform right = bones[0].pose.world_from_model;
+  bones[0].pose = well::pose_at(bones[0].pose, 0.5, -0.3, 0.2, 0.4, 0.1, -0.6);
+  const auto outputs = shipped::call("camera.refine", inputs(bones));
+  const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
+  EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.01);
+  for (std::size_t v = 0; v < 2; ++v) {
+    EXPECT_LT((found(outputs, v).translation_mm - none.translation_mm).norm(), 0.01);
+    EXPECT_LT(figure(motions(outputs, v), "predicted_shift_u_mm"), 0.1) << "the images show that they are right";
+  }
+}
+
+TEST(Refine, TwoBonesShareTheCameras) {
+  const RigidTransform frontal = motion({0.4, 0, -0.3}, {1, 1, 0}), lateral = motion({0, 0.5, 0}, {0, -1.5, 1});
+  const std::vector<Bone> bones{Bone({frontal, lateral}), Bone({frontal, lateral}, 1e4, -60)};
+  const auto poses = shipped::call("camera.refine", inputs(bones)).at("poses").as_list<marrow::Pose>();
+  const RigidTransform wanted = inverse(bones[0].pose.world_from_model) * bones[1].pose.world_from_model,
+                       is = inverse(poses[0].world_from_model) * poses[1].world_from_model;
+  EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
+  EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.03) << "the reduction does not feel the cameras";
+}
+
+TEST(Refine, TheViewsKeepTheirImagesAndNames) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  const auto after = shipped::call("camera.refine", inputs({Bone({none, none})})).at("views").as_list<marrow::View>();
+  EXPECT_EQ(after.names(), (std::vector<std::string>{"frontal", "lateral"}));
+  EXPECT_EQ(after[0].camera.intrinsics, views()[0].camera.intrinsics);
+  EXPECT_EQ(cv::countNonZero(after[1].image.pixels != views()[1].image.pixels), 0);
+}
+
+TEST(Refine, WarnsOfCamerasThatAreFarOff) {
+  std::vector<std::string> warnings;
+  marrow::Context::Hooks hooks;
+  hooks.log = [&](std::string_view text, marrow::LogLevel level) {
+    if (level == marrow::LogLevel::warning) warnings.emplace_back(text);
+  };
+  shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({3, 3, 3}, {0, 9, 0})})}), {},
+                marrow::Context(hooks));
+  ASSERT_EQ(warnings.size(), 2u);
+  EXPECT_EQ(warnings[0].find("view 'frontal': its camera is off by "), 0u) << warnings[0];
+  EXPECT_NE(warnings[0].find(" times what the options expect; is it the camera of this image, and are the poses right?"),
+            std::string::npos)
+      << warnings[0];
+  warnings.clear();
+  shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
+                {{"max_rounds", std::int64_t(1)}}, marrow::Context(hooks));
+  EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 rounds; raise max_rounds"});
+}
+
+TEST(Refine, SaysWhatIsWrong) {
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
+  const Bone bone({none, none});
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none})}, views(1))),
+            "there is one view only; a camera is corrected by comparing it with others, so give two views or more");
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({})), "there is no bone; wire the pose of at least one");
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none, none, none})})),
+            "the cost of 'distal' compares 3 views, but there are 2; make it of the same views");
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none, none}, 0)})),
+            "the cost gives no values without each block of the images; use a cost of the kind similarity");
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)}, [] {
+              marrow::List<marrow::View> behind;
+              for (marrow::View view : views()) {
+                view.camera.camera_from_world.translation_mm.z() = -600;
+                behind.add(view.name, view);
+              }
+              return behind;
+            }())),
+            "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
+  auto other = inputs({bone});
+  other["poses"] = inputs({bone, bone})["poses"];
+  EXPECT_EQ(shipped::refusal("camera.refine", other),
+            "costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
+}
+
+}  // namespace refine_test
