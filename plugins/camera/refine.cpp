@@ -5,8 +5,6 @@
 // minimise the sum of the costs, in units of their noise, and of the squares of the motions, in units of the deviations
 // expected of a calibration (a Gaussian prior). The minimum is found by Levenberg and Marquardt's steps. The curvature
 // there gives the covariance of all poses and motions together (Laplace's approximation).
-#include <tbb/parallel_for.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -15,11 +13,12 @@
 #include <marrow/plugin.hpp>
 
 #include <marrow/domain/decompositions.hpp>
-#include "marrow/toolbox/match/views_cost.hpp"
+#include "bone_in_view.hpp"
 
 namespace {
 
 using namespace marrow;
+using camera::from_units, camera::BoneInView, camera::Model;
 
 struct Options {
   double rotation_deg = 0.5;
@@ -37,12 +36,6 @@ struct Result {
   List<Pose> poses;
   List<Metrics> motions;
 };
-
-Vector6d from_units(const Vector6d& deg_and_mm) {
-  Vector6d scaled = deg_and_mm;
-  scaled.head<3>() *= radians(1);
-  return scaled;
-}
 
 /// A camera's motion: rotations [deg] about the axes u, v and depth of its image, through `centre_mm`, and shifts [mm]
 /// along them.
@@ -83,100 +76,6 @@ Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const Options
   return sight;
 }
 
-/// Quadratic model of a bone's cost in one view about the pose in which this view sees it, for motions in degrees and
-/// mm; and the scatter of the gradient over the blocks of this view's image.
-struct Model {
-  double value = 0;
-  Vector6d gradient = Vector6d::Zero();
-  Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
-};
-
-/// A bone's cost in one view.
-class InView {
- public:
-  InView(const Cost& cost, const FragmentFrame& frame, std::size_t view, const List<View>& views)
-      : cost_(cost), frame_(frame), view_(view), share_(1.0 / double(views.size())) {
-    for (std::size_t i = 0; i < views.size(); ++i) {
-      const auto count = std::size_t(match::Blocks::of(views[i].camera).count());
-      (i < view ? before_ : i == view ? blocks_ : after_) += count;
-    }
-  }
-
-  double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
-
-  /// By central differences. A step is so long that the cost rises by about `wanted_rise`; 0: by the deviation of the
-  /// cost's value, from block to block.
-  Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
-    const auto moved_by = [&](const Vector6d& step) { return moved(pose, frame_, from_units(step)); };
-    Model model;
-    model.value = value(pose);
-    if (!(wanted_rise > 0)) wanted_rise = changes_without_blocks(pose).norm();
-    std::array<double, 12> ends{};
-    Vector6d rises;
-    tbb::parallel_for(0, 6, [&](int axis) {
-      const auto rise = [&] {
-        ends[std::size_t(2 * axis)] = value(moved_by(steps_[axis] * Vector6d::Unit(axis)));
-        ends[std::size_t(2 * axis + 1)] = value(moved_by(-steps_[axis] * Vector6d::Unit(axis)));
-        return 0.5 * (ends[std::size_t(2 * axis)] + ends[std::size_t(2 * axis + 1)]) - model.value;
-      };
-      for (rises[axis] = rise(); rises[axis] > 3 * wanted_rise && steps_[axis] > kLeastStep; rises[axis] = rise())
-        steps_[axis] *= 0.5;
-      for (; rises[axis] < wanted_rise && steps_[axis] < kMostStep; rises[axis] = rise()) steps_[axis] *= 2;
-    });
-    for (int axis = 0; axis < 6; ++axis)
-      model.gradient[axis] = 0.5 * (ends[std::size_t(2 * axis)] - ends[std::size_t(2 * axis + 1)]);
-    model.curvature = curvature(pose, model.value, rises);
-    if (with_scatter) model.scatter = scatter(pose);
-    const Vector6d per_step = steps_.cwiseInverse();
-    model.gradient = model.gradient.cwiseProduct(per_step);
-    model.curvature = per_step.asDiagonal() * model.curvature * per_step.asDiagonal();
-    model.scatter = per_step.asDiagonal() * model.scatter * per_step.asDiagonal();
-    return model;
-  }
-
- private:
-  static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
-
-  RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {
-    return moved(pose, frame_, from_units(steps.cwiseProduct(steps_)));
-  }
-  /// In units of the steps, without its negative eigenvalues.
-  Matrix6d curvature(const RigidTransform& pose, double middle, const Vector6d& rises) const {
-    Matrix6d h = (2 * rises).asDiagonal();
-    tbb::parallel_for(0, 15, [&](int k) {
-      int i = 1, j = k;
-      for (; j >= i; ++i) j -= i;
-      const Vector6d both = Vector6d::Unit(i) + Vector6d::Unit(j);
-      h(i, j) = h(j, i) =
-          0.5 * (value(moved_by(pose, both)) + value(moved_by(pose, -both))) - middle - rises[i] - rises[j];
-    });
-    const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
-    return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
-  }
-  /// By how much each block of this view's image changes the cost in this view.
-  Eigen::VectorXd changes_without_blocks(const RigidTransform& pose) const {
-    const std::vector<double> without = cost_.without_each_block(pose);
-    if (without.size() != before_ + blocks_ + after_)
-      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
-    return (Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)).array() - cost_.value(pose)) / share_;
-  }
-  Matrix6d scatter(const RigidTransform& pose) const {
-    Eigen::MatrixXd gradients(6, Eigen::Index(blocks_));
-    tbb::parallel_for(0, 6, [&](int axis) {
-      gradients.row(axis) = 0.5 * (changes_without_blocks(moved_by(pose, Vector6d::Unit(axis))) -
-                                   changes_without_blocks(moved_by(pose, -Vector6d::Unit(axis))));
-    });
-    return gradients * gradients.transpose();
-  }
-
-  const Cost& cost_;
-  const FragmentFrame& frame_;
-  const std::size_t view_;
-  const double share_;  ///< of the view in the cost
-  std::size_t before_ = 0, blocks_ = 0, after_ = 0;
-  Vector6d steps_ = Vector6d::Constant(0.25);
-};
-
 /// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
 struct State {
   std::vector<RigidTransform> poses;
@@ -200,23 +99,25 @@ class Refinement {
     models_.resize(in_views_.size());
   }
 
-  /// Ends when a step makes the state hardly more probable, and the scale remains.
+  /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
+  /// with the largest marginal likelihood. So cameras that are right stay as they are.
   void run(int max_rounds, Context& context) {
-    for (int round = 0; round < max_rounds; ++round) {
-      context.check_cancelled();
-      context.progress(double(round) / max_rounds, "rounds");
-      expand(round < 2);
-      const double before = scale_;
-      if (round > 0) scale_ = most_probable_scale();
-      const double gain = step();
-      converged_ = gain < 0.05 && round > 0 && scale_ == before;
+    const State given = state_;
+    Found best;
+    for (const double scale : {1.0, 0.1, 0.01}) {
+      scale_ = scale;
+      if (scale < 1) state_ = given;
+      const bool converged = descend(max_rounds, context);
+      expand(scale == 1);
+      const Found found{scale, converged, evidence(), state_, models_};
       char text[96];
-      std::snprintf(text, sizeof text, "round %d: scale %.3g, log posterior density up by %.3g", round + 1, scale_, gain);
+      std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
+                    found.evidence);
       context.debug(text);
-      if (converged_) break;
+      if (scale == 1 || found.evidence > best.evidence) best = found;
     }
-    expand(true);
-    covariance_ = inverse_of(equations(scale_).first);
+    scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
+    covariance_ = inverse_of(equations().first);
   }
 
   bool converged() const { return converged_; }
@@ -236,6 +137,15 @@ class Refinement {
   }
 
  private:
+  /// The most probable state for a scale.
+  struct Found {
+    double scale = 1;
+    bool converged = false;
+    double evidence = 0;
+    State state;
+    std::vector<Model> models;
+  };
+
   static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
   Eigen::Index at_motion(std::size_t view) const { return 6 * Eigen::Index(poses_.size() + view); }
 
@@ -254,10 +164,13 @@ class Refinement {
     return sum;
   }
 
-  /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six directions, where the
-  /// pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a registration), times 2.
+  /// Makes the models anew, and if wanted the noises. The noise of a cost is by how much it rises, in the mean over six
+  /// directions, where the pose moves by what the scatter of its blocks predicts (as for the predicted covariance of a
+  /// registration), times 2; and twice this, because blocks do not see an error that is common to several of them
+  /// (docs/results.md).
   void expand(bool with_noise) {
-    constexpr double kWantedRise = 5;  // in units of the noise
+    constexpr double kWantedRise = 2.5;  // in units of the noise
+    constexpr double kUnseen = 2;
     for (std::size_t f = 0; f < poses_.size(); ++f) {
       Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
       for (std::size_t v = 0; v < views_.size(); ++v) {
@@ -268,18 +181,18 @@ class Refinement {
       }
       if (!with_noise) continue;
       const Matrix6d ridge = 1e-6 * curvature.trace() * Matrix6d::Identity();
-      noise_[f] = std::max(1e-12, (inverse_of_symmetric(curvature + ridge) * scatter).trace() / 6);
+      noise_[f] = std::max(1e-12, kUnseen * (inverse_of_symmetric(curvature + ridge) * scatter).trace() / 6);
     }
   }
 
   /// Curvature and gradient of the energy over all poses and motions.
-  std::pair<Eigen::MatrixXd, Eigen::VectorXd> equations(double scale) const {
+  std::pair<Eigen::MatrixXd, Eigen::VectorXd> equations() const {
     const Eigen::Index n = at_motion(views_.size());
     Eigen::MatrixXd a = Eigen::MatrixXd::Zero(n, n);
     Eigen::VectorXd b = Eigen::VectorXd::Zero(n);
     for (std::size_t v = 0; v < views_.size(); ++v) {
       const Eigen::Index m = at_motion(v);
-      const Vector6d weight = (scale * sights_[v].deviation).cwiseAbs2().cwiseInverse();
+      const Vector6d weight = (scale_ * sights_[v].deviation).cwiseAbs2().cwiseInverse();
       a.block<6, 6>(m, m) += weight.asDiagonal();
       b.segment<6>(m) += weight.cwiseProduct(state_.motions[v]);
       for (std::size_t f = 0; f < poses_.size(); ++f) {
@@ -298,21 +211,24 @@ class Refinement {
     return {a, b};
   }
 
-  /// The scale with the largest marginal likelihood, by Laplace's approximation about the current state. So cameras that
-  /// are right stay as they are.
-  double most_probable_scale() const {
-    double best = 1, best_evidence = -INFINITY;
-    for (double scale = 1.0 / 64; scale <= 4; scale *= 2) {
-      const auto [a, b] = equations(scale);
-      double evidence = 0.5 * b.dot(solve_symmetric<Eigen::Dynamic>(a, b));
-      for (std::size_t v = 0; v < views_.size(); ++v)
-        evidence -= 0.5 * state_.motions[v].cwiseQuotient(scale * sights_[v].deviation).squaredNorm() +
-                    6 * std::log(scale);
-      for (const double value : eigen_of_symmetric<Eigen::Dynamic>(a).values)
-        evidence -= 0.5 * std::log(std::max(value, 1e-9));
-      if (evidence > best_evidence) best = scale, best_evidence = evidence;
+  /// Goes on until a step makes the state hardly more probable. The noise is measured at the first scale only.
+  bool descend(int max_rounds, Context& context) {
+    for (int round = 0; round < max_rounds; ++round) {
+      context.check_cancelled();
+      context.progress(double(round) / max_rounds, "rounds");
+      expand(scale_ == 1 && round < 2);
+      if (step() < 0.05) return true;
     }
-    return best;
+    return false;
+  }
+
+  /// The logarithm of the marginal likelihood of the scale, by Laplace's approximation about the state; without a
+  /// constant.
+  double evidence() const {
+    double sum = -energy(state_) - 6 * double(views_.size()) * std::log(scale_);
+    for (const double value : eigen_of_symmetric<Eigen::Dynamic>(equations().first).values)
+      sum -= 0.5 * std::log(std::max(value, 1e-9));
+    return sum;
   }
 
   State after(const Eigen::VectorXd& step) const {
@@ -325,7 +241,7 @@ class Refinement {
 
   /// Goes to a state of less energy, and returns by how much less; 0 if there is none.
   double step() {
-    const auto [a, b] = equations(scale_);
+    const auto [a, b] = equations();
     const double before = energy(state_);
     for (double damping = 1e-6; damping < 1e4; damping *= 30) {
       Eigen::MatrixXd damped = a;
@@ -354,7 +270,7 @@ class Refinement {
   const List<View>& views_;
   std::vector<Sight> sights_;
   std::vector<std::shared_ptr<const Cost>> levels_;
-  std::vector<InView> in_views_;  ///< of the first bone in each view, then of the next
+  std::vector<BoneInView> in_views_;  ///< of the first bone in each view, then of the next
   std::vector<Model> models_;
   std::vector<double> noise_;  ///< of each bone's cost in one view
   State state_;
@@ -408,7 +324,8 @@ Result refine(const List<View>& views, const List<Cost>& costs, const List<Pose>
   if (!refinement.converged())
     context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
   char text[96];
-  std::snprintf(text, sizeof text, "the cameras are off by about %.3g times what the options expect", refinement.scale());
+  std::snprintf(text, sizeof text, "the cameras are off by about %.3g times what the options expect",
+                refinement.scale());
   context.info(text);
   Result result;
   for (std::size_t v = 0; v < views.size(); ++v) {
@@ -449,12 +366,14 @@ MARROW_PLUGIN(plugin) {
            over("view"))
       .option("rotation_deg", &Options::rotation_deg, "root mean square of the cameras' rotations", at_least(1e-6))
       .option("shift_mm", &Options::shift_mm, "root mean square of the cameras' shifts", at_least(1e-6))
-      .option("focal_percent", &Options::focal_percent,
-              "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows the "
-              "bone in the same size",
-              at_least(0))
+      .option(
+          "focal_percent", &Options::focal_percent,
+          "root mean square error of the focal lengths; it is corrected by a shift along the depth, which shows the "
+          "bone in the same size",
+          at_least(0))
       .option("centre_px", &Options::centre_px,
-              "root mean square error of the principal points; it is corrected by a shift across the depth", at_least(0))
+              "root mean square error of the principal points; it is corrected by a shift across the depth",
+              at_least(0))
       .option("contour_spacing_px", &Options::contour_spacing_px,
               "for costs of contours: distance between two points of the outline", at_least(0.1))
       .option("reach_px", &Options::reach_px,

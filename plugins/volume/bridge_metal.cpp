@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Metal makes streaks in the slices of a CT that show it. They are worst where a long piece lies within a slice, such as
-// a screw across a bone: what is left of the bone's border there leads every segmentation astray. A screw is seen in few
-// slices, and a bone hardly changes from one of its sides to the other. So these slices are replaced by what lies
+// Metal makes streaks in the slices of a CT that show it. They are worst where a long piece lies within a slice, such
+// as a screw across a bone: what is left of the bone's border there leads every segmentation astray. A screw is seen in
+// few slices, and a bone hardly changes from one of its sides to the other. So these slices are replaced by what lies
 // between their neighbours. Slices that a plate crosses are kept.
 #include <algorithm>
 #include <cmath>
@@ -96,7 +96,8 @@ Volume bridge_metal(const Volume& volume, const Options& options, Context& conte
 
 MARROW_PLUGIN(plugin) {
   plugin.node("volume.bridge_metal", bridge_metal)
-      .summary("Replaces slices of a CT in which long metal lies, such as screws, by what lies between their neighbours")
+      .summary(
+          "Replaces slices of a CT in which long metal lies, such as screws, by what lies between their neighbours")
       .in("volume", "CT in Hounsfield units; its slices lie across the third axis of its grid")
       .out("volume", "the CT with these slices interpolated; without metal, the same CT")
       .option("metal_hu", &Options::metal_hu, "metal is above this value", marrow::unit("HU"))

@@ -174,8 +174,9 @@ TEST(Refine, WarnsOfCamerasThatAreFarOff) {
                 marrow::Context(hooks));
   ASSERT_EQ(warnings.size(), 2u);
   EXPECT_EQ(warnings[0].find("view 'frontal': its camera is off by "), 0u) << warnings[0];
-  EXPECT_NE(warnings[0].find(" times what the options expect; is it the camera of this image, and are the poses right?"),
-            std::string::npos)
+  EXPECT_NE(
+      warnings[0].find(" times what the options expect; is it the camera of this image, and are the poses right?"),
+      std::string::npos)
       << warnings[0];
   warnings.clear();
   shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
@@ -193,14 +194,15 @@ TEST(Refine, SaysWhatIsWrong) {
             "the cost of 'distal' compares 3 views, but there are 2; make it of the same views");
   EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none, none}, 0)})),
             "the cost gives no values without each block of the images; use a cost of the kind similarity");
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)}, [] {
-              marrow::List<marrow::View> behind;
-              for (marrow::View view : views()) {
-                view.camera.camera_from_world.translation_mm.z() = -600;
-                behind.add(view.name, view);
-              }
-              return behind;
-            }())),
+  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
+                                                     [] {
+                                                       marrow::List<marrow::View> behind;
+                                                       for (marrow::View view : views()) {
+                                                         view.camera.camera_from_world.translation_mm.z() = -600;
+                                                         behind.add(view.name, view);
+                                                       }
+                                                       return behind;
+                                                     }())),
             "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
   auto other = inputs({bone});
   other["poses"] = inputs({bone, bone})["poses"];

@@ -37,19 +37,19 @@ struct Bridged {
 
 TEST(BridgeMetal, ReplacesTheSlicesOfAScrewByWhatLiesBetween) {
   marrow::Volume before = ct();
-  add_metal(before, 5, 25, 4);   // a plate
+  add_metal(before, 5, 25, 4);    // a plate
   add_metal(before, 14, 15, 16);  // a screw
   const Bridged run(before);
   for (int z = 0; z < 30; ++z)
     for (const auto& [x, y] : {std::pair(0, 0), std::pair(5, 9), std::pair(15, 9)}) {
       // From slice 12 to slice 17, because one neighbour at each side is replaced too.
-      const float expected = z < 13 || z > 16
-                                 ? before.at(x, y, z)
-                                 : before.at(x, y, 12) + float(z - 12) / 5 * (before.at(x, y, 17) - before.at(x, y, 12));
+      const float expected =
+          z < 13 || z > 16 ? before.at(x, y, z)
+                           : before.at(x, y, 12) + float(z - 12) / 5 * (before.at(x, y, 17) - before.at(x, y, 12));
       EXPECT_NEAR(run.ct.at(x, y, z), expected, 1e-3) << x << " " << y << " " << z;
     }
-  EXPECT_EQ(run.lines, std::vector<std::string>{
-                           "slices 13 to 16 (z = 15.6 to 19.2 mm) show long metal, and are bridged"});
+  EXPECT_EQ(run.lines,
+            std::vector<std::string>{"slices 13 to 16 (z = 15.6 to 19.2 mm) show long metal, and are bridged"});
 }
 
 TEST(BridgeMetal, LeavesACtWithoutMetalAsItIs) {

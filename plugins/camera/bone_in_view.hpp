@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <tbb/parallel_for.h>
+
+#include <array>
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/match/views_cost.hpp"
+
+namespace marrow::camera {
+
+/// From degrees and mm to radians and mm.
+inline Vector6d from_units(const Vector6d& deg_and_mm) {
+  Vector6d scaled = deg_and_mm;
+  scaled.head<3>() *= radians(1);
+  return scaled;
+}
+
+/// Quadratic model of a bone's cost in one view about the pose in which this view sees it, for motions in degrees and
+/// mm; and the scatter of the gradient over the blocks of this view's image.
+struct Model {
+  double value = 0;
+  Vector6d gradient = Vector6d::Zero();
+  Matrix6d curvature = Matrix6d::Zero(), scatter = Matrix6d::Zero();
+};
+
+/// A bone's cost in one view. Refers to the cost and the frame, which must outlive it. It remembers the steps of its
+/// last model, so model_at() is for one thread at a time.
+class BoneInView {
+ public:
+  /// The views are those that the cost compares, in their order: their sizes give the blocks.
+  BoneInView(const Cost& cost, const FragmentFrame& frame, std::size_t view, const List<View>& views)
+      : cost_(cost), frame_(frame), view_(view), share_(1.0 / double(views.size())) {
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const auto count = std::size_t(match::Blocks::of(views[i].camera).count());
+      (i < view ? before_ : i == view ? blocks_ : after_) += count;
+    }
+  }
+
+  double value(const RigidTransform& pose) const { return cost_.value_in_view(view_, pose); }
+
+  /// By central differences; the scatter only if asked for. A step is so long that the cost rises by about
+  /// `wanted_rise`; 0: by the deviation of the cost's value, from block to block.
+  Model model_at(const RigidTransform& pose, double wanted_rise, bool with_scatter) {
+    const auto moved_by = [&](const Vector6d& step) { return moved(pose, frame_, from_units(step)); };
+    Model model;
+    model.value = value(pose);
+    if (!(wanted_rise > 0)) wanted_rise = changes_without_blocks(pose).norm();
+    std::array<double, 12> ends{};
+    Vector6d rises;
+    tbb::parallel_for(0, 6, [&](int axis) {
+      const auto rise = [&] {
+        ends[std::size_t(2 * axis)] = value(moved_by(steps_[axis] * Vector6d::Unit(axis)));
+        ends[std::size_t(2 * axis + 1)] = value(moved_by(-steps_[axis] * Vector6d::Unit(axis)));
+        return 0.5 * (ends[std::size_t(2 * axis)] + ends[std::size_t(2 * axis + 1)]) - model.value;
+      };
+      for (rises[axis] = rise(); rises[axis] > 3 * wanted_rise && steps_[axis] > kLeastStep; rises[axis] = rise())
+        steps_[axis] *= 0.5;
+      for (; rises[axis] < wanted_rise && steps_[axis] < kMostStep; rises[axis] = rise()) steps_[axis] *= 2;
+    });
+    for (int axis = 0; axis < 6; ++axis)
+      model.gradient[axis] = 0.5 * (ends[std::size_t(2 * axis)] - ends[std::size_t(2 * axis + 1)]);
+    model.curvature = curvature(pose, model.value, rises);
+    if (with_scatter) model.scatter = scatter(pose);
+    const Vector6d per_step = steps_.cwiseInverse();
+    model.gradient = model.gradient.cwiseProduct(per_step);
+    model.curvature = per_step.asDiagonal() * model.curvature * per_step.asDiagonal();
+    model.scatter = per_step.asDiagonal() * model.scatter * per_step.asDiagonal();
+    return model;
+  }
+
+ private:
+  static constexpr double kMostStep = 4, kLeastStep = 1.0 / 64;  // degrees or mm
+
+  RigidTransform moved_by(const RigidTransform& pose, const Vector6d& steps) const {
+    return moved(pose, frame_, from_units(steps.cwiseProduct(steps_)));
+  }
+  /// In units of the steps, without its negative eigenvalues.
+  Matrix6d curvature(const RigidTransform& pose, double middle, const Vector6d& rises) const {
+    Matrix6d h = (2 * rises).asDiagonal();
+    tbb::parallel_for(0, 15, [&](int k) {
+      int i = 1, j = k;
+      for (; j >= i; ++i) j -= i;
+      const Vector6d both = Vector6d::Unit(i) + Vector6d::Unit(j);
+      h(i, j) = h(j, i) =
+          0.5 * (value(moved_by(pose, both)) + value(moved_by(pose, -both))) - middle - rises[i] - rises[j];
+    });
+    const SymmetricEigen<6> eigen = eigen_of_symmetric(h);
+    return eigen.vectors * eigen.values.cwiseMax(0).asDiagonal() * eigen.vectors.transpose();
+  }
+  /// By how much each block of this view's image changes the cost in this view.
+  Eigen::VectorXd changes_without_blocks(const RigidTransform& pose) const {
+    const std::vector<double> without = cost_.without_each_block(pose);
+    if (without.size() != before_ + blocks_ + after_)
+      throw Error("the cost gives no values without each block of the images; use a cost of the kind similarity");
+    return (Eigen::VectorXd::Map(without.data() + before_, Eigen::Index(blocks_)).array() - cost_.value(pose)) / share_;
+  }
+  Matrix6d scatter(const RigidTransform& pose) const {
+    Eigen::MatrixXd gradients(6, Eigen::Index(blocks_));
+    tbb::parallel_for(0, 6, [&](int axis) {
+      gradients.row(axis) = 0.5 * (changes_without_blocks(moved_by(pose, Vector6d::Unit(axis))) -
+                                   changes_without_blocks(moved_by(pose, -Vector6d::Unit(axis))));
+    });
+    return gradients * gradients.transpose();
+  }
+
+  const Cost& cost_;
+  const FragmentFrame& frame_;
+  const std::size_t view_;
+  const double share_;  ///< of the view in the cost
+  std::size_t before_ = 0, blocks_ = 0, after_ = 0;
+  Vector6d steps_ = Vector6d::Constant(0.25);
+};
+
+}  // namespace marrow::camera
