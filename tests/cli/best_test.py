@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: Apache-2.0
+"""pipelines/femur-best.yaml on a small simulated femur with an old plate: cameras that are right, and cameras that are a
+little off."""
+import json
+import pathlib
+import shutil
+import tempfile
+
+from cases import metrics
+from marrow_cli import SOURCE, Case, main, marrow
+
+PIPELINES = SOURCE / "pipelines"
+SMALL = ["bone.resolution_mm=1.6", "cameras.width_px=256", "cameras.height_px=256", "cameras.pixel_mm=1.172"]
+OFF = "knee fat folds vessels pin cable clamp table lag collimator saturation eight_bit".split()
+
+
+def sets(texts):
+    return [part for text in texts for part in ("--set", text)]
+
+
+class Best(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-best-"))
+        cls.cases = {}
+        for level in ("off", "usual"):
+            made = marrow(
+                "run",
+                PIPELINES / "simulate-clutter.yaml",
+                *["%s=off" % name for name in OFF],
+                "camera_faults=%s" % level,
+                "--out",
+                cls.shared / level,
+                "--quiet",
+                *sets(SMALL)
+            )
+            assert made.returncode == 0, made.stderr
+            cls.cases[level] = cls.shared / level / "outputs" / "case"
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.shared, ignore_errors=True)
+
+    def registered(self, level, *arguments, codes=(0,)):
+        result = marrow(
+            "run",
+            PIPELINES / "femur-best.yaml",
+            "case=%s" % self.cases[level],
+            "--out",
+            self.scratch / level,
+            *arguments
+        )
+        self.assertIn(result.returncode, codes, result.stdout + result.stderr)
+        return result, self.scratch / level / "outputs"
+
+    def test_right_cameras_stay(self):
+        result, outputs = self.registered("off", "--no-cache")
+        self.assertLess(metrics(outputs / "errors" / "distal.json")["mtre_mm"], 1)
+        self.assertIn("show long metal, and are bridged", result.stdout + result.stderr)
+        self.assertIn("node 'marks' (read.landmarks) failed", result.stderr)
+        for view in ("frontal", "lateral"):
+            self.assertLess(abs(metrics(outputs / "cameras" / (view + ".json"))["shift_v_mm"]), 0.3)
+
+    def test_cameras_that_are_off_are_said_to_be(self):
+        # Pixels of 1.2 mm make the error of 5 px so large that the verdict may be `wrong`, which ends with 3.
+        _, outputs = self.registered("usual", codes=(0, 3))
+        errors = metrics(outputs / "errors" / "distal.json")
+        self.assertLess(errors["mtre_mm"], 5)
+        self.assertGreater(errors["predicted_along_mm"], 0.3)
+        run = json.loads((self.scratch / "usual" / "run.json").read_text())
+        self.assertEqual([verdict["judgement"] == "trusted" for verdict in run["verdicts"]], [False])
+
+
+if __name__ == "__main__":
+    main()
