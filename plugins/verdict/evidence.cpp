@@ -34,7 +34,7 @@ constexpr const char* kThirdView = "a third view, from a direction between the o
 constexpr const char* kAxial = "a third view, or a landmark off the long axis";
 constexpr const char* kLook = "a look at the overlay of each view: is this the bone, the side and the camera?";
 constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
-constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or register.cameras";
+constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or camera.refine";
 constexpr Words kWords[] = {
     {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
     {"contour_decoys_scatter", "by contour, random poses scatter by %.2f of what they lie above this pose", kStart},
