@@ -79,9 +79,16 @@ void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
   evidence.push_back({"predicted_axial_deg", std::min(spread.axial_deg, kUnknown_deg), "deg"});
 }
 
-Evidence gather(const Judged& judged, const Pose* contour_pose, const Cost& cost, const Cost* contour_cost,
-                const List<View>& views, const List<EdgeMap>* edges, const OutlineProjector* projector,
-                const Mesh& mesh, const Options& options, const Context& context) {
+/// The share of the errors that the pose's own covariance stands for, and that are off.
+double predicted_failure(const Pose& pose, const Mesh& mesh) {
+  if (!pose.covariance) return 0;
+  if (!pose.covariance->allFinite()) return 1;
+  return double(verdicts::spread_of(pose, mesh).off) / verdicts::Spread::kDraws;
+}
+
+Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& searched, const Cost& cost,
+                const Cost* contour_cost, const List<View>& views, const List<EdgeMap>* edges,
+                const OutlineProjector* projector, const Mesh& mesh, const Options& options, const Context& context) {
   constexpr double kSpacing_px = 4, kReach_px = 16;
   const auto fine = cost.at_level({kSpacing_px, kReach_px, options.pixel_step});
   const auto coarse = cost.at_level({2 * kSpacing_px, 2 * kReach_px, 2 * options.pixel_step});
@@ -103,7 +110,7 @@ Evidence gather(const Judged& judged, const Pose* contour_pose, const Cost& cost
     evidence.push_back({"contour_apart_mm", judged.off_mm(contour_pose->world_from_model), "mm"});
     evidence.push_back({"contour_apart_deg", judged.axial_deg(contour_pose->world_from_model), "deg"});
   }
-  add_predicted(judged.pose, mesh, evidence);
+  add_predicted(searched, mesh, evidence);
   evidence.push_back({"warnings", double(judged.pose.warnings.size()), ""});
   return evidence;
 }
@@ -154,9 +161,12 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   }
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
                 &optimizer, &context};
+  // A pose may have changed after its search, as camera.refine does. Then its covariance includes what the images
+  // cannot tell, which is no evidence against the search.
+  const Pose& searched = stages && !stages->empty() ? (*stages)[stages->size() - 1] : pose;
   Verdict verdict;
-  verdict.figures = gather(judged, other_pose(contour_pose, stages), cost, contour_cost, views, edges, projector, mesh,
-                           options, context);
+  verdict.figures = gather(judged, other_pose(contour_pose, stages), searched, cost, contour_cost, views, edges,
+                           projector, mesh, options, context);
   const double inside_mm = others ? verdicts::intersection_mm(judged, mesh, *others, *other_bones) : 0;
   if (others) verdict.figures.push_back({"intersection_mm", inside_mm, "mm"});
   if (model.terms.empty()) {
@@ -165,13 +175,18 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     return verdict;
   }
   const auto contributions = model.contributions(verdict.figures);
-  verdict.failure_probability = model.probability(contributions);
+  const double predicted = predicted_failure(pose, mesh);
+  verdict.failure_probability = 1 - (1 - model.probability(contributions)) * (1 - predicted);
   verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > model.doubtful_above ? Judgement::doubtful
                                                                            : Judgement::trusted;
   if (inside_mm > options.most_intersection_mm && verdict.judgement == Judgement::trusted) {
     verdict.judgement = Judgement::doubtful;
     verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
+  }
+  if (predicted > model.doubtful_above) {
+    verdict.reasons.push_back(filled("the predicted deviations allow a failure with a probability of %.2f", predicted));
+    verdict.remedies.emplace_back(kCameras);
   }
   explain(contributions, verdict);
   return verdict;
@@ -184,7 +199,9 @@ MARROW_PLUGIN(plugin) {
       .summary("Judges a pose by evidence of many kinds, weighed by a failure model")
       .in("pose", "pose to judge")
       .in("contour_pose", "pose of the same bone, found by its contour")
-      .in("stages", "without contour_pose: poses of the search, of which 'first' is by contour (register.sequence)",
+      .in("stages",
+          "poses of the search: 'first' is by contour (register.sequence), unless contour_pose is given; the last one "
+          "has the predicted deviations of the search, without those that come from the cameras (camera.refine)",
           over("stage"))
       .in("cost", "cost whose minimum the pose is")
       .in("contour_cost", "another cost of the same bone, such as that of the contour")
