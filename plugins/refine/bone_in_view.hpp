@@ -8,7 +8,7 @@
 
 #include "marrow/toolbox/match/views_cost.hpp"
 
-namespace marrow::camera {
+namespace marrow::refine {
 
 /// From degrees and mm to radians and mm.
 inline Vector6d from_units(const Vector6d& deg_and_mm) {
@@ -113,4 +113,4 @@ class BoneInView {
   Vector6d steps_ = Vector6d::Constant(0.25);
 };
 
-}  // namespace marrow::camera
+}  // namespace marrow::refine

@@ -7,7 +7,7 @@
 #include "register/well.hpp"
 #include "shipped.hpp"
 
-namespace refine_test {
+namespace refine_cameras_test {
 
 using Eigen::Vector3d;
 using marrow::RigidTransform, marrow::Vector6d;
@@ -108,19 +108,19 @@ double figure(const marrow::Metrics& metrics, const std::string& name) {
   return shipped::figure(shipped::item(metrics), name);
 }
 
-TEST(Refine, FindsHowTheCamerasAreOffAgainstEachOther) {
+TEST(RefineCameras, FindsHowTheCamerasAreOffAgainstEachOther) {
   const RigidTransform frontal = motion({0.3, -0.2, 0.4}, {0.8, 0.5, -3}),
                        lateral = motion({-0.4, 0.3, 0.1}, {2, -0.7, 0.6});
-  const auto outputs = shipped::call("camera.refine", inputs({Bone({frontal, lateral})}));
+  const auto outputs = shipped::call("refine.cameras", inputs({Bone({frontal, lateral})}));
   const RigidTransform wanted = inverse(frontal) * lateral, is = inverse(found(outputs, 0)) * found(outputs, 1);
   EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
   EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.1);
 }
 
-TEST(Refine, HalfOfAnErrorGoesToEachOfTwoViews) {
+TEST(RefineCameras, HalfOfAnErrorGoesToEachOfTwoViews) {
   // v of both images is y of the world, so nothing tells which of the two cameras is too high by 2 mm.
   const auto outputs =
-      shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 2, 0})})}));
+      shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 2, 0})})}));
   EXPECT_NEAR(figure(motions(outputs, 0), "shift_v_mm"), -1, 0.02);
   EXPECT_NEAR(figure(motions(outputs, 1), "shift_v_mm"), 1, 0.02);
   EXPECT_NEAR(figure(motions(outputs, 0), "shift_u_mm"), 0, 0.02);
@@ -132,12 +132,12 @@ TEST(Refine, HalfOfAnErrorGoesToEachOfTwoViews) {
   EXPECT_GT((*pose.covariance)(3, 3), 0.01) << "the pose is not known better than the cameras";
 }
 
-TEST(Refine, CamerasThatAreRightStay) {
+TEST(RefineCameras, CamerasThatAreRightStay) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   std::vector<Bone> bones{Bone({none, none})};
   const RigidTransform right = bones[0].pose.world_from_model;
   bones[0].pose = well::pose_at(bones[0].pose, 0.5, -0.3, 0.2, 0.4, 0.1, -0.6);
-  const auto outputs = shipped::call("camera.refine", inputs(bones));
+  const auto outputs = shipped::call("refine.cameras", inputs(bones));
   const marrow::Pose pose = outputs.at("poses").as_list<marrow::Pose>()[0];
   EXPECT_LT(well::way(right, pose.world_from_model, pose.frame).norm(), 0.01);
   for (std::size_t v = 0; v < 2; ++v) {
@@ -146,31 +146,31 @@ TEST(Refine, CamerasThatAreRightStay) {
   }
 }
 
-TEST(Refine, TwoBonesShareTheCameras) {
+TEST(RefineCameras, TwoBonesShareTheCameras) {
   const RigidTransform frontal = motion({0.4, 0, -0.3}, {1, 1, 0}), lateral = motion({0, 0.5, 0}, {0, -1.5, 1});
   const std::vector<Bone> bones{Bone({frontal, lateral}), Bone({frontal, lateral}, 1e4, -60)};
-  const auto poses = shipped::call("camera.refine", inputs(bones)).at("poses").as_list<marrow::Pose>();
+  const auto poses = shipped::call("refine.cameras", inputs(bones)).at("poses").as_list<marrow::Pose>();
   const RigidTransform wanted = inverse(bones[0].pose.world_from_model) * bones[1].pose.world_from_model,
                        is = inverse(poses[0].world_from_model) * poses[1].world_from_model;
   EXPECT_LT(marrow::degrees(marrow::geodesic_angle_rad(wanted.rotation, is.rotation)), 0.02);
   EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.03) << "the reduction does not feel the cameras";
 }
 
-TEST(Refine, TheViewsKeepTheirImagesAndNames) {
+TEST(RefineCameras, TheViewsKeepTheirImagesAndNames) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
-  const auto after = shipped::call("camera.refine", inputs({Bone({none, none})})).at("views").as_list<marrow::View>();
+  const auto after = shipped::call("refine.cameras", inputs({Bone({none, none})})).at("views").as_list<marrow::View>();
   EXPECT_EQ(after.names(), (std::vector<std::string>{"frontal", "lateral"}));
   EXPECT_EQ(after[0].camera.intrinsics, views()[0].camera.intrinsics);
   EXPECT_EQ(cv::countNonZero(after[1].image.pixels != views()[1].image.pixels), 0);
 }
 
-TEST(Refine, WarnsOfCamerasThatAreFarOff) {
+TEST(RefineCameras, WarnsOfCamerasThatAreFarOff) {
   std::vector<std::string> warnings;
   marrow::Context::Hooks hooks;
   hooks.log = [&](std::string_view text, marrow::LogLevel level) {
     if (level == marrow::LogLevel::warning) warnings.emplace_back(text);
   };
-  shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({3, 3, 3}, {0, 9, 0})})}), {},
+  shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({3, 3, 3}, {0, 9, 0})})}), {},
                 marrow::Context(hooks));
   ASSERT_EQ(warnings.size(), 2u);
   EXPECT_EQ(warnings[0].find("view 'frontal': its camera is off by "), 0u) << warnings[0];
@@ -179,35 +179,35 @@ TEST(Refine, WarnsOfCamerasThatAreFarOff) {
       std::string::npos)
       << warnings[0];
   warnings.clear();
-  shipped::call("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
+  shipped::call("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), motion({0, 0, 0}, {0, 1, 0})})}),
                 {{"max_rounds", std::int64_t(1)}}, marrow::Context(hooks));
   EXPECT_EQ(warnings, std::vector<std::string>{"the cameras still moved after 1 rounds; raise max_rounds"});
 }
 
-TEST(Refine, SaysWhatIsWrong) {
+TEST(RefineCameras, SaysWhatIsWrong) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   const Bone bone({none, none});
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none})}, views(1))),
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none})}, views(1))),
             "there is one view only; a camera is corrected by comparing it with others, so give two views or more");
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({})), "there is no bone; wire the pose of at least one");
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none, none, none})})),
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({})), "there is no bone; wire the pose of at least one");
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none, none})})),
             "the cost of 'distal' compares 3 views, but there are 2; make it of the same views");
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({none, none}, 0)})),
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({none, none}, 0)})),
             "the cost gives no values without each block of the images; use a cost of the kind similarity");
-  EXPECT_EQ(shipped::refusal("camera.refine", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
-                                                     [] {
-                                                       marrow::List<marrow::View> behind;
-                                                       for (marrow::View view : views()) {
-                                                         view.camera.camera_from_world.translation_mm.z() = -600;
-                                                         behind.add(view.name, view);
-                                                       }
-                                                       return behind;
-                                                     }())),
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({Bone({motion({0, 0, 0}, {0, 0, 0}), none}, 1e4, 40)},
+                                                      [] {
+                                                        marrow::List<marrow::View> behind;
+                                                        for (marrow::View view : views()) {
+                                                          view.camera.camera_from_world.translation_mm.z() = -600;
+                                                          behind.add(view.name, view);
+                                                        }
+                                                        return behind;
+                                                      }())),
             "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
   auto other = inputs({bone});
   other["poses"] = inputs({bone, bone})["poses"];
-  EXPECT_EQ(shipped::refusal("camera.refine", other),
+  EXPECT_EQ(shipped::refusal("refine.cameras", other),
             "costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
 }
 
-}  // namespace refine_test
+}  // namespace refine_cameras_test

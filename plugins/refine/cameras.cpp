@@ -18,7 +18,7 @@
 namespace {
 
 using namespace marrow;
-using camera::from_units, camera::BoneInView, camera::Model;
+using refine::from_units, refine::BoneInView, refine::Model;
 
 struct Options {
   double rotation_deg = 0.5;
@@ -316,8 +316,8 @@ void warn_of_large(const std::string& view, const Vector6d& in_deviations, Conte
                " times what the options expect; is it the camera of this image, and are the poses right?");
 }
 
-Result refine(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
-              Context& context) {
+Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
+               Context& context) {
   check_inputs(views, costs, poses);
   Refinement refinement(costs, poses, views, options);
   refinement.run(options.max_rounds, context);
@@ -352,7 +352,7 @@ Result refine(const List<View>& views, const List<Cost>& costs, const List<Pose>
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.node("camera.refine", refine)
+  plugin.node("refine.cameras", refined)
       .summary("Corrects cameras that are a little off by the bones that their images show, together with the poses")
       .in("views", "X-ray views with the cameras that a calibration gives", over("view"))
       .in("costs", "cost of each bone's pose in these views", over("fragment"))
