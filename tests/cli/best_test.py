@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""pipelines/femur-best.yaml on a small simulated femur with an old plate: cameras that are right, and cameras that are a
-little off."""
+"""pipelines/femur-best.yaml on a small simulated femur with an old plate: with right cameras and with wrong ones."""
 import json
 import pathlib
 import shutil
