@@ -34,7 +34,7 @@ constexpr const char* kThirdView = "a third view, from a direction between the o
 constexpr const char* kAxial = "a third view, or a landmark off the long axis";
 constexpr const char* kLook = "a look at the overlay of each view: is this the bone, the side and the camera?";
 constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
-constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or camera.refine";
+constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or refine.cameras";
 constexpr Words kWords[] = {
     {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
     {"contour_decoys_scatter", "by contour, random poses scatter by %.2f of what they lie above this pose", kStart},
@@ -161,7 +161,7 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
   }
   Judged judged{pose, fragment_frame(mesh), geometry::targets_mm(pose.world_from_model, &mesh, nullptr, kTargets),
                 &optimizer, &context};
-  // A pose may have changed after its search, as camera.refine does. Then its covariance includes what the images
+  // A pose may have changed after its search, as refine.cameras does. Then its covariance includes what the images
   // cannot tell, which is no evidence against the search.
   const Pose& searched = stages && !stages->empty() ? (*stages)[stages->size() - 1] : pose;
   Verdict verdict;
@@ -201,7 +201,7 @@ MARROW_PLUGIN(plugin) {
       .in("contour_pose", "pose of the same bone, found by its contour")
       .in("stages",
           "poses of the search: 'first' is by contour (register.sequence), unless contour_pose is given; the last one "
-          "has the predicted deviations of the search, without those that come from the cameras (camera.refine)",
+          "has the predicted deviations of the search, without those that come from the cameras (refine.cameras)",
           over("stage"))
       .in("cost", "cost whose minimum the pose is")
       .in("contour_cost", "another cost of the same bone, such as that of the contour")
