@@ -57,7 +57,6 @@ constexpr Words kWords[] = {
     {"outline_spread_mm", "the edges scatter by %.2f mm about the outline", kLook},
     {"predicted_mtre_mm", "the bone's surface is known to %.2f mm", kThirdView},
     {"predicted_axial_deg", "the rotation about the long axis is known to %.2f degrees", kAxial},
-    {"intersection_mm", "the bone reaches %.1f mm into another bone", kLook},
     {"warnings", "the registration gave %.0f warnings", kLook},
 };
 

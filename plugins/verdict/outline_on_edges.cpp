@@ -25,9 +25,14 @@ struct Fit {
   double spread_mm = 0;    ///< median distance from the whole view's median
 };
 
+/// The position of an outline's point along the bone's long axis.
+double along_mm(const Judged& judged, const OutlinePoint& point) {
+  return (point.model_mm.cast<double>() - judged.frame.origin_mm).dot(judged.frame.axes.col(2));
+}
+
 /// The part of the outline: the position along the bone's long axis, and the side of the image.
 std::size_t part_of(const Judged& judged, const OutlinePoint& point, double from_mm, double to_mm) {
-  const double along = (point.model_mm.cast<double>() - judged.frame.origin_mm).dot(judged.frame.axes.col(2));
+  const double along = along_mm(judged, point);
   const int place = std::clamp(int((along - from_mm) / (to_mm - from_mm + 1e-9) * kParts), 0, kParts - 1);
   return std::size_t(2 * place + (point.normal_u > 0));
 }
@@ -36,7 +41,7 @@ Fit in_view(const Judged& judged, const std::vector<OutlinePoint>& outline, cons
   const match::NearestEdges nearest(edges, view.mask, radians(kTolerance_deg));
   double from_mm = std::numeric_limits<double>::infinity(), to_mm = -from_mm;
   for (const OutlinePoint& point : outline) {
-    const double along = (point.model_mm.cast<double>() - judged.frame.origin_mm).dot(judged.frame.axes.col(2));
+    const double along = along_mm(judged, point);
     from_mm = std::min(from_mm, along);
     to_mm = std::max(to_mm, along);
   }
