@@ -21,6 +21,9 @@ std::optional<Cost::Expansion> Cost::expansion(const RigidTransform&, const Frag
   return std::nullopt;
 }
 std::vector<double> Cost::without_each_block(const RigidTransform&) const { return {}; }
+std::vector<Cost::Expansion> Cost::expansion_without_each_block(const RigidTransform&, const FragmentFrame&) const {
+  return {};
+}
 std::size_t Cost::view_count() const { return 0; }
 double Cost::value_in_view(std::size_t, const RigidTransform& world_from_model) const {
   return value(world_from_model);

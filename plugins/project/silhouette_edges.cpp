@@ -83,8 +83,9 @@ class ContourFinder {
       const auto& patch = s_.patches[i];
       const bool crossed = may_cross[i];
       if (!crossed && !patch.rim_count) continue;
-      evaluate(patch);
-      if (crossed)
+      const std::uint32_t facing = evaluate(patch);
+      if (facing == 0) continue;
+      if (crossed && facing < patch.vertex_count)
         for (std::uint32_t k = 0; k < patch.triangle_count; ++k) add_triangle(s_.triangles[patch.first_triangle + k]);
       for (std::uint32_t k = 0; k < patch.rim_count; ++k) add_rim(s_.rims[patch.first_rim + k]);
     }
@@ -92,7 +93,8 @@ class ContourFinder {
   }
 
  private:
-  void evaluate(const SurfacePatches::Patch& patch) {
+  /// Returns how many vertices of the patch face the source.
+  std::uint32_t evaluate(const SurfacePatches::Patch& patch) {
     first_ = patch.first_vertex;
     const float sx = geometry_.source.x(), sy = geometry_.source.y(), sz = geometry_.source.z();
     for (std::uint32_t i = 0; i < patch.vertex_count; ++i) {
@@ -100,6 +102,9 @@ class ContourFinder {
       facing_[i] = s_.nx[k] * (sx - s_.x[k]) + s_.ny[k] * (sy - s_.y[k]) + s_.nz[k] * (sz - s_.z[k]);
       front_[i] = facing_[i] > 0;
     }
+    std::uint32_t count = 0;
+    for (std::uint32_t i = 0; i < patch.vertex_count; ++i) count += front_[i];
+    return count;
   }
 
   void add_triangle(const std::array<std::uint8_t, 3>& t) {

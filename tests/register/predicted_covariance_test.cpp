@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <atomic>
+#include <random>
 
 #include "bowl.hpp"
 
@@ -66,6 +67,83 @@ TEST(PredictedCovariance, IsTheSumOfTheMotionsWithoutEachBlock) {
     EXPECT_EQ(predicted.evaluations(), cost.asked);
     EXPECT_TRUE(predicted.warnings(1e9, 1e9).empty());
   }
+}
+
+/// Sums of squares of nine blocks, four residuals each, so few that each block matters much.
+class Squares : public marrow::Cost {
+ public:
+  static constexpr int kBlocks = 9, kResiduals = 4;
+  using Slopes = Eigen::Matrix<double, kResiduals, 6>;
+  explicit Squares(double size) {
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    for (int block = 0; block < kBlocks; ++block) {
+      slopes.push_back(Slopes::NullaryExpr([&] { return normal(random); }));
+      targets.push_back(size * Eigen::Vector4d::NullaryExpr([&] { return normal(random); }));
+    }
+  }
+
+  /// The minimum without a block (-1: with all), in degrees and mm from bottom().
+  Vector6d minimum(int left = -1) const {
+    Matrix6d squares = Matrix6d::Zero();
+    Vector6d products = Vector6d::Zero();
+    for (int block = 0; block < kBlocks; ++block) {
+      if (block == left) continue;
+      squares += slopes[std::size_t(block)].transpose() * slopes[std::size_t(block)];
+      products += slopes[std::size_t(block)].transpose() * targets[std::size_t(block)];
+    }
+    return squares.inverse() * products;
+  }
+  double value(const marrow::RigidTransform& pose) const override { return about(pose, -1).value; }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override { return nullptr; }
+  std::optional<Expansion> expansion(const marrow::RigidTransform& pose, const marrow::FragmentFrame&) const override {
+    return about(pose, -1);
+  }
+  std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform& pose,
+                                                      const marrow::FragmentFrame&) const override {
+    std::vector<Expansion> without;
+    for (int block = 0; block < kBlocks; ++block) without.push_back(about(pose, block));
+    return without;
+  }
+
+  std::vector<Slopes> slopes;
+  std::vector<Eigen::Vector4d> targets;
+
+ private:
+  Expansion about(const marrow::RigidTransform& pose, int left) const {
+    const Vector6d motion = well::way(bottom(), pose, frame());
+    Vector6d unit = Vector6d::Ones();
+    unit.head<3>() *= marrow::degrees(1);
+    Expansion expansion;
+    for (int block = 0; block < kBlocks; ++block) {
+      if (block == left) continue;
+      const Slopes slope = slopes[std::size_t(block)] * unit.asDiagonal();
+      const Eigen::Vector4d residual = slopes[std::size_t(block)] * motion - targets[std::size_t(block)];
+      expansion.value += 0.5 * residual.squaredNorm();
+      expansion.gradient += slope.transpose() * residual;
+      expansion.curvature += slope.transpose() * slope;
+    }
+    return expansion;
+  }
+};
+
+TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
+  const Squares cost(0.05);
+  const Vector6d least = cost.minimum();
+  Matrix6d expected = Matrix6d::Zero();
+  for (int block = 0; block < Squares::kBlocks; ++block) {
+    const Vector6d motion = cost.minimum(block) - least;
+    expected += motion * motion.transpose();
+  }
+  expected = in_radians(expected);
+  const marrow::FragmentFrame about = frame();
+  const marrow::RigidTransform pose = marrow::search::moved_by_units(bottom(), about, least);
+  const PredictedCovariance predicted(cost, pose, about);
+  ASSERT_TRUE(predicted.covariance());
+  EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-6 * expected.norm());
+  EXPECT_EQ(predicted.evaluations(), 3 + 25) << "the value, the derivatives twice, and a line of poses";
+  // Derivatives say nothing about a minimum that is wider than degrees, and this cost has no blocks to try.
+  EXPECT_FALSE(PredictedCovariance(Squares(50), pose, about).covariance());
 }
 
 TEST(PredictedCovariance, IsAbsentIfTheCostHasNoBlocks) {

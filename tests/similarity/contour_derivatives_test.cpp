@@ -77,11 +77,13 @@ struct Held {
   marrow::Value made;
 };
 
-Held cost_of(double offset_px, const shipped::Options& options) {
+/// With a mask of the frontal view, if there is one.
+Held cost_of(double offset_px, const shipped::Options& options, const cv::Mat& mask = {}) {
   List<marrow::View> views;
   List<marrow::EdgeMap> edges;
   for (const double angle : {0.0, 90.0}) {
-    views.add(angle == 0 ? "frontal" : "lateral", marrow::View{"", {}, shapes::c_arm(angle), {}});
+    views.add(angle == 0 ? "frontal" : "lateral",
+              marrow::View{"", {}, shapes::c_arm(angle), angle == 0 ? mask : cv::Mat()});
     edges.add(views.name(views.size() - 1), edges_outside(offset_px, angle == 0));
   }
   shipped::Options all{{"contour_spacing_px", 1.0}, {"reach_px", 20.0}, {"weights", std::vector<double>{3, 1}}};
@@ -165,6 +167,38 @@ TEST(ContourDerivatives, TheCurvatureIsThatOfTheValueAtTheBottom) {
   expect_curvature_at_the_bottom(*cost_of(1.5, {}));
 }
 
+/// Leaves out one square of 102 px, a fifth of the image, of the frontal view: by a mask, and as a block.
+void expect_same_without_a_block(double offset_px, const shipped::Options& options, const RigidTransform& pose,
+                                 double tolerance) {
+  constexpr int kSide_px = 102, kColumns = 6;
+  const auto whole = cost_of(offset_px, options);
+  const std::vector<Cost::Expansion> without = whole->expansion_without_each_block(pose, frame());
+  ASSERT_EQ(without.size(), std::size_t(2 * kColumns * kColumns));
+  for (const auto& [column, row] : {std::pair(1, 2), std::pair(3, 3), std::pair(2, 1)}) {
+    cv::Mat mask(512, 512, CV_8U, cv::Scalar(255));
+    mask(cv::Rect(column * kSide_px, row * kSide_px, kSide_px, kSide_px)) = 0;
+    const auto expected = cost_of(offset_px, options, mask)->expansion(pose, frame());
+    const Cost::Expansion& found = without[std::size_t(row * kColumns + column)];
+    const Vector6d difference = in_steps(found.gradient - expected->gradient);
+    const double change = in_steps(expected->gradient - whole->expansion(pose, frame())->gradient).norm();
+    EXPECT_LE(difference.norm(), tolerance * change + 1e-9) << column << ", " << row;
+    if (pose.translation_mm.norm() > 0) continue;  // away from the bottom, the curvatures differ
+    for (int i = 0; i < 6; ++i)
+      for (int j = 0; j < 6; ++j) {
+        const double scale = std::sqrt(expected->curvature(i, i) * expected->curvature(j, j));
+        EXPECT_NEAR(found.curvature(i, j), expected->curvature(i, j), 0.02 * scale) << i << ", " << j;
+      }
+  }
+}
+
+TEST(ContourDerivatives, WithoutABlockAreThoseWithAMask) {
+  const RigidTransform bottom{"world", "ct"};
+  for (const bool symmetric : {false, true}) {
+    expect_same_without_a_block(0, {{"estimate_offset", false}, {"symmetric", symmetric}}, away(), 0.05);
+    expect_same_without_a_block(1.5, {{"symmetric", symmetric}}, bottom, 0.05);
+  }
+}
+
 /// An upright line at u = 100 + the pose's x in mm, facing left, for v from 50 to 50 less than the image has.
 class Line : public marrow::OutlineProjector {
  public:
@@ -202,6 +236,17 @@ Held cost_of_line(const std::vector<marrow::EdgeMap>& maps, shipped::Options opt
   options["contour_spacing_px"] = 1.0;
   options["estimate_offset"] = false;
   return {new Line, views, edges, options};
+}
+
+TEST(ContourBlocks, TheCurvatureWithoutThemIsThatOfTheLoss) {
+  // Of sqrt(s^2 + x^2) with a scale s of 2 px: s^2 / (s^2 + x^2)^1.5, at x = 1.5 px and at 0.
+  const auto curvature = [](double edge_u_px) {
+    const auto cost = cost_of_line({line_at(edge_u_px)}, {{"scale_px", 2.0}});
+    const auto without = cost->expansion_without_each_block(shifted(0), {});
+    EXPECT_EQ(without.size(), 25u);
+    return without.empty() ? 0 : without[0].curvature(3, 3);
+  };
+  EXPECT_NEAR(curvature(101.5) / curvature(100), 0.256 / 0.5, 1e-4);
 }
 
 TEST(ContourBlocks, PredictTheScatterThatNoiseMakes) {

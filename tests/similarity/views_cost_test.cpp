@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "marrow/toolbox/match/block_expansions.hpp"
 #include "project/shapes.hpp"
 
 namespace views_cost_test {
@@ -25,6 +26,7 @@ TEST(Blocks, CoverTheImage) {
   EXPECT_EQ(blocks.at(0, 125), 8);
   EXPECT_EQ(blocks.at(999, 299), 23);
   EXPECT_EQ(blocks.at(2000, -5), 7) << "beyond the image counts as its border";
+  EXPECT_EQ(Blocks::of(camera, 5).side_px, 200);
   EXPECT_EQ(Blocks::of(shapes::c_arm(0, 200)).side_px, 48);
 }
 
@@ -37,6 +39,35 @@ TEST(BlockSums, WithoutEachBlock) {
   EXPECT_EQ(sums.all().weights, 5);
   EXPECT_EQ(sums.without_each([](const auto& left) { return left.values / left.weights; }),
             (std::vector<double>{10, 0.75}));
+}
+
+TEST(BlockExpansions, WithoutEachBlock) {
+  using marrow::match::BlockExpansions;
+  BlockExpansions first(Blocks{10, 2, 1}), second(Blocks{10, 1, 1});
+  const marrow::Vector6d along = marrow::Vector6d::Unit(3);
+  first.add(3, 0, along, 2, 3);
+  first.add(15, 0, 2 * along, 1, 5);
+  second.add(0, 0, along, -3, 1);
+  for (const double u_px : {3.0, 4.0, 15.0}) first.count(u_px, 0);
+  second.count(0, 0);
+  // The sums of first are 2 + 2 and 3 + 20, of 3 points; those of second -3 and 1, of one. The weights are 3 : 1.
+  const auto kept = BlockExpansions::without_each({first, second}, {3, 1}, 0.5, false);
+  ASSERT_EQ(kept.size(), 3u);
+  EXPECT_DOUBLE_EQ(kept[0].gradient[3], 0.75 * 2 - 0.25 * 3);
+  EXPECT_DOUBLE_EQ(kept[0].curvature(3, 3), 0.75 * 20 + 0.25 * 1);
+  EXPECT_DOUBLE_EQ(kept[1].gradient[3], 0.75 * 2 / 2 - 0.25 * 3);
+  EXPECT_DOUBLE_EQ(kept[1].curvature(3, 3), 0.75 * 3 / 2 + 0.25 * 1);
+  EXPECT_DOUBLE_EQ(kept[2].gradient[3], 0.75 * 4 / 3);
+  EXPECT_DOUBLE_EQ(kept[2].curvature(3, 3), 0.75 * 23 / 3);
+  // Two points count as four. With a common offset o, second derivatives by (x, o) are 3, -3, 3 in the one block and
+  // 20, -10, 5 in the other. First ones are 2, -2 and 2, -1.
+  const auto free = BlockExpansions::without_each({first}, {1}, 4, true);
+  ASSERT_EQ(free.size(), 2u);
+  EXPECT_NEAR(free[0].curvature(3, 3), (20 - 100 / 5.0) / 4, 1e-12);
+  EXPECT_NEAR(free[0].gradient[3], (2 - 10 * 1 / 5.0) / 4, 1e-12);
+  EXPECT_NEAR(free[1].curvature(3, 3), 0, 1e-12);
+  const auto bound = BlockExpansions::without_each({first}, {1}, 4, false);
+  EXPECT_DOUBLE_EQ(bound[1].curvature(3, 3), 3 / 4.0);
 }
 
 /// A cost whose views are 1 and 5 at the origin, and grow with x in the second. Without its single block a view is 0.

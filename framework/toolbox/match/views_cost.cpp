@@ -7,10 +7,10 @@
 
 namespace marrow::match {
 
-Blocks Blocks::of(const Camera& camera) {
-  constexpr int kLeastSide_px = 48, kAlongLongerSide = 8;
+Blocks Blocks::of(const Camera& camera, int along) {
+  constexpr int kLeastSide_px = 48;
   Blocks blocks;
-  blocks.side_px = std::max(kLeastSide_px, std::max(camera.width_px, camera.height_px) / kAlongLongerSide);
+  blocks.side_px = std::max(kLeastSide_px, std::max(camera.width_px, camera.height_px) / along);
   blocks.columns = std::max(1, (camera.width_px + blocks.side_px - 1) / blocks.side_px);
   blocks.rows = std::max(1, (camera.height_px + blocks.side_px - 1) / blocks.side_px);
   return blocks;

@@ -43,9 +43,14 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform& pose, const FragmentFrame& frame)
     : cost_(cost), pose_(pose), frame_(frame) {
   value_ = cost.value(pose);
+  ++evaluations_;
+  if (differentiate()) {
+    widen();
+    return;
+  }
   const std::vector<double> without_block = cost.without_each_block(pose);
   if (without_block.empty()) return;
-  evaluations_ += 2;
+  ++evaluations_;
   wanted_rise_ = deviation_of(value_, without_block);
   guess_steps();
   for (int round = 1;; ++round) {
@@ -80,6 +85,30 @@ std::vector<std::string> PredictedCovariance::warnings(double most_deg, double m
                          (turn ? " degrees" : " mm"));
   }
   return warnings;
+}
+
+/// By the cost's own derivatives, where it has them. They say little if a direction is nearly flat over degrees or
+/// millimetres. Then nothing is set, and the result is false.
+bool PredictedCovariance::differentiate() {
+  constexpr double kMostDeviation = 1;  // degrees or mm
+  const std::vector<Cost::Expansion> without_block = cost_.expansion_without_each_block(pose_, frame_);
+  const auto whole = cost_.expansion(pose_, frame_);
+  if (without_block.empty() || !whole) return false;
+  evaluations_ += 2;
+  Vector6d unit = Vector6d::Ones();
+  unit.head<3>() *= radians(1);
+  Matrix6d sum = Matrix6d::Zero(), mean = Matrix6d::Zero();
+  for (const Cost::Expansion& without : without_block) {
+    const Matrix6d h = unit.asDiagonal() * without.curvature * unit.asDiagonal();
+    const Vector6d g = unit.cwiseProduct(without.gradient - whole->gradient), motion = solve_symmetric<6>(h, g);
+    sum += motion * motion.transpose();
+    mean += h / double(without_block.size());
+  }
+  if (!sum.allFinite() || sum.diagonal().maxCoeff() > kMostDeviation * kMostDeviation) return false;
+  noise_ = (mean * sum).trace() / 6;
+  in_units_ = sum;
+  set_covariance(Matrix6d::Zero());
+  return true;
 }
 
 /// Steps that are nearly right save most of the search for them.
@@ -189,7 +218,10 @@ void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatte
     if (open_[std::size_t(i)]) inverse.row(i).setZero(), inverse.col(i).setZero();
   noise_ = (inverse * scatter).trace() / 6;
   in_units_ = steps_ * inverse * scatter * inverse * steps_.transpose();
-  const Matrix6d undetermined = steps_ * open * steps_.transpose();
+  set_covariance(steps_ * open * steps_.transpose());
+}
+
+void PredictedCovariance::set_covariance(const Matrix6d& undetermined) {
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= radians(1);
   covariance_ = unit.asDiagonal() * (in_units_ + undetermined) * unit.asDiagonal();

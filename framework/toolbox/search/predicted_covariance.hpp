@@ -11,15 +11,18 @@ namespace marrow::search {
 /// Moves a pose in the units of the search: degrees about and millimetres along the fragment's axes.
 RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& frame, const Vector6d& deg_and_mm);
 
-/// The covariance of a minimum, predicted by the infinitesimal jackknife over blocks of the images (Jaeckel 1972; Efron
-/// and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 21). Without one block the minimum would move by
-/// -H^-1 g, where H is the Hessian of the cost and g the gradient of the change that the cost has without the block.
-/// The covariance is the sum of the squares of these motions. So it follows the residuals' own noise, and their
-/// correlation within a block.
+/// The covariance of a minimum, predicted by the jackknife over blocks of the images (Efron and Tibshirani, An
+/// Introduction to the Bootstrap, 1993, chapter 11; Shao and Tu, The Jackknife and Bootstrap, 1995). Without one block
+/// the minimum would move by -H^-1 g, where g is the gradient of the change that the cost has without the block. The
+/// covariance is the sum of the squares of these motions. So it follows the residuals' own noise, and their correlation
+/// within a block.
 ///
-/// Derivatives are central differences along six directions. They are the axes first. If the cost is flat in a
-/// direction between them, they are then the eigenvectors of the Hessian, with a longer step in this direction. A step
-/// is four to eight standard deviations long: enough that the roughness of the cost does not matter.
+/// If the cost gives its derivatives without each block, H is the Hessian without the block. This matters where a block
+/// alone determines a direction: the residuals that are left there are much smaller than its errors. Otherwise H is
+/// that of the whole cost (the infinitesimal jackknife: Jaeckel 1972), and derivatives are central differences along
+/// six directions. They are the axes first. If the cost is flat in a direction between them, they are then the
+/// eigenvectors of the Hessian, with a longer step in this direction. A step is four to eight standard deviations long:
+/// enough that the roughness of the cost does not matter.
 ///
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
@@ -41,6 +44,8 @@ class PredictedCovariance {
 
  private:
   RigidTransform pose_at(const Vector6d& motion) const { return moved_by_units(pose_, frame_, motion); }
+  bool differentiate();
+  void set_covariance(const Matrix6d& undetermined);
   void guess_steps();
   void choose_steps();
   Matrix6d hessian();

@@ -32,8 +32,11 @@ struct PairFrame {
     along = (end - origin) / length;
     across = {-along.y(), along.x()};  // to the right
   }
-  Eigen::Vector2d in_pair(const Eigen::Vector2d& pixel) const {
-    return {along.dot(pixel - origin), across.dot(pixel - origin)};
+  /// Maps a homogeneous pixel to its place in the pair, homogeneous too.
+  Eigen::Matrix3d from_pixel() const {
+    Eigen::Matrix3d map;
+    map << along.x(), along.y(), -along.dot(origin), across.x(), across.y(), -across.dot(origin), 0, 0, 1;
+    return map;
   }
   Eigen::Vector2d pixel(double s, double t) const { return origin + s * along + t * across; }
 };
@@ -45,17 +48,21 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
   std::array<std::vector<Extreme>, 2> sides{std::vector<Extreme>(count), std::vector<Extreme>(count)};
   std::vector<Eigen::Vector2d> flat(model.vertices_mm.size());
   const RigidTransform camera_from_model = camera.camera_from_world * world_from_model;
+  const Eigen::Matrix3d pair_from_camera = pair.from_pixel() * camera.intrinsics,
+                        pair_from_model = pair_from_camera * camera_from_model.rotation;
+  const Eigen::Vector3d offset = pair_from_camera * camera_from_model.translation_mm;
   for (std::size_t i = 0; i < flat.size(); ++i) {
-    const Eigen::Vector3d x = camera_from_model * model.vertices_mm[i];
-    flat[i] = x.z() > 0 ? pair.in_pair((camera.intrinsics * x).hnormalized())
+    const Eigen::Vector3d x = pair_from_model * model.vertices_mm[i] + offset;  // x.z() is the depth
+    flat[i] = x.z() > 0 ? Eigen::Vector2d(x.head<2>() * (1 / x.z()))
                         : Eigen::Vector2d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
   const auto cross = [&](std::uint32_t a, std::uint32_t b) {
     if (flat[a].x() > flat[b].x()) std::swap(a, b);
     const double from = flat[a].x(), to = flat[b].x();
     if (!(to > from) || to < 0 || from > pair.length) return;
-    const long last = std::min(long(count) - 1, long(std::floor(to / kStep_px)));
-    for (long k = std::max(0L, long(std::ceil(from / kStep_px))); k <= last; ++k) {
+    const long last = std::min(long(count) - 1, long(to / kStep_px));
+    const long before = from > 0 ? long(from / kStep_px) : 0;  // std::ceil is a slow function call
+    for (long k = before + (double(before) * kStep_px < from); k <= last; ++k) {
       const double part = (double(k) * kStep_px - from) / (to - from);
       const double across = flat[a].y() + part * (flat[b].y() - flat[a].y());
       for (int side = 0; side < 2; ++side) {
@@ -65,11 +72,19 @@ std::array<std::vector<Extreme>, 2> extremes_of(const Mesh& model, const RigidTr
       }
     }
   };
-  for (const auto& triangle : model.triangles)
+  // Many triangles lie beside the pair, or between two positions.
+  const auto is_apart = [&](const std::array<std::uint32_t, 3>& triangle) {
+    const double a = flat[triangle[0]].x(), b = flat[triangle[1]].x(), c = flat[triangle[2]].x(),
+                 low = std::min(std::min(a, b), c), high = std::max(std::max(a, b), c);
+    return high < 0 || low > pair.length || (low > 0 && double(long(high / kStep_px)) < low / kStep_px);
+  };
+  for (const auto& triangle : model.triangles) {
+    if (is_apart(triangle)) continue;
     for (int k = 0; k < 3; ++k)
       // Each edge belongs to two triangles. It is used only where its vertex numbers ascend. An edge at an open border
       // may be skipped, but other edges of its triangle cross the same positions.
       if (triangle[k] < triangle[(k + 1) % 3]) cross(triangle[k], triangle[(k + 1) % 3]);
+  }
   for (auto& side : sides)
     for (Extreme& extreme : side)
       if (extreme.seen) extreme.world = world_from_model * extreme.world;

@@ -97,6 +97,11 @@ class Cost {
   /// minimum moves without each block shows how uncertain it is (delete-a-group jackknife: Shao and Tu, The Jackknife
   /// and Bootstrap, 1995). Empty if the cost cannot tell, which is the default.
   virtual std::vector<double> without_each_block(const RigidTransform& world_from_model) const;
+  /// The quadratic model of the cost at a pose with each block left out in turn, all in one call. Blocks may be larger
+  /// here than in without_each_block(). The curvature is that of the cost itself with its matches kept, so it may
+  /// differ from that of expansion(), which is made for a search. Empty if the cost cannot tell, which is the default.
+  virtual std::vector<Expansion> expansion_without_each_block(const RigidTransform& world_from_model,
+                                                              const FragmentFrame& frame) const;
   /// The number of views that the cost compares; 0, the default, if it cannot be split into views.
   virtual std::size_t view_count() const;
   /// The cost of a pose in one view alone, with view < view_count(). It has the range of value().

@@ -14,6 +14,11 @@ class EdgeLoss {
   double operator()(double distance2) const { return distance2 < reach2_ ? raw(distance2) : worst_; }
   /// Derivative by the distance, divided by the distance.
   double weight(double distance2) const { return distance2 < reach2_ ? 1 / std::sqrt(scale2_ + distance2) : 0; }
+  /// Second derivative by one coordinate of the distance, whose square is `part2`. At most weight().
+  double curvature(double distance2, double part2) const {
+    const double sum = scale2_ + distance2;
+    return distance2 < reach2_ ? (sum - part2) / (sum * std::sqrt(sum)) : 0;
+  }
 
  private:
   double raw(double distance2) const { return std::sqrt(scale2_ + distance2) - scale_; }

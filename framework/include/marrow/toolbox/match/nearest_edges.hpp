@@ -29,6 +29,8 @@ class NearestEdges {
       if (mask.empty() || mask.at<std::uint8_t>(v, u)) edges_.push_back(edge);
     }
     smooth(edges.width_px, edges.height_px);
+    rows_of_edges_.reserve(edges_.size());
+    for (const EdgePixel& edge : edges_) rows_of_edges_.push_back(row_of(edge));
     labels_.resize(kSectors * std::size_t(rows_) * std::size_t(columns_));
     tbb::parallel_for(0, kSectors, [&](int sector) { fill(sector, tolerance_rad); });
   }
@@ -114,7 +116,7 @@ class NearestEdges {
   // The cell of an edge. If smoothing has moved the edge out of the image, it is the cell at the border.
   int column_of(const EdgePixel& edge) const { return std::clamp(int(edge.u_px + 0.5f) / kCell_px, 0, columns_ - 1); }
   int row_of(const EdgePixel& edge) const { return std::clamp(int(edge.v_px + 0.5f) / kCell_px, 0, rows_ - 1); }
-  int row_of(std::int32_t label) const { return row_of(edges_[std::size_t(label)]); }
+  int row_of(std::int32_t label) const { return rows_of_edges_[std::size_t(label)]; }
 
   /// Each cell gets the nearest edge of its own column.
   void nearest_in_columns(std::int32_t* labels) const {
@@ -170,6 +172,7 @@ class NearestEdges {
 
   int columns_, rows_;
   std::vector<EdgePixel> edges_;
+  std::vector<int> rows_of_edges_;  ///< a small table, because the rows of a million cells are asked for
   std::vector<std::int32_t> labels_;
 };
 

@@ -13,8 +13,8 @@ namespace marrow::match {
 struct Blocks {
   int side_px = 1, columns = 1, rows = 1;
 
-  /// Blocks of at least 48 px, and about 8 along the longer side of the image.
-  static Blocks of(const Camera& camera);
+  /// Blocks of at least 48 px, and about `along` of them along the longer side of the image.
+  static Blocks of(const Camera& camera, int along = 8);
   int count() const { return columns * rows; }
   /// The block of a pixel. Positions outside the image belong to the nearest block.
   int at(double u_px, double v_px) const {
