@@ -69,6 +69,22 @@ MARROW_DISPATCH void mark_patches(const SurfacePatches::Bounds& b, const float* 
   }
 }
 
+/// The vertices of a patch: n . (source - x), and whether this is positive. Returns how many are. Two loops, because a
+/// loop over numbers of one size is computed several at once.
+MARROW_DISPATCH std::uint32_t face_source(const SurfacePatches& s, std::size_t first, std::size_t count,
+                                          const float* source, float* facing, std::uint8_t* front) {
+  const float *x = s.x.data() + first, *y = s.y.data() + first, *z = s.z.data() + first, *nx = s.nx.data() + first,
+              *ny = s.ny.data() + first, *nz = s.nz.data() + first;
+  const float sx = source[0], sy = source[1], sz = source[2];
+  for (std::size_t i = 0; i < count; ++i) facing[i] = nx[i] * (sx - x[i]) + ny[i] * (sy - y[i]) + nz[i] * (sz - z[i]);
+  std::uint32_t positive = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    front[i] = facing[i] > 0;
+    positive += front[i];
+  }
+  return positive;
+}
+
 /// Finds the contour generator as the zero line of g = n . (source - x), which is linear within each triangle. It uses
 /// interpolated normals of the vertices, so it is a smooth curve. A curve along the edges of the mesh would zigzag.
 class ContourFinder {
@@ -83,7 +99,9 @@ class ContourFinder {
       const auto& patch = s_.patches[i];
       const bool crossed = may_cross[i];
       if (!crossed && !patch.rim_count) continue;
-      const std::uint32_t facing = evaluate(patch);
+      first_ = patch.first_vertex;
+      const std::uint32_t facing =
+          face_source(s_, first_, patch.vertex_count, geometry_.source.data(), facing_.data(), front_.data());
       if (facing == 0) continue;
       if (crossed && facing < patch.vertex_count)
         for (std::uint32_t k = 0; k < patch.triangle_count; ++k) add_triangle(s_.triangles[patch.first_triangle + k]);
@@ -93,20 +111,6 @@ class ContourFinder {
   }
 
  private:
-  /// Returns how many vertices of the patch face the source.
-  std::uint32_t evaluate(const SurfacePatches::Patch& patch) {
-    first_ = patch.first_vertex;
-    const float sx = geometry_.source.x(), sy = geometry_.source.y(), sz = geometry_.source.z();
-    for (std::uint32_t i = 0; i < patch.vertex_count; ++i) {
-      const std::size_t k = first_ + i;
-      facing_[i] = s_.nx[k] * (sx - s_.x[k]) + s_.ny[k] * (sy - s_.y[k]) + s_.nz[k] * (sz - s_.z[k]);
-      front_[i] = facing_[i] > 0;
-    }
-    std::uint32_t count = 0;
-    for (std::uint32_t i = 0; i < patch.vertex_count; ++i) count += front_[i];
-    return count;
-  }
-
   void add_triangle(const std::array<std::uint8_t, 3>& t) {
     const int front[3] = {front_[t[0]], front_[t[1]], front_[t[2]]}, count = front[0] + front[1] + front[2];
     if (count == 0 || count == 3) return;

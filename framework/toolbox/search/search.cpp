@@ -95,10 +95,10 @@ double Search::refine(const Cost& cost, const std::vector<int>& axes, const Step
     context_.check_cancelled();
     return cost.value(pose_at(x));
   };
-  if (cost.expansion(pose_, frame_))
-    problem.expansion = [&](const Eigen::VectorXd& x) {
+  if (const auto at_start = cost.expansion(pose_, frame_))
+    problem.expansion = [&, at_start](const Eigen::VectorXd& x) {
       context_.check_cancelled();
-      return in_coordinates(cost.expansion(pose_at(x), frame_), motion_at(x), axes);
+      return in_coordinates(x.isZero(0) ? at_start : cost.expansion(pose_at(x), frame_), motion_at(x), axes);
     };
   double least = std::numeric_limits<double>::infinity();
   problem.observer = [&](int evaluation, const Eigen::VectorXd& x, double value) {
