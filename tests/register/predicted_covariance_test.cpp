@@ -127,15 +127,20 @@ class Squares : public marrow::Cost {
   }
 };
 
+/// The covariance of the minima without each block, from the normal equations.
+Matrix6d covariance_of_minima(const Squares& cost) {
+  Matrix6d sum = Matrix6d::Zero();
+  for (int block = 0; block < Squares::kBlocks; ++block) {
+    const Vector6d motion = cost.minimum(block) - cost.minimum();
+    sum += motion * motion.transpose();
+  }
+  return in_radians(sum);
+}
+
 TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
   const Squares cost(0.05);
   const Vector6d least = cost.minimum();
-  Matrix6d expected = Matrix6d::Zero();
-  for (int block = 0; block < Squares::kBlocks; ++block) {
-    const Vector6d motion = cost.minimum(block) - least;
-    expected += motion * motion.transpose();
-  }
-  expected = in_radians(expected);
+  const Matrix6d expected = covariance_of_minima(cost);
   const marrow::FragmentFrame about = frame();
   const marrow::RigidTransform pose = marrow::search::moved_by_units(bottom(), about, least);
   const PredictedCovariance predicted(cost, pose, about);
@@ -144,6 +149,34 @@ TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlock) {
   EXPECT_EQ(predicted.evaluations(), 3 + 25) << "the value, the derivatives twice, and a line of poses";
   // Derivatives say nothing about a minimum that is wider than degrees, and this cost has no blocks to try.
   EXPECT_FALSE(PredictedCovariance(Squares(50), pose, about).covariance());
+}
+
+TEST(PredictedCovariance, IsThatOfTheMinimaWithoutEachBlockByDifferencesToo) {
+  class Values : public Squares {
+   public:
+    using Squares::Squares;
+    std::optional<Expansion> expansion(const marrow::RigidTransform&, const marrow::FragmentFrame&) const override {
+      return std::nullopt;
+    }
+    std::vector<double> without_each_block(const marrow::RigidTransform& pose) const override {
+      std::vector<double> values;
+      for (const Expansion& without : Squares::expansion_without_each_block(pose, frame()))
+        values.push_back(without.value);
+      return values;
+    }
+    std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform&,
+                                                        const marrow::FragmentFrame&) const override {
+      return {};
+    }
+  };
+  const Values cost(0.05);
+  const marrow::FragmentFrame about = frame();
+  const marrow::RigidTransform pose = marrow::search::moved_by_units(bottom(), about, cost.minimum());
+  const PredictedCovariance predicted(cost, pose, about);
+  const Matrix6d expected = covariance_of_minima(cost);
+  ASSERT_TRUE(predicted.covariance());
+  EXPECT_LT((*predicted.covariance() - expected).norm(), 1e-3 * expected.norm()) << *predicted.covariance() << "\n\n"
+                                                                                 << expected;
 }
 
 TEST(PredictedCovariance, IsAbsentIfTheCostHasNoBlocks) {

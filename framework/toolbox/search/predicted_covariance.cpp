@@ -56,11 +56,17 @@ PredictedCovariance::PredictedCovariance(const Cost& cost, const RigidTransform&
   for (int round = 1;; ++round) {
     choose_steps();
     const Matrix6d h = hessian();
-    invert(h, scatter(), round == 1 ? kFlat : kFlatLater);
-    const double wanted_before = wanted_rise_;
+    const Eigen::MatrixXd at_ends = without_each_block_at_ends();
+    const auto gradient = gradients(at_ends);
+    const double flat = round == 1 ? kFlat : kFlatLater;
+    noise_ = (inverse(h, flat) * gradient.transpose() * gradient).trace() / 6;
+    const double least_curvature = eigen_of_symmetric(h).values[0] / wanted_rise_, wanted_before = wanted_rise_;
     wanted_rise_ = std::min(wanted_rise_, kWantedRise * noise_);
-    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature_ > kFlatLater);
-    if (steps_are_right || round == kMostRounds) break;
+    const bool steps_are_right = wanted_rise_ > 0.5 * wanted_before && (round > 1 || least_curvature > kFlatLater);
+    if (steps_are_right || round == kMostRounds) {
+      move_without_each_block(at_ends, flat);
+      break;
+    }
     turn_steps(h);
   }
   widen();
@@ -146,43 +152,63 @@ void PredictedCovariance::choose_steps() {
   for (const int count : evaluations) evaluations_ += count;
 }
 
-/// The Hessian in units of the steps. A mixed second derivative is the mean rise along the diagonal of two axes, in
-/// both senses, minus the rises along the two axes.
-Matrix6d PredictedCovariance::hessian() {
+/// Both ends of the diagonal of each two axes.
+std::vector<RigidTransform> PredictedCovariance::diagonals() const {
   std::vector<RigidTransform> poses;
   for (int i = 0; i < 6; ++i)
     for (int j = 0; j < i; ++j)
       for (const double sense : {1.0, -1.0}) poses.push_back(pose_at(sense * (steps_.col(i) + steps_.col(j))));
-  const std::vector<double> values = cost_.values(poses);
-  evaluations_ += int(values.size());
+  return poses;
+}
+
+/// The Hessian in units of the steps. A mixed second derivative is the mean rise along the diagonal of two axes, in
+/// both senses, minus the rises along the two axes.
+Matrix6d PredictedCovariance::hessian_of(double value, const Vector6d& rises,
+                                         const Eigen::VectorXd& at_diagonals) const {
   Matrix6d h;
-  auto value = values.begin();
+  Eigen::Index end = 0;
   for (int i = 0; i < 6; ++i) {
-    h(i, i) = 2 * rises_[i];
-    for (int j = 0; j < i; ++j, value += 2)
-      h(i, j) = h(j, i) = 0.5 * (value[0] + value[1]) - value_ - rises_[i] - rises_[j];
+    h(i, i) = 2 * rises[i];
+    for (int j = 0; j < i; ++j, end += 2)
+      h(i, j) = h(j, i) = 0.5 * (at_diagonals[end] + at_diagonals[end + 1]) - value - rises[i] - rises[j];
   }
   for (int i = 0; i < 6; ++i)
     if (open_[std::size_t(i)]) h.row(i).setZero(), h.col(i).setZero();
   return h;
 }
 
-/// The sum over the blocks of g g^T, in units of the steps.
-Matrix6d PredictedCovariance::scatter() {
-  std::array<std::vector<double>, 12> without;
-  tbb::parallel_for(0, 12, [&](int i) {
-    without[std::size_t(i)] = cost_.without_each_block(pose_at((i % 2 ? -1 : 1) * steps_.col(i / 2)));
-  });
-  evaluations_ += 12;
-  Matrix6d sum = Matrix6d::Zero();
-  for (std::size_t block = 0; block < without[0].size(); ++block) {
-    Vector6d gradient;
-    for (std::size_t axis = 0; axis < 6; ++axis)
-      gradient[int(axis)] =
-          0.5 * ((without[2 * axis][block] - ends_[2 * axis]) - (without[2 * axis + 1][block] - ends_[2 * axis + 1]));
-    sum += gradient * gradient.transpose();
-  }
-  return sum;
+Matrix6d PredictedCovariance::hessian() {
+  const std::vector<double> values = cost_.values(diagonals());
+  evaluations_ += int(values.size());
+  return hessian_of(value_, rises_, Eigen::Map<const Eigen::VectorXd>(values.data(), Eigen::Index(values.size())));
+}
+
+/// Values without each block at all poses: in each row those of one block.
+Eigen::MatrixXd PredictedCovariance::without_each_block(const std::vector<RigidTransform>& poses) {
+  std::vector<std::vector<double>> values(poses.size());
+  tbb::parallel_for(std::size_t(0), poses.size(),
+                    [&](std::size_t i) { values[i] = cost_.without_each_block(poses[i]); });
+  evaluations_ += int(poses.size());
+  Eigen::MatrixXd rows(Eigen::Index(values[0].size()), Eigen::Index(poses.size()));
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    rows.col(Eigen::Index(i)) = Eigen::Map<const Eigen::VectorXd>(values[i].data(), rows.rows());
+  return rows;
+}
+
+/// At both ends of each step.
+Eigen::MatrixXd PredictedCovariance::without_each_block_at_ends() {
+  std::vector<RigidTransform> poses;
+  for (int end = 0; end < 12; ++end) poses.push_back(pose_at((end % 2 ? -1 : 1) * steps_.col(end / 2)));
+  return without_each_block(poses);
+}
+
+/// The gradients, in units of the steps, of the changes that leaving out a block makes. One block in each row.
+Eigen::Matrix<double, Eigen::Dynamic, 6> PredictedCovariance::gradients(const Eigen::MatrixXd& at_ends) const {
+  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(at_ends.rows(), 6);
+  for (int axis = 0; axis < 6; ++axis)
+    gradients.col(axis) = 0.5 * ((at_ends.col(2 * axis).array() - ends_[std::size_t(2 * axis)]) -
+                                 (at_ends.col(2 * axis + 1).array() - ends_[std::size_t(2 * axis + 1)]));
+  return gradients;
 }
 
 /// The next steps go along the eigenvectors of the Hessian, which keep the directions that are open.
@@ -202,22 +228,35 @@ void PredictedCovariance::turn_steps(const Matrix6d& hessian) {
         std::clamp(steps_.col(i).cwiseAbs().maxCoeff(), kLeastStep, kMostStep) / steps_.col(i).cwiseAbs().maxCoeff();
 }
 
-/// After the first round the steps are nearly eigenvectors, so a smaller curvature than `flat` is roughness. Also sets
-/// the noise to the mean rise of the cost that the covariance stands for.
-void PredictedCovariance::invert(const Matrix6d& hessian, const Matrix6d& scatter, double flat) {
-  constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
-  Matrix6d open = Matrix6d::Zero();
-  for (int i = 0; i < 6; ++i)
-    if (open_[std::size_t(i)]) open(i, i) = kMostVariance;
+/// The inverse in the directions that are not open. After the first round the steps are nearly eigenvectors, so a
+/// smaller curvature than `flat` is roughness.
+Matrix6d PredictedCovariance::inverse(const Matrix6d& hessian, double flat) const {
   const SymmetricEigen<6> eigen = eigen_of_symmetric(hessian);
-  least_curvature_ = eigen.values[0] / wanted_rise_;
   Matrix6d inverse = Matrix6d::Zero();
   for (int i = 0; i < 6; ++i)
     inverse += eigen.vectors.col(i) * eigen.vectors.col(i).transpose() / std::max(eigen.values[i], flat * wanted_rise_);
   for (int i = 0; i < 6; ++i)
     if (open_[std::size_t(i)]) inverse.row(i).setZero(), inverse.col(i).setZero();
-  noise_ = (inverse * scatter).trace() / 6;
-  in_units_ = steps_ * inverse * scatter * inverse * steps_.transpose();
+  return inverse;
+}
+
+void PredictedCovariance::move_without_each_block(const Eigen::MatrixXd& at_ends, double flat) {
+  constexpr double kMostVariance = 100 * 100;  // in squared steps; used for directions that nothing determines
+  const Eigen::MatrixXd at_pose = without_each_block({pose_}), at_diagonals = without_each_block(diagonals());
+  const auto gradient = gradients(at_ends);
+  Matrix6d sum = Matrix6d::Zero();
+  for (Eigen::Index block = 0; block < at_ends.rows(); ++block) {
+    Vector6d rises;
+    for (int axis = 0; axis < 6; ++axis)
+      rises[axis] = 0.5 * (at_ends(block, 2 * axis) + at_ends(block, 2 * axis + 1)) - at_pose(block, 0);
+    const Matrix6d h = hessian_of(at_pose(block, 0), rises, at_diagonals.row(block));
+    const Vector6d motion = inverse(h, flat) * gradient.row(block).transpose();
+    sum += motion * motion.transpose();
+  }
+  in_units_ = steps_ * sum * steps_.transpose();
+  Matrix6d open = Matrix6d::Zero();
+  for (int i = 0; i < 6; ++i)
+    if (open_[std::size_t(i)]) open(i, i) = kMostVariance;
   set_covariance(steps_ * open * steps_.transpose());
 }
 

@@ -17,12 +17,11 @@ RigidTransform moved_by_units(const RigidTransform& pose, const FragmentFrame& f
 /// covariance is the sum of the squares of these motions. So it follows the residuals' own noise, and their correlation
 /// within a block.
 ///
-/// If the cost gives its derivatives without each block, H is the Hessian without the block. This matters where a block
-/// alone determines a direction: the residuals that are left there are much smaller than its errors. Otherwise H is
-/// that of the whole cost (the infinitesimal jackknife: Jaeckel 1972), and derivatives are central differences along
-/// six directions. They are the axes first. If the cost is flat in a direction between them, they are then the
-/// eigenvectors of the Hessian, with a longer step in this direction. A step is four to eight standard deviations long:
-/// enough that the roughness of the cost does not matter.
+/// H is the Hessian without the block. This matters where a block alone determines a direction: the residuals that are
+/// left there are much smaller than its errors. The derivatives are the cost's own, if it has them. Otherwise they are
+/// central differences along six directions. These are the axes first. If the cost is flat in a direction between them,
+/// they are then the eigenvectors of the Hessian, with a longer step in this direction. A step is four to eight
+/// standard deviations long: enough that the roughness of the cost does not matter.
 ///
 /// Along the least certain direction the cost may have other minima, or be flatter than its curvature says. So the
 /// variance in this direction becomes that of the density exp(-cost / noise) along it, if this is twice as large.
@@ -48,10 +47,15 @@ class PredictedCovariance {
   void set_covariance(const Matrix6d& undetermined);
   void guess_steps();
   void choose_steps();
+  std::vector<RigidTransform> diagonals() const;
+  Matrix6d hessian_of(double value, const Vector6d& rises, const Eigen::VectorXd& at_diagonals) const;
   Matrix6d hessian();
-  Matrix6d scatter();
+  Matrix6d inverse(const Matrix6d& hessian, double flat) const;
+  Eigen::MatrixXd without_each_block(const std::vector<RigidTransform>& poses);
+  Eigen::MatrixXd without_each_block_at_ends();
+  Eigen::Matrix<double, Eigen::Dynamic, 6> gradients(const Eigen::MatrixXd& at_ends) const;
+  void move_without_each_block(const Eigen::MatrixXd& at_ends, double flat);
   void turn_steps(const Matrix6d& hessian);
-  void invert(const Matrix6d& hessian, const Matrix6d& scatter, double flat);
   void widen();
   void find_other_minima(const std::vector<RigidTransform>& poses, const std::vector<double>& values);
 
@@ -65,7 +69,6 @@ class PredictedCovariance {
   Matrix6d steps_ = 0.5 * Matrix6d::Identity();  ///< a direction in each column, in degrees and mm
   Vector6d rises_;                               ///< mean rises of the cost at both ends of each step
   std::array<double, 12> ends_{};                ///< the cost at both ends of each step
-  double least_curvature_ = 0;                   ///< of the Hessian, in units of the steps and the wanted rise
   std::array<bool, 6> open_{};                   ///< directions in which the cost hardly changes
   Matrix6d in_units_;                            ///< the covariance in degrees and mm, without open directions
   std::optional<Matrix6d> covariance_;
