@@ -11,7 +11,7 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostBytes = 100;       // bytes
+constexpr std::size_t kMostNameBytes = 100;   // bytes
 constexpr std::size_t kMostInFileName = 200;  // with an extension and a temporary's prefix it is below the usual 255
 
 /// As in URLs. `text` may have several bytes.
@@ -29,7 +29,7 @@ std::string percent_encoded(std::string_view text) {
 
 std::string fault_of_name(const std::string& name) {
   if (name.empty()) return "it is empty";
-  if (name.size() > kMostBytes) return "it has " + std::to_string(name.size()) + " bytes";
+  if (name.size() > kMostNameBytes) return "it has " + std::to_string(name.size()) + " bytes";
   if (name.find('/') != std::string::npos) return "it holds '/'";
   if (name.find('\\') != std::string::npos) return "it holds '\\'";
   if (printable(name) != name) return "it holds a control character or bytes that are no UTF-8";

@@ -9,7 +9,8 @@
 namespace marrow {
 namespace {
 
-constexpr std::size_t kMostBytes = 256'000;  // else a long value that is named often fills memory, terminal and records
+constexpr std::size_t kMostInputBytes =
+    256'000;  // else a long value that is named often fills memory, terminal and records
 
 }  // namespace
 
@@ -26,9 +27,9 @@ std::optional<std::string> InputTexts::put_into(const std::string& text, const P
     std::size_t end = i + 1;
     while (end < text.size() && (std::isalnum(static_cast<unsigned char>(text[end])) || text[end] == '_')) ++end;
     const std::string* value = value_of(text.substr(i + 1, end - i - 1), place);
-    if (value && (bytes_ += value->size()) > kMostBytes) {
+    if (value && (bytes_ += value->size()) > kMostInputBytes) {
       diagnostics_.add(
-          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostBytes / 1000) + " kB",
+          place, "the values of inputs make the pipeline longer than " + std::to_string(kMostInputBytes / 1000) + " kB",
           "give shorter values, or name them less often");
       return std::nullopt;
     }

@@ -11,6 +11,7 @@
 #include <set>
 #include <sstream>
 
+#include "build_note.hpp"
 #include "keys.hpp"
 #include "marrow/domain/error.hpp"
 #include "regular_file.hpp"
@@ -19,7 +20,6 @@ namespace marrow {
 namespace {
 
 namespace fs = std::filesystem;
-constexpr std::size_t kMostNote_bytes = 1 << 16;
 
 /// What the loader knows about a library: its own name, and the names of those that it links.
 struct Names {
@@ -92,35 +92,8 @@ bool is_of_the_system(const std::string& library) {
   return (library.starts_with("/usr/") && !library.starts_with("/usr/local/")) || library.starts_with("/lib");
 }
 
-/// The build id that the linker writes into each build as a note, or an empty text.
-std::string build_note(const RegularFile& file) {
-  Elf64_Ehdr header{};
-  if (file.read(&header, sizeof header, 0) < sizeof header || std::memcmp(header.e_ident, ELFMAG, SELFMAG) != 0 ||
-      header.e_phentsize != sizeof(Elf64_Phdr))
-    return "";
-  std::vector<Elf64_Phdr> segments(header.e_phnum);
-  file.read(segments.data(), segments.size() * sizeof(Elf64_Phdr), header.e_phoff);
-  for (const Elf64_Phdr& segment : segments) {
-    if (segment.p_type != PT_NOTE || segment.p_filesz > kMostNote_bytes) continue;
-    std::string text(segment.p_filesz, '\0');
-    text.resize(file.read(text.data(), text.size(), segment.p_offset));
-    const auto padded = [](std::size_t bytes) { return (bytes + 3) / 4 * 4; };
-    for (std::size_t at = 0; at + sizeof(Elf64_Nhdr) <= text.size();) {
-      Elf64_Nhdr note;
-      std::memcpy(&note, text.data() + at, sizeof note);
-      const std::size_t name = at + sizeof note, content = name + padded(note.n_namesz);
-      at = content + padded(note.n_descsz);
-      if (at > text.size() || note.n_namesz > text.size() || note.n_descsz > text.size()) break;
-      if (note.n_type == NT_GNU_BUILD_ID && text.compare(name, 4, "GNU", 4) == 0)
-        return text.substr(content, note.n_descsz);
-    }
-  }
-  return "";
-}
-
 Digest identity_of_package(const std::string& path, const struct stat& status) try {
   Hasher hasher;
-  hasher.add(fs::path(path).filename().string());
   const std::string note = build_note(RegularFile(path));
   hasher.add(note);
   hasher.add(std::int64_t(status.st_size));

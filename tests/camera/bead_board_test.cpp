@@ -126,13 +126,14 @@ struct Result {
   List<Camera> cameras;
   Calibration calibration;
   List<Picture> pictures;
+  Metrics report;
 };
 
 Result calibrated(const List<Image>& images) {
   const auto outputs =
       shipped::call("camera.bead_board", {{"images", shipped::list(images, "view")}}, {{"board", kBoardFile.string()}});
   return {outputs.at("camera").as_list<Camera>(), outputs.at("calibration").as<Calibration>(),
-          outputs.at("picture").as_list<Picture>()};
+          outputs.at("picture").as_list<Picture>(), outputs.at("report").as<Metrics>()};
 }
 
 TEST(BeadBoard, DeviceFromRenderedImages) {
@@ -161,6 +162,12 @@ TEST(BeadBoard, DeviceFromRenderedImages) {
 TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
   const Exposed exposed = expose(9, 6);
   const Result result = calibrated(exposed.images);
+  std::string names;
+  for (const auto& item : result.report.items) names += item.name + " ";
+  EXPECT_EQ(names,
+            "residual worst_residual beads outliers focal_u focal_u_deviation principal_u principal_u_deviation "
+            "focal_v focal_v_deviation principal_v principal_v_deviation k1 k1_deviation k2 k2_deviation k3 "
+            "k3_deviation ");
   View view{"view1", exposed.images[0], result.cameras[0], {}};
   apply_calibration(view, result.calibration);
   double worst = 0;

@@ -81,6 +81,33 @@ TEST(Histories, EachPartThatMayChangeAResultCounts) {
   }
 }
 
+TEST(Dependences, StartsDifferOnlyWhereTheyAreDrawn) {
+  marrow::Pipeline pipeline;
+  pipeline.nodes.resize(3);
+  pipeline.nodes[0].id = "start", pipeline.nodes[1].id = "pose", pipeline.nodes[2].id = "other";
+  marrow::Reference start;
+  start.node = 0;
+  pipeline.nodes[1].wires = {{0, {start}, false}};
+  Experiment experiment;
+  const auto on_start = [&] {
+    std::vector<bool> result;
+    for (const Dependence& one : dependences(pipeline, experiment)) result.push_back(one.on_start);
+    return result;
+  };
+  const std::vector<bool> none{false, false, false}, two{true, true, false};
+  EXPECT_EQ(on_start(), none) << "no protocol";
+  experiment.protocol.emplace();
+  experiment.protocol->node = "start";
+  experiment.protocol->rotation_deg = experiment.protocol->translation_mm = experiment.protocol->distance_mm = 0;
+  EXPECT_EQ(on_start(), none) << "all starts are the same";
+  for (double StartProtocol::*size :
+       {&StartProtocol::rotation_deg, &StartProtocol::translation_mm, &StartProtocol::distance_mm}) {
+    (*experiment.protocol).*size = 1;
+    EXPECT_EQ(on_start(), two);
+    (*experiment.protocol).*size = 0;
+  }
+}
+
 /// SplitMix64 as scipy_test.py has it as well.
 struct SplitMix {
   std::uint64_t state;

@@ -25,8 +25,10 @@ class ApartTest : public testing::Test {
     file = scratch.write("file.txt", word);
     marrow::Diagnostics diagnostics;
     const auto path = scratch.write(
-        "p.yaml", "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25}" + more +
-                      "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
+        "p.yaml",
+        "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25, words: [one, "
+        ", three]}" +
+            more + "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
     pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
     settings.threads = 2;
@@ -58,6 +60,7 @@ class ApartTest : public testing::Test {
 TEST_F(ApartTest, GivesWhatTheNodeGives) {
   const RunResult result = run("hello");
   EXPECT_NE(pid_t(value(result, 0, 1)), getpid());
+  EXPECT_EQ(value(result, 0, 2), 11) << "letters of the words";
   const double drawn = value(result, 0) - 1.25;
   EXPECT_EQ(drawn, std::floor(drawn));
   settings.seed = 4;

@@ -35,6 +35,7 @@ NEAR = {
         "cli_ca",
         "cli_co",
         "cli_d",
+        "cli_k",
         "cli_mu",
         "cli_na",
         "cli_nu",

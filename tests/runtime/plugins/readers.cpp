@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdlib>
 #include <fstream>
+#include <numeric>
 #include <opencv2/core.hpp>
 #include <thread>
 
@@ -16,6 +17,7 @@ using marrow::Metrics;
 struct Options {
   std::filesystem::path path;
   double value = 0;
+  std::vector<std::string> words;
 };
 
 Metrics number(const Options& options, const Metrics* added, marrow::Context& context) {
@@ -45,7 +47,8 @@ Metrics number(const Options& options, const Metrics* added, marrow::Context& co
   context.warn("a warning of " + word);
   context.progress(0.5, "half");
   return {{{"value", options.value + double(context.seed() % 1000) + (added ? added->items.at(0).value : 0), ""},
-           {"process", double(getpid()), ""}}};
+           {"process", double(getpid()), ""},
+           {"letters", double(std::accumulate(options.words.begin(), options.words.end(), std::string()).size()), ""}}};
 }
 }  // namespace
 
@@ -57,5 +60,6 @@ MARROW_PLUGIN(plugin) {
       .in("added", "a number")
       .out("number", "the number")
       .option("path", &Options::path, "a file")
-      .option("value", &Options::value, "a number");
+      .option("value", &Options::value, "a number")
+      .option("words", &Options::words, "words");
 }
