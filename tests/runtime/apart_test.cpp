@@ -26,8 +26,8 @@ class ApartTest : public testing::Test {
     marrow::Diagnostics diagnostics;
     const auto path = scratch.write(
         "p.yaml",
-        "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25, words: [one, "
-        ", three]}" +
+        "marrow: 1\nnodes:\n  r: {uses: parse.test_number, with: {path: file.txt, value: 1.25, words: [one, two, "
+        "three]}" +
             more + "}\n  other: {uses: test.constant, with: {value: 5}}\noutputs: {r: r, other: other}\n");
     pipeline = marrow::read_pipeline(path, {}, test_catalogue(), diagnostics);
     EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
