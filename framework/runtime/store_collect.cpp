@@ -20,6 +20,7 @@ using Kind = StoreItem::Kind;
 using FileClock = fs::file_time_type::clock;
 
 constexpr auto kDay = std::chrono::hours(24);
+constexpr auto kMinute = std::chrono::minutes(1);
 
 std::uint64_t bytes_of(const fs::path& path) {
   std::error_code error;
@@ -172,7 +173,7 @@ std::string Store::tidy() const {
   const fs::path mark = folder_ / "tidied";
   std::error_code error;
   const auto age = FileClock::now() - fs::last_write_time(mark, error);
-  if (!error && age >= FileClock::duration::zero() && age < kDay) return "";  // a mark from the future says nothing
+  if (!error && age >= FileClock::duration::zero() && age < kMinute) return "";  // a mark from the future says nothing
   constexpr std::string_view kText = "when the store was last brought back to its size\n";
   write_whole(mark, [&](Archive& out) { out.bytes(kText.data(), kText.size()); });
   return collect(*limit).fault;

@@ -127,13 +127,15 @@ struct Result {
   Calibration calibration;
   List<Picture> pictures;
   Metrics report;
+  List<Metrics> poses;
 };
 
 Result calibrated(const List<Image>& images) {
   const auto outputs =
       shipped::call("camera.bead_board", {{"images", shipped::list(images, "view")}}, {{"board", kBoardFile.string()}});
   return {outputs.at("camera").as_list<Camera>(), outputs.at("calibration").as<Calibration>(),
-          outputs.at("picture").as_list<Picture>(), outputs.at("report").as<Metrics>()};
+          outputs.at("picture").as_list<Picture>(), outputs.at("report").as<Metrics>(),
+          outputs.at("poses").as_list<Metrics>()};
 }
 
 TEST(BeadBoard, DeviceFromRenderedImages) {
@@ -168,6 +170,12 @@ TEST(BeadBoard, ImagesReadWithTheCalibrationAreThoseOfAPinhole) {
             "residual worst_residual beads outliers focal_u focal_u_deviation principal_u principal_u_deviation "
             "focal_v focal_v_deviation principal_v principal_v_deviation k1 k1_deviation k2 k2_deviation k3 "
             "k3_deviation ");
+  std::map<std::string, double> pose;
+  for (const auto& item : result.poses[0].items) pose[item.name] = item.value;
+  EXPECT_EQ(pose.size(), 8u);
+  EXPECT_GT(pose.at("translation_x_deviation"), 0);
+  EXPECT_LT(pose.at("translation_x_deviation") + pose.at("translation_y_deviation"), pose.at("translation_z_deviation"))
+      << "depth is seen worst";
   View view{"view1", exposed.images[0], result.cameras[0], {}};
   apply_calibration(view, result.calibration);
   double worst = 0;

@@ -82,6 +82,7 @@ TEST(CaptureRange, PassesOverEmptyBinsButReachesNoFurtherByThem) {
   EXPECT_EQ(capture_range(outcomes).range, 4) << "4 to 10 mm were not tried";
   EXPECT_EQ(capture_range({{9, false}}).range, 0) << "0 to 8 mm were not tried";
   EXPECT_FALSE(capture_range({{9, false}}).is_open);
+  EXPECT_EQ(capture_range({{0.3, true}, {0.4, true}}, 0.1).range, 0.4) << "no farther than was tried";
   EXPECT_EQ(capture_range({}).range, 0);
   EXPECT_FALSE(capture_range({}).is_open);
 }

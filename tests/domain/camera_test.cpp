@@ -115,6 +115,20 @@ TEST(Camera, CheckNamesTheFault) {
   EXPECT_NE(message_of([&] { check_camera(camera, "view 'a'"); }).find("not a rotation"), std::string::npos);
 }
 
+TEST(Camera, DistortionThatMoreThanDoublesTheImageIsRefused) {
+  // The corner is at radius 0.5 sqrt(2) of the normalised image, so its square is 0.5.
+  Eigen::Matrix3d intrinsics;
+  intrinsics << 1000, 0, 499.5, 0, 1000, 499.5, 0, 0, 1;
+  const auto fault = [&](double factor_at_corner) {
+    marrow::RadialDistortion distortion;
+    distortion.k[0] = (factor_at_corner - 1) / 0.5;
+    return message_of([&] { check_distortion(intrinsics, distortion, 1000, 1000, "camera 'c'"); });
+  };
+  EXPECT_EQ(fault(1.95), "");
+  EXPECT_TRUE(fault(2.1).starts_with("camera 'c': the radial distortion folds the image or more than doubles it, "))
+      << fault(2.1);
+}
+
 TEST(View, CheckNamesTheFault) {
   marrow::View view{"lateral", {cv::Mat(800, 400, CV_8U, cv::Scalar(0))}, frontal(), {}};
   EXPECT_EQ(message_of([&] { check_view(view); }), "");

@@ -65,6 +65,7 @@ TEST_F(ExecutorTest, MapsOverListsInStepAndNested) {
           "step: step, nest: nest, sum: sum");
   const marrow::Value step = output(result, 0);
   ASSERT_EQ(step.names, (std::vector<std::string>{"a", "b"}));
+  EXPECT_EQ(step.type, marrow::TypeInfo::of<marrow::Metrics>());
   EXPECT_EQ(step.items[1].as<marrow::Metrics>().items[0].value, 40);
   const marrow::Value nest = output(result, 1);
   ASSERT_EQ(nest.axis, "side");

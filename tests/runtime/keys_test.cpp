@@ -227,6 +227,23 @@ TEST_F(Keys, WritesThroughMemoryDoNotPass) {
   munmap(text, 10000);
 }
 
+TEST_F(Keys, FilesInMemoryAreReadEachTime) {
+  struct statfs system {};
+  if (statfs("/dev/shm", &system) != 0 || system.f_type != TMPFS_MAGIC) GTEST_SKIP() << "there is no tmpfs";
+  const std::string file = "/dev/shm/marrow-keys-" + std::to_string(getpid());
+  std::ofstream(file) << std::string(100, 'x');
+  const int descriptor = open(file.c_str(), O_RDWR | O_CLOEXEC);
+  auto* text = static_cast<char*>(mmap(nullptr, 100, PROT_READ | PROT_WRITE, MAP_SHARED, descriptor, 0));
+  close(descriptor);
+  ASSERT_NE(static_cast<void*>(text), MAP_FAILED);
+  std::this_thread::sleep_for(std::chrono::milliseconds(3100));  // elsewhere a digest is kept from then on
+  const Digest before = marrow::path_digest(file);
+  text[50] = 'a';  // gives the file no new time
+  EXPECT_NE(marrow::path_digest(file), before);
+  munmap(text, 100);
+  fs::remove(file);
+}
+
 TEST_F(Keys, OfResults) {
   const Digest recipe{1, 2}, build{3, 4};
   const Digest key = marrow::result_key(recipe, build, false, 1);

@@ -54,6 +54,19 @@ TEST_F(StoreTest, AResultThatAnotherProcessMakesIsWaitedFor) {
   waitpid(child, nullptr, 0);
 }
 
+TEST_F(StoreTest, NoFileStaysOpen) {
+  const auto open_files = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
+  };
+  const Digest key = marrow::hash_of(1);
+  std::filesystem::create_directories(store.folder() / key.hex().substr(0, 2) / key.hex());  // a folder is no entry
+  const auto before = open_files();
+  { const Store::Claim claim = store.claim(marrow::hash_of(2), nullptr); }
+  EXPECT_EQ(open_files(), before) << "claim";
+  EXPECT_FALSE(store.find(key));
+  EXPECT_EQ(open_files(), before) << "entry";
+}
+
 TEST_F(StoreTest, AKilledProcessGivesItsClaimsBack) {
   const Digest key = marrow::hash_of(1);
   const pid_t child = claimer(store, key, [] { std::this_thread::sleep_for(std::chrono::hours(1)); });

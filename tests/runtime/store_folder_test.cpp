@@ -316,13 +316,17 @@ TEST_F(StoreFolderTest, AWrongLimitRemovesNothing) {
   EXPECT_TRUE(store.find(marrow::hash_of(1))) << "an empty one counts as not set";
 }
 
-TEST_F(StoreFolderTest, ItIsTidiedOnceADayWhateverTheClockOnceSaid) {
+TEST_F(StoreFolderTest, ItIsTidiedOnceAMinuteWhateverTheClockOnceSaid) {
   ASSERT_EQ(save(store), "");
   environment.set("MARROW_CACHE_GB", "1");
   EXPECT_EQ(store.tidy(), "");
   environment.set("MARROW_CACHE_GB", "0");
   EXPECT_EQ(store.tidy(), "");
   EXPECT_TRUE(store.find(marrow::hash_of(1))) << "it was tidied up just now";
+  fs::last_write_time(folder / "tidied", fs::file_time_type::clock::now() - std::chrono::seconds(61));
+  EXPECT_EQ(store.tidy(), "");
+  EXPECT_FALSE(store.find(marrow::hash_of(1)));
+  ASSERT_EQ(save(store), "");
   fs::last_write_time(folder / "tidied", fs::file_time_type::clock::now() + std::chrono::hours(24 * 365));
   EXPECT_EQ(store.tidy(), "");
   EXPECT_FALSE(store.find(marrow::hash_of(1)));

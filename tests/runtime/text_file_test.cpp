@@ -3,6 +3,7 @@
 #include "framework/runtime/text_file.hpp"
 
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <thread>
 
@@ -119,6 +120,16 @@ TEST_F(TextFileTest, ManyWritersLeaveOneWholeFile) {
   const std::string text = read_text_file(scratch.path / "file", 20000);
   EXPECT_EQ(text, std::string(20000, text[0]));
   EXPECT_EQ(files(), 1u);
+}
+
+TEST_F(TextFileTest, ReadsWhereStandardInputIsClosed) {
+  const fs::path file = scratch.write("file", "text");
+  const int kept = dup(STDIN_FILENO);
+  close(STDIN_FILENO);
+  const std::string fault = fault_of([&] { EXPECT_EQ(read_text_file(file, 100), "text"); });
+  dup2(kept, STDIN_FILENO);
+  close(kept);
+  EXPECT_EQ(fault, "none");
 }
 
 }  // namespace text_file_test

@@ -104,8 +104,7 @@ class Comparison {
     write_tables(experiment_, rows, answer, folder_);
     const std::vector<CellIndex> shown = cells_to_show(experiment_, rows, request_.shown);
     if (!draw(shown)) return stopped();
-    const std::string untidy = request_.no_cache ? "" : store_.tidy();
-    if (!untidy.empty())
+    if (const std::string untidy = tidy(); !untidy.empty())
       std::fprintf(stderr, "marrow: note: the store of results is not tidied up: %s\n", untidy.c_str());
     write_report(experiment_, rows, answer, runner_, shown, request_, folder_);
     print_counts(rows);
@@ -122,6 +121,8 @@ class Comparison {
     std::fprintf(stderr, "marrow: %s; the same command goes on from here\n", stopped_text().c_str());
     return 130;
   }
+
+  std::string tidy() const { return request_.no_cache ? "" : store_.tidy(); }
 
   Job job_of(const char* what, const CellIndex& cell, std::string group) const {
     const std::size_t number = number_of(cell);
@@ -166,6 +167,7 @@ class Comparison {
       const CellIndex& cell = cells_[job.number];
       CellRow row = row_of(cell, end);
       runner_.write(cell, row);
+      tidy();  // thousands of cells would fill the disk before the end; a fault is said there
       progress.done(++done, row.id + (row.failed.empty() ? "" : " failed: " + row.failed) +
                                 (row.absent.empty() ? "" : ": " + row.absent));
       rows_[job.number] = std::move(row);

@@ -124,9 +124,9 @@ class Store {
   /// comparison is using stay. Also removes what killed processes left behind. Touches only files and folders with
   /// names that the store itself gives, and follows no links.
   Freed collect(std::uint64_t keep_bytes) const;
-  /// Calls collect() with the limit MARROW_CACHE_GB (20 if it is not set), but at most once a day. It is called after a
-  /// run, so that the store does not fill the disk. Returns what could not be removed. If MARROW_CACHE_GB is wrong,
-  /// returns why and removes nothing.
+  /// Calls collect() with the limit MARROW_CACHE_GB (20 if it is not set), but at most once a minute. It is called
+  /// after a run and during a comparison, so that the store does not fill the disk. Returns what could not be removed.
+  /// If MARROW_CACHE_GB is wrong, returns why and removes nothing.
   std::string tidy() const;
 
  private:
