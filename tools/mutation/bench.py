@@ -43,6 +43,7 @@ NEAR = {
         "cli_r",
         "cli_sc",
         "cli_w",
+        "conformance_optimizer",
     ],
     "framework/compare": ["compare.", "compare_", "cli_compare", "cli_commands"],
     "plugins/camera": ["camera.", "conformance_camera", "cli_schema"],
