@@ -59,9 +59,13 @@ TEST_F(StoreTest, NoFileStaysOpen) {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"), std::filesystem::directory_iterator());
   };
   const Digest key = marrow::hash_of(1);
+  ASSERT_EQ(store.prepare(), "");
   std::filesystem::create_directories(store.folder() / key.hex().substr(0, 2) / key.hex());  // a folder is no entry
   const auto before = open_files();
-  { const Store::Claim claim = store.claim(marrow::hash_of(2), nullptr); }
+  {
+    const Store::Claim claim = store.claim(marrow::hash_of(2), nullptr);
+    EXPECT_EQ(open_files(), before + 1) << "the claim is held";
+  }
   EXPECT_EQ(open_files(), before) << "claim";
   EXPECT_FALSE(store.find(key));
   EXPECT_EQ(open_files(), before) << "entry";
