@@ -62,14 +62,11 @@ void CellRunner::add_pipeline(Hasher& hasher, const Pipeline& pipeline, const fs
   std::set<Digest> build_ids;
   std::set<std::string> paths;
   if (!case_folder.empty()) paths.insert(fs::absolute(case_folder).string());
-  const std::vector<bool> needed = pipeline.needed();
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    const PipelineNode& node = pipeline.nodes[i];
-    const Digest build_id = catalogue_.library_of(node.info.name)->build_id;
+  for (const PipelineNode* node : called_nodes(pipeline)) {
+    const Digest build_id = catalogue_.library_of(node->info.name)->build_id;
     build_ids.insert(build_id);
-    if (keeps_dependencies_) dependencies_.builds.emplace(node.info.name, build_id);
-    if (needed[i])
-      for (const std::string& path : paths_of(node)) paths.insert(path);
+    if (keeps_dependencies_) dependencies_.builds.emplace(node->info.name, build_id);
+    for (const std::string& path : paths_of(*node)) paths.insert(path);
   }
   for (const Digest& id : build_ids) hasher.add(id);
   hasher.add(machine_digest());

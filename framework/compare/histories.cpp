@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+
 #include "marrow/compare/cell.hpp"
 
 namespace marrow::compare {
@@ -10,6 +12,13 @@ bool names_a_path(const NodeInfo& info) {
   return false;
 }
 
+/// Whether the node's result depends on the case by itself: by a path or by chance.
+bool depends_on_case(const PipelineNode& node) {
+  if (!node.repetition) return names_a_path(node.info) || node.info.random;
+  const std::vector<const PipelineNode*> called = called_nodes(node.repetition->first);
+  return std::any_of(called.begin(), called.end(), [](const PipelineNode* one) { return depends_on_case(*one); });
+}
+
 }  // namespace
 
 std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_name) {
@@ -18,7 +27,8 @@ std::vector<Digest> histories(const Pipeline& pipeline, const std::string& case_
     Hasher hasher;
     hasher.add(node.info.name);
     for (const OptionValue& option : node.options) std::visit([&](const auto& value) { hasher.add(value); }, option);
-    if (names_a_path(node.info) || node.info.random) hasher.add(case_name);
+    if (node.repetition) hasher.add(resolved_yaml(node.repetition->alone));
+    if (depends_on_case(node)) hasher.add(case_name);
     for (const Wire& wire : node.wires)
       for (const Reference& source : wire.sources) {
         hasher.add(node.info.inputs[std::size_t(wire.port)].name);
@@ -35,7 +45,7 @@ std::vector<Dependence> dependences(const Pipeline& pipeline, const Experiment& 
   const StartProtocol* protocol = experiment.protocol ? &*experiment.protocol : nullptr;
   std::vector<Dependence> result;
   for (const PipelineNode& node : pipeline.nodes) {
-    Dependence own{names_a_path(node.info) || node.info.random,
+    Dependence own{depends_on_case(node),
                    protocol && protocol->node == node.id &&
                        (protocol->rotation_deg > 0 || protocol->translation_mm > 0 || protocol->distance_mm > 0)};
     for (const Wire& wire : node.wires)

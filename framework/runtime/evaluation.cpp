@@ -38,6 +38,11 @@ void Evaluation::report(RunEvent::Kind kind, std::size_t node, const std::string
   settings_.observer({kind, pipeline_.nodes[node].id, item, std::move(text), fraction, seconds, level});
 }
 
+void Evaluation::forward(const RunEvent& event) const {
+  const std::scoped_lock lock(observer_mutex_);
+  settings_.observer(event);
+}
+
 Evaluation::Recipe Evaluation::recipe(std::size_t node, const Call& call, Contents* contents) const {
   const NodeInfo& info = pipeline_.nodes[node].info;
   const Digest recipe = recipe_of(pipeline_.nodes[node], call.inputs, contents);
@@ -162,6 +167,7 @@ std::string Evaluation::failure_text(std::size_t index, const std::string& item,
   const PipelineNode& node = pipeline_.nodes[index];
   std::string text = "node '" + node.id + "' (" + node.info.name + ")";
   if (!item.empty()) text += " for " + item;
+  if (!settings_.within.empty()) text += " in " + settings_.within;
   text += " failed: " + reason;
   std::string inputs;
   for (const Wire& wire : node.wires) {
@@ -186,8 +192,8 @@ Provenance Evaluation::provenance(std::size_t index, const std::vector<Value>& i
 }
 
 std::string Evaluation::place(std::size_t node, const std::string& item) const {
-  return std::filesystem::absolute(pipeline_.file).lexically_normal().string() + "\n" + pipeline_.nodes[node].id +
-         "\n" + item;
+  return std::filesystem::absolute(pipeline_.file).lexically_normal().string() + "\n" +
+         (settings_.within.empty() ? "" : settings_.within + "\n") + pipeline_.nodes[node].id + "\n" + item;
 }
 
 void Evaluation::remember(std::size_t node, const Call& call, const Recipe& recipe) {

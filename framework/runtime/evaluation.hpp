@@ -53,6 +53,8 @@ class Evaluation {
 
   void report(RunEvent::Kind kind, std::size_t node, const std::string& item, std::string text, double fraction = 0,
               double seconds = 0, LogLevel level = LogLevel::info) const;
+  /// Reports an event of a body.
+  void forward(const RunEvent& event) const;
   /// The result of a call that failed, which it reports. If the node may fail and `is_own`, this is a warning. A
   /// failure is not the node's own if the system refused what any node needs.
   CallResult failure(std::size_t node, const std::string& item, const std::string& reason, bool is_own = true) const;

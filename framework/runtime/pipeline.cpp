@@ -17,6 +17,7 @@
 #include "pipeline_names.hpp"
 #include "pipeline_options.hpp"
 #include "pipeline_references.hpp"
+#include "pipeline_repetition.hpp"
 #include "pipeline_text.hpp"
 
 namespace marrow {
@@ -36,7 +37,9 @@ class Resolver {
         tries_others_(!is_trial && diagnostics.empty()),
         input_texts_(written, diagnostics) {}
 
-  Pipeline resolve() {
+  /// `outer`: the files whose bodies hold this pipeline, and its own.
+  Pipeline resolve(const std::vector<fs::path>& outer = {}) {
+    files_ = outer;
     pipeline_.name = written_.name;
     pipeline_.help = written_.help;
     pipeline_.file = written_.file;
@@ -59,7 +62,11 @@ class Resolver {
     node.id = written.id;
     node.place = written.place;
     node.may_fail = written.may_fail;
-    if (const NodeInfo* info = catalogue_.find(written.uses)) {
+    if (written.repetition) {
+      resolve_repetition(
+          written, node, input_texts_,
+          [&](const PipelineArguments& arguments) { return read_body(written, arguments); }, diagnostics_);
+    } else if (const NodeInfo* info = catalogue_.find(written.uses)) {
       node.info = *info;
       if (const KindInfo* kind = catalogue_.find_kind(info->kind())) node.apart = kind->apart;
       resolve_options(written, node, input_texts_, unknown_values_, diagnostics_);
@@ -77,6 +84,33 @@ class Resolver {
       diagnostics_.add(written.uses_place, "unknown node " + in_quotes(written.uses), hint);
     }
     pipeline_.nodes.push_back(std::move(node));
+  }
+
+  ReadBody read_body(const WrittenNode& node, const PipelineArguments& arguments) {
+    constexpr std::size_t kMostBodies = 8;  // one in the other
+    const WrittenValue& body = node.repetition->body;
+    WrittenPipeline written;
+    std::vector<fs::path> files = files_;
+    if (body.value.IsScalar()) {
+      const auto text = input_texts_.put_into(body.value.Scalar(), body.place);
+      if (!text) return {};
+      const fs::path file = body.folder / *text;
+      std::error_code ignored;
+      files.push_back(fs::weakly_canonical(file, ignored));
+      if (std::count(files.begin(), files.end(), files.back()) > 1 || files.size() > kMostBodies) {
+        diagnostics_.add(body.place, in_quotes(*text) + " repeats itself: a body must not be its own body");
+        return {};
+      }
+      written = read_written_pipeline(file, arguments, diagnostics_, false);
+    } else {
+      written = read_written_body(written_.file, node.id, body.value, arguments, diagnostics_);
+    }
+    if (written.nodes.empty()) return {};
+    Resolver resolver(written, catalogue_, diagnostics_, !tries_others_);
+    ReadBody read{resolver.resolve(files), {}};
+    for (const auto& [option_of, option] : resolver.unknown_values_) read.incomplete.insert(option_of->id);
+    for (const std::string& note : read.pipeline.notes) pipeline_.notes.push_back(note);
+    return read;
   }
 
   const std::vector<std::string>& node_names() {
@@ -118,7 +152,7 @@ class Resolver {
     const WrittenNode& written = written_.nodes[index];
     PipelineNode& node = pipeline_.nodes[index];
     if (node.info.name.empty()) return;
-    const std::vector<KindPort>& of_kind = ports_of_kind(node.info.kind());
+    const std::vector<KindPort> of_kind = node.repetition ? std::vector<KindPort>() : ports_of_kind(node.info.kind());
     for (const auto& [name, value] : written.wires) {
       const auto port = std::find_if(node.info.inputs.begin(), node.info.inputs.end(),
                                      [&, n = name](const PortInfo& p) { return p.name == n; });
@@ -180,7 +214,7 @@ class Resolver {
     const PipelineNode& from = pipeline_.nodes[std::size_t(source.node)];
     const PortInfo& output = from.info.outputs[std::size_t(source.output)];
     const KindInfo* kind = catalogue_.find_kind(node.info.kind());
-    if (output.type.id == TypeInfo::of<Truth>().id && (!kind || !kind->sees_truth)) {
+    if (output.type.id == TypeInfo::of<Truth>().id && !node.repetition && (!kind || !kind->sees_truth)) {
       diagnostics_.add(source.place,
                        "the truth may be wired only to nodes of a kind that may see it, not to " + node.info.name,
                        "a method that sees the truth proves nothing");
@@ -217,7 +251,7 @@ class Resolver {
   const std::vector<std::string>& names_that_fit(std::size_t index) {
     constexpr std::size_t kMostNodes = 300, kMostTried = 4;
     static const std::vector<std::string> kNone;
-    if (!tries_others_ || written_.nodes.size() > kMostNodes) return kNone;
+    if (!tries_others_ || written_.nodes.size() > kMostNodes || written_.nodes[index].repetition) return kNone;
     if (const auto known = fitting_.find(index); known != fitting_.end()) return known->second;
     if (fitting_.size() == kMostTried) return kNone;
     std::vector<std::string>& names = fitting_[index];
@@ -277,6 +311,7 @@ class Resolver {
   UnknownValues unknown_values_;
   std::map<std::size_t, std::vector<std::string>> fitting_;  ///< by the index of the node
   InputTexts input_texts_;
+  std::vector<fs::path> files_;
 };
 
 }  // namespace
@@ -285,7 +320,8 @@ Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments,
                        Diagnostics& diagnostics, bool inputs_required) {
   const WrittenPipeline written = read_written_pipeline(file, arguments, diagnostics, inputs_required);
   if (written.nodes.empty()) return {};
-  return Resolver(written, catalogue, diagnostics).resolve();
+  std::error_code ignored;
+  return Resolver(written, catalogue, diagnostics).resolve({fs::weakly_canonical(file, ignored)});
 }
 
 }  // namespace marrow

@@ -7,6 +7,7 @@
 #include "may_fail.hpp"
 #include "pipeline_names.hpp"
 #include "pipeline_order.hpp"
+#include "pipeline_repetition.hpp"
 
 namespace marrow {
 namespace {
@@ -36,8 +37,9 @@ void sort_nodes(Pipeline& pipeline, Diagnostics& diagnostics) {
 }
 
 void check_picks(const Pipeline& pipeline, const Reference& source, Diagnostics& diagnostics) {
-  const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
-  const std::size_t axes = from.mapped_axes.size() + !from.info.outputs[std::size_t(source.output)].axis.empty();
+  Reference whole = source;
+  whole.items.clear();
+  const std::size_t axes = pipeline.axes_of(whole).size();
   if (source.items.size() > axes)
     diagnostics.add(source.place,
                     in_quotes(source.text) + " picks " + in_quotes(source.items[axes]) + ", but " +
@@ -51,6 +53,7 @@ void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) 
     for (const Reference& source : wire.sources) {
       check_picks(pipeline, source, diagnostics);
       if (!diagnostics.empty()) return;
+      if (node.repetition) continue;
       for (const std::string& axis : pipeline.axes_of(source)) {
         if (axis == consumed && wire.is_list_literal)
           diagnostics.add(source.place, in_quotes(source.text) + " is already a list over " + in_quotes(axis),
@@ -60,6 +63,7 @@ void find_axes(Pipeline& pipeline, std::size_t index, Diagnostics& diagnostics) 
       }
     }
   }
+  if (node.repetition) check_axes_of_repetition(pipeline, node, diagnostics);
   for (const PortInfo& output : node.info.outputs)
     if (!output.axis.empty() && contains(node.mapped_axes, output.axis))
       diagnostics.add(node.place,

@@ -25,6 +25,14 @@ class PipelineReader {
     folder_ = fs::absolute(file).parent_path();
   }
 
+  WrittenPipeline read_body(const std::string& name, const YAML::Node& root) {
+    is_body_ = true;
+    pipeline_.name = name;
+    read_root(root);
+    for (const Override& one : arguments_.overrides) apply_override(one.key, one.value, one.place);
+    return pipeline_;
+  }
+
   WrittenPipeline read() {
     const auto text = read_source(pipeline_.file, "the pipeline file", diagnostics_);
     if (!text) return pipeline_;
@@ -38,7 +46,7 @@ class PipelineReader {
  private:
   void read_root(const YAML::Node& root) {
     static const std::vector<std::string> kKeys{"marrow", "name", "help", "inputs", "nodes", "outputs"};
-    const Place start{pipeline_.file.string(), 1, 1};
+    const Place start = is_body_ ? yaml_.place(root) : Place{pipeline_.file.string(), 1, 1};
     bool versioned = false, has_name = false, has_nodes = false, has_outputs = false;
     for (const YamlEntry& entry : yaml_.map(root, start, "the pipeline", &kKeys)) {
       if (entry.key == "marrow") {
@@ -66,8 +74,8 @@ class PipelineReader {
       }
     }
     if (!root.IsMap()) return;
-    if (!has_name) name_after_file(start);
-    if (!versioned) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
+    if (!has_name && !is_body_) name_after_file(start);
+    if (!versioned && !is_body_) yaml_.fault(start, "the key 'marrow' is missing", "begin the file with  marrow: 1");
     if (!has_nodes)
       yaml_.fault(start, "the key 'nodes' is missing", "name the nodes of the pipeline under it");
     else if (pipeline_.nodes.empty() && diagnostics_.empty())
@@ -153,7 +161,8 @@ class PipelineReader {
   }
 
   void read_node(const YamlEntry& entry) {
-    static const std::vector<std::string> kKeys{"uses", "with", "in", "may_fail"};
+    static const std::vector<std::string> kKeys{"uses", "with",  "in",      "may_fail", "repeat",
+                                                "over", "carry", "at_most", "until",    "if_pass_fails"};
     WrittenNode node;
     node.id = entry.key;
     node.place = entry.place;
@@ -161,6 +170,9 @@ class PipelineReader {
     if (entry.key.find('.') != std::string::npos)
       yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a dot",
                   "dots are for outputs, as in case.views");
+    if (entry.key.find('/') != std::string::npos)
+      yaml_.fault(entry.place, "the node's name " + in_quotes(entry.key) + " has a slash",
+                  "slashes are for nodes of a body, as in track/edges");
     if (entry.key.empty()) yaml_.fault(entry.place, "a node has no name", "write it as  name: {uses: kind.name}");
     bool has_uses = false;
     for (const YamlEntry& part : yaml_.map(entry.value, entry.place, "node " + in_quotes(entry.key), &kKeys)) {
@@ -170,6 +182,8 @@ class PipelineReader {
         node.uses = yaml_.text(part.value, part.place, "uses").value_or("");
       } else if (part.key == "may_fail") {
         node.may_fail = yaml_.boolean(part.value, part.place, may_fail_of(node.id)).value_or(false);
+      } else if (part.key != "with" && part.key != "in") {
+        read_repetition(node, part);
       } else {
         auto& target = part.key == "with" ? node.options : node.wires;
         for (const YamlEntry& item :
@@ -177,9 +191,65 @@ class PipelineReader {
           target.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
       }
     }
-    if (!has_uses && entry.value.IsMap())
+    if (node.repetition) {
+      check_repetition(node, has_uses);
+    } else if (!has_uses && entry.value.IsMap()) {
       yaml_.fault(entry.place, "node " + in_quotes(entry.key) + " does not say what it uses", "add  uses: kind.name");
+    }
     pipeline_.nodes.push_back(std::move(node));
+  }
+
+  void read_repetition(WrittenNode& node, const YamlEntry& part) {
+    if (!node.repetition) node.repetition.emplace();
+    WrittenRepetition& repetition = *node.repetition;
+    const std::string what = in_quotes(part.key) + " of node " + in_quotes(node.id);
+    if (part.key == "repeat") {
+      repetition.body = {yaml_.place(part.value), part.value, folder_};
+    } else if (part.key == "over") {
+      repetition.over_place = part.place;
+      repetition.over = yaml_.text(part.value, part.place, what).value_or("");
+    } else if (part.key == "until") {
+      repetition.until_place = part.place;
+      repetition.until = yaml_.text(part.value, part.place, what).value_or("");
+    } else if (part.key == "carry") {
+      for (const YamlEntry& item : yaml_.map(part.value, part.place, what))
+        repetition.carry.emplace_back(item.key, WrittenValue{item.place, item.value, folder_});
+    } else if (part.key == "at_most") {
+      repetition.at_most_place = part.place;
+      set_at_most(repetition, yaml_.integer(part.value, part.place, what));
+    } else {
+      set_if_pass_fails(repetition, part.place, yaml_.text(part.value, part.place, what));
+    }
+  }
+
+  void set_at_most(WrittenRepetition& repetition, const std::optional<std::int64_t>& passes) {
+    constexpr std::int64_t kMostPasses = 1'000'000;
+    if (passes && (*passes < 1 || *passes > kMostPasses))
+      diagnostics_.add(repetition.at_most_place, "'at_most' is " + std::to_string(*passes) +
+                                                     ", but must be a number of passes from 1 to 1000000");
+    else if (passes)
+      repetition.at_most = int(*passes);
+  }
+
+  void set_if_pass_fails(WrittenRepetition& repetition, const Place& place, const std::optional<std::string>& what) {
+    static const std::vector<std::string> kChoices{"end", "go_on"};
+    if (what && std::find(kChoices.begin(), kChoices.end(), *what) == kChoices.end())
+      diagnostics_.add(place, "'if_pass_fails' is " + in_quotes(*what) + ", but must be end or go_on",
+                       suggestion(*what, kChoices));
+    repetition.goes_on = what == "go_on";
+  }
+
+  void check_repetition(const WrittenNode& node, bool has_uses) {
+    const WrittenRepetition& repetition = *node.repetition;
+    const std::string who = "node " + in_quotes(node.id);
+    if (has_uses)
+      yaml_.fault(node.place, who + " has both 'uses' and a body", "leave out one of  uses:  and  repeat:");
+    else if (!repetition.body.value.IsDefined() || repetition.body.value.IsNull())
+      yaml_.fault(node.place, who + " does not say what it repeats",
+                  "add  repeat: FILE  with the body, a pipeline file");
+    else if (repetition.over.empty() && repetition.at_most == 0 && !repetition.over_place.line)
+      yaml_.fault(node.place, who + " need not end: it goes over no axis and has no limit of passes",
+                  "add  over: AXIS,  or  at_most: PASSES");
   }
 
   static std::string may_fail_of(const std::string& node) { return "'may_fail' of node " + in_quotes(node); }
@@ -204,6 +274,7 @@ class PipelineReader {
       return;
     }
     const std::string what = key.substr(dot + 1);
+    if (node->repetition && set_repetition(*node, what, text, place, written)) return;
     const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
     if (what == "uses" && text.empty()) {
       diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses",
@@ -234,9 +305,32 @@ class PipelineReader {
       target.emplace_back(name, value);
   }
 
+  /// Whether the override is one of the repetition; then it is done.
+  bool set_repetition(WrittenNode& node, const std::string& what, const std::string& text, const Place& place,
+                      const Place& written) {
+    WrittenRepetition& repetition = *node.repetition;
+    StrictYaml yaml(place, diagnostics_);
+    const YAML::Node value(text);
+    if (what.starts_with("body.")) {
+      repetition.overrides.push_back({what.substr(5), text, written.file.empty() ? Place{} : place});
+    } else if (what == "at_most") {
+      repetition.at_most_place = place;
+      set_at_most(repetition, yaml.integer(value, place, "'at_most'"));
+    } else if (what == "until") {
+      repetition.until_place = place;
+      repetition.until = text;
+    } else if (what == "if_pass_fails") {
+      set_if_pass_fails(repetition, place, text);
+    } else {
+      return false;
+    }
+    return true;
+  }
+
   const PipelineArguments& arguments_;
   Diagnostics& diagnostics_;
   bool inputs_required_;
+  bool is_body_ = false;
   StrictYaml yaml_;
   WrittenPipeline pipeline_;
   fs::path folder_;
@@ -244,6 +338,11 @@ class PipelineReader {
 };
 
 }  // namespace
+
+WrittenPipeline read_written_body(const fs::path& file, const std::string& name, const YAML::Node& body,
+                                  const PipelineArguments& arguments, Diagnostics& diagnostics) {
+  return PipelineReader(file, arguments, diagnostics, false).read_body(name, body);
+}
 
 WrittenPipeline read_written_pipeline(const fs::path& file, const PipelineArguments& arguments,
                                       Diagnostics& diagnostics, bool inputs_required) {

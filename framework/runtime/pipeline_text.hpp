@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -19,6 +20,20 @@ struct WrittenValue {
   bool is_override = false;  ///< from an override: the parts of its text have no places of their own
 };
 
+/// The body of a node, as written.
+struct WrittenRepetition {
+  WrittenValue body;  ///< the name of a file, or the body itself
+  std::string over;   ///< empty for a loop
+  Place over_place;
+  std::vector<std::pair<std::string, WrittenValue>> carry;
+  std::string until;
+  Place until_place;
+  int at_most = 0;
+  Place at_most_place;
+  bool goes_on = false;
+  std::vector<Override> overrides;  ///< of the body
+};
+
 struct WrittenNode {
   std::string id;
   Place place;
@@ -27,6 +42,7 @@ struct WrittenNode {
   bool may_fail = false;
   std::vector<std::pair<std::string, WrittenValue>> options;
   std::vector<std::pair<std::string, WrittenValue>> wires;
+  std::optional<WrittenRepetition> repetition;
 };
 
 /// A pipeline file as written, with the overrides applied. No name in it has been looked up yet.
@@ -53,5 +69,8 @@ inline bool is_written(const std::vector<std::pair<std::string, WrittenValue>>& 
 
 WrittenPipeline read_written_pipeline(const std::filesystem::path& file, const PipelineArguments& arguments,
                                       Diagnostics& diagnostics, bool inputs_required);
+/// The body of a node that is written in the file of the pipeline itself. `name`: of the node.
+WrittenPipeline read_written_body(const std::filesystem::path& file, const std::string& name, const YAML::Node& body,
+                                  const PipelineArguments& arguments, Diagnostics& diagnostics);
 
 }  // namespace marrow

@@ -35,15 +35,13 @@ std::optional<fs::path> folder_that_holds(const std::vector<fs::path>& folders, 
 
 void expect_nothing_reads(const Pipeline& pipeline, const fs::path& place, const std::string& what,
                           const std::string& advice) {
-  const std::vector<bool> needed = pipeline.needed();
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    if (!needed[i]) continue;
-    for (const std::string& path : paths_of(pipeline.nodes[i])) {
+  for (const PipelineNode* node : called_nodes(pipeline)) {
+    for (const std::string& path : paths_of(*node)) {
       std::error_code error;
       const fs::path folder = real_path(path);
       if (!fs::is_directory(folder, error) || !folder_that_holds({folder}, place)) continue;
-      throw Error(what + " " + place.string() + " lies in " + folder.string() + ", a folder that node '" +
-                  pipeline.nodes[i].id + "' reads, which would change while it is read; " + advice);
+      throw Error(what + " " + place.string() + " lies in " + folder.string() + ", a folder that node '" + node->id +
+                  "' reads, which would change while it is read; " + advice);
     }
   }
 }

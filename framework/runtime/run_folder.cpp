@@ -116,6 +116,24 @@ json inputs_of(const PipelineNode& node, const RunResult& result) {
   return inputs;
 }
 
+/// The same for a node of a body. What it gets comes from nodes of the body, from what the passes were given, or both.
+json inputs_in_body(const PipelineNode& node, const Repetition& repetition, const PassesRecord& passes) {
+  json inputs = json::object();
+  for (const Wire& wire : node.wires) {
+    Hasher hasher;
+    for (const Reference& source : wire.sources) {
+      const std::vector<Value>& outputs = passes.nodes[std::size_t(source.node)].outputs;
+      if (std::size_t(source.output) < outputs.size()) hasher.add(key_of(outputs[std::size_t(source.output)]));
+      for (std::size_t i = 0; i < passes.given.size(); ++i) {
+        const Reference& target = repetition.given[i].target;
+        if (target.node == source.node && target.output == source.output) hasher.add(key_of(passes.given[i]));
+      }
+    }
+    inputs[node.info.inputs[std::size_t(wire.port)].name] = hasher.digest().hex();
+  }
+  return inputs;
+}
+
 /// The digests of what the node's options of type path named when the node read it; null if it was missing or
 /// unreadable.
 json files_of(const NodeRecord& record) {
@@ -155,6 +173,14 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
             {"random", node.info.random},
             {"files", files_of(record)}};
   if (!record.reason.empty()) j["reason"] = record.reason;
+  if (record.passes) {
+    j["passes"] = json::array();
+    for (const PassesRecord::Pass& pass : record.passes->passes) {
+      j["passes"].push_back({{"name", pass.name}, {"status", status_name(pass.status)}, {"seconds", pass.seconds}});
+      if (!pass.reason.empty()) j["passes"].back()["reason"] = pass.reason;
+    }
+    if (!record.passes->end.empty()) j["end"] = record.passes->end;
+  }
   if (record.stopped > 0) j["not_run_because_of_it"] = record.stopped;
   if (const LibraryInfo* library = catalogue.library_of(node.info.name)) {
     j["library"] = library->file.filename().string();
@@ -169,18 +195,28 @@ json json_of(const NodeRecord& record, const PipelineNode& node, const Catalogue
   return j;
 }
 
-json plugins_used(const Pipeline& pipeline, const RunResult& result, const Catalogue& catalogue) {
-  json list = json::array();
-  std::set<fs::path> seen;
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    const LibraryInfo* library = catalogue.library_of(pipeline.nodes[i].info.name);
-    if (!took_part(result.nodes[i]) || !library || !seen.insert(library->file).second) continue;
-    json linked = json::array();
-    for (const LinkedLibrary& one : library->linked) linked.push_back(fs::path(one.path).filename().string());
-    list.push_back(
-        {{"file", library->file.filename().string()}, {"build_id", library->build_id.hex()}, {"links", linked}});
+/// Calls use(node, record, its name) for each node that took part, and then for those of its body. Outside of bodies,
+/// `inputs_of_node` gives the keys of a node's inputs.
+using InputsOfNode = std::function<json(const PipelineNode&)>;
+using UseOfNode = std::function<void(const PipelineNode&, const NodeRecord&, const std::string&, const json&)>;
+void for_each_node(const Pipeline& pipeline, const std::vector<NodeRecord>& records, const std::string& path,
+                   const InputsOfNode& inputs_of_node, const UseOfNode& use) {
+  for (std::size_t i = 0; i < pipeline.nodes.size() && i < records.size(); ++i) {
+    const PipelineNode& node = pipeline.nodes[i];
+    if (!took_part(records[i])) continue;
+    use(node, records[i], path + node.id, inputs_of_node(node));
+    if (!records[i].passes) continue;
+    const auto in_body = [&](const PipelineNode& one) {
+      return inputs_in_body(one, *node.repetition, *records[i].passes);
+    };
+    for_each_node(node.repetition->alone, records[i].passes->nodes, path + node.id + "/", in_body, use);
   }
-  return list;
+}
+
+json json_of(const LibraryInfo& library) {
+  json linked = json::array();
+  for (const LinkedLibrary& one : library.linked) linked.push_back(fs::path(one.path).filename().string());
+  return {{"file", library.file.filename().string()}, {"build_id", library.build_id.hex()}, {"links", linked}};
 }
 
 }  // namespace
@@ -288,16 +324,22 @@ void RunFolder::write_record(const Pipeline& pipeline, const RunResult& result, 
                  {"inputs", json::object()},
                  {"overrides", json::array()},
                  {"nodes", json::array()},
-                 {"plugins", plugins_used(pipeline, result, catalogue)},
+                 {"plugins", json::array()},
                  {"outputs", json::array()}};
   for (const NamedVerdict& one : verdicts_of(pipeline, result)) record["verdicts"].push_back(json_of(one));
   for (const InputValue& one : arguments.inputs) record["inputs"][one.name] = one.value;
   for (const Override& one : arguments.overrides) record["overrides"].push_back(one.key + "=" + one.value);
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    if (!took_part(result.nodes[i])) continue;
-    record["nodes"].push_back(json_of(result.nodes[i], pipeline.nodes[i], catalogue));
-    record["nodes"].back()["inputs"] = inputs_of(pipeline.nodes[i], result);
-  }
+  std::set<fs::path> libraries;
+  const auto inputs_of_node = [&](const PipelineNode& node) { return inputs_of(node, result); };
+  for_each_node(pipeline, result.nodes, "", inputs_of_node,
+                [&](const PipelineNode& node, const NodeRecord& done, const std::string& name, const json& inputs) {
+                  json j = json_of(done, node, catalogue);
+                  j["id"] = name;
+                  j["inputs"] = inputs;
+                  record["nodes"].push_back(std::move(j));
+                  const LibraryInfo* library = catalogue.library_of(node.info.name);
+                  if (library && libraries.insert(library->file).second) record["plugins"].push_back(json_of(*library));
+                });
   // These limits decide whether a file is read at all.
   if (settings.file_limits.memory_mb > 0) record["file_memory_mb"] = settings.file_limits.memory_mb;
   if (settings.file_limits.seconds > 0) record["file_seconds"] = settings.file_limits.seconds;

@@ -18,6 +18,7 @@ template const Content* content_of<Pose>();
 template const Content* content_of<Truth>();
 template const Content* content_of<Metrics>();
 template const Content* content_of<Verdict>();
+template const Content* content_of<Stop>();
 template const Content* content_of<Scene>();
 template const Content* content_of<Landscape>();
 template const Content* content_of<Case>();

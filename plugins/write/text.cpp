@@ -26,6 +26,11 @@ void verdict(const marrow::Verdict& verdict, const std::string& path) {
   write_text(path, marrow::files::verdict(verdict));
 }
 
+void stop(const marrow::Stop& stop, const std::string& path) {
+  const nlohmann::ordered_json json = {{"stops", stop.stops}, {"reason", stop.reason}};
+  write_text(path, json.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) + "\n");
+}
+
 /// A file holds the landmarks of one fragment, and is named after it.
 void landmarks(const marrow::Landmarks& landmarks, const std::string& path) {
   write_text(path, marrow::files::landmarks(landmarks, std::filesystem::path(path).stem().string()));
@@ -48,5 +53,6 @@ MARROW_PLUGIN(plugin) {
   plugin.writer<marrow::Seeds>(".yaml", seeds, "points of one fragment");
   plugin.writer<marrow::Verdict>(".yaml", verdict, "judgement of a pose, with reasons, remedies and figures");
   plugin.writer<marrow::Landmarks>(".yaml", landmarks, "landmarks of the fragment that the file is named after");
+  plugin.writer<marrow::Stop>(".json", stop, "whether a repetition ends, and why");
   plugin.writer<marrow::Metrics>(".json", metrics, "figures of merit with units");
 }

@@ -102,6 +102,9 @@ struct DisplacedOptions {
   std::array<double, 3> rotation_deg{}, translation_mm{};
   double distance_mm = 0;
 };
+marrow::Stop stop_above(const Metrics& a, const ConstantOptions& options) {
+  return {value_of(a) > options.value, "it is above " + std::to_string(int(options.value))};
+}
 Metrics displaced(const DisplacedOptions& options) { return number(options.translation_mm[0]); }
 }  // namespace
 
@@ -163,6 +166,11 @@ MARROW_PLUGIN(plugin) {
       .option("rotation_deg", &DisplacedOptions::rotation_deg, "rotation")
       .option("translation_mm", &DisplacedOptions::translation_mm, "translation")
       .option("distance_mm", &DisplacedOptions::distance_mm, "distance");
+  plugin.node("test.stop_above", stop_above)
+      .summary("Ends a loop")
+      .in("a", "number")
+      .out("stop", "whether it is above the value")
+      .option("value", &ConstantOptions::value, "largest number that does not stop");
   plugin.node("test.truth", truth).summary("The truth").out("truth", "the truth");
   plugin.kind("judge").summary("may see the truth").sees_truth();
   plugin.node("judge.test", judge)

@@ -48,7 +48,10 @@ struct RunSettings {
   std::set<std::string> made_anew = {};
   bool remember = true;  ///< store what each node's result was made from, so that the next plan can say what changed
   FileLimits file_limits = {};
+  std::string within = {};  ///< the node and the pass whose body is run, as "track/0007"; empty for a whole pipeline
 };
+
+struct PassesRecord;
 
 /// What happened to one node in a run.
 struct NodeRecord {
@@ -66,6 +69,7 @@ struct NodeRecord {
   std::vector<Value> outputs;  ///< in the order of the node's outputs
   /// By option: digest of the content that its paths named when they were read; zero if missing or unreadable.
   std::map<std::string, Digest> files;
+  std::shared_ptr<PassesRecord> passes;  ///< of a node with a body, if a pass was begun
 
   /// Whether no item of it was begun because an earlier node failed or the run was stopped.
   bool was_stopped() const;
@@ -73,6 +77,22 @@ struct NodeRecord {
 const char* status_name(NodeRecord::Status status);
 /// "3 nodes were not run because of it".
 std::string not_run_text(int nodes);
+
+/// What happened to the body of a node.
+struct PassesRecord {
+  struct Pass {
+    std::string name;
+    NodeRecord::Status status = NodeRecord::Status::done;
+    std::string reason;  ///< why it is not done
+    double seconds = 0;
+  };
+  std::vector<Pass> passes;
+  std::string end;  ///< why there was no further pass, in words; empty if all items had theirs
+  /// What the passes were given, by Repetition::given: lists over the passes that have keys but no data.
+  std::vector<Value> given;
+  /// Of all passes together, in the order of Repetition::alone. Their outputs are such lists, too.
+  std::vector<NodeRecord> nodes;
+};
 
 struct RunResult {
   std::vector<NodeRecord> nodes;  ///< in the order of Pipeline::nodes

@@ -3,6 +3,7 @@
 #include <filesystem>
 #include <functional>
 #include <map>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,6 +29,8 @@ struct Wire {
   bool is_list_literal = false;
 };
 
+struct Repetition;
+
 struct PipelineNode {
   std::string id;
   Place place;
@@ -37,6 +40,8 @@ struct PipelineNode {
   std::vector<OptionValue> options;  ///< in the order of info.options
   std::vector<Wire> wires;
   std::vector<std::string> mapped_axes;  ///< the node is called for each item along these, outermost first
+  /// If the node has a body, `info` is made from it: its name is "repeat", its inputs are what the body is given.
+  std::shared_ptr<const Repetition> repetition;
 };
 
 struct PipelineOutput {
@@ -53,12 +58,40 @@ struct Pipeline {
   std::vector<PipelineOutput> outputs;
   std::vector<std::string> notes;  ///< remarks for people that are not faults
 
-  /// The axes of an output of a node, outermost first.
+  /// The axes of a value that a reference names, outermost first.
   std::vector<std::string> axes_of(const Reference& source) const;
   /// For each node, whether it must be run for the outputs. given(id) says whether the outputs of a node are already
   /// known.
   std::vector<bool> needed(const std::function<bool(const std::string&)>& given = {}) const;
 };
+
+/// A body: a pipeline that a node runs again and again, one pass after the other. A pass runs for each item of an axis,
+/// or until a stop rule holds. Outputs of the node: for each output NAME of the body, NAME (the list over all passes)
+/// and last_NAME (that of the last pass that did not fail).
+struct Repetition {
+  /// What is given to the body in the place of an output of one of its nodes.
+  struct Given {
+    std::string name;               ///< node or node.output of the body; the name of the port
+    Reference target;               ///< the same in `alone`
+    std::string node;               ///< the node of `body` that stands for it
+    std::vector<std::string> axes;  ///< that a pass is given, outermost first
+    int carried = -1;               ///< the output of the body that takes its place in the next pass; -1: none
+  };
+  Pipeline alone;  ///< the body as it was read, a pipeline that can be run alone
+  /// The body as it is run in a pass: for each value that is given it has a node that is never called.
+  Pipeline body;
+  /// The same for the first pass. It makes those carried values itself that the node's inputs do not give.
+  Pipeline first;
+  std::vector<Given> given;  ///< in the order of the node's inputs; then those that are only carried
+  std::string axis;          ///< of the passes: that of the items, or "pass"
+  bool is_loop = false;      ///< not over the items of an axis; passes are named 1, 2, 3...
+  int at_most = 0;           ///< passes; 0: as many as there are items
+  int until = -1;            ///< the output of the body, of type stop, that ends the passes; -1: none
+  bool goes_on = false;      ///< after a pass that failed; what it did not make is absent then
+};
+
+/// The nodes that a run may call: those that the outputs need, and of nodes with a body, those of the body.
+std::vector<const PipelineNode*> called_nodes(const Pipeline& pipeline);
 
 /// A value of one of the pipeline's inputs.
 struct InputValue {

@@ -7,6 +7,7 @@
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/landmarks.hpp"
 #include "marrow/domain/scene.hpp"
+#include "marrow/domain/stop.hpp"
 #include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/value.hpp"
 
@@ -25,6 +26,7 @@ MARROW_VALUE_TYPE(marrow::Pose, "pose", 2)
 MARROW_VALUE_TYPE(marrow::Truth, "truth", 1)
 MARROW_VALUE_TYPE(marrow::Metrics, "metrics", 1)
 MARROW_VALUE_TYPE(marrow::Verdict, "verdict", 1)
+MARROW_VALUE_TYPE(marrow::Stop, "stop", 1)
 MARROW_VALUE_TYPE(marrow::Scene, "scene", 1)
 MARROW_VALUE_TYPE(marrow::Landscape, "landscape", 1)
 MARROW_VALUE_TYPE(marrow::Case, "case", 1)
@@ -50,6 +52,7 @@ extern template const Content* content_of<Pose>();
 extern template const Content* content_of<Truth>();
 extern template const Content* content_of<Metrics>();
 extern template const Content* content_of<Verdict>();
+extern template const Content* content_of<Stop>();
 extern template const Content* content_of<Scene>();
 extern template const Content* content_of<Landscape>();
 extern template const Content* content_of<Case>();
