@@ -3,6 +3,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "drawn_graph.hpp"
 #include "marrow/domain/printable.hpp"
 
 namespace marrow::cli {
@@ -24,19 +25,33 @@ std::string dot_text(const std::string& text) {
   return result;
 }
 
-void print_text(const Pipeline& pipeline) {
+/// The nodes with their wires; a body further to the right.
+void print_nodes(const Pipeline& pipeline, const std::string& margin) {
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
     const PipelineNode& node = pipeline.nodes[i];
-    std::printf("%s  (%s)%s%s%s\n", node.id.c_str(), node.info.name.c_str(),
-                node.mapped_axes.empty() ? "" : ("  for each " + axes_text(node.mapped_axes)).c_str(),
+    std::printf("%s%s  (%s)%s%s%s\n", margin.c_str(), node.id.c_str(), node.info.name.c_str(),
+                node.repetition            ? ("  " + passes_text(*node.repetition)).c_str()
+                : node.mapped_axes.empty() ? ""
+                                           : ("  for each " + axes_text(node.mapped_axes)).c_str(),
                 node.may_fail ? "  [may fail]" : "", needed[i] ? "" : "  [not needed]");
     for (const Wire& wire : node.wires) {
       std::string sources;
       for (const Reference& source : wire.sources) sources += (sources.empty() ? "" : " + ") + source.text;
-      std::printf("    %s <- %s\n", node.info.inputs[std::size_t(wire.port)].name.c_str(), printable(sources).c_str());
+      std::printf("%s    %s <- %s\n", margin.c_str(), node.info.inputs[std::size_t(wire.port)].name.c_str(),
+                  printable(sources).c_str());
     }
+    if (!node.repetition) continue;
+    for (const Repetition::Given& given : node.repetition->given)
+      if (given.carried >= 0)
+        std::printf("%s    %s <- %s of the pass before\n", margin.c_str(), given.name.c_str(),
+                    node.repetition->alone.outputs[std::size_t(given.carried)].name.c_str());
+    print_nodes(node.repetition->alone, margin + "    | ");
   }
+}
+
+void print_text(const Pipeline& pipeline) {
+  print_nodes(pipeline, "");
   std::printf("outputs\n");
   for (const PipelineOutput& output : pipeline.outputs) {
     const std::vector<std::string> axes = pipeline.axes_of(output.source);
@@ -45,29 +60,42 @@ void print_text(const Pipeline& pipeline) {
   }
 }
 
+/// The nodes of one body, each with its own body in a frame. `body` is empty for the whole pipeline.
+void print_dot_nodes(const DrawnGraph& graph, const std::string& body, const std::string& margin) {
+  for (const DrawnNode& drawn : graph.nodes) {
+    if (drawn.body != body) continue;
+    const PipelineNode& node = *drawn.node;
+    const std::string axes = node.repetition            ? "\\n" + dot_text(passes_text(*node.repetition))
+                             : node.mapped_axes.empty() ? ""
+                                                        : "\\nfor each " + axes_text(node.mapped_axes);
+    const std::string id = dot_text(drawn.id);
+    std::printf("%s\"%s\" [label=\"%s\\n%s%s%s\"];\n", margin.c_str(), id.c_str(), dot_text(node.id).c_str(),
+                dot_text(node.info.name).c_str(), axes.c_str(), node.may_fail ? "\\nmay fail" : "");
+    if (!node.repetition) continue;
+    std::printf("%ssubgraph \"cluster %s\" {\n%s  style=rounded; color=gray70;\n", margin.c_str(), id.c_str(),
+                margin.c_str());
+    print_dot_nodes(graph, drawn.id, margin + "  ");
+    std::printf("%s}\n", margin.c_str());
+  }
+}
+
 void print_dot(const Pipeline& pipeline) {
   std::printf("digraph \"%s\" {\n  rankdir=LR; node [shape=box, style=rounded, fontname=\"sans-serif\"];\n",
               dot_text(pipeline.name).c_str());
-  for (const PipelineNode& node : pipeline.nodes) {
-    const std::string axes = node.mapped_axes.empty() ? "" : "\\nfor each " + axes_text(node.mapped_axes);
-    const std::string id = dot_text(node.id);
-    std::printf("  \"%s\" [label=\"%s\\n%s%s%s\"];\n", id.c_str(), id.c_str(), dot_text(node.info.name).c_str(),
-                axes.c_str(), node.may_fail ? "\\nmay fail" : "");
-  }
-  const auto edge = [&](const Reference& source, const std::string& target, const std::string& port) {
-    const PipelineNode& from = pipeline.nodes[std::size_t(source.node)];
-    const PortInfo& output = from.info.outputs[std::size_t(source.output)];
-    // Dashed edges carry functions, solid edges carry data.
-    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s];\n", dot_text(from.id).c_str(), dot_text(target).c_str(),
-                dot_text(port).c_str(), output.type.is_function ? ", style=dashed" : "");
-  };
-  for (const PipelineNode& node : pipeline.nodes)
-    for (const Wire& wire : node.wires)
-      for (const Reference& source : wire.sources) edge(source, node.id, node.info.inputs[std::size_t(wire.port)].name);
+  const DrawnGraph graph = drawn_graph(pipeline, false);
+  print_dot_nodes(graph, "", "  ");
+  // Dashed edges carry functions, solid edges carry data. What is handed to the next pass does not rank nodes.
+  for (const DrawnEdge& edge : graph.edges)
+    std::printf("  \"%s\" -> \"%s\" [label=\"%s\"%s%s];\n", dot_text(edge.from).c_str(), dot_text(edge.to).c_str(),
+                dot_text(edge.port).c_str(), edge.is_function ? ", style=dashed" : "",
+                edge.is_of_pass_before ? ", constraint=false, color=gray50" : "");
   for (const PipelineOutput& output : pipeline.outputs) {
+    const PipelineNode& from = pipeline.nodes[std::size_t(output.source.node)];
+    const bool is_function = from.info.outputs[std::size_t(output.source.output)].type.is_function;
     std::printf("  \"output %s\" [label=\"%s\", shape=ellipse];\n", dot_text(output.name).c_str(),
                 dot_text(output.name).c_str());
-    edge(output.source, "output " + output.name, "");
+    std::printf("  \"%s\" -> \"output %s\" [label=\"\"%s];\n", dot_text(from.id).c_str(), dot_text(output.name).c_str(),
+                is_function ? ", style=dashed" : "");
   }
   std::printf("}\n");
 }

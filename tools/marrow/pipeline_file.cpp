@@ -4,6 +4,7 @@
 
 #include "command_options.hpp"
 #include "commands.hpp"
+#include "drawn_graph.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
@@ -71,6 +72,9 @@ int check(const PipelineRequest& request, bool json) {
     std::string axes;
     for (const std::string& axis : node.mapped_axes) axes += (axes.empty() ? "" : " and ") + axis;
     if (!axes.empty()) std::printf("  %s is called for each %s\n", node.id.c_str(), axes.c_str());
+    if (node.repetition)
+      std::printf("  %s runs a body of %zu nodes: %s\n", node.id.c_str(), node.repetition->alone.nodes.size(),
+                  passes_text(*node.repetition).c_str());
   }
   const std::vector<bool> needed = pipeline.needed();
   for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)

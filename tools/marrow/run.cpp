@@ -36,7 +36,7 @@ class RunProgress {
     if (request_.json) print_json(event);
     switch (event.kind) {
       case Kind::finished:
-        line(LogLevel::info, where, seconds_text(event.seconds));
+        line(is_short_step_of_body(event) ? LogLevel::debug : LogLevel::info, where, seconds_text(event.seconds));
         break;
       case Kind::skipped:
         line(LogLevel::info, where, "skipped: " + event.text);
@@ -69,6 +69,12 @@ class RunProgress {
 
  private:
   bool silent() const { return request_.quiet || request_.json; }
+
+  /// A body may be run a thousand times: its short steps would bury everything else.
+  static bool is_short_step_of_body(const RunEvent& event) {
+    constexpr double kShort_s = 0.5;
+    return event.node.find('/') != std::string::npos && event.seconds < kShort_s;
+  }
 
   static std::string seconds_text(double seconds) {
     char text[32];
@@ -123,22 +129,33 @@ std::string status_text(const NodeRecord& record) {
   return text;
 }
 
-void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
-                   const RunFolder& folder) {
-  std::printf("\n");
-  print_verdicts(verdicts_of(pipeline, result));
-  std::printf("%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    const NodeRecord& record = result.nodes[i];
+/// One line for each node, then those of its body. `path`: "", or the node and a slash.
+void print_nodes(const Pipeline& pipeline, const std::vector<NodeRecord>& records, const std::string& path) {
+  for (std::size_t i = 0; i < pipeline.nodes.size() && i < records.size(); ++i) {
+    const NodeRecord& record = records[i];
     if (record.status == NodeRecord::Status::not_needed || record.was_stopped()) continue;
     // The reason of a failure was printed when the node failed.
     const bool is_told =
         record.status == NodeRecord::Status::failed || record.status == NodeRecord::Status::failed_alone;
     const std::string reason = is_told ? "" : printable_lines(record.reason);
-    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", pipeline.nodes[i].id.c_str(), pipeline.nodes[i].info.name.c_str(),
-                record.seconds, record.calls, status_text(record).c_str(), reason.empty() ? "" : ": ", reason.c_str());
+    std::printf("%-16s %-34s %9.3f %6d  %s%s%s\n", (path + pipeline.nodes[i].id).c_str(),
+                pipeline.nodes[i].info.name.c_str(), record.seconds, record.calls, status_text(record).c_str(),
+                reason.empty() ? "" : ": ", reason.c_str());
     if (record.stopped > 0) std::printf("%-16s %s\n", "", not_run_text(record.stopped).c_str());
+    if (!record.passes) continue;
+    const std::size_t passes = record.passes->passes.size();
+    std::printf("%-16s %zu %s%s%s\n", "", passes, passes == 1 ? "pass" : "passes",
+                record.passes->end.empty() ? "" : "; ", printable(record.passes->end).c_str());
+    print_nodes(pipeline.nodes[i].repetition->alone, record.passes->nodes, path + pipeline.nodes[i].id + "/");
   }
+}
+
+void print_summary(const Pipeline& pipeline, const RunResult& result, const std::vector<RunFolder::Written>& written,
+                   const RunFolder& folder) {
+  std::printf("\n");
+  print_verdicts(verdicts_of(pipeline, result));
+  std::printf("%-16s %-34s %9s %6s  %s\n", "node", "uses", "seconds", "calls", "status");
+  print_nodes(pipeline, result.nodes, "");
   std::printf("%-16s %-34s %9.3f\n\n", "all", "", result.seconds);
   print_results(pipeline, result);
   std::printf("results in %s\n", printable(folder.path().string()).c_str());

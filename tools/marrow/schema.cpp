@@ -83,36 +83,60 @@ Json pipeline_schema(const Catalogue& catalogue) {
     uses.push_back({{"const", name}, {"description", catalogue.find(name)->summary}});
     conditions.push_back(node_schema(*catalogue.find(name), catalogue));
   }
-  const Json node = {{"type", "object"},
-                     {"required", {"uses"}},
-                     {"additionalProperties", false},
-                     {"properties",
-                      {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
-                       {"with", {{"type", "object"}, {"description", "options"}}},
-                       {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
-                       {"may_fail",
-                        {{"type", "boolean"},
-                         {"default", false},
-                         {"description", "whether the run goes on without the node's outputs if it fails"}}}}},
-                     {"allOf", conditions}};
+  const Json place = {{"type", "string"}};
+  const Json node = {
+      {"type", "object"},
+      {"anyOf", {{{"required", {"uses"}}}, {{"required", {"repeat"}}}}},
+      {"additionalProperties", false},
+      {"properties",
+       {{"uses", {{"description", "kind.name of the node"}, {"oneOf", uses}}},
+        {"with", {{"type", "object"}, {"description", "options"}}},
+        {"in", {{"type", "object"}, {"description", "port: node, node.output or node.output.item"}}},
+        {"may_fail",
+         {{"type", "boolean"},
+          {"default", false},
+          {"description", "whether the run goes on without the node's outputs if it fails"}}},
+        {"repeat",
+         {{"description", "the body that is run again and again: a pipeline file, or nodes and outputs"},
+          {"anyOf", {place, {{"$ref", "#/definitions/body"}}}}}},
+        {"over", {{"type", "string"}, {"description", "the axis of the items that passes are for"}}},
+        {"carry",
+         {{"type", "object"},
+          {"additionalProperties", place},
+          {"description", "node of the body: output of the body that takes its place in the next pass"}}},
+        {"at_most", {{"type", "integer"}, {"minimum", 1}, {"description", "number of passes"}}},
+        {"until", {{"type", "string"}, {"description", "output of the body, of type stop, that ends the passes"}}},
+        {"if_pass_fails",
+         {{"enum", {"end", "go_on"}}, {"default", "end"}, {"description", "what follows a failed pass"}}}}},
+      {"allOf", conditions}};
   const Json input = {{"type", "object"},
                       {"additionalProperties", false},
                       {"properties",
                        {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},
                         {"default", {{"type", {"string", "number", "boolean"}}}},
                         {"help", {{"type", "string"}}}}}};
+  const Json inputs = {{"type", "object"}, {"additionalProperties", input}};
+  const Json nodes = {{"type", "object"}, {"additionalProperties", {{"$ref", "#/definitions/node"}}}};
+  const Json outputs = {{"type", "object"}, {"additionalProperties", place}};
   return {{"$schema", "http://json-schema.org/draft-07/schema#"},
           {"title", "marrow pipeline"},
           {"type", "object"},
           {"required", {"marrow", "nodes", "outputs"}},
           {"additionalProperties", false},
+          {"definitions",
+           {{"node", node},
+            {"body",
+             {{"type", "object"},
+              {"required", {"nodes", "outputs"}},
+              {"additionalProperties", false},
+              {"properties", {{"inputs", inputs}, {"nodes", nodes}, {"outputs", outputs}}}}}}},
           {"properties",
            {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
             {"name", {{"type", "string"}}},
             {"help", {{"type", "string"}}},
-            {"inputs", {{"type", "object"}, {"additionalProperties", input}}},
-            {"nodes", {{"type", "object"}, {"additionalProperties", node}}},
-            {"outputs", {{"type", "object"}, {"additionalProperties", {{"type", "string"}}}}}}}};
+            {"inputs", inputs},
+            {"nodes", nodes},
+            {"outputs", outputs}}}};
 }
 
 int schema(const std::filesystem::path& file) {

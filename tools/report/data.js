@@ -8,6 +8,7 @@
 //     starts_protocol, success_rule, time_rule}                       sentences
 //   variants: [{name, is_baseline, options: {"NODE.uses": "KIND.NAME", "NODE.OPTION": value}}]
 //   figures: [{name, columns: [name], rows: [{name, unit, values: [number | null per column]}]}]     of a run
+//   passes: [{node, end, passes: [{name, status, seconds, reason}]}]     of a run whose nodes have bodies
 //   metrics: [{name, label, unit, success_below: number | null, higher_is_better}]      of those with it,
 //   success_above; the first is the main one cases: ["case-01", ...], starts: ["0", ...] summary: [per variant {runs,
 //   failed, success: {count, of, rate, low, high},
@@ -39,7 +40,8 @@ const Data = (() => {
   const FORMAT = 1;
 
   function complete(data) {
-    for (const name of ['figures', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells'])
+    for (const name
+             of ['figures', 'passes', 'variants', 'metrics', 'cases', 'starts', 'summary', 'comparisons', 'cells'])
       data[name] = data[name] || [];
     for (const name of ['experiment', 'pictures', 'scenes', 'geometries']) data[name] = data[name] || {};
     for (const variant of data.variants) variant.options = variant.options || {};

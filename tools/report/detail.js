@@ -34,8 +34,20 @@ const Detail = (() => {
     ]);
   }
 
+  // A table of many items is easier to read with a row an item.
+  function upright(table) {
+    if (table.columns.length <= 8 || table.columns.length <= table.rows.length) return table;
+    const title = (row) => row.name + (row.unit ? ' (' + row.unit + ')' : '');
+    return {
+      name: table.name,
+      columns: table.rows.map(title),
+      rows: table.columns.map(
+          (name, i) => ({name, unit: '', values: table.rows.map((row) => (i in row.values ? row.values[i] : null))}))
+    };
+  }
+
   // Figures of merit of a run, a table for each group of them.
-  const figures = (data) => data.figures.map(
+  const figures = (data) => data.figures.map(upright).map(
       (table) => el(
           'div', {class: 'scroll'},
           el('table', {class: 'figures'}, el('caption', {}, table.name),

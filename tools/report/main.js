@@ -248,6 +248,7 @@ const Page = (() => {
     add(summary(data));
     if (many && data.metrics.length) add(distributions(data), paired(data), capture(data), byCase(data));
     add(closer(data));
+    if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
     if (data.graph && (data.graph.nodes || []).length) {
       add(section(
           'graph', 'Pipeline', data.variants.length > 1 ? 'Framed nodes differ between the variants.' : null,

@@ -74,7 +74,7 @@ class Comparer {
         result.only_before.push_back(node.id);
       } else if (!differing_.contains(node.id)) {
         result.same += node.makes_data() || !functions_differ(node, *other);
-      } else if (following_.contains(node.id)) {
+      } else if (following_.contains(node.id) || differs_by_pass_before(node, *other)) {
         result.in_consequence.push_back(node.id);
       } else {
         result.roots.push_back({&node, other, reasons_of(node, *other)});
@@ -95,15 +95,17 @@ class Comparer {
     if (before.went_well() != now.went_well() || (!now.went_well() && before.status != now.status)) return true;
     if (now.has_failed() && before.reason != now.reason) return true;
     const auto a = before.data(), b = now.data();
-    const bool went_well = before.went_well();
-    if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well);  // their names may differ
+    const bool went_well = before.went_well() && !before.is_in_body();  // one of the runs may have more passes
+    const bool in_body = before.is_in_body();
+    if (a.size() == 1 && b.size() == 1) return is_other(*a[0], *b[0], went_well, in_body);  // their names may differ
     return !std::equal(a.begin(), a.end(), b.begin(), b.end(), [&](const RecordedOutput* x, const RecordedOutput* y) {
-      return x->name == y->name && !is_other(*x, *y, went_well);
+      return x->name == y->name && !is_other(*x, *y, went_well, in_body);
     });
   }
 
-  /// Whether an output differs. For nodes that failed or did not run, only the items that exist are compared.
-  static bool is_other(const RecordedOutput& before, const RecordedOutput& now, bool went_well) {
+  /// Whether an output differs. For nodes that failed or did not run, only the items that exist are compared; for nodes
+  /// of a body, only the items that exist in both runs.
+  static bool is_other(const RecordedOutput& before, const RecordedOutput& now, bool went_well, bool in_body) {
     if (went_well || before.key == now.key) return before.key != now.key;
     const auto present = [](const RecordedOutput& output) {
       std::map<std::string, std::string> items;
@@ -111,7 +113,12 @@ class Comparer {
         if (!item.is_absent()) items[item.place] = item.key;
       return items;
     };
-    return present(before) != present(now);
+    const auto old_items = present(before), items = present(now);
+    if (!in_body) return old_items != items;
+    return std::any_of(items.begin(), items.end(), [&](const auto& item) {
+      const auto old = old_items.find(item.first);
+      return old != old_items.end() && old->second != item.second;
+    });
   }
 
   static bool functions_differ(const RecordedNode& before, const RecordedNode& now) {
@@ -142,7 +149,27 @@ class Comparer {
     for_changed_inputs(before, now, [&](const std::string&, const RecordedNode&, const RecordedNode& from) {
       result = result || differing_.contains(from.id) || (!from.makes_data() && following_.contains(from.id));
     });
-    return result;
+    return result || has_differing_body(now);
+  }
+
+  /// Whether a node of its body differs; the node itself then follows from that.
+  bool has_differing_body(const RecordedNode& node) const {
+    const std::string body = node.id + "/";
+    const auto first = differing_.lower_bound(body);
+    return node.uses == "repeat" && first != differing_.end() && first->starts_with(body);
+  }
+
+  /// Whether a node of a body differs only because of what the pass before handed on.
+  bool differs_by_pass_before(const RecordedNode& before, const RecordedNode& now) const {
+    const bool takes_it = std::any_of(now.wires.begin(), now.wires.end(), [&](const auto& wire) {
+      const auto& from = wire.second.from_pass_before;
+      return std::any_of(from.begin(), from.end(), [&](const std::string& id) { return differing_.contains(id); });
+    });
+    if (!takes_it) return false;
+    std::vector<Change> why;
+    std::set<std::string> seen;
+    add_reasons(before, now, "", seen, why);
+    return why.empty();
   }
 
   std::vector<Change> reasons_of(const RecordedNode& before, const RecordedNode& now) const {

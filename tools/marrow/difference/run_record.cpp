@@ -28,16 +28,45 @@ std::string text_of(const YAML::Node& value) {
   return "[" + text + "]";
 }
 
-RecordedWire wire_of(const YAML::Node& value) {
-  RecordedWire wire{text_of(value), {}};
-  const auto add = [&](const YAML::Node& source) {
-    wire.from.push_back(source.Scalar().substr(0, source.Scalar().find('.')));
-  };
-  if (value.IsSequence())
-    for (const YAML::Node& source : value) add(source);
-  else
-    add(value);
+std::string node_in(const std::string& reference) { return reference.substr(0, reference.find('.')); }
+
+std::vector<std::string> references_in(const YAML::Node& value) {
+  std::vector<std::string> references;
+  if (!value.IsSequence()) return {value.Scalar()};
+  for (const YAML::Node& source : value) references.push_back(source.Scalar());
+  return references;
+}
+
+/// What the nodes of a body are given from outside, by node or node.output of the body.
+struct GivenToBody {
+  std::map<std::string, std::vector<std::string>> from, from_pass_before;
+};
+
+/// `path`: of the body that the node is in ("track/"), or "".
+RecordedWire wire_of(const YAML::Node& value, const std::string& path, const GivenToBody& given) {
+  RecordedWire wire{text_of(value), {}, {}};
+  for (const std::string& reference : references_in(value)) {
+    const auto from = given.from.find(reference), before = given.from_pass_before.find(reference);
+    if (before != given.from_pass_before.end()) wire.from_pass_before = before->second;
+    if (from != given.from.end())
+      wire.from.insert(wire.from.end(), from->second.begin(), from->second.end());
+    else
+      wire.from.push_back(path + node_in(reference));
+  }
   return wire;
+}
+
+/// `path`: of the body.
+GivenToBody given_by(const YAML::Node& node, const std::map<std::string, RecordedWire>& wires,
+                     const std::string& path) {
+  GivenToBody given;
+  for (const auto& [port, wire] : wires) given.from[port] = wire.from;
+  const YAML::Node outputs = node["repeat"]["outputs"];
+  for (const auto& carried : node["carry"])
+    for (const auto& output : outputs)
+      if (output.first.Scalar() == carried.second.Scalar())
+        given.from_pass_before[carried.first.Scalar()] = {path + node_in(output.second.Scalar())};
+  return given;
 }
 
 /// A key or the digest of a content: 32 hexadecimal digits.
@@ -114,6 +143,17 @@ void add_record(const json& recorded, RecordedNode& node) {
   throw Error(file.string() + " is not what 'marrow run' wrote: " + why + "; run it again");
 }
 
+/// Anything that could crash the reader is refused.
+void check_graph(const YAML::Node& graph, const fs::path& file) {
+  if (!graph.IsMap() || !graph["nodes"].IsDefined() || !graph["nodes"].IsMap())
+    refuse_pipeline(file, "it holds no pipeline");
+  for (const auto& node : graph["nodes"]) {
+    if (!node.second.IsMap())
+      refuse_pipeline(file, "its node " + in_quotes(printable(node.first.Scalar())) + " is no map");
+    if (node.second["repeat"].IsDefined()) check_graph(node.second["repeat"], file);
+  }
+}
+
 /// The resolved pipeline that the run wrote. Anything that could crash the reader is refused.
 YAML::Node pipeline_of(const fs::path& file) {
   Diagnostics faults;
@@ -121,31 +161,51 @@ YAML::Node pipeline_of(const fs::path& file) {
   if (const auto text = read_source(file, "the pipeline", faults))
     pipeline = StrictYaml(file.string(), faults).parse(*text);
   if (!faults.empty()) refuse_pipeline(file, faults.sorted()[0].message);
-  if (!pipeline.IsMap() || !pipeline["nodes"].IsDefined() || !pipeline["nodes"].IsMap())
-    refuse_pipeline(file, "it holds no pipeline");
-  for (const auto& node : pipeline["nodes"])
-    if (!node.second.IsMap())
-      refuse_pipeline(file, "its node " + in_quotes(printable(node.first.Scalar())) + " is no map");
+  check_graph(pipeline, file);
   return pipeline;
 }
 
-/// Reads the nodes of the resolved pipeline that are in the run's record.
-void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
-  std::map<std::string, const json*> recorded;
-  if (!record.at("nodes").is_array()) throw Error("its 'nodes' is no list");
-  for (const json& one : record.at("nodes")) recorded.emplace(one.at("id"), &one);
-  for (const auto& entry : pipeline["nodes"]) {
+/// What decides how a body is run, as if it were options of the node.
+void read_repetition(const YAML::Node& written, RecordedNode& node) {
+  node.uses = "repeat";
+  for (const char* key : {"over", "at_most", "until", "if_pass_fails"})
+    if (written[key].IsDefined()) node.options[key] = text_of(written[key]);
+  for (const auto& carried : written["carry"])
+    node.options["carry." + carried.first.Scalar()] = text_of(carried.second);
+}
+
+using RecordedNodes = std::map<std::string, const json*>;
+
+/// Reads the nodes of a graph that are in the run's record, and those of their bodies.
+void read_graph(const YAML::Node& graph, const std::string& path, const GivenToBody& given,
+                const RecordedNodes& recorded, RunRecord& run) {
+  for (const auto& entry : graph["nodes"]) {
+    const YAML::Node written = entry.second;
     RecordedNode node;
-    node.id = entry.first.Scalar();
+    node.id = path + entry.first.Scalar();
     const auto found = recorded.find(node.id);
     if (found == recorded.end()) continue;
-    node.uses = entry.second["uses"].Scalar();
-    for (const auto& wire : entry.second["in"]) node.wires[wire.first.Scalar()] = wire_of(wire.second);
-    for (const auto& option : entry.second["with"]) node.options[option.first.Scalar()] = text_of(option.second);
+    for (const auto& wire : written["in"]) node.wires[wire.first.Scalar()] = wire_of(wire.second, path, given);
+    for (const auto& option : written["with"]) node.options[option.first.Scalar()] = text_of(option.second);
+    const bool has_body = written["repeat"].IsDefined();
+    if (has_body)
+      read_repetition(written, node);
+    else
+      node.uses = written["uses"].IsDefined() ? written["uses"].Scalar() : "";
     add_record(*found->second, node);
-    run.places.emplace(node.id, run.nodes.size());
+    const std::string id = node.id;
+    const auto wires = node.wires;
+    run.places.emplace(id, run.nodes.size());
     run.nodes.push_back(std::move(node));
+    if (has_body) read_graph(written["repeat"], id + "/", given_by(written, wires, id + "/"), recorded, run);
   }
+}
+
+void read_nodes(const YAML::Node& pipeline, const json& record, RunRecord& run) {
+  RecordedNodes recorded;
+  if (!record.at("nodes").is_array()) throw Error("its 'nodes' is no list");
+  for (const json& one : record.at("nodes")) recorded.emplace(one.at("id"), &one);
+  read_graph(pipeline, "", {}, recorded, run);
   for (const auto& [id, one] : recorded)
     if (!run.places.contains(id)) throw Error("its node " + in_quotes(printable(id)) + " is none of pipeline.yaml");
 }

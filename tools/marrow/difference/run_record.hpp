@@ -27,10 +27,12 @@ struct RecordedOutput {
 };
 
 struct RecordedWire {
-  std::string text;               ///< "case.views", "[a, b]"
-  std::vector<std::string> from;  ///< the nodes that it comes from
+  std::string text;                           ///< "case.views", "[a, b]"
+  std::vector<std::string> from;              ///< the nodes that it comes from
+  std::vector<std::string> from_pass_before;  ///< the nodes of the body that make it for the next pass
 };
 
+/// A node, or one of a node's body: its id is then "node/node of the body", and it is the sum of all passes.
 struct RecordedNode {
   std::string id, uses, status, reason, library, build_id;
   bool random = false;
@@ -41,6 +43,7 @@ struct RecordedNode {
       files;  ///< by option of type path: digest of the content that it names; nothing if that did not exist
   std::vector<RecordedOutput> outputs;
 
+  bool is_in_body() const { return id.find('/') != std::string::npos; }
   bool has_failed() const { return status.starts_with("failed"); }  ///< also if it may ("failed alone")
   bool went_well() const { return status == "done" || status == "not needed"; }
   bool makes_data() const { return !data().empty(); }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <set>
-
 #include "catalogue_text.hpp"
 #include "commands.hpp"
+#include "drawn_graph.hpp"
 #include "report/report.hpp"
 
 namespace marrow::cli {
@@ -10,7 +9,17 @@ namespace {
 
 using nlohmann::json;
 
+/// How a body is run, as if it were options of the node.
+std::map<std::string, std::string> options_of_repetition(const Repetition& repetition) {
+  std::map<std::string, std::string> options{{"passes", passes_text(repetition)},
+                                             {"if_pass_fails", repetition.goes_on ? "go_on" : "end"}};
+  for (const Repetition::Given& given : repetition.given)
+    if (given.carried >= 0) options["carry " + given.name] = repetition.alone.outputs[std::size_t(given.carried)].name;
+  return options;
+}
+
 std::map<std::string, std::string> options_of(const PipelineNode& node) {
+  if (node.repetition) return options_of_repetition(*node.repetition);
   std::map<std::string, std::string> options;
   for (std::size_t i = 0; i < node.options.size(); ++i) options[node.info.options[i].name] = yaml_text(node.options[i]);
   return options;
@@ -18,6 +27,7 @@ std::map<std::string, std::string> options_of(const PipelineNode& node) {
 
 /// Options whose values are not the defaults.
 json given_options(const PipelineNode& node) {
+  if (node.repetition) return options_of_repetition(*node.repetition);
   json given = json::object();
   for (std::size_t i = 0; i < node.options.size(); ++i) {
     const OptionInfo& option = node.info.options[i];
@@ -55,25 +65,21 @@ std::string difference(const PipelineNode& base, const PipelineNode& other) {
 
 json graph_of(const Pipeline& pipeline, const std::vector<std::pair<std::string, Pipeline>>& variants) {
   json nodes = json::array(), edges = json::array();
-  const std::vector<bool> needed = pipeline.needed();
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i) {
-    const PipelineNode& node = pipeline.nodes[i];
-    if (!needed[i]) continue;
+  const DrawnGraph graph = drawn_graph(pipeline, true);
+  std::vector<std::pair<std::string, DrawnGraph>> others;
+  for (const auto& [name, other] : variants) others.emplace_back(name, drawn_graph(other, false));
+  for (const auto& [id, body, node] : graph.nodes) {
     json differs = json::object();
-    for (const auto& [name, other] : variants)
-      for (const PipelineNode& same : other.nodes)
-        if (same.id == node.id) {
-          const std::string text = difference(node, same);
+    for (const auto& [name, other] : others)
+      for (const DrawnNode& same : other.nodes)
+        if (same.id == id) {
+          const std::string text = difference(*node, *same.node);
           if (!text.empty()) differs[name] = text;
         }
-    nodes.push_back(
-        {{"id", node.id}, {"uses", node.info.name}, {"options", given_options(node)}, {"differs", differs}});
-    for (const Wire& wire : node.wires)
-      for (const Reference& source : wire.sources)
-        edges.push_back({{"from", pipeline.nodes[std::size_t(source.node)].id},
-                         {"to", node.id},
-                         {"port", node.info.inputs[std::size_t(wire.port)].name}});
+    nodes.push_back({{"id", id}, {"uses", node->info.name}, {"options", given_options(*node)}, {"differs", differs}});
   }
+  for (const DrawnEdge& edge : graph.edges)
+    if (!edge.is_of_pass_before) edges.push_back({{"from", edge.from}, {"to", edge.to}, {"port", edge.port}});
   return {{"nodes", nodes}, {"edges", edges}};
 }
 

@@ -62,6 +62,22 @@ json figures_of(const fs::path& folder, const json& record) {
   return tables;
 }
 
+/// The passes of the nodes that have bodies.
+json passes_of(const json& record) {
+  json all = json::array();
+  for (const json& node : record.value("nodes", json::array())) {
+    if (!node.contains("passes")) continue;
+    json passes = json::array();
+    for (const json& pass : node["passes"])
+      passes.push_back({{"name", pass.at("name").get<std::string>()},
+                        {"status", pass.at("status").get<std::string>()},
+                        {"seconds", pass.value("seconds", 0.0)},
+                        {"reason", pass.value("reason", "")}});
+    all.push_back({{"node", node.value("id", "")}, {"end", node.value("end", "")}, {"passes", passes}});
+  }
+  return all;
+}
+
 json graph_of_run(const fs::path& file) {
   const Catalogue catalogue;
   Diagnostics diagnostics;
@@ -119,6 +135,7 @@ json page_of(const fs::path& folder, const json& record, ReportMaterial& materia
                {"starts", {"0"}},
                {"variants", {{{"name", "result"}, {"is_baseline", false}, {"options", json::object()}}}}};
   data["figures"] = figures_of(folder, record);
+  data["passes"] = passes_of(record);
   material.add_run(folder, cell);
   data["cells"] = {cell};
   data["pictures"] = std::move(material.pictures);
