@@ -275,6 +275,11 @@ class PipelineReader {
     }
     const std::string what = key.substr(dot + 1);
     if (node->repetition && set_repetition(*node, what, text, place, written)) return;
+    if (node->repetition && what == "uses") {
+      diagnostics_.add(place, "node " + in_quotes(node->id) + " repeats a body, so no other node can take its place",
+                       "a node of the body is changed by  " + node->id + ".body.NODE.uses=kind.name");
+      return;
+    }
     const WrittenValue value{place, yaml.parse(text), folder_of(written), true};
     if (what == "uses" && text.empty()) {
       diagnostics_.add(place, "node " + in_quotes(node->id) + " does not say what it uses",

@@ -198,6 +198,16 @@ class Repetition(Runs):
             json.loads((self.scratch / "a/outputs/s.json").read_text()), {"stops": True, "reason": "it is above 2"}
         )
 
+    def test_nothing_takes_the_place_of_a_body(self):
+        path = self.write("p.yaml", OVER)
+        self.assertIn(
+            "error: node 'r' repeats a body, so no other node can take its place\n"
+            "  hint: a node of the body is changed by  r.body.NODE.uses=kind.name\n",
+            self.told(2, "check", path, "--set", "r.uses=test.add"),
+        )
+        self.assertNotIn("\nFits\n", self.told(0, "list", "--fits", path, "r"))
+        self.told(0, "check", path, "--set", "r.body.sum.uses=test.add")
+
     def test_names_have_no_slash(self):
         self.write("p.yaml", OVER.replace("  l: ", "  a/l: "))
         self.assertIn(

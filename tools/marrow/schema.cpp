@@ -74,7 +74,7 @@ Json node_schema(const NodeInfo& node, const Catalogue& catalogue) {
     needs.push_back("in");
   }
   if (!needs.empty()) schema["required"] = needs;
-  return {{"if", {{"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
+  return {{"if", {{"required", {"uses"}}, {"properties", {{"uses", {{"const", node.name}}}}}}}, {"then", schema}};
 }
 
 Json pipeline_schema(const Catalogue& catalogue) {

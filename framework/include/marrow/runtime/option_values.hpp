@@ -14,6 +14,17 @@
 
 namespace marrow::detail {
 
+/// Lists of numbers: of any length as std::vector<double>, of fixed length as std::array<double, N> or Eigen::Vector3d.
+template <class M>
+constexpr bool is_list_of_numbers() {
+  if constexpr (std::is_same_v<M, std::vector<double>> || requires { M::SizeAtCompileTime; })
+    return true;
+  else if constexpr (requires { std::tuple_size<M>::value; })
+    return std::is_same_v<typename M::value_type, double>;
+  else
+    return false;
+}
+
 template <class M>
 OptionValue to_option_value(const M& member) {
   if constexpr (std::is_same_v<M, bool>)
@@ -32,7 +43,9 @@ OptionValue to_option_value(const M& member) {
     std::vector<std::string> texts;
     for (const auto& path : member) texts.push_back(path.string());
     return texts;
-  } else {  // a list of numbers: std::vector<double>, std::array<double, N>, Eigen::Vector3d
+  } else {
+    static_assert(is_list_of_numbers<M>(),
+                  "an option of this type is not known; for numbers, use std::vector<double> or std::array<double, N>");
     return std::vector<double>(member.begin(), member.end());
   }
 }
