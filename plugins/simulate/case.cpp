@@ -16,20 +16,6 @@ struct CaseOptions {
   std::string start = "none";
 };
 
-/// The points that lie in the CT, at least two voxels from its border.
-std::vector<Eigen::Vector3d> within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm) {
-  constexpr double kBorder = 2;
-  std::vector<Eigen::Vector3d> inside;
-  for (const auto& point : points_mm) {
-    const Eigen::Vector3d index = grid.index_from_point(point);
-    bool is_inside = true;
-    for (int k = 0; k < 3; ++k)
-      is_inside = is_inside && index[k] >= kBorder && index[k] <= grid.size[std::size_t(k)] - 1 - kBorder;
-    if (is_inside) inside.push_back(point);
-  }
-  return inside;
-}
-
 Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom, const CaseOptions& options) {
   phantom::check_phantom(phantom, "simulate.case");
   check_volume(ct, "simulate.case: CT");
@@ -47,7 +33,7 @@ Case assemble(const Volume& ct, const List<View>& views, const Phantom& phantom,
       throw Error("simulate.case: the option 'register' names the fragment '" + name + "', but there are: " + known);
   }
   for (const Fragment& fragment : phantom.fragments) {
-    Seeds seeds{fragment.name, within(ct.grid, fragment.seeds_mm),
+    Seeds seeds{fragment.name, phantom::points_within(ct.grid, fragment.seeds_mm),
                 std::find(options.wanted.begin(), options.wanted.end(), fragment.name) != options.wanted.end()};
     if (seeds.wanted) result.truth.add(fragment.name, Truth{fragment.world_from_ct});
     if (seeds.wanted && options.start == "exact") {

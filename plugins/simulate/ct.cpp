@@ -63,7 +63,7 @@ Grid grid_around(const Phantom& phantom, const CtOptions& options) {
   low.array() -= options.margin_mm;
   high.array() += options.margin_mm;
   if (options.range_mm[1] > options.range_mm[0]) {
-    low.z() = std::max(low.z(), distal_end + options.range_mm[0]);
+    low.z() = distal_end + options.range_mm[0];
     high.z() = std::min(high.z(), distal_end + options.range_mm[1]);
   }
   Grid grid;
@@ -404,7 +404,9 @@ void declare(auto&& node) {
       .option("spacing_mm", &CtOptions::spacing_mm, "voxel size along x, y, z")
       .option("margin_mm", &CtOptions::margin_mm, "space around the bone", at_least(0))
       .option("range_mm", &CtOptions::range_mm,
-              "scans only between these two heights above the bone's distal end; [0, 0]: the whole bone")
+              "scans only between these two heights above the bone's distal end, such as [-100, 200] for a knee; [0, "
+              "0]: the "
+              "whole bone")
       .option("blur_mm", &CtOptions::blur_mm, "standard deviation of the Gaussian point-spread function", at_least(0),
               at_most(3))
       .option("noise_hu", &CtOptions::noise_hu, "standard deviation of the noise", at_least(0), unit("HU"))

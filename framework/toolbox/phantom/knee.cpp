@@ -102,6 +102,12 @@ DistalEnd distal_end(const Mesh& outer) {
   return {low.z(), 0.5 * (most.x() - least.x()), least.y(), most.y(), middle, head_x / heads > middle.x() ? -1.0 : 1.0};
 }
 
+Vector3d knee_axis_at(const Mesh& femur_outer) {
+  const DistalEnd end = distal_end(femur_outer);
+  const double scale = end.half_width_mm / kMeanHalfWidthMm;
+  return {end.middle_mm.x(), end.back_y - 21 * scale, end.lowest_z + 22 * scale};
+}
+
 Body fixed_to(const Fragment& fragment, const std::string& name, const std::string& material, Mesh surface) {
   Body body;
   body.name = name;
@@ -120,7 +126,7 @@ std::vector<Body> make_knee(const Mesh& femur_outer, const Fragment& fragment, c
   // The patella lies before the groove, about a thumb above the joint.
   const Vector3d kneecap(end.middle_mm.x(), end.front_y - (0.5 * shape.gap_mm + 8 * scale),
                          end.lowest_z + 40 * scale + shape.patella_up_mm);
-  const Vector3d axis(end.middle_mm.x(), end.back_y - 21 * scale, end.lowest_z + 22 * scale);
+  const Vector3d axis = knee_axis_at(femur_outer);
   const auto one_mm = [](const Vector3d&) { return 1.2; };
   const std::vector<std::pair<Part, Vector3d>> parts{
       {{"tibia", tibia, shell_of_tibia, {-46, -40, -kTibiaEnd - 6}, {46, 40, 12}}, plateau},

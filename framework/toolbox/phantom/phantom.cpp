@@ -86,6 +86,19 @@ void place_distal_end(Bone& bone, double depth_mm) {
   for (double& z : bone.fill_z_mm) z += by.z();
 }
 
+std::vector<Eigen::Vector3d> points_within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm) {
+  constexpr double kBorder = 2;
+  std::vector<Eigen::Vector3d> inside;
+  for (const auto& point : points_mm) {
+    const Eigen::Vector3d index = grid.index_from_point(point);
+    bool is_inside = true;
+    for (int k = 0; k < 3; ++k)
+      is_inside = is_inside && index[k] >= kBorder && index[k] <= grid.size[std::size_t(k)] - 1 - kBorder;
+    if (is_inside) inside.push_back(point);
+  }
+  return inside;
+}
+
 Fill::Fill(const Bone& bone) : z_(bone.fill_z_mm), fraction_(bone.fill_fraction), integral_(z_.size(), 0.0) {
   for (std::size_t i = 1; i < z_.size(); ++i)
     integral_[i] = integral_[i - 1] + 0.5 * (fraction_[i] + fraction_[i - 1]) * (z_[i] - z_[i - 1]);

@@ -13,6 +13,9 @@ struct DistalEnd {
 };
 DistalEnd distal_end(const Mesh& outer);
 
+/// A point of the axis about which the knee bends, in frame "bone". The axis has the direction x.
+Eigen::Vector3d knee_axis_at(const Mesh& femur_outer);
+
 struct KneeShape {
   double gap_mm = 4.5;          ///< between femur and tibia: cartilage
   double flexion_rad = 0.2;     ///< in the images

@@ -9,6 +9,7 @@
 #include "marrow/domain/fields.hpp"
 #include "marrow/domain/mesh.hpp"
 #include "marrow/domain/transform.hpp"
+#include "marrow/domain/volume.hpp"
 #include "marrow/runtime/value.hpp"
 
 namespace marrow::phantom {
@@ -85,6 +86,9 @@ void check_phantom(const ClutteredPhantom& phantom, const std::string& what);
 /// Moves the surfaces, the thigh and the fill. Then the lowest point lies `depth_mm` below the origin, and the middle
 /// of the bone's lowest 100 mm lies on the z axis. The origin is the isocentre of the views.
 void place_distal_end(Bone& bone, double depth_mm);
+
+/// The points that lie in the grid, at least two voxels from its border.
+std::vector<Eigen::Vector3d> points_within(const Grid& grid, const std::vector<Eigen::Vector3d>& points_mm);
 
 /// The volume fraction of bone at positions along z, and its exact mean along straight lines.
 class Fill {

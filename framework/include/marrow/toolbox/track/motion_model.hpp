@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// An error-state Kalman filter on SE(3) for a bone of constant velocity with white acceleration, and its smoother.
+// Sola, Quaternion kinematics for the error-state Kalman filter, arXiv 1711.02508, 2017; Rauch, Tung, Striebel, AIAA
+// Journal 3(8), 1965. The error is a small motion as defined at Pose and a difference of velocities.
+#include <vector>
+
+#include "marrow/toolbox/track/track_state.hpp"
+
+namespace marrow::track {
+
+/// The state one frame later, without a measurement: `now` and `predicted` are the prediction.
+TrackState predicted(const TrackState& state);
+
+/// Squared Mahalanobis distance of a measured pose from the state's prediction. It is distributed as chi-squared with 6
+/// degrees of freedom if the model holds.
+double surprise(const TrackState& state, const Measurement& measured);
+
+/// The predicted state with a measurement.
+TrackState updated(const TrackState& state, const Measurement& measured);
+
+/// The best estimate of each frame from all frames (Rauch-Tung-Striebel). `states`: of one filter, frame after frame.
+/// The accelerations along each axis are first chosen by the largest likelihood of the measurements, from a hundredth
+/// of the filter's to the filter's own. Throws Error if there is no state or their numbers do not follow each other.
+std::vector<TrackState> smoothed(const std::vector<TrackState>& states);
+
+}  // namespace marrow::track

@@ -1,0 +1,178 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/track/motion_model.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::track {
+namespace {
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// The small motion after a motion that adding to the motion's numbers amounts to: for rotations the right Jacobian of
+/// SO(3) (Sola, eq. 183), for translations the rotation back.
+Matrix6d of_addition(const Vector6d& motion) {
+  const Eigen::Vector3d turn = motion.head<3>();
+  const double angle = turn.norm();
+  const Eigen::Matrix3d cross = cross_matrix(turn);
+  Matrix6d matrix = Matrix6d::Zero();
+  matrix.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() - 0.5 * cross;
+  if (angle > 1e-4)
+    matrix.topLeftCorner<3, 3>() = Eigen::Matrix3d::Identity() - (1 - std::cos(angle)) / (angle * angle) * cross +
+                                   (angle - std::sin(angle)) / (angle * angle * angle) * cross * cross;
+  matrix.bottomRightCorner<3, 3>() = rotation_from_vector(turn).transpose();
+  return matrix;
+}
+
+/// How an error before a frame becomes the error after it. The bone moves by m = velocity * dt; an error (r, t) before
+/// that motion is the error (R^T r, R^T (t + r x t_m)) after it, with R and t_m of the motion.
+Matrix12d transition(const Vector6d& velocity_per_s, double dt_s) {
+  const Vector6d motion = velocity_per_s * dt_s;
+  const Eigen::Matrix3d back = rotation_from_vector(motion.head<3>()).transpose();
+  Matrix12d matrix = Matrix12d::Identity();
+  matrix.block<3, 3>(0, 0) = back;
+  matrix.block<3, 3>(3, 0) = -back * cross_matrix(motion.tail<3>());
+  matrix.block<3, 3>(3, 3) = back;
+  matrix.topRightCorner<6, 6>() = dt_s * of_addition(motion);
+  return matrix;
+}
+
+/// The covariance that accelerations add during one frame.
+Matrix12d process_noise(const Vector6d& acceleration_per_s2, const Vector6d& velocity_per_s, double dt_s) {
+  Eigen::Matrix<double, 12, 6> gain;
+  gain << 0.5 * dt_s * dt_s * of_addition(velocity_per_s * dt_s), dt_s * Matrix6d::Identity();
+  return gain * acceleration_per_s2.cwiseAbs2().asDiagonal() * gain.transpose();
+}
+
+Matrix6d innovation_covariance(const TrackState& state, const Measurement& measured) {
+  return state.predicted.covariance.topLeftCorner<6, 6>() + measured.covariance;
+}
+
+Vector6d innovation(const TrackState& state, const Measurement& measured) {
+  return motion_between(state.predicted.world_from_model, measured.world_from_model, state.fragment);
+}
+
+Matrix12d symmetric(const Matrix12d& matrix) { return 0.5 * (matrix + matrix.transpose()); }
+
+/// The filter run again over the measurements of the states, with other accelerations.
+std::vector<TrackState> filtered(const std::vector<TrackState>& states, const Vector6d& acceleration_per_s2,
+                                 double& log_likelihood) {
+  std::vector<TrackState> result;
+  TrackState before = states.front();
+  log_likelihood = 0;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    TrackState state = states.front();
+    if (i > 0) {
+      before.acceleration_per_s2 = acceleration_per_s2;
+      state = predicted(before);
+      state.note = states[i].note;
+      state.usual_cost = states[i].usual_cost;
+      if (states[i].measured) {
+        const Eigen::LLT<Matrix6d> factor(innovation_covariance(state, *states[i].measured));
+        const Vector6d y = innovation(state, *states[i].measured);
+        log_likelihood -= 0.5 * y.dot(factor.solve(y)) + factor.matrixLLT().diagonal().array().log().sum();
+        state = updated(state, *states[i].measured);
+      }
+    }
+    state.acceleration_per_s2 = acceleration_per_s2;
+    result.push_back(state);
+    before = state;
+  }
+  return result;
+}
+
+/// One axis after the other, twice: which of several accelerations explains the measurements best.
+Vector6d likeliest_acceleration(const std::vector<TrackState>& states) {
+  constexpr int kSteps = 8;  // from the filter's own, each half of the one before
+  Vector6d best = states.front().acceleration_per_s2;
+  double most = 0;
+  filtered(states, best, most);
+  const Vector6d own = best;
+  for (int round = 0; round < 2; ++round)
+    for (int axis = 0; axis < 6; ++axis)
+      for (int step = 0; step < kSteps; ++step) {
+        Vector6d tried = best;
+        tried[axis] = own[axis] * std::pow(0.5, step);
+        double likelihood = 0;
+        filtered(states, tried, likelihood);
+        if (likelihood <= most) continue;
+        most = likelihood;
+        best = tried;
+      }
+  return best;
+}
+
+}  // namespace
+
+TrackState predicted(const TrackState& state) {
+  const double dt_s = 1 / state.frame_rate_hz;
+  TrackState next = state;
+  ++next.frame;
+  next.measured.reset();
+  next.surprise = std::numeric_limits<double>::quiet_NaN();
+  next.note.clear();
+  const Kinematics& now = state.now;
+  next.predicted.world_from_model = moved(now.world_from_model, state.fragment, now.velocity_per_s * dt_s);
+  next.predicted.velocity_per_s = now.velocity_per_s;
+  const Matrix12d by = transition(now.velocity_per_s, dt_s);
+  next.predicted.covariance = symmetric(by * now.covariance * by.transpose() +
+                                        process_noise(state.acceleration_per_s2, now.velocity_per_s, dt_s));
+  next.now = next.predicted;
+  return next;
+}
+
+double surprise(const TrackState& state, const Measurement& measured) {
+  const Vector6d y = innovation(state, measured);
+  return y.dot(innovation_covariance(state, measured).llt().solve(y));
+}
+
+TrackState updated(const TrackState& state, const Measurement& measured) {
+  const Matrix12d& p = state.predicted.covariance;
+  const Eigen::LLT<Matrix6d> factor(innovation_covariance(state, measured));
+  const Eigen::Matrix<double, 12, 6> gain = factor.solve(p.topRows<6>()).transpose();
+  const Vector12d error = gain * innovation(state, measured);
+  TrackState next = state;
+  next.now.world_from_model = moved(state.predicted.world_from_model, state.fragment, error.head<6>());
+  next.now.velocity_per_s = state.predicted.velocity_per_s + error.tail<6>();
+  // Joseph's form keeps the covariance positive.
+  Matrix12d left = Matrix12d::Identity();
+  left.leftCols<6>() -= gain;
+  next.now.covariance = symmetric(left * p * left.transpose() + gain * measured.covariance * gain.transpose());
+  next.surprise = surprise(state, measured);
+  next.measured = measured;
+  next.frames_lost = 0;
+  return next;
+}
+
+std::vector<TrackState> smoothed(const std::vector<TrackState>& states) {
+  if (states.empty()) throw Error("there is no frame to smooth");
+  for (std::size_t i = 0; i < states.size(); ++i)
+    if (states[i].frame != states.front().frame + int(i))
+      throw Error("the frames to smooth do not follow each other: frame " + std::to_string(states[i].frame) +
+                  " stands where frame " + std::to_string(states.front().frame + int(i)) + " is expected");
+  double ignored = 0;
+  std::vector<TrackState> result = filtered(states, likeliest_acceleration(states), ignored);
+  for (std::size_t i = result.size() - 1; i-- > 0;) {
+    const TrackState& next = result[i + 1];
+    Kinematics& now = result[i].now;
+    const Matrix12d by = transition(now.velocity_per_s, 1 / next.frame_rate_hz);
+    const Matrix12d gain = next.predicted.covariance.ldlt().solve(by * now.covariance).transpose();
+    Vector12d error;
+    error << motion_between(next.predicted.world_from_model, next.now.world_from_model, next.fragment),
+        next.now.velocity_per_s - next.predicted.velocity_per_s;
+    const Vector12d correction = gain * error;
+    now.world_from_model = moved(now.world_from_model, next.fragment, correction.head<6>());
+    now.velocity_per_s += correction.tail<6>();
+    now.covariance =
+        symmetric(now.covariance + gain * (next.now.covariance - next.predicted.covariance) * gain.transpose());
+  }
+  return result;
+}
+
+}  // namespace marrow::track

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// Exact poses and seeds of the bones in a phantom with bodies: its fragments, and those bodies that are bones, too.
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/phantom/phantom.hpp"
+
+namespace {
+
+using namespace marrow;
+using phantom::Body;
+using phantom::ClutteredPhantom;
+using phantom::Fragment;
+
+struct Options {
+  std::vector<std::string> bodies;
+};
+
+struct Bones {
+  List<Truth> truths;
+  List<Seeds> seeds;
+  List<Pose> starts;
+};
+
+/// Points just below the surface, all along the body. `ct_from_world` is that of the body.
+std::vector<Eigen::Vector3d> seeds_of(const Body& body) {
+  constexpr std::size_t kSeeds = 40;
+  constexpr double kDepth_mm = 1;
+  std::vector<Eigen::Vector3d> normals(body.surface.vertices_mm.size(), Eigen::Vector3d::Zero());
+  for (const auto& triangle : body.surface.triangles) {
+    const auto at = [&](int k) { return body.surface.vertices_mm[std::size_t(triangle[std::size_t(k)])]; };
+    const Eigen::Vector3d normal = (at(1) - at(0)).cross(at(2) - at(0));
+    for (const auto vertex : triangle) normals[std::size_t(vertex)] += normal;
+  }
+  std::vector<Eigen::Vector3d> seeds;
+  const std::size_t step = std::max<std::size_t>(1, normals.size() / kSeeds);
+  for (std::size_t i = 0; i < normals.size(); i += step)
+    seeds.push_back(body.ct_from_world *
+                    Eigen::Vector3d(body.surface.vertices_mm[i] - kDepth_mm * normals[i].normalized()));
+  return seeds;
+}
+
+Bones bones(const ClutteredPhantom& phantom, const Volume* ct, const Options& options) {
+  phantom::check_phantom(phantom, "simulate.bones");
+  Bones bones;
+  const auto add = [&](const std::string& name, const RigidTransform& world_from_ct,
+                       std::vector<Eigen::Vector3d> seeds_mm) {
+    bones.truths.add(name, Truth{world_from_ct});
+    if (ct) seeds_mm = phantom::points_within(ct->grid, seeds_mm);
+    bones.seeds.add(name, Seeds{name, std::move(seeds_mm), true});
+    Pose start;
+    start.world_from_model = world_from_ct;
+    bones.starts.add(name, start);
+  };
+  for (const Fragment& fragment : phantom.phantom.fragments)
+    add(fragment.name, fragment.world_from_ct, fragment.seeds_mm);
+  for (const std::string& name : options.bodies) {
+    const auto found =
+        std::find_if(phantom.bodies.begin(), phantom.bodies.end(), [&](const Body& body) { return body.name == name; });
+    if (found == phantom.bodies.end()) {
+      std::string known;
+      for (const Body& body : phantom.bodies) known += (known.empty() ? "'" : ", '") + body.name + "'";
+      throw Error("simulate.bones: the phantom has no body '" + name + "'; there are " + known);
+    }
+    add(name, inverse(found->ct_from_world), seeds_of(*found));
+  }
+  return bones;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.bones", bones)
+      .summary("Gives exact poses and seeds of the fragments of a phantom, and of further bones among its bodies")
+      .in("phantom", "phantom with tissues and bodies")
+      .in("volume", "CT of the phantom: then only seeds in it are given")
+      .out("truths", &Bones::truths, "exact pose of each bone", over("fragment"))
+      .out("seeds", &Bones::seeds, "points inside each bone, in the CT", over("fragment"))
+      .out("starts", &Bones::starts, "the same poses, as starts for experiments that displace them", over("fragment"))
+      .option("bodies", &Options::bodies, "names of the bodies that are bones, such as tibia");
+}

@@ -1,0 +1,158 @@
+// SPDX-License-Identifier: Apache-2.0
+// A knee that bends again and again: femur and lower leg frame by frame, for studies of following bones.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/phantom/knee.hpp"
+
+namespace {
+
+using namespace marrow;
+using phantom::Body;
+using phantom::ClutteredPhantom;
+using phantom::Fragment;
+
+struct Options {
+  int frames = 100;
+  double frame_rate_hz = 62;
+  double period_s = 0.8;
+  double flexion_deg = 60;
+  double axial_deg = 10;
+  double swing_deg = 8;
+  double shift_mm = 8;
+  std::vector<double> blank;
+  bool crossing = false;
+};
+
+/// A rotation by a vector about a point, in the frame of both.
+RigidTransform turned_about(const Eigen::Vector3d& point_mm, const Eigen::Vector3d& rotation_rad,
+                            const std::string& frame) {
+  RigidTransform turn{frame, frame};
+  turn.rotation = rotation_from_vector(rotation_rad);
+  turn.translation_mm = point_mm - turn.rotation * point_mm;
+  return turn;
+}
+
+void move(Body& body, const RigidTransform& by) {
+  for (auto& vertex : body.surface.vertices_mm) vertex = by * vertex;
+  body.ct_from_world = body.ct_from_world * inverse(by);
+}
+
+bool is_of_lower_leg(const Body& body) { return body.name.starts_with("tibia") || body.name.starts_with("fibula"); }
+
+/// A closed shutter: steel that fills the field of view.
+Body shutter() {
+  constexpr double kHalf_mm = 170;
+  Body body;
+  body.name = "shutter";
+  body.material = "steel";
+  body.surface.frame = "world";
+  for (int i = 0; i < 8; ++i)
+    body.surface.vertices_mm.emplace_back(i & 1 ? kHalf_mm : -kHalf_mm, i & 2 ? kHalf_mm : -kHalf_mm,
+                                          i & 4 ? kHalf_mm : -kHalf_mm);
+  body.surface.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                            {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return body;
+}
+
+class Knee {
+ public:
+  Knee(const ClutteredPhantom& phantom, const Options& options)
+      : rest_(phantom), options_(options), fragment_(distal_fragment(phantom)) {
+    for (const Body& body : phantom.bodies)
+      if (is_of_lower_leg(body)) leg_.push_back(body);
+    if (leg_.empty())
+      throw Error("simulate.knee_motion: the phantom has no lower leg; add it by simulate.clutter with knee: mild");
+  }
+
+  ClutteredPhantom at(int frame) const {
+    const double phase = 2 * kPi * frame / options_.frame_rate_hz / options_.period_s;
+    const double bent = 0.5 * (1 - std::cos(phase));
+    ClutteredPhantom now = rest_;
+    const RigidTransform world_from_bone = fragment_.world_from_bone();
+    const Eigen::Vector3d knee_mm = world_from_bone * phantom::knee_axis_at(rest_.phantom.bone.outer);
+    const Eigen::Matrix3d& axes = world_from_bone.rotation;
+    RigidTransform femur = turned_about(
+        knee_mm, axes * radians(options_.swing_deg) * Eigen::Vector3d(-bent, 0.2 * bent, 0.4 * bent), "world");
+    femur.translation_mm += options_.shift_mm * Eigen::Vector3d(0.3 * std::sin(phase), 0.5 * bent, std::sin(phase));
+    for (Fragment& fragment : now.phantom.fragments)
+      if (fragment.name == fragment_.name) fragment.world_from_ct = femur * fragment.world_from_ct;
+    const RigidTransform bend =
+        turned_about(knee_mm, axes * Eigen::Vector3d(radians(options_.flexion_deg) * bent, 0, 0), "world");
+    const RigidTransform turn =
+        turned_about(knee_mm, axes * Eigen::Vector3d(0, 0, radians(options_.axial_deg) * bent), "world");
+    for (Body& body : now.bodies)
+      if (is_of_lower_leg(body))
+        move(body, femur * bend * turn);
+      else if (body.moves_with == fragment_.name)
+        move(body, femur);
+    if (options_.crossing) add_crossing(frame, now);
+    if (is_blank(frame)) now.bodies.push_back(shutter());
+    return now;
+  }
+
+ private:
+  static Fragment distal_fragment(const ClutteredPhantom& phantom) {
+    for (const Fragment& fragment : phantom.phantom.fragments)
+      if (fragment.side < 0) return fragment;
+    return phantom.phantom.fragments.at(0);
+  }
+
+  bool is_blank(int frame) const {
+    return options_.blank.size() == 2 && frame + 1 >= options_.blank[0] && frame + 1 <= options_.blank[1];
+  }
+
+  /// The other leg's shin, which swings through behind the knee.
+  void add_crossing(int frame, ClutteredPhantom& now) const {
+    constexpr double kBehind_mm = 110, kWay_mm = 240;
+    for (Body body : leg_) {
+      RigidTransform shift{"world", "world"};
+      shift.translation_mm = {kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm, 60};
+      move(body, shift);
+      body.name = "other " + body.name;
+      body.moves_with.clear();
+      body.in_ct = false;
+      now.bodies.push_back(std::move(body));
+    }
+  }
+
+  const ClutteredPhantom& rest_;
+  const Options& options_;
+  Fragment fragment_;
+  std::vector<Body> leg_;
+};
+
+List<ClutteredPhantom> knee_motion(const ClutteredPhantom& phantom, const Options& options, Context& context) {
+  phantom::check_phantom(phantom, "simulate.knee_motion");
+  if (!options.blank.empty() && (options.blank.size() != 2 || options.blank[0] > options.blank[1]))
+    throw Error("simulate.knee_motion: 'blank' takes the first and the last blank frame, as [40, 49]");
+  const Knee knee(phantom, options);
+  List<ClutteredPhantom> frames;
+  for (int i = 0; i < options.frames; ++i) {
+    context.check_cancelled();
+    char name[16];
+    std::snprintf(name, sizeof name, "%04d", i + 1);
+    frames.add(name, knee.at(i));
+  }
+  return frames;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.knee_motion", knee_motion)
+      .summary("A knee that bends and stretches: the phantom in each frame of a sequence")
+      .in("phantom", "femur with the lower leg of simulate.clutter")
+      .out("phantoms", "the phantom frame by frame; the soft tissue keeps its place", over("frame"))
+      .option("frames", &Options::frames, "number of frames", at_least(1), at_most(100000))
+      .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-3), unit("Hz"))
+      .option("period_s", &Options::period_s, "time from stretched to bent and back", at_least(1e-3), unit("s"))
+      .option("flexion_deg", &Options::flexion_deg, "largest flexion, from the knee's flexion at rest")
+      .option("axial_deg", &Options::axial_deg, "rotation of the lower leg about its long axis at the largest flexion")
+      .option("swing_deg", &Options::swing_deg, "rotation of the femur at the largest flexion")
+      .option("shift_mm", &Options::shift_mm, "how far the femur is shifted on its way")
+      .option("blank", &Options::blank, "first and last frame that the closed shutter makes blank; none: no frame")
+      .option("crossing", &Options::crossing, "whether the other leg's bones cross the field of view");
+}

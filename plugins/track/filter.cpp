@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: Apache-2.0
+// Takes a frame's registered pose into the state, or finds the bone lost in this frame.
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/track/motion_model.hpp"
+
+namespace {
+
+using namespace marrow;
+using track::Measurement;
+using track::TrackState;
+
+struct Options {
+  double gate = 22.46;
+  double most_cost_ratio = 2;
+  double first_scale = 2;
+  double least_deg = 0.02;
+  double least_mm = 0.02;
+};
+
+struct Frame {
+  TrackState state;
+  Pose pose;
+};
+
+/// The registered pose in the state's frame of axes. Its deviations are at least those of the options: a covariance
+/// that is too small would shut out all later frames.
+Measurement measured_by(const Pose& pose, double scale, const Options& options) {
+  Measurement measured{pose.world_from_model, scale * *pose.covariance};
+  for (int i = 0; i < 6; ++i) {
+    const double least = i < 3 ? radians(options.least_deg) : options.least_mm;
+    measured.covariance(i, i) += least * least;
+  }
+  return measured;
+}
+
+/// Why the frame's pose is not taken. Empty if it is.
+std::string why_lost(const TrackState& state, const Pose* pose, const Verdict* verdict, double surprise,
+                     const Options& options) {
+  char text[160];
+  if (!pose) return "no pose was found";
+  if (!pose->covariance || !pose->covariance->allFinite()) return "the images do not determine the pose";
+  if (verdict && verdict->judgement == Judgement::wrong)
+    return "its verdict is wrong" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
+  if (pose->cost > options.most_cost_ratio * state.usual_cost) {
+    std::snprintf(text, sizeof text, "its cost is %.3g, where %.3g is usual", pose->cost, state.usual_cost);
+    return text;
+  }
+  if (!(surprise <= options.gate)) {
+    std::snprintf(text, sizeof text, "it is not where the motion leads: squared distance %.3g, at most %.3g", surprise,
+                  options.gate);
+    return text;
+  }
+  return "";
+}
+
+Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdict, const Options& options,
+             Context& context) {
+  Frame frame{predicted, {}};
+  TrackState& state = frame.state;
+  const bool is_measured = pose && pose->covariance && pose->covariance->allFinite();
+  std::optional<Measurement> measured;
+  const double scale = predicted.usual_covariance ? predicted.noise_scale : options.first_scale;
+  if (is_measured) measured = measured_by(*pose, scale, options);
+  const double surprise = measured ? track::surprise(predicted, *measured) : state.surprise;
+  const std::string lost = why_lost(predicted, pose, verdict, surprise, options);
+  if (lost.empty()) {
+    state = track::updated(predicted, *measured);
+    state.usual_covariance = pose->covariance;
+    constexpr double kShare = 0.1;  // of the newest frame in the usual cost and in the scale
+    constexpr double kExpected = 6;
+    // If the poses scatter more than their covariances say, the surprises are too large on average.
+    state.noise_scale = std::max(1.0, scale * (1 - kShare + kShare * surprise / kExpected));
+    state.usual_cost =
+        std::isnan(state.usual_cost) ? pose->cost : (1 - kShare) * state.usual_cost + kShare * pose->cost;
+  } else {
+    ++state.frames_lost;
+    state.surprise = surprise;
+    state.note = lost;
+    context.warn("the bone is lost in frame " + std::to_string(state.frame + 1) + ": " + lost);
+  }
+  frame.pose.world_from_model = state.now.world_from_model;
+  frame.pose.frame = state.fragment;
+  frame.pose.covariance = state.now.covariance.topLeftCorner<6, 6>();
+  if (pose) frame.pose.cost = pose->cost;
+  if (!lost.empty()) frame.pose.warnings.push_back(lost);
+  return frame;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("track.filter", filter)
+      .summary("A frame's pose from its registration and from the motion so far (error-state Kalman filter)")
+      .in("state", "what is known before the frame, of track.predict")
+      .in("pose", "pose that was registered in the frame, with its covariance; it may be missing")
+      .in("verdict", "verdict on this pose: a wrong one is not taken")
+      .out("state", &Frame::state, "what is known after the frame")
+      .out("pose", &Frame::pose, "best pose of the frame with its covariance; where the bone is lost, the prediction")
+      .option("gate", &Options::gate,
+              "largest squared Mahalanobis distance between the registered and the predicted pose (22.46: 99.9 % of "
+              "right poses)",
+              at_least(0), unit(""))
+      .option("most_cost_ratio", &Options::most_cost_ratio,
+              "largest cost of a pose that is taken, as a multiple of that of the frames so far", at_least(0), unit(""))
+      .option("first_scale", &Options::first_scale,
+              "factor on the covariances of the first registered poses; later it follows from how far they scatter",
+              at_least(1), unit(""))
+      .option("least_deg", &Options::least_deg, "deviation that is added to each registered angle", at_least(0))
+      .option("least_mm", &Options::least_mm, "deviation that is added to each registered translation", at_least(0));
+}

@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// The way of a bone as one value, and as a table (CSV) that other programs read.
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
+
+namespace {
+
+using namespace marrow;
+using track::TrackState;
+using track::Trajectory;
+
+Trajectory trajectory(const List<TrackState>& states) {
+  Trajectory result;
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    result.frames.push_back(states.name(i));
+    result.states.push_back(states[i]);
+  }
+  return result;
+}
+
+std::string quoted(const std::string& text) {
+  std::string result = "\"";
+  for (const char c : text) result += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return result + "\"";
+}
+
+/// A row of world_from_model (row-major), then the deviations along the six axes.
+void write_csv(const Trajectory& trajectory, const std::string& path) {
+  std::string text = "frame,name,time_s,found";
+  for (int row = 1; row <= 3; ++row)
+    for (int column = 1; column <= 4; ++column)
+      text += ",m" + std::to_string(row) + std::to_string(column) + (column == 4 ? "_mm" : "");
+  text +=
+      ",deviation_frontal_deg,deviation_lateral_deg,deviation_axial_deg,deviation_frontal_mm,deviation_lateral_mm,"
+      "deviation_along_mm,note\n";
+  const auto add = [&](double value) {
+    char number[40];
+    std::snprintf(number, sizeof number, ",%.10g", value);
+    text += number;
+  };
+  for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
+    const TrackState& state = trajectory.states[i];
+    text += std::to_string(state.frame + 1) + "," + quoted(trajectory.frames[i]);
+    add(state.time_s());
+    text += state.is_found() ? ",1" : ",0";
+    const RigidTransform& pose = state.now.world_from_model;
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) add(pose.rotation(row, column));
+      add(pose.translation_mm[row]);
+    }
+    for (int k = 0; k < 6; ++k) {
+      const double deviation = std::sqrt(std::max(0.0, state.now.covariance(k, k)));
+      add(k < 3 ? degrees(deviation) : deviation);
+    }
+    text += "," + quoted(state.note) + "\n";
+  }
+  files::write_text(path, text);
+}
+
+void write_state(const TrackState& state, const std::string& path) { write_csv({{""}, {state}}, path); }
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("track.trajectory", trajectory)
+      .summary("The way of a bone through all frames, as one table")
+      .in("states", "what is known after each frame", over("frame"))
+      .out("trajectory", "poses, deviations, and in which frames the bone was found");
+  plugin.writer<TrackState>(".csv", write_state, "one frame: time, 3x4 matrix world_from_model, deviations");
+  plugin.writer<Trajectory>(".csv", write_csv, "a line a frame: time, 3x4 matrix world_from_model, deviations");
+}

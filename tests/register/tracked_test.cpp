@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "bowl.hpp"
+#include "marrow/toolbox/track/track_state.hpp"
+#include "shipped.hpp"
+
+namespace tracked_test {
+
+using marrow::Cost;
+using marrow::Matrix6d;
+using marrow::Pose;
+using marrow::Vector6d;
+
+Pose truth() {
+  Pose pose;
+  pose.frame = {Eigen::Vector3d(5, -3, 80), marrow::rotation_from_vector({0.1, -0.2, 0.3})};
+  pose.world_from_model = {"world", "ct", marrow::rotation_from_vector({0.2, 0.1, -0.4}), Eigen::Vector3d(12, -7, 30)};
+  return pose;
+}
+
+/// A prediction off by this much, with these deviations of all angles and translations.
+Pose predicted(const Vector6d& off_deg_mm, double deg, double mm) {
+  Pose pose = truth();
+  Vector6d motion = off_deg_mm, deviation;
+  motion.head<3>() *= marrow::radians(1);
+  pose.world_from_model = moved(truth().world_from_model, pose.frame, motion);
+  deviation << Eigen::Vector3d::Constant(marrow::radians(deg)), Eigen::Vector3d::Constant(mm);
+  pose.covariance = Matrix6d(deviation.cwiseAbs2().asDiagonal());
+  return pose;
+}
+
+shipped::Inputs inputs(const std::shared_ptr<const Cost>& cost, const Pose& initial) {
+  return {{"cost", marrow::Value::of<Cost>(cost)},
+          {"optimizer", shipped::call("optimizer.nelder_mead", {}).at("optimizer")},
+          {"initial", shipped::item(initial)}};
+}
+
+double apart(const Pose& pose) {
+  return well::way(truth().world_from_model, pose.world_from_model, truth().frame).norm();
+}
+
+std::shared_ptr<const Cost> bowl() {
+  return std::make_shared<well::Bowl>(truth().world_from_model, truth().frame, Matrix6d::Identity(), 100);
+}
+
+TEST(Tracked, FindsTheMinimumNearThePrediction) {
+  const auto out = shipped::call("register.tracked", inputs(bowl(), predicted({1, -1, 2, 1, -1, 2}, 2, 2)));
+  EXPECT_LT(apart(out.at("pose").as<Pose>()), 0.05);
+  EXPECT_EQ(out.at("stages").as_list<Pose>().names(), (std::vector<std::string>{"predicted", "final"}));
+  const Matrix6d covariance = *out.at("pose").as<Pose>().covariance;
+  EXPECT_NEAR(std::sqrt(covariance(3, 3)), 0.1, 0.02) << "1 / sqrt(100 * 1)";
+}
+
+TEST(Tracked, LooksFurtherWhereTheResultIsUnlikely) {
+  // The well has waves: the search ends in one of them unless it looks all around.
+  const auto well = std::make_shared<const well::Well>(truth().world_from_model, truth().frame, 60, 6);
+  const Pose far = predicted({2, -2, 9, 3, -3, 9}, 4, 4);
+  const auto out = shipped::call("register.tracked", inputs(well, far), {{"gate", 0.0}});
+  const auto stages = out.at("stages").as_list<Pose>();
+  ASSERT_EQ(stages.names(), (std::vector<std::string>{"predicted", "near", "final"}));
+  EXPECT_LE(out.at("pose").as<Pose>().cost, stages[1].cost);
+  EXPECT_LE(apart(out.at("pose").as<Pose>()), apart(stages[1]));
+}
+
+TEST(Tracked, MostFramesTakeOverACovariance) {
+  marrow::track::TrackState state;
+  state.usual_covariance = Matrix6d(7 * Matrix6d::Identity());
+  const auto covariance = [&](int frame) {
+    state.frame = frame;
+    shipped::Inputs in = inputs(bowl(), predicted({1, -1, 2, 1, -1, 2}, 2, 2));
+    in["state"] = shipped::item(state);
+    return *shipped::call("register.tracked", in).at("pose").as<Pose>().covariance;
+  };
+  EXPECT_EQ(covariance(3), 7 * Matrix6d::Identity());
+  EXPECT_NE(covariance(20), 7 * Matrix6d::Identity()) << "every tenth is new";
+}
+
+TEST(Tracked, AStartWithoutACovarianceIsHardlyKnown) {
+  Pose without = predicted({2, -1, 3, 1, 4, -2}, 1, 1);
+  without.covariance.reset();
+  EXPECT_LT(apart(shipped::call("register.tracked", inputs(bowl(), without)).at("pose").as<Pose>()), 0.05);
+}
+
+}  // namespace tracked_test

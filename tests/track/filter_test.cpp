@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include "sequences.hpp"
+
+namespace filter_test {
+
+using marrow::Pose;
+using marrow::Vector6d;
+using marrow::track::TrackState;
+using sequences::six;
+using shipped::item;
+
+const Vector6d kNoise = six(0.05, 0.05, 0.2, 0.05, 0.05, 0.1);
+
+Pose pose_at(const marrow::RigidTransform& world_from_model, const TrackState& state, double cost = 0.2) {
+  Pose pose;
+  pose.world_from_model = world_from_model;
+  pose.frame = state.fragment;
+  pose.covariance = marrow::Matrix6d(kNoise.cwiseAbs2().asDiagonal());
+  pose.cost = cost;
+  return pose;
+}
+
+shipped::Outputs filtered(const TrackState& state, const Pose* pose, const marrow::Verdict* verdict = nullptr,
+                          const shipped::Options& options = {}) {
+  shipped::Inputs inputs{{"state", item(state)}};
+  if (pose) inputs["pose"] = item(*pose);
+  if (verdict) inputs["verdict"] = item(*verdict);
+  return shipped::call("track.filter", inputs, options);
+}
+
+TrackState state_of(const shipped::Outputs& outputs) { return outputs.at("state").as<TrackState>(); }
+
+TEST(TrackFilter, FollowsABoneWithinItsDeviations) {
+  TrackState state = sequences::begin({{"frame_rate_hz", 62.0}});
+  marrow::Random random(1, 1);
+  marrow::RigidTransform truth = state.now.world_from_model;
+  Vector6d velocity = six(120, -60, 90, 100, -150, 50);
+  double surprises = 0, squares = 0;
+  constexpr int kFrames = 400;
+  for (int i = 0; i < kFrames; ++i) {
+    state = marrow::track::predicted(state);
+    const auto measured = sequences::measured(truth, state, kNoise, random);
+    const Pose pose = pose_at(measured.world_from_model, state);
+    // Of 400 right poses, some lie beyond the gate by chance. They count here, too.
+    state = state_of(filtered(state, &pose, nullptr, {{"gate", 1e9}, {"first_scale", 1.0}}));
+    surprises += state.surprise / kFrames;
+    const Vector6d error = motion_between(truth, state.now.world_from_model, state.fragment);
+    squares += error.dot(state.now.covariance.topLeftCorner<6, 6>().inverse() * error) / kFrames;
+    Vector6d acceleration;
+    for (int k = 0; k < 6; ++k) acceleration[k] = state.acceleration_per_s2[k] * random.normal();
+    const double dt = 1 / state.frame_rate_hz;
+    truth = moved(truth, state.fragment, velocity * dt + 0.5 * dt * dt * acceleration);
+    velocity += dt * acceleration;
+  }
+  // Chi-squared with 6 degrees of freedom; a little less, because the scale of the noise is never below 1.
+  EXPECT_NEAR(surprises, 5.5, 1);
+  EXPECT_NEAR(squares, 5, 1);
+}
+
+TEST(TrackFilter, SaysWhyABoneIsLost) {
+  TrackState state = marrow::track::predicted(sequences::begin());
+  state.usual_cost = 0.2;
+  const marrow::RigidTransform there = state.predicted.world_from_model;
+  const auto note = [&](const Pose* pose, const marrow::Verdict* verdict = nullptr) {
+    return state_of(filtered(state, pose, verdict)).note;
+  };
+  Pose good = pose_at(there, state);
+  EXPECT_EQ(note(&good), "");
+  EXPECT_EQ(note(nullptr), "no pose was found");
+  Pose without = good;
+  without.covariance.reset();
+  EXPECT_EQ(note(&without), "the images do not determine the pose");
+  const Pose dear = pose_at(there, state, 0.5);
+  EXPECT_EQ(note(&dear), "its cost is 0.5, where 0.2 is usual");
+  const Pose far = pose_at(moved(there, state.fragment, six(0, 0, 60, 0, 0, 0)), state);
+  EXPECT_EQ(note(&far).substr(0, 54), "it is not where the motion leads: squared distance 168");
+  marrow::Verdict wrong;
+  wrong.judgement = marrow::Judgement::wrong;
+  wrong.reasons = {"the shaft is too wide"};
+  EXPECT_EQ(note(&good, &wrong), "its verdict is wrong: the shaft is too wide");
+}
+
+TEST(TrackFilter, ALostBoneIsWhereItsMotionLeads) {
+  TrackState state = marrow::track::predicted(sequences::begin());
+  const shipped::Outputs outputs = filtered(state, nullptr);
+  const TrackState lost = state_of(outputs);
+  EXPECT_FALSE(lost.is_found());
+  EXPECT_EQ(lost.frames_lost, 1);
+  EXPECT_EQ(lost.now.world_from_model.rotation, state.predicted.world_from_model.rotation);
+  EXPECT_EQ(outputs.at("pose").as<Pose>().warnings, (std::vector<std::string>{"no pose was found"}));
+  const TrackState again = state_of(filtered(marrow::track::predicted(lost), nullptr));
+  EXPECT_EQ(again.frames_lost, 2);
+  EXPECT_GT(again.now.covariance(2, 2), lost.now.covariance(2, 2));
+  const TrackState next = marrow::track::predicted(again);
+  const Pose found = pose_at(next.predicted.world_from_model, next);
+  EXPECT_EQ(state_of(filtered(next, &found)).frames_lost, 0);
+}
+
+}  // namespace filter_test
