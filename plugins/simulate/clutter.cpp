@@ -53,13 +53,6 @@ void add(std::vector<Body>& bodies, const std::vector<Body>& more) {
   bodies.insert(bodies.end(), more.begin(), more.end());
 }
 
-/// The fragment at the knee.
-const Fragment& distal_fragment(const Phantom& phantom) {
-  for (const Fragment& fragment : phantom.fragments)
-    if (fragment.side < 0) return fragment;
-  return phantom.fragments.front();
-}
-
 /// The height in frame "bone" below which the bone is whole.
 double whole_below(const Phantom& phantom) {
   constexpr double kFromFractureMm = 8;
@@ -83,7 +76,7 @@ void add_plate(ClutteredPhantom& cluttered, std::size_t level, std::uint64_t see
   shape.material = level == 0 ? "titanium" : "steel";
   const Phantom& phantom = cluttered.phantom;
   std::vector<Body> plate =
-      phantom::make_plate(phantom.bone.outer, distal_fragment(phantom), shape, whole_below(phantom), random);
+      phantom::make_plate(phantom.bone.outer, phantom::distal_fragment(phantom), shape, whole_below(phantom), random);
   if (plate.empty()) context.warn("the fracture is too near to the knee for a plate below it; it is left out");
   add(cluttered.bodies, plate);
 }
@@ -120,7 +113,7 @@ void add_knee(ClutteredPhantom& cluttered, std::size_t level, std::uint64_t seed
   shape.ct_flexion_rad = radians(kKneeFlexionDeg[0] * random.uniform());
   shape.patella_up_mm = 10 * (random.uniform() - 0.5);
   const Phantom& phantom = cluttered.phantom;
-  add(cluttered.bodies, phantom::make_knee(phantom.bone.outer, distal_fragment(phantom), shape));
+  add(cluttered.bodies, phantom::make_knee(phantom.bone.outer, phantom::distal_fragment(phantom), shape));
 }
 
 struct Cluttered {
@@ -133,16 +126,13 @@ ClutteredPhantom moved_back(const ClutteredPhantom& now, double distance_mm, std
   marrow::Random random(seed, 10);
   const double x = random.normal(), y = random.normal(), z = random.normal();
   ClutteredPhantom earlier = now;
-  const std::string name = distal_fragment(now.phantom).name;
+  const std::string name = phantom::distal_fragment(now.phantom).name;
   RigidTransform shift{"world", "world"};
   shift.translation_mm = distance_mm * Eigen::Vector3d(x, y, z).normalized();
   for (Fragment& fragment : earlier.phantom.fragments)
     if (fragment.name == name) fragment.world_from_ct = shift * fragment.world_from_ct;
-  for (Body& body : earlier.bodies) {
-    if (body.moves_with != name) continue;
-    for (auto& vertex : body.surface.vertices_mm) vertex += shift.translation_mm;
-    body.ct_from_world = body.ct_from_world * inverse(shift);
-  }
+  for (Body& body : earlier.bodies)
+    if (body.moves_with == name) phantom::move(body, shift);
   return earlier;
 }
 
@@ -162,7 +152,7 @@ void add_surgery(ClutteredPhantom& cluttered, const ClutterOptions& options, std
                                           : *level == 1 ? std::vector{4.0}
                                                         : std::vector{5.0, 3.0};
     add(cluttered.bodies,
-        phantom::make_pins(phantom.bone.outer, distal_fragment(phantom), diameters, radius + 60, random));
+        phantom::make_pins(phantom.bone.outer, phantom::distal_fragment(phantom), diameters, radius + 60, random));
   }
   if (const auto level = level_of(options.cable)) {
     marrow::Random random(seed, 7);

@@ -35,11 +35,6 @@ RigidTransform turned_about(const Eigen::Vector3d& point_mm, const Eigen::Vector
   return turn;
 }
 
-void move(Body& body, const RigidTransform& by) {
-  for (auto& vertex : body.surface.vertices_mm) vertex = by * vertex;
-  body.ct_from_world = body.ct_from_world * inverse(by);
-}
-
 bool is_of_lower_leg(const Body& body) { return body.name.starts_with("tibia") || body.name.starts_with("fibula"); }
 
 /// A closed shutter: steel that fills the field of view.
@@ -60,7 +55,7 @@ Body shutter() {
 class Knee {
  public:
   Knee(const ClutteredPhantom& phantom, const Options& options)
-      : rest_(phantom), options_(options), fragment_(distal_fragment(phantom)) {
+      : rest_(phantom), options_(options), fragment_(phantom::distal_fragment(phantom.phantom)) {
     for (const Body& body : phantom.bodies)
       if (is_of_lower_leg(body)) leg_.push_back(body);
     if (leg_.empty())
@@ -85,21 +80,15 @@ class Knee {
         turned_about(knee_mm, axes * Eigen::Vector3d(0, 0, radians(options_.axial_deg) * bent), "world");
     for (Body& body : now.bodies)
       if (is_of_lower_leg(body))
-        move(body, femur * bend * turn);
+        phantom::move(body, femur * bend * turn);
       else if (body.moves_with == fragment_.name)
-        move(body, femur);
+        phantom::move(body, femur);
     if (options_.crossing) add_crossing(frame, now);
     if (is_blank(frame)) now.bodies.push_back(shutter());
     return now;
   }
 
  private:
-  static Fragment distal_fragment(const ClutteredPhantom& phantom) {
-    for (const Fragment& fragment : phantom.phantom.fragments)
-      if (fragment.side < 0) return fragment;
-    return phantom.phantom.fragments.at(0);
-  }
-
   bool is_blank(int frame) const {
     return options_.blank.size() == 2 && frame + 1 >= options_.blank[0] && frame + 1 <= options_.blank[1];
   }
@@ -110,7 +99,7 @@ class Knee {
     for (Body body : leg_) {
       RigidTransform shift{"world", "world"};
       shift.translation_mm = {kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm, 60};
-      move(body, shift);
+      phantom::move(body, shift);
       body.name = "other " + body.name;
       body.moves_with.clear();
       body.in_ct = false;

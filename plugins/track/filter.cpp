@@ -81,9 +81,7 @@ Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdi
     state.note = lost;
     context.warn("the bone is lost in frame " + std::to_string(state.frame + 1) + ": " + lost);
   }
-  frame.pose.world_from_model = state.now.world_from_model;
-  frame.pose.frame = state.fragment;
-  frame.pose.covariance = state.now.covariance.topLeftCorner<6, 6>();
+  frame.pose = track::pose_of(state);
   if (pose) frame.pose.cost = pose->cost;
   if (!lost.empty()) frame.pose.warnings.push_back(lost);
   return frame;

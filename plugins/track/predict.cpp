@@ -14,11 +14,8 @@ struct Prediction {
 };
 
 Prediction predict(const TrackState& before) {
-  Prediction prediction{track::predicted(before), {}};
-  prediction.pose.world_from_model = prediction.state.predicted.world_from_model;
-  prediction.pose.frame = before.fragment;
-  prediction.pose.covariance = prediction.state.predicted.covariance.topLeftCorner<6, 6>();
-  return prediction;
+  const TrackState state = track::predicted(before);
+  return {state, track::pose_of(state)};
 }
 
 }  // namespace

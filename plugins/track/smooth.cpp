@@ -19,12 +19,8 @@ Smoothed smooth(const List<TrackState>& states) {
   all = track::smoothed(all);
   Smoothed result;
   for (std::size_t i = 0; i < all.size(); ++i) {
-    Pose pose;
-    pose.world_from_model = all[i].now.world_from_model;
-    pose.frame = all[i].fragment;
-    pose.covariance = all[i].now.covariance.topLeftCorner<6, 6>();
     result.states.add(states.name(i), all[i]);
-    result.poses.add(states.name(i), pose);
+    result.poses.add(states.name(i), track::pose_of(all[i]));
   }
   return result;
 }

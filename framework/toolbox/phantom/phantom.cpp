@@ -69,6 +69,17 @@ void check_phantom(const ClutteredPhantom& cluttered, const std::string& what) {
     }
 }
 
+const Fragment& distal_fragment(const Phantom& phantom) {
+  for (const Fragment& fragment : phantom.fragments)
+    if (fragment.side < 0) return fragment;
+  return phantom.fragments.front();
+}
+
+void move(Body& body, const RigidTransform& by) {
+  for (auto& vertex : body.surface.vertices_mm) vertex = by * vertex;
+  body.ct_from_world = body.ct_from_world * inverse(by);
+}
+
 void place_distal_end(Bone& bone, double depth_mm) {
   double lowest = bone.outer.vertices_mm.front().z();
   for (const auto& vertex : bone.outer.vertices_mm) lowest = std::min(lowest, vertex.z());

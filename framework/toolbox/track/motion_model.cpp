@@ -150,6 +150,14 @@ TrackState updated(const TrackState& state, const Measurement& measured) {
   return next;
 }
 
+Pose pose_of(const TrackState& state) {
+  Pose pose;
+  pose.world_from_model = state.now.world_from_model;
+  pose.frame = state.fragment;
+  pose.covariance = state.now.covariance.topLeftCorner<6, 6>();
+  return pose;
+}
+
 std::vector<TrackState> smoothed(const std::vector<TrackState>& states) {
   if (states.empty()) throw Error("there is no frame to smooth");
   for (std::size_t i = 0; i < states.size(); ++i)

@@ -83,6 +83,12 @@ void check_bone(const Bone& bone, const std::string& what);
 void check_phantom(const Phantom& phantom, const std::string& what);
 void check_phantom(const ClutteredPhantom& phantom, const std::string& what);
 
+/// The fragment at the knee; the whole bone if it is not broken. `phantom` has at least one fragment.
+const Fragment& distal_fragment(const Phantom& phantom);
+
+/// Moves a body in the images, by a motion in frame "world". Its place in the CT stays the same.
+void move(Body& body, const RigidTransform& by);
+
 /// Moves the surfaces, the thigh and the fill. Then the lowest point lies `depth_mm` below the origin, and the middle
 /// of the bone's lowest 100 mm lies on the z axis. The origin is the isocentre of the views.
 void place_distal_end(Bone& bone, double depth_mm);

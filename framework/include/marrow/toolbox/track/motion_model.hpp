@@ -12,6 +12,9 @@ namespace marrow::track {
 /// The state one frame later, without a measurement: `now` and `predicted` are the prediction.
 TrackState predicted(const TrackState& state);
 
+/// The pose in `now` with its covariance.
+Pose pose_of(const TrackState& state);
+
 /// Squared Mahalanobis distance of a measured pose from the state's prediction. It is distributed as chi-squared with 6
 /// degrees of freedom if the model holds.
 double surprise(const TrackState& state, const Measurement& measured);
