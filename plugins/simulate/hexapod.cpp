@@ -1,0 +1,163 @@
+// SPDX-License-Identifier: Apache-2.0
+// A bone fragment on a hexapod (Stewart platform) that is told to move. Where the fragment really is depends on errors
+// of the legs, of the joints and of the mounting.
+#include <algorithm>
+#include <marrow/plugin.hpp>
+
+#include "marrow/domain/random.hpp"
+#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/robot/hexapod.hpp"
+
+namespace {
+
+using namespace marrow;
+using phantom::Fragment;
+using robot::Hexapod;
+
+struct Options : robot::HexapodShape, robot::HexapodLimits {
+  std::string fragment = "distal";
+  double grip_mm = 5;
+  Eigen::Vector3d fragment_at_mm{3, -4, 5};
+  Eigen::Vector3d stand_deg{2, -3, 25};
+  double leg_sd_mm = 0.02;
+  double joint_sd_mm = 0.05;
+  double mount_sd_deg = 2;
+  double mount_sd_mm = 2;
+  int platform_seed = 1;
+};
+
+struct Result {
+  List<Truth> platform;
+  List<Truth> fragment;
+  List<Metrics> legs;
+};
+
+Eigen::Vector3d normal3(marrow::Random& random) {
+  const double x = random.normal(), y = random.normal(), z = random.normal();
+  return {x, y, z};
+}
+
+const Fragment& fragment_of(const phantom::Phantom& phantom, const std::string& name) {
+  std::string known;
+  for (const Fragment& fragment : phantom.fragments) {
+    if (fragment.name == name) return fragment;
+    known += (known.empty() ? "" : ", ") + fragment.name;
+  }
+  throw Error("simulate.hexapod: the phantom has no fragment '" + name + "', only " + known);
+}
+
+/// The fragment stands on the platform with its fracture downwards, its long axis along z. `grip_mm`: height of its
+/// lowest point.
+RigidTransform platform_from_ct(const Fragment& fragment, double grip_mm) {
+  if (fragment.outer.triangles.empty())
+    throw Error("simulate.hexapod: fragment '" + fragment.name +
+                "' has no surface of its own; make it with simulate.fracture");
+  Eigen::Matrix3d upright = Eigen::Matrix3d::Identity();
+  if (fragment.side < 0) upright.diagonal() << 1, -1, -1;
+  RigidTransform transform{"platform", "ct", upright * fragment.frame.axes.transpose(), Eigen::Vector3d::Zero()};
+  transform.translation_mm = -transform.rotation * fragment.frame.origin_mm;
+  double lowest = 0;
+  for (const Eigen::Vector3d& vertex : fragment.outer.vertices_mm) lowest = std::min(lowest, (transform * vertex).z());
+  transform.translation_mm.z() += grip_mm - lowest;
+  return transform;
+}
+
+/// The platform stands so that the fragment's middle lies at `fragment_at_mm` while the platform is at home.
+RigidTransform world_from_base(const Hexapod& hexapod, const RigidTransform& platform_from_ct, const Fragment& fragment,
+                               const Options& options) {
+  RigidTransform transform{"world", "base", rotation_from_vector(options.stand_deg * kPi / 180),
+                           Eigen::Vector3d::Zero()};
+  const RigidTransform base_from_ct = hexapod.base_from_home * platform_from_ct;
+  transform.translation_mm = options.fragment_at_mm - transform.rotation * (base_from_ct * fragment.frame.origin_mm);
+  return transform;
+}
+
+/// The hexapod as it is built, which its controller does not know.
+Hexapod as_built(Hexapod hexapod, const Options& options) {
+  marrow::Random random{std::uint64_t(options.platform_seed)};
+  for (auto* joints : {&hexapod.base_mm, &hexapod.platform_mm})
+    for (Eigen::Vector3d& joint : *joints) joint += options.joint_sd_mm * normal3(random);
+  return hexapod;
+}
+
+/// The mounting's error: a turn about the fragment's middle and a shift.
+RigidTransform misplaced(const RigidTransform& platform_from_ct, const Eigen::Vector3d& middle_mm,
+                         const Options& options, std::uint64_t seed) {
+  marrow::Random random(seed, 0);
+  const Eigen::Vector3d middle = platform_from_ct * middle_mm;
+  RigidTransform error{"platform", "platform", rotation_from_vector(radians(options.mount_sd_deg) * normal3(random)),
+                       Eigen::Vector3d::Zero()};
+  error.translation_mm = middle - error.rotation * middle + options.mount_sd_mm * normal3(random);
+  return error * platform_from_ct;
+}
+
+Metrics lengths_in_words(const Vector6d& lengths_mm) {
+  Metrics metrics;
+  for (int i = 0; i < 6; ++i) metrics.items.push_back({"leg" + std::to_string(i + 1), lengths_mm[i], "mm"});
+  return metrics;
+}
+
+Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, const Options& options, Context& context) {
+  phantom::check_phantom(phantom, "simulate.hexapod");
+  const Fragment& fragment = fragment_of(phantom, options.fragment);
+  const Hexapod nominal = robot::make_hexapod(options), built = as_built(nominal, options);
+  const RigidTransform upright = platform_from_ct(fragment, options.grip_mm),
+                       world = world_from_base(nominal, upright, fragment, options),
+                       mounted = misplaced(upright, fragment.frame.origin_mm, options, context.seed());
+  Result result;
+  for (std::size_t i = 0; i < commands.size(); ++i) {
+    const std::string& name = commands.name(i);
+    check_rigid(commands[i].world_from_model, "motion '" + name + "'");
+    RigidTransform motion = commands[i].world_from_model;
+    motion.target = motion.source = "platform";
+    const RigidTransform told = nominal.base_from_home * motion;
+    robot::check_workspace(nominal, options, told, "simulate.hexapod: motion '" + name + "'");
+    Vector6d lengths = robot::leg_lengths_mm(nominal, told);
+    result.legs.add(name, lengths_in_words(lengths));
+    marrow::Random random(context.seed(), i + 1);
+    for (int k = 0; k < 6; ++k) lengths[k] += options.leg_sd_mm * random.normal();
+    const RigidTransform platform = world * robot::pose_of_legs(built, lengths, told).base_from_platform;
+    result.platform.add(name, Truth{platform});
+    result.fragment.add(name, Truth{platform * mounted});
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.hexapod", hexapod)
+      .summary("A bone fragment on a hexapod that is told to move, with errors of its legs, joints and mounting")
+      .random()
+      .in("phantom", "the fragment; it stands on the platform with its fracture downwards")
+      .in("commands", "motions of the platform from home, in the axes of the platform at home, z upwards",
+          over("position"))
+      .out("platform", &Result::platform, "exact pose of the platform in the world", over("position"))
+      .out("fragment", &Result::fragment, "exact pose of the fragment: world from CT", over("position"))
+      .out("legs", &Result::legs, "length of each leg as the controller sets it", over("position"))
+      .option("fragment", &Options::fragment, "name of the fragment on the platform")
+      .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))
+      .option("platform_radius_mm", &Options::platform_radius_mm, "the same of the platform", at_least(1))
+      .option("base_gap_deg", &Options::base_gap_deg, "angle between the two joints of a pair of the base", at_least(0),
+              at_most(119))
+      .option("platform_gap_deg", &Options::platform_gap_deg, "the same of the platform", at_least(0), at_most(119))
+      .option("height_mm", &Options::height_mm, "height of the platform's joints above the base's at home", at_least(1))
+      .option("stroke_mm", &Options::stroke_mm, "how far a leg's length may differ from that at home, to either side",
+              at_least(0))
+      .option("joint_deg", &Options::joint_deg, "how far a leg may turn in its joints from its direction at home",
+              at_least(0), at_most(90))
+      .option("grip_mm", &Options::grip_mm, "height of the fragment's end above the platform's joints", at_least(0))
+      .option("fragment_at_mm", &Options::fragment_at_mm,
+              "where the fragment's middle lies in the world while the platform is at home, if nothing is off")
+      .option("stand_deg", &Options::stand_deg, "rotation vector of the hexapod's base in the world")
+      .option("leg_sd_mm", &Options::leg_sd_mm, "standard deviation of each leg's length, drawn for each motion",
+              at_least(0))
+      .option("joint_sd_mm", &Options::joint_sd_mm,
+              "standard deviation of each coordinate of each joint, drawn once for the hexapod", at_least(0))
+      .option("mount_sd_deg", &Options::mount_sd_deg,
+              "standard deviation of the fragment's turn on the platform about each axis, drawn once in a run",
+              at_least(0))
+      .option("mount_sd_mm", &Options::mount_sd_mm, "the same of its shift along each axis", at_least(0))
+      .option("platform_seed", &Options::platform_seed, "seed of the joints' errors: one hexapod for each seed",
+              at_least(0));
+}

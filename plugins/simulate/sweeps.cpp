@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a robot is told in a study of accuracy: turns about one axis after the other.
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  std::vector<std::string> axes{"x", "y", "z"};
+  double range_deg = 15;
+  double step_deg = 1;
+  Eigen::Vector3d pivot_mm{0, 0, 90};
+};
+
+Pose turned(int axis, double angle_deg, const Eigen::Vector3d& pivot_mm) {
+  Pose pose;
+  pose.world_from_model = {
+      "home", "platform", rotation_from_vector(radians(angle_deg) * Eigen::Vector3d::Unit(axis)), {}};
+  pose.world_from_model.translation_mm = pivot_mm - pose.world_from_model.rotation * pivot_mm;
+  return pose;
+}
+
+List<Pose> sweeps(const Options& options) {
+  const int steps = int(std::floor(options.range_deg / options.step_deg + 1e-9));
+  List<Pose> commands;
+  commands.add("neutral", turned(0, 0, options.pivot_mm));
+  for (const std::string& axis : options.axes) {
+    const auto add = [&](int step) {
+      char name[48];
+      std::snprintf(name, sizeof name, "r%s%+06.2f", axis.c_str(), step * options.step_deg);
+      commands.add(name, turned(axis[0] - 'x', step * options.step_deg, options.pivot_mm));
+    };
+    // From neutral to one side, then from neutral to the other. So each motion begins near a known one.
+    for (int step = 0; step <= steps; ++step) add(step);
+    for (int step = 1; step <= steps; ++step) add(-step);
+  }
+  return commands;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("simulate.sweeps", sweeps)
+      .summary("Motions that a platform is told to make: turns about x, y and z, each from one side to the other")
+      .out("commands",
+           "motions from home, with z upwards: first 'neutral', then for example 'rx+03.00' for 3 degrees about x",
+           over("position"))
+      .option("axes", &Options::axes, "axes of the platform at home", one_of({"x", "y", "z"}))
+      .relation(at_least_one({"axes"}))
+      .relation(distinct("axes"))
+      .option("range_deg", &Options::range_deg, "largest turn, to either side", at_least(0), at_most(90))
+      .option("step_deg", &Options::step_deg, "step between two turns", at_least(0.01), at_most(90))
+      .option("pivot_mm", &Options::pivot_mm, "the point that stays, from the middle of the platform");
+}
