@@ -103,7 +103,57 @@ Camera second() {
   return camera;
 }
 
-Inputs sample() { return {{"images", images_of(board_images())}, {"views", views_of(device(0), second())}}; }
+/// A chessboard with 9 x 6 inner corners and squares of 20 mm, with 2 x 2 samples per pixel and without distortion.
+Picture chessboard_picture(int number) {
+  constexpr double kSquare_mm = 20;
+  const RigidTransform pose = device(number).camera_from_world;
+  Eigen::Matrix3d pixel_from_board;
+  pixel_from_board << pose.rotation.leftCols<2>(),
+      Eigen::Vector3d(2.0 * number, 5.0 - number, 1000) - pose.rotation * Eigen::Vector3d(80, 50, 0);
+  const Eigen::Matrix3d board_from_pixel = (device(number).intrinsics * pixel_from_board).inverse();
+  cv::Mat pixels(kSize_px, kSize_px, CV_8UC3);
+  for (int v = 0; v < kSize_px; ++v)
+    for (int u = 0; u < kSize_px; ++u) {
+      int dark = 0;
+      for (int k = 0; k < 4; ++k) {
+        const Eigen::Vector2d at =
+            (board_from_pixel * Eigen::Vector3d(u - 0.25 + 0.5 * (k & 1), v - 0.25 + 0.5 * (k >> 1), 1)).hnormalized() /
+            kSquare_mm;
+        const int column = int(std::floor(at.x())), row = int(std::floor(at.y()));
+        dark += column >= -1 && column <= 8 && row >= -1 && row <= 5 && (column + row) % 2 == 0;
+      }
+      pixels.at<cv::Vec3b>(v, u) = cv::Vec3b::all(std::uint8_t(230 - 50 * dark));
+    }
+  return {pixels};
+}
+
+Value chessboards() {
+  static const Value kPictures = [] {
+    List<Picture> list;
+    for (int i = 0; i < 5; ++i) list.add(std::to_string(i), chessboard_picture(i));
+    return Value::of<Picture>(list, "photograph");
+  }();
+  return kPictures;
+}
+
+Inputs sample() {
+  List<Picture> photographs;
+  List<Camera> cameras;
+  for (const char* name : {"a", "b"}) {
+    photographs.add(name, {cv::Mat(kSize_px, kSize_px, CV_8UC3, cv::Scalar(80, 120, 40))});
+    cameras.add(name, device(0));
+  }
+  Calibration calibration;
+  calibration.width_px = calibration.height_px = kSize_px;
+  calibration.intrinsics = device(0).intrinsics;
+  calibration.distortion.k = {0.1, 0, 0};
+  return {{"images", images_of(board_images())},
+          {"views", views_of(device(0), second())},
+          {"boards", chessboards()},
+          {"photographs", Value::of<Picture>(photographs, "view")},
+          {"cameras", Value::of<Camera>(cameras, "view")},
+          {"calibration", Value::of<Calibration>(std::make_shared<const Calibration>(calibration))}};
+}
 
 std::map<std::string, OptionValue> options() {
   return {

@@ -37,15 +37,6 @@ Eigen::Vector3d normal3(marrow::Random& random) {
   return {x, y, z};
 }
 
-const Fragment& fragment_of(const phantom::Phantom& phantom, const std::string& name) {
-  std::string known;
-  for (const Fragment& fragment : phantom.fragments) {
-    if (fragment.name == name) return fragment;
-    known += (known.empty() ? "" : ", ") + fragment.name;
-  }
-  throw Error("simulate.hexapod: the phantom has no fragment '" + name + "', only " + known);
-}
-
 /// The fragment stands on the platform with its fracture downwards, its long axis along z. `grip_mm`: height of its
 /// lowest point.
 RigidTransform platform_from_ct(const Fragment& fragment, double grip_mm) {
@@ -57,7 +48,9 @@ RigidTransform platform_from_ct(const Fragment& fragment, double grip_mm) {
   RigidTransform transform{"platform", "ct", upright * fragment.frame.axes.transpose(), Eigen::Vector3d::Zero()};
   transform.translation_mm = -transform.rotation * fragment.frame.origin_mm;
   double lowest = 0;
-  for (const Eigen::Vector3d& vertex : fragment.outer.vertices_mm) lowest = std::min(lowest, (transform * vertex).z());
+  for (const auto& triangle : fragment.outer.triangles)
+    for (const std::uint32_t corner : triangle)
+      lowest = std::min(lowest, (transform * fragment.outer.vertices_mm[corner]).z());
   transform.translation_mm.z() += grip_mm - lowest;
   return transform;
 }
@@ -99,7 +92,7 @@ Metrics lengths_in_words(const Vector6d& lengths_mm) {
 
 Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, const Options& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.hexapod");
-  const Fragment& fragment = fragment_of(phantom, options.fragment);
+  const Fragment& fragment = phantom::fragment_named(phantom, options.fragment, "simulate.hexapod");
   const Hexapod nominal = robot::make_hexapod(options), built = as_built(nominal, options);
   const RigidTransform upright = platform_from_ct(fragment, options.grip_mm),
                        world = world_from_base(nominal, upright, fragment, options),

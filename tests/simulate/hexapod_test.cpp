@@ -74,7 +74,9 @@ TEST(SimulateHexapod, WithoutErrorsItDoesWhatItIsTold) {
     if (one.name == "distal") distal = &one;
   EXPECT_LT((fragment[0].world_from_model * distal->frame.origin_mm - Eigen::Vector3d(3, -4, 5)).norm(), 1e-7);
   double lowest = 1e9;
-  for (const auto& vertex : distal->outer.vertices_mm) lowest = std::min(lowest, (platform_from_ct * vertex).z());
+  for (const auto& triangle : distal->outer.triangles)
+    for (const auto corner : triangle)
+      lowest = std::min(lowest, (platform_from_ct * distal->outer.vertices_mm[corner]).z());
   EXPECT_NEAR(lowest, 5, 1e-9);
   EXPECT_NEAR((platform_from_ct.rotation * distal->frame.axes.col(2)).z(), -1, 1e-9);
 }

@@ -80,6 +80,15 @@ void move(Body& body, const RigidTransform& by) {
   body.ct_from_world = body.ct_from_world * inverse(by);
 }
 
+const Fragment& fragment_named(const Phantom& phantom, const std::string& name, const std::string& what) {
+  std::string known;
+  for (const Fragment& fragment : phantom.fragments) {
+    if (fragment.name == name) return fragment;
+    known += (known.empty() ? "" : ", ") + fragment.name;
+  }
+  throw Error(what + ": the phantom has no fragment '" + name + "', only " + known);
+}
+
 void place_distal_end(Bone& bone, double depth_mm) {
   double lowest = bone.outer.vertices_mm.front().z();
   for (const auto& vertex : bone.outer.vertices_mm) lowest = std::min(lowest, vertex.z());

@@ -89,6 +89,9 @@ const Fragment& distal_fragment(const Phantom& phantom);
 /// Moves a body in the images, by a motion in frame "world". Its place in the CT stays the same.
 void move(Body& body, const RigidTransform& by);
 
+/// The fragment of this name. Throws Error, naming `what` and the names that there are, if there is none.
+const Fragment& fragment_named(const Phantom& phantom, const std::string& name, const std::string& what);
+
 /// Moves the surfaces, the thigh and the fill. Then the lowest point lies `depth_mm` below the origin, and the middle
 /// of the bone's lowest 100 mm lies on the z axis. The origin is the isocentre of the views.
 void place_distal_end(Bone& bone, double depth_mm);

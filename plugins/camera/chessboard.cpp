@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calibration of a camera for visible light from photographs of a chessboard (Zhang 2000, as OpenCV does it), and where
+// the camera is while it sees the board at a known place.
+#include <algorithm>
+#include <cmath>
+#include <marrow/plugin.hpp>
+#include <opencv2/calib3d.hpp>
+
+#include "marrow/toolbox/calibration/chessboard.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options : calibration::Chessboard, calibration::ChessboardPlace {
+  int radial_terms = 2;
+};
+
+struct Result {
+  Calibration calibration;
+  List<Camera> cameras;
+  Metrics report;
+};
+
+/// Corners in one photograph.
+struct Seen {
+  std::string name;
+  std::vector<Eigen::Vector2d> pixels;
+};
+
+std::string size_of(const cv::Mat& pixels) {
+  return std::to_string(pixels.cols) + " x " + std::to_string(pixels.rows) + " pixels";
+}
+
+/// What OpenCV's calibration finds. The last three terms of its distortion are not used or not always.
+struct Fit {
+  cv::Mat1d matrix = cv::Mat1d::eye(3, 3), distortion = cv::Mat1d::zeros(1, 5), deviation, residuals;
+  std::vector<cv::Mat> rotations, translations;
+  double residual_px = 0;
+};
+
+Fit fitted(const std::vector<Seen>& seen, const cv::Size& size, const Options& options) {
+  std::vector<cv::Point3f> board;
+  for (const Eigen::Vector3d& corner : calibration::corners_mm(options))
+    board.emplace_back(float(corner.x()), float(corner.y()), 0.0f);
+  std::vector<std::vector<cv::Point2f>> pixels;
+  for (const Seen& one : seen) {
+    pixels.emplace_back();
+    for (const Eigen::Vector2d& corner : one.pixels) pixels.back().emplace_back(float(corner.x()), float(corner.y()));
+  }
+  int flags = cv::CALIB_ZERO_TANGENT_DIST;
+  if (options.radial_terms < 3) flags |= cv::CALIB_FIX_K3;
+  if (options.radial_terms < 2) flags |= cv::CALIB_FIX_K2;
+  if (options.radial_terms < 1) flags |= cv::CALIB_FIX_K1;
+  Fit fit;
+  const double root_mean_square =
+      cv::calibrateCamera(std::vector<std::vector<cv::Point3f>>(seen.size(), board), pixels, size, fit.matrix,
+                          fit.distortion, fit.rotations, fit.translations, fit.deviation, cv::noArray(), fit.residuals,
+                          flags, {cv::TermCriteria::EPS | cv::TermCriteria::COUNT, 100, 1e-12});
+  fit.residual_px = root_mean_square / std::sqrt(2.0);  // OpenCV's is the length, this is that of a coordinate
+  return fit;
+}
+
+Calibration calibration_of(const Fit& fit, const cv::Size& size) {
+  Calibration result;
+  result.width_px = size.width;
+  result.height_px = size.height;
+  result.intrinsics << fit.matrix(0, 0), 0, fit.matrix(0, 2), 0, fit.matrix(1, 1), fit.matrix(1, 2), 0, 0, 1;
+  result.distortion.k = {fit.distortion(0, 0), fit.distortion(0, 1), fit.distortion(0, 4)};
+  const auto deviation = [&](int i) { return fit.deviation(i, 0); };  // fx, fy, cx, cy, k1, k2, p1, p2, k3
+  result.focal_deviation_px = {deviation(0), deviation(1)};
+  result.principal_deviation_px = {deviation(2), deviation(3)};
+  result.distortion_deviation = {deviation(4), deviation(5), deviation(8)};
+  result.residual_px = fit.residual_px;
+  return result;
+}
+
+Camera camera_of(const Fit& fit, std::size_t i, const Calibration& device, const RigidTransform& world_from_board) {
+  const cv::Mat1d turn = fit.rotations[i], shift = fit.translations[i];
+  const RigidTransform camera_from_board{
+      "camera", "board", rotation_from_vector({turn(0), turn(1), turn(2)}), {shift(0), shift(1), shift(2)}};
+  return {device.width_px, device.height_px, device.intrinsics, camera_from_board * inverse(world_from_board)};
+}
+
+Metrics report_of(const Fit& fit, const Calibration& c, std::size_t photographs) {
+  double worst = 0;
+  for (const double residual : fit.residuals) worst = std::max(worst, residual);
+  Metrics report{
+      {{"photographs", double(photographs), ""}, {"residual", c.residual_px, "px"}, {"worst_photograph", worst, "px"}}};
+  const char* axes[] = {"u", "v"};
+  for (int i : {0, 1}) {
+    report.items.push_back({std::string("focal_") + axes[i], c.intrinsics(i, i), "px"});
+    report.items.push_back({std::string("focal_") + axes[i] + "_deviation", c.focal_deviation_px[i], "px"});
+    report.items.push_back({std::string("principal_") + axes[i], c.intrinsics(i, 2), "px"});
+    report.items.push_back({std::string("principal_") + axes[i] + "_deviation", c.principal_deviation_px[i], "px"});
+  }
+  for (std::size_t i = 0; i < 3; ++i) report.items.push_back({"k" + std::to_string(i + 1), c.distortion.k[i], ""});
+  return report;
+}
+
+Result chessboard(const List<Picture>& boards, const List<Picture>* placed, const Options& options, Context& context) {
+  calibration::check_chessboard(options, "camera.chessboard");
+  const std::string board = std::to_string(options.columns) + " x " + std::to_string(options.rows) + " inner corners";
+  std::vector<Seen> seen;
+  cv::Size size;
+  const auto look_at = [&](const std::string& name, const Picture& photograph) {
+    context.check_cancelled();
+    if (photograph.pixels.empty() || photograph.pixels.type() != CV_8UC3)
+      throw Error("photograph '" + name + "' is not a colour picture of 8 bits");
+    if (size.area() > 0 && photograph.pixels.size() != size)
+      throw Error("photograph '" + name + "' has " + size_of(photograph.pixels) + ", those before it " +
+                  std::to_string(size.width) + " x " + std::to_string(size.height) +
+                  "; one calibration is for one size");
+    size = photograph.pixels.size();
+    seen.push_back({name, calibration::find_corners(photograph, options)});
+    return !seen.back().pixels.empty();
+  };
+  for (std::size_t i = 0; i < boards.size(); ++i)
+    if (!look_at(boards.name(i), boards[i])) {
+      context.warn("photograph '" + boards.name(i) + "' does not show a whole chessboard with " + board +
+                   "; it is left out");
+      seen.pop_back();
+    }
+  if (seen.size() < 3)
+    throw Error(std::to_string(seen.size()) + " of " + std::to_string(boards.size()) +
+                " photographs show a chessboard with " + board +
+                "; at least 3 are needed, and 10 are better, with the board tilted differently in each");
+  const std::size_t first_placed = seen.size();
+  for (std::size_t i = 0; placed && i < placed->size(); ++i)
+    if (!look_at(placed->name(i), (*placed)[i]))
+      throw Error("photograph '" + placed->name(i) + "' does not show the whole chessboard with " + board +
+                  " at its known place, so the camera's place is not known");
+  const Fit fit = fitted(seen, size, options);
+  Result result;
+  result.calibration = calibration_of(fit, size);
+  check_distortion(result.calibration.intrinsics, result.calibration.distortion, size.width, size.height,
+                   "the calibration");
+  result.report = report_of(fit, result.calibration, seen.size());
+  const RigidTransform world_from_board = calibration::world_from_board(options, options);
+  for (std::size_t i = first_placed; i < seen.size(); ++i)
+    result.cameras.add(seen[i].name, camera_of(fit, i, result.calibration, world_from_board));
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("camera.chessboard", chessboard)
+      .summary(
+          "Calibration from photographs of a chessboard (Zhang 2000), and the camera's place where it sees the board "
+          "at "
+          "a known place")
+      .in("boards", "the board in at least 3 ways, not corrected for distortion", over("photograph"))
+      .in("placed", "the board at its known place, one photograph from each place of the camera", over("view"))
+      .out("calibration", &Result::calibration, "camera matrix and distortion, with standard deviations")
+      .out("camera", &Result::cameras, "camera of each photograph in 'placed', without distortion", over("view"))
+      .out("report", &Result::report,
+           "the same as figures, with the residual of a coordinate and the root mean square distance in the worst "
+           "photograph")
+      .option("columns", &Options::columns, "number of inner corners in a row", at_least(3), at_most(100))
+      .option("rows", &Options::rows, "number of inner corners in a column; one even, one odd", at_least(3),
+              at_most(100))
+      .option("square_mm", &Options::square_mm, "side of a square", at_least(0.1))
+      .option("middle_mm", &Options::middle_mm, "the known place: the middle of the inner corners in the world")
+      .option("turns_deg", &Options::turns_deg,
+              "the known place: turns about x, then y, then z, from a board in the plane z = 0 that is seen from below")
+      .option("radial_terms", &Options::radial_terms, "number of terms of the radial distortion (r^2, r^4, r^6)",
+              at_least(0), at_most(3));
+}
