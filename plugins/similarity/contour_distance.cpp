@@ -18,8 +18,10 @@ struct Options {
   double reach_px = 6;
   double scale_px = 1;
   double direction_tolerance_deg = 40;
+  std::string polarity = "brighter_outside";
   double edge_offset_px = 0;
   bool estimate_offset = true;
+  bool x_ray = true;
   bool symmetric = false;
   double others_reach_px = marrow::match::kOthersReach_px;
   std::vector<double> weights;
@@ -262,13 +264,27 @@ class ContourDistance : public marrow::match::ViewsCost {
       if (p.u_px < kMargin_px || p.v_px < kMargin_px || p.u_px > right || p.v_px > bottom) continue;
       if (!view.mask.empty() && !view.mask.at<std::uint8_t>(int(p.v_px + 0.5f), int(p.u_px + 0.5f))) continue;
       if (scene_->options.symmetric) compared.push_back(p);
-      if (const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v))
+      if (const marrow::EdgePixel* edge = nearest_edge(index, p))
         matches.residuals.push_back(residual(p, *edge));
       else
         matches.unmatched_px.emplace_back(p.u_px, p.v_px);
     }
     if (scene_->options.symmetric) matches.of_edges = match_edges(index, compared);
     return matches;
+  }
+
+  bool either_polarity() const { return scene_->options.polarity == "either"; }
+
+  /// With either polarity, the nearer one of two edges: that which is brighter outside, and that which is darker there.
+  const marrow::EdgePixel* nearest_edge(std::size_t index, const marrow::OutlinePoint& p) const {
+    const marrow::EdgePixel* edge = scene_->edges[index].find(p.u_px, p.v_px, p.normal_u, p.normal_v);
+    if (!either_polarity()) return edge;
+    const marrow::EdgePixel* other = scene_->edges[index].find(p.u_px, p.v_px, -p.normal_u, -p.normal_v);
+    if (!edge || !other) return edge ? edge : other;
+    const auto distance2 = [&](const marrow::EdgePixel& e) {
+      return (e.u_px - p.u_px) * (e.u_px - p.u_px) + (e.v_px - p.v_px) * (e.v_px - p.v_px);
+    };
+    return distance2(*other) < distance2(*edge) ? other : edge;
   }
 
   std::vector<Residual> match_edges(std::size_t index, const std::vector<marrow::OutlinePoint>& outline) const {
@@ -279,7 +295,7 @@ class ContourDistance : public marrow::match::ViewsCost {
                                                 scene_->views[index].camera.height_px, reach_px);
     std::vector<Residual> residuals;
     for (const marrow::EdgePixel& edge : scene_->edges[index].all())
-      if (const int point = nearest.find(edge, reach_px, least_cosine); point >= 0)
+      if (const int point = nearest.find(edge, reach_px, least_cosine, either_polarity()); point >= 0)
         residuals.push_back(residual(outline[std::size_t(point)], edge));
     return residuals;
   }
@@ -350,7 +366,7 @@ std::shared_ptr<const marrow::Cost> contour_distance(const marrow::OutlineProjec
   scene->projector = &projector;
   scene->views = views;
   scene->options = options;
-  if (options.estimate_offset) scene->options.edge_offset_px -= edges_inside_px(views, edges);
+  if (options.estimate_offset && options.x_ray) scene->options.edge_offset_px -= edges_inside_px(views, edges);
   for (std::size_t i = 0; i < views.size(); ++i) {
     scene->edges.emplace_back(own[i], views[i].mask, marrow::radians(options.direction_tolerance_deg));
     if (scene->edges.back().empty())
@@ -386,11 +402,19 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0.01))
       .option("direction_tolerance_deg", &Options::direction_tolerance_deg,
               "largest angle between the directions of edge and outline", marrow::at_least(10), marrow::at_most(180))
+      .option("polarity", &Options::polarity,
+              "brighter_outside: edges count where the image is brighter outside the model, as in X-ray images; "
+              "either: where it is darker, too, as in photographs",
+              marrow::one_of({"brighter_outside", "either"}))
       .option("edge_offset_px", &Options::edge_offset_px,
-              "distance of the edges outside the model's outline; if estimate_offset is set, in addition to the "
-              "distance that the image's blur makes, and the middle of the range of +-3 px that is tried")
+              "distance of the edges outside the model's outline; if estimate_offset and x_ray are set, in addition to "
+              "the distance that the image's blur makes; with estimate_offset, the middle of the range of +-3 px "
+              "that is tried")
       .option("estimate_offset", &Options::estimate_offset,
               "find the best edge offset at each pose; it is the same in all views")
+      .option("x_ray", &Options::x_ray,
+              "with estimate_offset: blur moves edges inwards, as in X-ray images of a round bone; false: it moves "
+              "them to no side, as in photographs")
       .option("symmetric", &Options::symmetric,
               "half of the cost comes from the distances in the other direction, from the edges near the outline to "
               "the outline")

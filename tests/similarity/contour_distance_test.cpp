@@ -86,6 +86,44 @@ TEST(ContourDistance, IsTheDistanceThatOneComputesByHand) {
   EXPECT_NEAR(cost->value(shifted(30)), std::sqrt(101.0) - 1, 1e-5) << "beyond the reach";
 }
 
+TEST(ContourDistance, OfEitherPolarityTheNearerEdgeCounts) {
+  // Darker outside at 103, brighter outside at 98.
+  marrow::EdgeMap map = line_at(103, 1);
+  for (const marrow::EdgePixel& pixel : line_at(98, -1).pixels) map.pixels.push_back(pixel);
+  std::sort(map.pixels.begin(), map.pixels.end(),
+            [](const auto& a, const auto& b) { return a.v_px != b.v_px ? a.v_px < b.v_px : a.u_px < b.u_px; });
+  for (const bool symmetric : {false, true}) {
+    shipped::Options options = fixed_offset();
+    options["symmetric"] = symmetric;
+    const auto one = contour_distance(one_view(), edge_maps(map), options);
+    options["polarity"] = std::string("either");
+    const auto both = contour_distance(one_view(), edge_maps(map), options);
+    EXPECT_GT(one->value(shifted(3)), one->value(shifted(2)));
+    EXPECT_NEAR(both->value(shifted(3)), 0, symmetric ? 0.3 : 1e-5);
+    EXPECT_NEAR(both->value(shifted(-2)), 0, symmetric ? 0.3 : 1e-5);
+    if (symmetric) continue;
+    EXPECT_NEAR(both->value(shifted(2)), std::sqrt(2.0) - 1, 1e-5);
+    EXPECT_NEAR(one->value(shifted(2)), std::sqrt(17.0) - 1, 1e-5);
+  }
+}
+
+TEST(ContourDistance, InAPhotographBlurMovesEdgesToNoSide) {
+  // A step under a blur of 2 px. As an X-ray image, its edge is taken to lie 1.5 px inside of the outline.
+  cv::Mat1f blurred(200, 200);
+  for (int v = 0; v < 200; ++v)
+    for (int u = 0; u < 200; ++u) blurred(v, u) = float(70 + 30 * std::erf((99.5 - u) / (2 * std::sqrt(2.0))));
+  marrow::List<marrow::View> views;
+  views.add("lateral", marrow::View{"lateral", {blurred}, shapes::c_arm(0, 200), {}});
+  // The search for the offset ends 3 px from the expected one. An edge 4 px inside is reached with x_ray only.
+  const auto cost = [&](bool x_ray) {
+    return contour_distance(views, edge_maps(line_at(99.5, -1)),
+                            {{"x_ray", x_ray}, {"contour_spacing_px", 1.0}, {"reach_px", 10.0}})
+        ->value(shifted(99.5 - 100 - 4));
+  };
+  EXPECT_LT(cost(true), 0.01);
+  EXPECT_NEAR(cost(false), std::sqrt(2.0) - 1, 0.01);
+}
+
 TEST(ContourDistance, EdgesOfTheOtherDirectionDoNotCount) {
   marrow::EdgeMap map = line_at(100, -1);
   for (const auto& edge : line_at(103, 1).pixels) map.pixels.push_back(edge);

@@ -29,8 +29,9 @@ class NearestOutline {
   }
 
   /// Index of the nearest point, or -1 if there is none within `reach_px`, which must not exceed that of the
-  /// constructor. `least_cosine`: of the angle between the edge's direction and the point's normal.
-  int find(const EdgePixel& edge, double reach_px, float least_cosine) const {
+  /// constructor. `least_cosine`: of the angle between the edge's direction and the point's normal. With
+  /// `either_polarity`, the direction may also be the opposite one.
+  int find(const EdgePixel& edge, double reach_px, float least_cosine, bool either_polarity = false) const {
     int nearest = -1;
     float least = float(reach_px * reach_px);
     const int c = column(edge.u_px), r = row(edge.v_px);
@@ -39,8 +40,8 @@ class NearestOutline {
         for (std::uint32_t k = first_[cell(x, y)]; k < first_[cell(x, y) + 1]; ++k) {
           const OutlinePoint& p = points_[order_[k]];
           const float du = edge.u_px - p.u_px, dv = edge.v_px - p.v_px, distance2 = du * du + dv * dv;
-          if (distance2 >= least || edge.direction_u * p.normal_u + edge.direction_v * p.normal_v < least_cosine)
-            continue;
+          const float cosine = edge.direction_u * p.normal_u + edge.direction_v * p.normal_v;
+          if (distance2 >= least || (either_polarity ? std::abs(cosine) : cosine) < least_cosine) continue;
           least = distance2;
           nearest = int(order_[k]);
         }
