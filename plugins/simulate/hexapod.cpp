@@ -29,6 +29,7 @@ struct Options : robot::HexapodShape, robot::HexapodLimits {
 struct Result {
   List<Truth> platform;
   List<Truth> fragment;
+  Pose start;
   List<Metrics> legs;
 };
 
@@ -98,6 +99,7 @@ Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, cons
                        world = world_from_base(nominal, upright, fragment, options),
                        mounted = misplaced(upright, fragment.frame.origin_mm, options, context.seed());
   Result result;
+  result.start.world_from_model = world * nominal.base_from_home * upright;
   for (std::size_t i = 0; i < commands.size(); ++i) {
     const std::string& name = commands.name(i);
     check_rigid(commands[i].world_from_model, "motion '" + name + "'");
@@ -127,6 +129,7 @@ MARROW_PLUGIN(plugin) {
           over("position"))
       .out("platform", &Result::platform, "exact pose of the platform in the world", over("position"))
       .out("fragment", &Result::fragment, "exact pose of the fragment: world from CT", over("position"))
+      .out("start", &Result::start, "where the fragment would be with the platform at home, if nothing were off")
       .out("legs", &Result::legs, "length of each leg as the controller sets it", over("position"))
       .option("fragment", &Options::fragment, "name of the fragment on the platform")
       .option("base_radius_mm", &Options::base_radius_mm, "radius of the circle of the base's joints", at_least(1))

@@ -17,7 +17,18 @@ struct Options : phantom::Sensor {
   std::string fragment = "distal";
   double clamp_mm = 32;
   double platform_radius_mm = 105;
+  double ambient = 0.4;
+  double lamps = 1;
+  double backdrop = 0.045;
 };
+
+phantom::Studio studio_of(const Options& options) {
+  phantom::Studio studio;
+  for (phantom::Lamp& lamp : studio.lamps) lamp.strength *= options.lamps;
+  studio.ambient = options.ambient;
+  studio.backdrop *= options.backdrop / studio.backdrop[1];
+  return studio;
+}
 
 Painted bone_of(const Fragment& fragment, const RigidTransform& world_from_ct) {
   Painted bone{fragment.outer, {0.86, 0.80, 0.66}, 0.12, true};
@@ -59,12 +70,13 @@ List<Picture> photograph(const phantom::CameraArm& arm, const phantom::Phantom& 
                     {0.42, 0.43, 0.44},
                     0.4,
                     false});
+  const phantom::Studio studio = studio_of(options);
   List<Picture> pictures;
   for (std::size_t i = 0; i < arm.names.size(); ++i) {
     context.check_cancelled();
     pictures.add(arm.names[i],
-                 phantom::photograph(bodies, phantom::camera_at_stop(arm, i, context.seed()), arm.device.distortion, {},
-                                     options, marrow::Random(context.seed(), 1000 + i)()));
+                 phantom::photograph(bodies, phantom::camera_at_stop(arm, i, context.seed()), arm.device.distortion,
+                                     studio, options, marrow::Random(context.seed(), 1000 + i)()));
   }
   return pictures;
 }
@@ -86,6 +98,11 @@ MARROW_PLUGIN(plugin) {
       .option("clamp_mm", &Options::clamp_mm, "height of the clamp on the platform; it hides the bone's end",
               at_least(0))
       .option("platform_radius_mm", &Options::platform_radius_mm, "radius of the platform's plate", at_least(1))
+      .option("ambient", &Options::ambient, "even light from all sides; white paint under light of 1 is white",
+              at_least(0), at_most(1), unit(""))
+      .option("lamps", &Options::lamps, "strength of the lamps: 1 for 0.4 from the left and 0.2 from the right",
+              at_least(0), at_most(2), unit(""))
+      .option("backdrop", &Options::backdrop, "light from the backdrop", at_least(0), at_most(1), unit(""))
       .option("blur_px", &Options::blur_px, "standard deviation of the lens's blur", at_least(0), at_most(10))
       .option("gamma", &Options::gamma, "grey value = 255 light^(1 / gamma)", at_least(0.1), at_most(10), unit("1"))
       .option("noise_levels", &Options::noise_levels, "standard deviation of the noise, of 255 levels, in each colour",

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The exact surfaces and poses of a phantom's fragments, for studies of steps that need no CT.
+// The exact surfaces and poses of a phantom's fragments, for studies whose images are not those of a case.
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
@@ -11,9 +11,10 @@ using namespace marrow;
 struct Known {
   List<Mesh> models;
   List<Truth> truths;
+  List<Seeds> seeds;
 };
 
-Known truth(const phantom::Phantom& phantom) {
+Known truth(const phantom::Phantom& phantom, const Volume* volume) {
   phantom::check_phantom(phantom, "simulate.truth");
   Known known;
   for (const phantom::Fragment& fragment : phantom.fragments) {
@@ -22,6 +23,8 @@ Known truth(const phantom::Phantom& phantom) {
                   "' has no surface of its own; make it with simulate.fracture");
     known.models.add(fragment.name, fragment.outer);
     known.truths.add(fragment.name, Truth{fragment.world_from_ct});
+    if (volume)
+      known.seeds.add(fragment.name, {fragment.name, phantom::points_within(volume->grid, fragment.seeds_mm), true});
   }
   return known;
 }
@@ -32,6 +35,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.truth", truth)
       .summary("Gives the exact surface and pose of each fragment of a phantom")
       .in("phantom", "fragments with their surfaces and exact poses")
+      .in("volume", "CT of the phantom, for the seeds")
       .out("models", &Known::models, "outer surface in CT coordinates, open at the fracture", over("fragment"))
-      .out("truths", &Known::truths, "exact pose in the images", over("fragment"));
+      .out("truths", &Known::truths, "exact pose in the images", over("fragment"))
+      .out("seeds", &Known::seeds, "points inside each fragment, if its CT is given", over("fragment"));
 }

@@ -120,4 +120,17 @@ TEST(SimulateCase, WrongFragmentsAndUncoveredOnesAreExplained) {
   EXPECT_NE(marrow::test::message_of([] { assemble_with(Volume{}); }), "");
 }
 
+TEST(SimulateTruth, GivesSeedsIfTheCtIsGiven) {
+  const shipped::Inputs phantom{{"phantom", shipped::item(chain().phantom)}};
+  EXPECT_TRUE(shipped::call("simulate.truth", phantom).at("seeds").items.empty());
+  shipped::Inputs both = phantom;
+  both["volume"] = shipped::item(chain().ct);
+  const auto seeds = shipped::call("simulate.truth", both).at("seeds").as_list<Seeds>();
+  ASSERT_EQ(seeds.size(), chain().phantom.fragments.size());
+  for (std::size_t i = 0; i < seeds.size(); ++i) {
+    EXPECT_EQ(seeds[i].fragment, chain().phantom.fragments[i].name);
+    EXPECT_EQ(seeds[i].points_mm, phantom::points_within(chain().ct.grid, chain().phantom.fragments[i].seeds_mm));
+  }
+}
+
 }  // namespace case_test

@@ -68,6 +68,8 @@ TEST(SimulateHexapod, WithoutErrorsItDoesWhatItIsTold) {
     EXPECT_LT((mounted.rotation - platform_from_ct.rotation).norm(), 1e-9);
     EXPECT_LT((mounted.translation_mm - platform_from_ct.translation_mm).norm(), 1e-7);
   }
+  EXPECT_LT((made.at("start").as<Pose>().world_from_model.rotation - fragment[0].world_from_model.rotation).norm(),
+            1e-9);
   // The fragment stands on its fracture, its middle at the place that is asked for.
   const phantom::Fragment* distal = nullptr;
   for (const auto& one : broken().fragments)

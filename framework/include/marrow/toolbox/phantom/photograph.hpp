@@ -27,9 +27,9 @@ struct Lamp {
 
 /// Where photographs are taken: lamps, even light from all sides, and a backdrop that has one colour.
 struct Studio {
-  std::vector<Lamp> lamps{{{-0.5, -0.6, 0.6}, 0.65}, {{0.8, -0.3, 0.5}, 0.35}};
-  double ambient = 0.22;
-  Eigen::Vector3d backdrop{0.13, 0.15, 0.17};
+  std::vector<Lamp> lamps{{{-0.5, -0.6, 0.6}, 0.4}, {{0.8, -0.3, 0.5}, 0.2}};
+  double ambient = 0.4;
+  Eigen::Vector3d backdrop{0.04, 0.045, 0.05};
 };
 
 /// How a sensor makes numbers of light.
