@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdio>
 #include <marrow/plugin.hpp>
+#include <optional>
 
 #include "spread.hpp"
 
@@ -16,6 +17,7 @@ using marrow::verdicts::Spread;
 struct Options {
   double doubtful_above = 0.05;
   double wrong_above = 0.5;
+  double contradicts_above = 1.8;
 };
 
 /// With one decimal.
@@ -78,11 +80,47 @@ void judge_by_warnings(const marrow::Pose& pose, Verdict& verdict) {
   verdict.remedies.emplace_back("a look at the overlay of each view");
 }
 
-Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const Options& options) {
+/// The rotation about the long axis between the prior and the pose that images and prior have led to, in standard
+/// deviations. The pose lies between the two, so its difference from the prior has the variance of the prior minus that
+/// of the pose; this is the same as comparing prior and images with the sum of their variances. Nothing if the images
+/// say hardly more than the prior.
+std::optional<double> contradiction(const marrow::Pose& pose, const marrow::Pose& prior) {
+  constexpr double kLeastNews = 0.01;  // of the prior's variance
+  const double of_prior = (*prior.covariance)(2, 2), news = of_prior - (*pose.covariance)(2, 2);
+  if (!(news > kLeastNews * of_prior)) return std::nullopt;
+  return std::abs(motion_between(prior.world_from_model, pose.world_from_model, pose.frame)[2]) / std::sqrt(news);
+}
+
+/// A prior that the images contradict makes the pose doubtful: one of the two is wrong.
+void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const Options& options, Verdict& verdict,
+                    marrow::Context& context) {
+  marrow::check_rigid(prior.world_from_model, "the prior");
+  if (!prior.covariance)
+    throw marrow::Error("the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
+  if (!pose.covariance) return;
+  const double apart_deg =
+      marrow::degrees(std::abs(motion_between(prior.world_from_model, pose.world_from_model, pose.frame)[2]));
+  verdict.figures.push_back({"prior_axial_deg", apart_deg, "deg"});
+  const std::optional<double> deviations = contradiction(pose, prior);
+  if (!deviations) return;
+  verdict.figures.push_back({"prior_axial_deviations", *deviations, ""});
+  if (*deviations <= options.contradicts_above) return;
+  verdict.judgement = std::max(verdict.judgement, Judgement::doubtful);
+  verdict.reasons.insert(verdict.reasons.begin(), "the prior contradicts the images: they are " + shown(apart_deg) +
+                                                      " degrees apart about the long axis, " + shown(*deviations) +
+                                                      " times the deviation expected of this difference");
+  verdict.remedies.emplace_back(
+      "a look at the markers, if the prior comes from these: has the skin slid, or one moved?");
+  context.warn(verdict.reasons.front());
+}
+
+Verdict predicted(const marrow::Pose& pose, const marrow::Mesh& mesh, const marrow::Pose* prior, const Options& options,
+                  marrow::Context& context) {
   marrow::check_rigid(pose.world_from_model, "pose");
   Verdict verdict;
   judge_by_deviations(pose, mesh, options, verdict);
   judge_by_warnings(pose, verdict);
+  if (prior) judge_by_prior(pose, *prior, options, verdict, context);
   return verdict;
 }
 
@@ -93,6 +131,9 @@ MARROW_PLUGIN(plugin) {
       .summary("Judges a pose by its predicted deviations and its warnings alone")
       .in("pose", "pose to judge, with its predicted covariance")
       .in("mesh", "surface of the bone; 200 points spread over it are the targets of the mTRE")
+      .in("prior",
+          "pose known from elsewhere, which the registration took into account: whether its rotation about the long "
+          "axis agrees with the images")
       .out("verdict",
            "probability that the mTRE is above 2 mm or the rotation about the long axis off by more than 5 degrees, "
            "from 10000 errors drawn with the predicted covariance; not known for a pose without one")
@@ -100,5 +141,10 @@ MARROW_PLUGIN(plugin) {
               marrow::at_least(0), marrow::at_most(1))
       .option("wrong_above", &Options::wrong_above, "a pose is wrong above this probability", marrow::at_least(0),
               marrow::at_most(1))
-      .relation(marrow::below("doubtful_above", "wrong_above"));
+      .relation(marrow::below("doubtful_above", "wrong_above"))
+      .option(
+          "contradicts_above", &Options::contradicts_above,
+          "a prior whose rotation about the long axis is farther off than this many standard deviations contradicts "
+          "the images: the pose is doubtful at best",
+          marrow::at_least(0));
 }

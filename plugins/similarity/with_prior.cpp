@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: Apache-2.0
+// A cost of the images together with what is known about the pose from elsewhere, such as markers on the skin. The prior
+// is Student's t: near its middle it counts like a normal distribution with the prior's covariance, and a pose that the
+// images want clearly is hardly held back from far away.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <marrow/domain/decompositions.hpp>
+#include <marrow/plugin.hpp>
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  double degrees_of_freedom = 4;
+};
+
+Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
+  Eigen::Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// How a rotation vector r changes if a small rotation comes before it: the inverse of the right Jacobian of SO(3)
+/// (Sola, Deray and Atchuthan, arXiv 1812.01537, Eq 144).
+Eigen::Matrix3d vector_by_rotation(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  const Eigen::Matrix3d cross = cross_matrix(r);
+  const double second =
+      angle < 1e-4 ? 1.0 / 12 : (1 - 0.5 * angle * std::cos(0.5 * angle) / std::sin(0.5 * angle)) / (angle * angle);
+  return Eigen::Matrix3d::Identity() + 0.5 * cross + second * cross * cross;
+}
+
+/// Minus the logarithm of the density of a pose, without a constant.
+class Prior {
+ public:
+  Prior(const Pose& pose, double degrees_of_freedom)
+      : pose_(pose), weight_(degrees_of_freedom + 6), information_(inverse_of_symmetric(*pose.covariance)) {
+    const auto eigen = eigen_of_symmetric<6>(information_);
+    root_ = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
+  }
+
+  Vector6d motion(const RigidTransform& pose) const { return motion_between(pose_.world_from_model, pose, pose_.frame); }
+
+  /// With q = xi^T Lambda xi: (nu + 6) / 2 log(1 + q / (nu + 6)), the multivariate t with nu degrees of freedom whose
+  /// curvature in the middle is Lambda.
+  double energy(const RigidTransform& pose) const { return 0.5 * weight_ * std::log1p(square(motion(pose)) / weight_); }
+
+  /// What the motion's weight in the energy is, against that of a normal distribution: 1 in the middle, less outside.
+  double weight(const Vector6d& motion) const { return weight_ / (weight_ + square(motion)); }
+
+  /// How motion() changes with a small motion of the pose in `frame`.
+  Matrix6d motion_by_motion(const Vector6d& motion, const FragmentFrame& frame) const {
+    const Eigen::Matrix3d turn = pose_.frame.axes.transpose() * frame.axes;
+    Matrix6d in_own_frame = Matrix6d::Zero(), change = Matrix6d::Zero();
+    in_own_frame.topLeftCorner<3, 3>() = in_own_frame.bottomRightCorner<3, 3>() = turn;
+    in_own_frame.bottomLeftCorner<3, 3>() =
+        -pose_.frame.axes.transpose() * cross_matrix(pose_.frame.origin_mm - frame.origin_mm) * frame.axes;
+    change.topLeftCorner<3, 3>() = vector_by_rotation(motion.head<3>());
+    change.bottomRightCorner<3, 3>() = rotation_from_vector(motion.head<3>());
+    return change * in_own_frame;
+  }
+
+  const Matrix6d& information() const { return information_; }
+  /// A matrix L with L L^T = the information.
+  const Matrix6d& root() const { return root_; }
+
+ private:
+  double square(const Vector6d& motion) const { return motion.dot(information_ * motion); }
+
+  Pose pose_;
+  double weight_;
+  Matrix6d information_, root_;
+};
+
+/// By how much a cost rises where the pose moves by a standard deviation, times 2: what one unit of minus the logarithm
+/// of the likelihood is worth. The median over six directions, and twice this, because the deviations come from blocks
+/// of the images, which do not see an error that is common to several of them (docs/results.md).
+double noise_of(const Cost& cost, const Pose& found) {
+  constexpr double kDeviations = 2, kMostStep = 4, kUnseen = 2;  // a step in degrees or mm
+  Vector6d unit = Vector6d::Ones();
+  unit.head<3>() *= degrees(1);
+  const auto eigen = eigen_of_symmetric<6>(unit.asDiagonal() * *found.covariance * unit.asDiagonal());
+  std::vector<RigidTransform> poses{found.world_from_model};
+  std::array<double, 6> steps{};
+  for (int i = 0; i < 6; ++i) {
+    const double deviation = std::sqrt(std::max(eigen.values[i], 1e-12)),
+                 step = std::min(kDeviations * deviation, kMostStep);
+    steps[std::size_t(i)] = step / deviation;
+    for (const double sense : {1.0, -1.0}) {
+      const Vector6d motion = sense * step * eigen.vectors.col(i);
+      poses.push_back(moved(found.world_from_model, found.frame, motion.cwiseQuotient(unit)));
+    }
+  }
+  const std::vector<double> values = cost.values(poses);
+  std::array<double, 6> noise{};
+  for (std::size_t i = 0; i < 6; ++i) {
+    const double rise = 0.5 * (values[2 * i + 1] + values[2 * i + 2]) - values[0];
+    noise[i] = 2 * rise / (steps[i] * steps[i]);
+  }
+  std::sort(noise.begin(), noise.end());
+  return std::max(1e-12, kUnseen * 0.5 * (noise[2] + noise[3]));
+}
+
+/// What all levels have in common.
+struct Known {
+  Prior prior;
+  Pose found;
+};
+
+class WithPrior : public Cost {
+ public:
+  /// `images` is kept by `owner`, or by the runtime.
+  WithPrior(std::shared_ptr<const Known> known, const Cost& images, std::shared_ptr<const Cost> owner)
+      : known_(std::move(known)), images_(images), owner_(std::move(owner)), noise_(noise_of(images, known_->found)) {}
+
+  double value(const RigidTransform& pose) const override { return images_.value(pose) + term(pose); }
+  std::vector<double> values(const std::vector<RigidTransform>& poses) const override {
+    std::vector<double> values = images_.values(poses);
+    for (std::size_t i = 0; i < poses.size(); ++i) values[i] += term(poses[i]);
+    return values;
+  }
+  std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
+    const std::shared_ptr<const Cost> images = images_.at_level(level);
+    return std::make_shared<WithPrior>(known_, *images, images);
+  }
+
+  std::optional<Expansion> expansion(const RigidTransform& pose, const FragmentFrame& frame) const override {
+    auto about = images_.expansion(pose, frame);
+    if (!about) return about;
+    const Expansion prior = term_about(pose, frame);
+    about->value += prior.value;
+    about->gradient += prior.gradient;
+    about->curvature += prior.curvature;
+    return about;
+  }
+
+  /// The blocks of the images, and six residuals of the prior, each with its expected size. So a deviation that is
+  /// predicted from them is that of images and prior together.
+  std::vector<double> without_each_block(const RigidTransform& pose) const override {
+    std::vector<double> without = images_.without_each_block(pose);
+    if (without.empty()) return without;
+    const double prior = term(pose), whole = images_.value(pose) + prior;
+    for (double& value : without) value += prior;
+    const Vector6d motion = known_->prior.motion(pose);
+    const Vector6d residuals = std::sqrt(known_->prior.weight(motion)) * known_->prior.root().transpose() * motion;
+    for (const double residual : residuals) without.push_back(whole + noise_ * residual);
+    return without;
+  }
+  std::vector<Expansion> expansion_without_each_block(const RigidTransform& pose,
+                                                      const FragmentFrame& frame) const override {
+    std::vector<Expansion> without = images_.expansion_without_each_block(pose, frame);
+    const auto whole = expansion(pose, frame);
+    if (without.empty() || !whole) return {};
+    const Expansion prior = term_about(pose, frame);
+    Matrix6d mean = Matrix6d::Zero();
+    const double count = double(without.size());
+    for (Expansion& one : without) {
+      one.value += prior.value;
+      one.gradient += prior.gradient;
+      one.curvature += prior.curvature;
+      mean += one.curvature / count;
+    }
+    const Vector6d motion = known_->prior.motion(pose);
+    const Matrix6d residuals = std::sqrt(known_->prior.weight(motion)) *
+                               known_->prior.motion_by_motion(motion, frame).transpose() * known_->prior.root();
+    for (int i = 0; i < 6; ++i) without.push_back({whole->value, whole->gradient + noise_ * residuals.col(i), mean});
+    return without;
+  }
+
+ private:
+  double term(const RigidTransform& pose) const { return noise_ * known_->prior.energy(pose); }
+
+  /// Gauss-Newton with the weight of Student's t.
+  Expansion term_about(const RigidTransform& pose, const FragmentFrame& frame) const {
+    const Vector6d motion = known_->prior.motion(pose);
+    const Matrix6d change = known_->prior.motion_by_motion(motion, frame),
+                   pulls = noise_ * known_->prior.weight(motion) * change.transpose() * known_->prior.information();
+    return {term(pose), pulls * motion, pulls * change};
+  }
+
+  std::shared_ptr<const Known> known_;
+  const Cost& images_;
+  std::shared_ptr<const Cost> owner_;
+  double noise_;
+};
+
+void check_pose(const Pose& pose, const std::string& name, const std::string& remedy) {
+  check_rigid(pose.world_from_model, name);
+  if (!pose.covariance) throw Error(name + " has no covariance; " + remedy);
+  if (!pose.covariance->allFinite() || !(eigen_of_symmetric<6>(*pose.covariance).values[0] > 0))
+    throw Error(name + " has a covariance that is not positive definite; " + remedy);
+}
+
+std::shared_ptr<const Cost> with_prior(const Cost& cost, const Pose& prior, const Pose& found, const Options& options) {
+  check_pose(prior, "the prior", "take it from a node that predicts one, such as a fit of markers");
+  check_pose(found, "the pose found by the images",
+             "take it from a registration by a cost of the kind similarity, which predicts one");
+  if (prior.world_from_model.source != found.world_from_model.source ||
+      prior.world_from_model.target != found.world_from_model.target)
+    throw Error("the prior leads from '" + prior.world_from_model.source + "' to '" + prior.world_from_model.target +
+                "', but the pose found by the images from '" + found.world_from_model.source + "' to '" +
+                found.world_from_model.target + "'; give poses of the same model");
+  return std::make_shared<WithPrior>(std::make_shared<const Known>(Prior(prior, options.degrees_of_freedom), found),
+                                     cost, nullptr);
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("similarity.with_prior", with_prior)
+      .summary(
+          "A cost together with a pose that is known from elsewhere, as Student's t with this pose's covariance; for "
+          "markers on the skin")
+      .in("cost", "cost of the images alone")
+      .in("prior", "pose known from elsewhere, with its covariance")
+      .in("found", "pose found by the same cost alone, with its covariance: how much the cost rises there within a "
+                   "standard deviation says what the prior counts")
+      .out("cost", "the cost, plus minus the logarithm of the prior's density in units of the cost's likelihood")
+      .option("degrees_of_freedom", &Options::degrees_of_freedom,
+              "of Student's t; with fewer, a pose far from the prior costs less", marrow::at_least(1),
+              marrow::at_most(1000));
+}
