@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A pose from markers on the skin that a tracking system measures in the world. Two errors are known apart: that of each
-// marker by itself, and a rotation of all markers together about the bone's long axis, as the skin slides over the bone.
-// Weighted least squares with the covariance of both; begun at the unweighted fit (Arun, Huang and Blostein, IEEE PAMI
-// 9, 1987; Umeyama, IEEE PAMI 13, 1991).
+// A pose from markers on the skin that a tracking system measures in the world. Two errors are known apart: that of
+// each marker by itself, and a motion of all markers together, as the skin slides about and along the bone. Weighted
+// least squares with the covariance of both; begun at the unweighted fit (Arun, Huang and Blostein, IEEE PAMI 9, 1987;
+// Umeyama, IEEE PAMI 13, 1991).
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
@@ -20,6 +20,7 @@ using geometry::short_number;
 struct Options {
   std::vector<double> noise_mm{2};
   double common_rotation_deg = 5;
+  double common_shift_mm = 5;
 };
 
 /// Markers in the CT and as tracked, in the order of tracking, with their standard deviations.
@@ -64,14 +65,15 @@ Markers markers_of(const Landmarks& landmarks, const Options& options) {
   return markers;
 }
 
-/// The linear model y = J m + e about a pose, m the small motion and e with covariance S = sigma^2 I + j c j^T, in the
-/// world; j is the column of J for the rotation about the long axis.
+/// The linear model y = J m + e about a pose: m is the small motion, and e has the covariance S = diag(sigma^2) + J C
+/// J^T with C that of the markers' common motion.
 struct Linear {
   Eigen::MatrixXd by_motion, covariance;
   Eigen::VectorXd residuals_mm;
 };
 
-Linear linear_at(const RigidTransform& pose, const FragmentFrame& frame, const Markers& markers, double common_rad) {
+Linear linear_at(const RigidTransform& pose, const FragmentFrame& frame, const Markers& markers,
+                 const Matrix6d& common) {
   const auto count = Eigen::Index(markers.names.size());
   Linear linear{Eigen::MatrixXd(3 * count, 6), Eigen::MatrixXd::Zero(3 * count, 3 * count), Eigen::VectorXd(3 * count)};
   for (Eigen::Index i = 0; i < count; ++i) {
@@ -80,16 +82,17 @@ Linear linear_at(const RigidTransform& pose, const FragmentFrame& frame, const M
     linear.residuals_mm.segment<3>(3 * i) = markers.world_mm[k] - pose * markers.model_mm[k];
     linear.covariance.diagonal().segment<3>(3 * i).setConstant(markers.noise_mm[k] * markers.noise_mm[k]);
   }
-  linear.covariance += common_rad * common_rad * linear.by_motion.col(2) * linear.by_motion.col(2).transpose();
+  linear.covariance += linear.by_motion * common * linear.by_motion.transpose();
   return linear;
 }
 
 /// Gauss-Newton. Returns the covariance of the small motion at the pose, (J^T S^-1 J)^-1.
-Matrix6d fit_weighted(RigidTransform& pose, const FragmentFrame& frame, const Markers& markers, double common_rad) {
+Matrix6d fit_weighted(RigidTransform& pose, const FragmentFrame& frame, const Markers& markers,
+                      const Matrix6d& common) {
   constexpr int kRounds = 20;
   constexpr double kEnd = 1e-12;  // radians and mm
   for (int round = 1;; ++round) {
-    const Linear linear = linear_at(pose, frame, markers, common_rad);
+    const Linear linear = linear_at(pose, frame, markers, common);
     const Eigen::LLT<Eigen::MatrixXd> covariance(linear.covariance);
     const Eigen::MatrixXd weighted = covariance.solve(linear.by_motion);
     const Matrix6d inverse = Matrix6d(linear.by_motion.transpose() * weighted).inverse();
@@ -99,7 +102,8 @@ Matrix6d fit_weighted(RigidTransform& pose, const FragmentFrame& frame, const Ma
   }
 }
 
-/// Residuals in units of the markers' own noise, against what is expected of them: they have 3 N - 6 degrees of freedom.
+/// Residuals in units of the markers' own noise, against what is expected of them: they have 3 N - 6 degrees of
+/// freedom.
 void warn_of_residuals(Pose& pose, const Markers& markers, Context& context) {
   constexpr double kMost = 2.5;  // three right markers exceed it once in 3000 times, more markers less often
   double squares = 0, largest = 0;
@@ -118,9 +122,9 @@ void warn_of_residuals(Pose& pose, const Markers& markers, Context& context) {
                " times what noise_mm says; axial rotation known to " +
                short_number(degrees(std::sqrt((*pose.covariance)(2, 2)))) + " degrees");
   if (ratio <= kMost) return;
-  pose.warnings.push_back("the markers do not keep their places to each other: they are off by " +
-                          short_number(ratio) + " times what noise_mm says, '" + farthest + "' by " +
-                          short_number(largest) + " mm; are two names exchanged, or did a marker move?");
+  pose.warnings.push_back("the markers do not keep their places to each other: they are off by " + short_number(ratio) +
+                          " times what noise_mm says, '" + farthest + "' by " + short_number(largest) +
+                          " mm; are two names exchanged, or did a marker move?");
   context.warn(pose.warnings.back());
 }
 
@@ -131,7 +135,10 @@ Pose skin_markers(const Mesh& model, const Landmarks& landmarks, const Options& 
   pose.world_from_model = geometry::fit_rigid(markers.model_mm, markers.world_mm, "the markers");
   pose.world_from_model.source = model.frame;
   pose.frame = fragment_frame(model);
-  pose.covariance = fit_weighted(pose.world_from_model, pose.frame, markers, radians(options.common_rotation_deg));
+  const double common_rad = radians(options.common_rotation_deg), common_mm = options.common_shift_mm;
+  Vector6d deviations;
+  deviations << 0, 0, common_rad, common_mm, common_mm, common_mm;
+  pose.covariance = fit_weighted(pose.world_from_model, pose.frame, markers, deviations.cwiseAbs2().asDiagonal());
   warn_of_residuals(pose, markers, context);
   return pose;
 }
@@ -141,15 +148,19 @@ Pose skin_markers(const Mesh& model, const Landmarks& landmarks, const Options& 
 MARROW_PLUGIN(plugin) {
   plugin.node("initial.skin_markers", skin_markers)
       .summary(
-          "Pose from tracked markers on the skin, by weighted least squares; its covariance has the error of each marker "
+          "Pose from tracked markers on the skin, by weighted least squares; its covariance has the error of each "
+          "marker "
           "and the rotation of all of them about the bone")
       .in("model", "surface of the fragment; it gives the axes")
       .in("landmarks", "markers in the CT and their tracked positions")
       .out("pose", "fitted pose with its covariance; its cost is the root mean square of the distances left, in mm")
-      .option("noise_mm", &Options::noise_mm,
-              "standard deviation of each tracked coordinate of a marker by itself: one for all, or one for each in the "
-              "order of tracking")
+      .option(
+          "noise_mm", &Options::noise_mm,
+          "standard deviation of each tracked coordinate of a marker by itself: one for all, or one for each in the "
+          "order of tracking")
       .option("common_rotation_deg", &Options::common_rotation_deg,
               "standard deviation of the rotation of all markers together about the long axis", at_least(0),
-              at_most(90));
+              at_most(90))
+      .option("common_shift_mm", &Options::common_shift_mm,
+              "standard deviation of the shift of all markers together, along each axis of the fragment", at_least(0));
 }

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A cost of the images together with what is known about the pose from elsewhere, such as markers on the skin. The prior
-// is Student's t: near its middle it counts like a normal distribution with the prior's covariance, and a pose that the
-// images want clearly is hardly held back from far away.
+// A cost of the images together with what is known about the pose from elsewhere, such as markers on the skin. The
+// prior is Student's t: near its middle it counts like a normal distribution with the prior's covariance, and a pose
+// that the images want clearly is hardly held back from far away.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -42,7 +42,9 @@ class Prior {
     root_ = eigen.vectors * eigen.values.cwiseMax(0).cwiseSqrt().asDiagonal();
   }
 
-  Vector6d motion(const RigidTransform& pose) const { return motion_between(pose_.world_from_model, pose, pose_.frame); }
+  Vector6d motion(const RigidTransform& pose) const {
+    return motion_between(pose_.world_from_model, pose, pose_.frame);
+  }
 
   /// With q = xi^T Lambda xi: (nu + 6) / 2 log(1 + q / (nu + 6)), the multivariate t with nu degrees of freedom whose
   /// curvature in the middle is Lambda.
@@ -216,8 +218,9 @@ MARROW_PLUGIN(plugin) {
           "markers on the skin")
       .in("cost", "cost of the images alone")
       .in("prior", "pose known from elsewhere, with its covariance")
-      .in("found", "pose found by the same cost alone, with its covariance: how much the cost rises there within a "
-                   "standard deviation says what the prior counts")
+      .in("found",
+          "pose found by the same cost alone, with its covariance: how much the cost rises there within a "
+          "standard deviation says what the prior counts")
       .out("cost", "the cost, plus minus the logarithm of the prior's density in units of the cost's likelihood")
       .option("degrees_of_freedom", &Options::degrees_of_freedom,
               "of Student's t; with fewer, a pose far from the prior costs less", marrow::at_least(1),

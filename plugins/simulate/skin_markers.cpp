@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Markers on the skin around a limb, as a tracking system measures them. Skin slides over the bone: each marker by
-// itself, and all of them together about the limb's axis. The common part does not average out.
+// itself, and all of them together. The common part does not average out.
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -20,6 +20,7 @@ struct Options {
   double length_mm = 150;
   double noise_mm = 2;
   double common_rotation_deg = 5;
+  double common_shift_mm = 5;
   double false_rotation_deg = 0;
 };
 
@@ -48,6 +49,7 @@ Landmarks markers_of(const Fragment& fragment, const Options& options, Random& r
   const std::vector<Eigen::Vector3d> places = marker_places(fragment.frame, options, random);
   Vector6d slide = Vector6d::Zero();
   slide[2] = radians(options.common_rotation_deg * random.normal() + options.false_rotation_deg);
+  for (int axis = 3; axis < 6; ++axis) slide[axis] = options.common_shift_mm * random.normal();
   const RigidTransform world_from_skin = moved(fragment.world_from_ct, fragment.frame, slide);
   Landmarks markers;
   for (std::size_t i = 0; i < places.size(); ++i) {
@@ -76,8 +78,9 @@ List<Landmarks> skin_markers(const phantom::Phantom& phantom, const Options& opt
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.skin_markers", skin_markers)
       .summary(
-          "Simulates tracked markers on the skin around each fragment of a phantom; the skin slides over the bone, each "
-          "marker by itself and all together about the long axis")
+          "Simulates tracked markers on the skin around each fragment of a phantom; the skin slides over the bone, "
+          "each "
+          "marker by itself, and all together")
       .in("phantom", "fragments with their axes and exact poses")
       .out("landmarks",
            "places of the markers when the CT was made (mm, CT coordinates), and as they are tracked now (mm, world)",
@@ -92,6 +95,8 @@ MARROW_PLUGIN(plugin) {
               at_least(0))
       .option("common_rotation_deg", &Options::common_rotation_deg,
               "standard deviation of the rotation of all markers together about the long axis", at_least(0))
+      .option("common_shift_mm", &Options::common_shift_mm,
+              "standard deviation of the shift of all markers together, along each axis of the fragment", at_least(0))
       .option("false_rotation_deg", &Options::false_rotation_deg,
               "a further such rotation, always the same: for tests of a method that must notice it");
 }
