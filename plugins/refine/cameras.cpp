@@ -288,6 +288,10 @@ void check_inputs(const List<View>& views, const List<Cost>& costs, const List<P
     throw Error("costs and poses are not of the same bones; wire both from nodes that are called for each fragment");
   for (std::size_t f = 0; f < poses.size(); ++f) {
     check_rigid(poses[f].world_from_model, "the pose of '" + poses.name(f) + "'");
+    if (costs[f].view_count() == 0)
+      throw Error("the cost of '" + costs.name(f) +
+                  "' cannot be split into views: it compares no views, or it holds more than them, such as a prior; "
+                  "give the cost of the images alone");
     if (costs[f].view_count() != views.size())
       throw Error("the cost of '" + costs.name(f) + "' compares " + std::to_string(costs[f].view_count()) +
                   " views, but there are " + std::to_string(views.size()) + "; make it of the same views");

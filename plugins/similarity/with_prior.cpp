@@ -14,7 +14,8 @@ namespace {
 using namespace marrow;
 
 struct Options {
-  double degrees_of_freedom = 4;
+  double degrees_of_freedom = 30;
+  double noise_times = 2;
 };
 
 Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& v) {
@@ -78,10 +79,9 @@ class Prior {
 };
 
 /// By how much a cost rises where the pose moves by a standard deviation, times 2: what one unit of minus the logarithm
-/// of the likelihood is worth. The median over six directions, and twice this, because the deviations come from blocks
-/// of the images, which do not see an error that is common to several of them (docs/results.md).
+/// of the likelihood is worth. The median over six directions.
 double noise_of(const Cost& cost, const Pose& found) {
-  constexpr double kDeviations = 2, kMostStep = 4, kUnseen = 2;  // a step in degrees or mm
+  constexpr double kDeviations = 2, kMostStep = 4;  // a step in degrees or mm
   Vector6d unit = Vector6d::Ones();
   unit.head<3>() *= degrees(1);
   const auto eigen = eigen_of_symmetric<6>(unit.asDiagonal() * *found.covariance * unit.asDiagonal());
@@ -103,20 +103,15 @@ double noise_of(const Cost& cost, const Pose& found) {
     noise[i] = 2 * rise / (steps[i] * steps[i]);
   }
   std::sort(noise.begin(), noise.end());
-  return std::max(1e-12, kUnseen * 0.5 * (noise[2] + noise[3]));
+  return std::max(1e-12, 0.5 * (noise[2] + noise[3]));
 }
 
-/// What all levels have in common.
-struct Known {
-  Prior prior;
-  Pose found;
-};
-
+/// The prior counts the same at each level of the cost: a coarse level is too rough for a noise of its own.
 class WithPrior : public Cost {
  public:
   /// `images` is kept by `owner`, or by the runtime.
-  WithPrior(std::shared_ptr<const Known> known, const Cost& images, std::shared_ptr<const Cost> owner)
-      : known_(std::move(known)), images_(images), owner_(std::move(owner)), noise_(noise_of(images, known_->found)) {}
+  WithPrior(std::shared_ptr<const Prior> prior, double noise, const Cost& images, std::shared_ptr<const Cost> owner)
+      : prior_(std::move(prior)), noise_(noise), images_(images), owner_(std::move(owner)) {}
 
   double value(const RigidTransform& pose) const override { return images_.value(pose) + term(pose); }
   std::vector<double> values(const std::vector<RigidTransform>& poses) const override {
@@ -126,7 +121,7 @@ class WithPrior : public Cost {
   }
   std::shared_ptr<const Cost> at_level(const CostLevel& level) const override {
     const std::shared_ptr<const Cost> images = images_.at_level(level);
-    return std::make_shared<WithPrior>(known_, *images, images);
+    return std::make_shared<WithPrior>(prior_, noise_, *images, images);
   }
 
   std::optional<Expansion> expansion(const RigidTransform& pose, const FragmentFrame& frame) const override {
@@ -146,8 +141,8 @@ class WithPrior : public Cost {
     if (without.empty()) return without;
     const double prior = term(pose), whole = images_.value(pose) + prior;
     for (double& value : without) value += prior;
-    const Vector6d motion = known_->prior.motion(pose);
-    const Vector6d residuals = std::sqrt(known_->prior.weight(motion)) * known_->prior.root().transpose() * motion;
+    const Vector6d motion = prior_->motion(pose);
+    const Vector6d residuals = std::sqrt(prior_->weight(motion)) * prior_->root().transpose() * motion;
     for (const double residual : residuals) without.push_back(whole + noise_ * residual);
     return without;
   }
@@ -165,28 +160,28 @@ class WithPrior : public Cost {
       one.curvature += prior.curvature;
       mean += one.curvature / count;
     }
-    const Vector6d motion = known_->prior.motion(pose);
-    const Matrix6d residuals = std::sqrt(known_->prior.weight(motion)) *
-                               known_->prior.motion_by_motion(motion, frame).transpose() * known_->prior.root();
+    const Vector6d motion = prior_->motion(pose);
+    const Matrix6d residuals =
+        std::sqrt(prior_->weight(motion)) * prior_->motion_by_motion(motion, frame).transpose() * prior_->root();
     for (int i = 0; i < 6; ++i) without.push_back({whole->value, whole->gradient + noise_ * residuals.col(i), mean});
     return without;
   }
 
  private:
-  double term(const RigidTransform& pose) const { return noise_ * known_->prior.energy(pose); }
+  double term(const RigidTransform& pose) const { return noise_ * prior_->energy(pose); }
 
   /// Gauss-Newton with the weight of Student's t.
   Expansion term_about(const RigidTransform& pose, const FragmentFrame& frame) const {
-    const Vector6d motion = known_->prior.motion(pose);
-    const Matrix6d change = known_->prior.motion_by_motion(motion, frame),
-                   pulls = noise_ * known_->prior.weight(motion) * change.transpose() * known_->prior.information();
+    const Vector6d motion = prior_->motion(pose);
+    const Matrix6d change = prior_->motion_by_motion(motion, frame),
+                   pulls = noise_ * prior_->weight(motion) * change.transpose() * prior_->information();
     return {term(pose), pulls * motion, pulls * change};
   }
 
-  std::shared_ptr<const Known> known_;
+  std::shared_ptr<const Prior> prior_;
+  double noise_;
   const Cost& images_;
   std::shared_ptr<const Cost> owner_;
-  double noise_;
 };
 
 void check_pose(const Pose& pose, const std::string& name, const std::string& remedy) {
@@ -205,8 +200,8 @@ std::shared_ptr<const Cost> with_prior(const Cost& cost, const Pose& prior, cons
     throw Error("the prior leads from '" + prior.world_from_model.source + "' to '" + prior.world_from_model.target +
                 "', but the pose found by the images from '" + found.world_from_model.source + "' to '" +
                 found.world_from_model.target + "'; give poses of the same model");
-  return std::make_shared<WithPrior>(std::make_shared<const Known>(Prior(prior, options.degrees_of_freedom), found),
-                                     cost, nullptr);
+  return std::make_shared<WithPrior>(std::make_shared<const Prior>(prior, options.degrees_of_freedom),
+                                     options.noise_times * noise_of(cost, found), cost, nullptr);
 }
 
 }  // namespace
@@ -224,5 +219,9 @@ MARROW_PLUGIN(plugin) {
       .out("cost", "the cost, plus minus the logarithm of the prior's density in units of the cost's likelihood")
       .option("degrees_of_freedom", &Options::degrees_of_freedom,
               "of Student's t; with fewer, a pose far from the prior costs less", marrow::at_least(1),
-              marrow::at_most(1000));
+              marrow::at_most(1000))
+      .option("noise_times", &Options::noise_times,
+              "how many times larger the noise of the images' cost is than the deviations of the pose found say: these "
+              "come from blocks of the images, and do not see an error that is common to several blocks",
+              marrow::at_least(0.01), marrow::at_most(1000));
 }

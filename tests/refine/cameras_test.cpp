@@ -204,6 +204,10 @@ TEST(RefineCameras, SaysWhatIsWrong) {
                                                         return behind;
                                                       }())),
             "view 'frontal': the bones do not lie in front of its camera; look at the overlays first");
+  EXPECT_EQ(
+      shipped::refusal("refine.cameras", inputs({Bone({})})),
+      "the cost of 'distal' cannot be split into views: it compares no views, or it holds more than them, such as "
+      "a prior; give the cost of the images alone");
   auto other = inputs({bone});
   other["poses"] = inputs({bone, bone})["poses"];
   EXPECT_EQ(shipped::refusal("refine.cameras", other),

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "evaluate/listener.hpp"
 #include "shipped.hpp"
 
 namespace predicted_test {
@@ -135,6 +136,69 @@ TEST(VerdictPredicted, RefusesAnotherBonesSurface) {
                              {{"pose", shipped::item(pose_with({0, 0, 1, 0, 0, 1}))}, {"mesh", shipped::item(mesh)}}),
             "the model is in the frame 'elsewhere', but the pose takes points in 'ct'; give the model that was "
             "registered");
+}
+
+/// A prior that is turned by an angle about the long axis against a pose.
+marrow::Pose prior_of(const marrow::Pose& pose, double turned_deg, double deviation_deg) {
+  marrow::Pose prior = pose_with({1, 1, deviation_deg, 3, 3, 3});
+  marrow::Vector6d turn = marrow::Vector6d::Zero();
+  turn[2] = marrow::radians(turned_deg);
+  prior.world_from_model = marrow::moved(pose.world_from_model, pose.frame, turn);
+  return prior;
+}
+Verdict verdict_of(const marrow::Pose& pose, const marrow::Pose& prior, marrow::Context context = marrow::Context(),
+                   const shipped::Options& options = {}) {
+  return shipped::call("verdict.predicted",
+                       {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}, {"prior", shipped::item(prior)}},
+                       options, context)
+      .at("verdict")
+      .as<Verdict>();
+}
+
+TEST(VerdictPredicted, APriorThatContradictsTheImagesMakesAPoseDoubtful) {
+  // The pose is known to 3 degrees, the prior to 5: they differ by 4 = sqrt(5^2 - 3^2) degrees, give or take.
+  const marrow::Pose pose = pose_with({0.1, 0.1, 3, 0.1, 0.1, 0.1});
+  listener::Listener listener;
+  const Verdict verdict = verdict_of(pose, prior_of(pose, -20, 5), listener.context, {{"doubtful_above", 0.3}});
+  EXPECT_EQ(verdict.judgement, Judgement::doubtful);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 5, 1e-6);
+  const std::string said =
+      "the prior contradicts the images: they are 20.0 degrees apart about the long axis, 5.0 times the deviation "
+      "expected of this difference";
+  EXPECT_EQ(verdict.reasons.at(0), said);
+  EXPECT_EQ(listener.warnings, Texts{said});
+  EXPECT_EQ(verdict.remedies.back(),
+            "a look at the markers, if the prior comes from these: has the skin slid, or one moved?");
+}
+
+TEST(VerdictPredicted, APriorThatAgreesChangesNoJudgement) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  listener::Listener listener;
+  const Verdict verdict = verdict_of(pose, prior_of(pose, 6, 5), listener.context);
+  EXPECT_EQ(verdict.judgement, Judgement::trusted);
+  EXPECT_NEAR(figure(verdict, "prior_axial_deviations"), 6 / std::sqrt(25 - 0.25), 1e-6);
+  EXPECT_TRUE(listener.warnings.empty());
+  // The limit is an option.
+  EXPECT_EQ(verdict_of(pose, prior_of(pose, 6, 5), marrow::Context(), {{"contradicts_above", 1.2}}).judgement,
+            Judgement::doubtful);
+}
+
+TEST(VerdictPredicted, WhereTheImagesSayNothingThereIsNothingToCompare) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 4.99, 0.1, 0.1, 0.1});
+  const Verdict verdict = verdict_of(pose, prior_of(pose, 20, 5));
+  EXPECT_TRUE(std::isnan(figure(verdict, "prior_axial_deviations")));
+  EXPECT_NEAR(figure(verdict, "prior_axial_deg"), 20, 1e-6);
+}
+
+TEST(VerdictPredicted, APriorNeedsACovariance) {
+  const marrow::Pose pose = pose_with({0.1, 0.1, 0.5, 0.1, 0.1, 0.1});
+  marrow::Pose prior = prior_of(pose, 0, 5);
+  prior.covariance.reset();
+  EXPECT_EQ(shipped::refusal(
+                "verdict.predicted",
+                {{"pose", shipped::item(pose)}, {"mesh", shipped::item(box())}, {"prior", shipped::item(prior)}}),
+            "the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
 }
 
 }  // namespace predicted_test
