@@ -13,6 +13,9 @@ MARROW_PLUGIN(plugin) {
       .in<marrow::SignedField>("field", "signed distance to the surface")
       .in<marrow::View>("views", "views with their cameras and masks", marrow::over("view"))
       .in<marrow::EdgeMap>("edges", "edge pixels of each view", marrow::over("view"))
+      .in<marrow::Cost>("cost", "another cost, to which this one adds something")
+      .in<marrow::Pose>("prior", "pose known from elsewhere, with its covariance")
+      .in<marrow::Pose>("found", "pose found by 'cost' alone, with its covariance")
       .in<marrow::Pose>("others", "poses of other fragments, which are left out of the comparison",
                         marrow::over("fragment"))
       .in<marrow::OutlineProjector, marrow::RadiographProjector>(

@@ -15,6 +15,7 @@
 #include "marrow/runtime/types.hpp"
 #include "marrow/toolbox/analytic/body.hpp"
 #include "marrow/toolbox/analytic/x_ray_view.hpp"
+#include "sample_cost.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -67,6 +68,16 @@ View view_of(int index, const Scene& scene) {
   return x_ray_view(x_ray, index ? "lateral" : "frontal", BodyProjector(bodies), truth());
 }
 
+/// The true pose, known to 1 degree and 1 mm.
+Pose known_pose() {
+  Pose pose;
+  pose.world_from_model = truth();
+  pose.frame = fragment_frame(mesh_of(bone()));
+  pose.covariance = Matrix6d::Identity();
+  pose.covariance->topLeftCorner<3, 3>() *= radians(1) * radians(1);
+  return pose;
+}
+
 /// All inputs of the kind, except those about other fragments. `change` may change a view and its edges.
 Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>& change = nullptr) {
   List<View> views;
@@ -87,7 +98,10 @@ Inputs inputs_of(const Scene& scene, const std::function<void(View&, EdgeMap&)>&
           {"volume", item(volume_of(bone(), grid, 700, 0))},
           {"field", item(field_of(bone(), grid, 6))},
           {"views", Value::of(views, "view")},
-          {"edges", Value::of(edges, "view")}};
+          {"edges", Value::of(edges, "view")},
+          {"cost", Value::of<Cost>(std::make_shared<const DistanceCost>(truth(), known_pose().frame))},
+          {"prior", item(known_pose())},
+          {"found", item(known_pose())}};
 }
 
 /// The node's cost together with the inputs that it refers to.

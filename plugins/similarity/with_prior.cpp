@@ -216,6 +216,7 @@ MARROW_PLUGIN(plugin) {
       .in("found",
           "pose found by the same cost alone, with its covariance: how much the cost rises there within a "
           "standard deviation says what the prior counts")
+      .trait("derivatives")
       .out("cost", "the cost, plus minus the logarithm of the prior's density in units of the cost's likelihood")
       .option("degrees_of_freedom", &Options::degrees_of_freedom,
               "of Student's t; with fewer, a pose far from the prior costs less", marrow::at_least(1),

@@ -3,6 +3,7 @@
 program."""
 import json
 import random
+import shutil
 
 from marrow_cli import SOURCE, Case, main, marrow
 
@@ -34,6 +35,7 @@ class Mutations(Case):
         chance = random.Random(20261121)
         files = sorted((SOURCE / "pipelines").glob("*.yaml"))
         self.assertGreater(len(files), 2)
+        shutil.copytree(SOURCE / "pipelines" / "track", self.scratch / "track")  # bodies of pipelines
         good = at_line = elsewhere = 0
         for number in range(200):
             path = files[number % len(files)]

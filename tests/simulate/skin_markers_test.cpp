@@ -23,7 +23,9 @@ const marrow::Value& phantom() {
   return phantom;
 }
 
-const marrow::phantom::Fragment& distal() { return phantom().as<marrow::phantom::Phantom>().fragments[0]; }
+const marrow::phantom::Fragment& distal() {
+  return marrow::phantom::distal_fragment(phantom().as<marrow::phantom::Phantom>());
+}
 
 Landmarks markers(shipped::Options options, std::uint64_t seed = 1) {
   for (const char* name : {"noise_mm", "common_rotation_deg", "common_shift_mm"})

@@ -6,6 +6,7 @@
 #include "dicom_pixels.hpp"
 #include "header_lines.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/toolbox/files/sequence_files.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/files/xray_header.hpp"
 #include "samples.hpp"
@@ -108,6 +109,21 @@ Image read_image_file(const fs::path& path, int frame) {
               " pages; an image has one (a stack is a volume; frame, from 1, picks a page)");
   check_one_channel(samples.components, path);
   return image_of(samples, std::max(1, frame), path);
+}
+
+std::vector<Image> read_image_frames(const fs::path& path, const FrameRange& range) {
+  std::vector<Image> images;
+  const std::string extension = in_small_letters(path.extension().string());
+  if (extension != ".tif" && extension != ".tiff") {
+    const int count = is_dicom(path) ? read_dicom_pixels(path, 1).frames : 1;
+    for (const int frame : frames_of(range, count, path.string())) images.push_back(read_image_file(path, frame));
+    return images;
+  }
+  const Samples samples = read_tiff(path);
+  check_one_channel(samples.components, path);
+  for (const int frame : frames_of(range, samples.size[2], path.string()))
+    images.push_back(image_of(samples, frame, path));
+  return images;
 }
 
 }  // namespace marrow::files

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "marrow/domain/image.hpp"
+
+namespace marrow::files {
+
+/// The frames of a sequence that are read, counted from 1.
+struct FrameRange {
+  int first = 1;
+  int last = 0;   ///< 0: the last one that there is
+  int every = 1;  ///< 2: every second one, from `first` on
+};
+
+/// The numbers of the wanted frames, if there are `count`. Throws Error, beginning with `what`, if there is no frame
+/// `first` or `last`, or if `last` lies before `first`.
+std::vector<int> frames_of(const FrameRange& range, int count, const std::string& what);
+
+/// The images of a folder, one a frame, in the order of their numbers. An empty pattern stands for all files of the
+/// folder that are images by their extension. Else their paths from the folder fit the pattern: * stands for any
+/// characters but /, ? for one. The names may differ only in a number, and no number may be missing. Throws Error
+/// otherwise. The files are not opened.
+std::vector<std::filesystem::path> frame_files(const std::filesystem::path& folder, const std::string& pattern);
+
+/// Frames of one file, each as read_image_file() returns it: pages of a TIFF, frames of a DICOM file.
+std::vector<Image> read_image_frames(const std::filesystem::path& path, const FrameRange& range);
+
+}  // namespace marrow::files

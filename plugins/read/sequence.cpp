@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: Apache-2.0
+// A sequence of X-ray images: of each view a folder of images, a file with several frames, or a video.
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/domain/names.hpp"
+#include "marrow/toolbox/files/calibration_file.hpp"
+#include "marrow/toolbox/files/camera_file.hpp"
+#include "marrow/toolbox/files/sequence_files.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
+#include "marrow/toolbox/track/sequence.hpp"
+#include "video.hpp"
+
+namespace {
+
+using namespace marrow;
+using track::SequenceFrame;
+
+namespace fs = std::filesystem;
+
+struct Options : files::FrameRange {
+  std::vector<std::string> names;
+  std::vector<fs::path> images;
+  std::vector<std::string> patterns;
+  std::vector<fs::path> cameras;
+  fs::path calibration;
+};
+
+std::vector<Image> read_images(const fs::path& path, const std::string& pattern, const Options& options,
+                               Context& context) {
+  if (!fs::is_directory(path)) {
+    if (!pattern.empty())
+      throw Error(path.string() + ": a pattern chooses files of a folder, but this is no folder; leave it out");
+    return read_sequence::is_video(path) ? read_sequence::read_video(path, options)
+                                         : files::read_image_frames(path, options);
+  }
+  const std::vector<fs::path> all = files::frame_files(path, pattern);
+  std::vector<Image> images;
+  for (const int frame : files::frames_of(options, int(all.size()), path.string())) {
+    context.check_cancelled();
+    images.push_back(files::read_image_file(all[std::size_t(frame - 1)]));
+    const cv::Mat &first = images.front().pixels, &now = images.back().pixels;
+    if (now.size() != first.size() || now.type() != first.type())
+      throw Error(all[std::size_t(frame - 1)].string() + ": frame " + std::to_string(frame) + " has " +
+                  std::to_string(now.cols) + " x " + std::to_string(now.rows) + " pixels of " +
+                  std::to_string(8 * now.elemSize1()) + " bits, but the first one " + std::to_string(first.cols) +
+                  " x " + std::to_string(first.rows) + " of " + std::to_string(8 * first.elemSize1()) +
+                  "; all frames of a view must be alike");
+  }
+  return images;
+}
+
+DistortedCamera camera_of(const std::string& name, std::size_t i, const List<Camera>* cameras, const Options& options) {
+  if (!cameras) return files::read_camera_file(options.cameras.at(i));
+  const Camera* camera = cameras->find(name);
+  if (!camera) throw Error("view '" + name + "' has no camera of that name; give the cameras the views' names");
+  DistortedCamera result;
+  result.camera = *camera;
+  return result;
+}
+
+/// Adds a view to each frame.
+void add_view(const std::string& name, std::vector<Image> images, const DistortedCamera& camera, const Options& options,
+              std::vector<SequenceFrame>& frames, Context& context) {
+  std::optional<Calibration> calibration;
+  if (!options.calibration.empty()) calibration = files::read_calibration_file(options.calibration);
+  if (calibration && !camera.distortion.is_none())
+    throw Error("view '" + name + "': both its camera and " + options.calibration.string() +
+                " tell of a distortion; it is removed only once: take it out of one of them");
+  for (std::size_t k = 0; k < images.size(); ++k) {
+    context.check_cancelled();
+    View view;
+    view.name = name;
+    view.image = std::move(images[k]);
+    view.camera = camera.camera;
+    check_view(view);
+    if (calibration)
+      apply_calibration(view, *calibration);
+    else if (!camera.distortion.is_none())
+      remove_distortion(view, camera.distortion);
+    frames[k].views.push_back(std::move(view));
+    context.progress(double(k + 1) / double(images.size()), name);
+  }
+}
+
+List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options, Context& context) {
+  if (!cameras && options.cameras.empty()) throw Error("the node that is wired to 'camera' gave none");
+  std::vector<SequenceFrame> frames;
+  for (std::size_t i = 0; i < options.names.size(); ++i) {
+    const std::string& name = options.names[i];
+    check_item_name("view", name);
+    const std::string pattern = options.patterns.empty() ? std::string() : options.patterns.at(i);
+    std::vector<Image> images = read_images(options.images.at(i), pattern, options, context);
+    if (i == 0) frames.resize(images.size());
+    if (images.size() != frames.size())
+      throw Error("view '" + name + "' has " + std::to_string(images.size()) + " frames, but view '" +
+                  options.names.front() + "' has " + std::to_string(frames.size()) + " (" +
+                  options.images.at(i).string() + "); all views must show the same moments");
+    add_view(name, std::move(images), camera_of(name, i, cameras, options), options, frames, context);
+  }
+  List<SequenceFrame> result;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    char name[16];
+    std::snprintf(name, sizeof name, "%04zu", std::size_t(options.first) + k * std::size_t(options.every));
+    result.add(name, std::move(frames[k]));
+  }
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.sequence", sequence)
+      .summary("Reads a sequence of X-ray views: folders of images, files with several frames, or videos")
+      .in("camera", "one camera per view, with the view's name, if no camera files are given", over("view"))
+      .out("frames", "all views of each moment, named by the number of the frame; a known distortion is removed",
+           over("frame"))
+      .option("names", &Options::names, "one name per view", required())
+      .relation(at_least_one({"names"}))
+      .relation(distinct("names"))
+      .option(
+          "images", &Options::images,
+          "per view: a folder of images (PNG, TIFF, DICOM) whose names differ in a number only, a file with several "
+          "pages or frames (TIFF, DICOM), or a video",
+          required())
+      .relation(same_length({"names", "images"}))
+      .option(
+          "patterns", &Options::patterns,
+          "per view: which files of its folder belong to it, as 'frontal_*.png' or '*/frontal.png'; * stands for any "
+          "characters, ? for one. Empty: all images of the folder")
+      .relation(as_many_or_none("patterns", "names"))
+      .option("cameras", &Options::cameras, "one camera file (XMALab's text or marrow's YAML) per view")
+      .relation(exactly_one({"in.camera", "cameras"}))
+      .relation(as_many_or_none("cameras", "names"))
+      .option("calibration", &Options::calibration,
+              "calibration file of the device that took all views; its camera matrix replaces those of the cameras, "
+              "and its distortion is removed from the images")
+      .option("first", &Options::first, "first frame that is read, counted from 1", at_least(1))
+      .option("last", &Options::last, "last frame that is read; 0: to the end", at_least(0))
+      .option("every", &Options::every, "2: every second frame is read", at_least(1));
+}
