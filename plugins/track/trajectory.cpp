@@ -27,19 +27,25 @@ std::string quoted(const std::string& text) {
   return result + "\"";
 }
 
-/// A row of world_from_model (row-major), then the deviations along the six axes.
+constexpr const char* kAxes[] = {"frontal_deg", "lateral_deg", "axial_deg", "frontal_mm", "lateral_mm", "along_mm"};
+
+/// A row of world_from_model (row-major), then the motion from the first frame along the bone's six axes, then the
+/// deviations along them.
 void write_csv(const Trajectory& trajectory, const std::string& path) {
   std::string text = "frame,name,time_s,found";
   for (int row = 1; row <= 3; ++row)
     for (int column = 1; column <= 4; ++column)
       text += ",m" + std::to_string(row) + std::to_string(column) + (column == 4 ? "_mm" : "");
-  text +=
-      ",deviation_frontal_deg,deviation_lateral_deg,deviation_axial_deg,deviation_frontal_mm,deviation_lateral_mm,"
-      "deviation_along_mm,note\n";
+  for (const char* prefix : {",", ",deviation_"})
+    for (const char* axis : kAxes) text += std::string(prefix) + axis;
+  text += ",note\n";
   const auto add = [&](double value) {
     char number[40];
     std::snprintf(number, sizeof number, ",%.10g", value);
     text += number;
+  };
+  const auto add_degrees_and_mm = [&](const Vector6d& values) {
+    for (int k = 0; k < 6; ++k) add(k < 3 ? degrees(values[k]) : values[k]);
   };
   for (std::size_t i = 0; i < trajectory.states.size(); ++i) {
     const TrackState& state = trajectory.states[i];
@@ -51,10 +57,9 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
       for (int column = 0; column < 3; ++column) add(pose.rotation(row, column));
       add(pose.translation_mm[row]);
     }
-    for (int k = 0; k < 6; ++k) {
-      const double deviation = std::sqrt(std::max(0.0, state.now.covariance(k, k)));
-      add(k < 3 ? degrees(deviation) : deviation);
-    }
+    add_degrees_and_mm(
+        motion_between(trajectory.states.front().now.world_from_model, pose, trajectory.states.front().fragment));
+    add_degrees_and_mm(state.now.covariance.diagonal().head<6>().cwiseMax(0).cwiseSqrt());
     text += "," + quoted(state.note) + "\n";
   }
   files::write_text(path, text);
@@ -69,6 +74,7 @@ MARROW_PLUGIN(plugin) {
       .summary("The way of a bone through all frames, as one table")
       .in("states", "what is known after each frame", over("frame"))
       .out("trajectory", "poses, deviations, and in which frames the bone was found");
-  plugin.writer<TrackState>(".csv", write_state, "one frame: time, 3x4 matrix world_from_model, deviations");
-  plugin.writer<Trajectory>(".csv", write_csv, "a line a frame: time, 3x4 matrix world_from_model, deviations");
+  plugin.writer<TrackState>(".csv", write_state, "one frame: time, 3x4 matrix world_from_model, motion, deviations");
+  plugin.writer<Trajectory>(
+      ".csv", write_csv, "a line a frame: time, 3x4 matrix world_from_model, motion from the first frame, deviations");
 }

@@ -141,6 +141,7 @@ const Page = (() => {
       const open = () => {
         Page.scene = scene = new SceneView(data, entries);
         places.scene.replaceChildren(scene.element);
+        if (Page.player) Page.player.moveModels();
       };
       if (entries.length) whenNear(places.scene, () => data.lookedAt[state.at] === pair && !scene && open());
     };
@@ -159,7 +160,7 @@ const Page = (() => {
               picker(), places.pictures,
               data.is_run && data.cells[0] &&
                   el('details', {open: true}, el('summary', {}, 'All pictures'),
-                     Pictures.gallery(data, data.cells[0]))),
+                     Pictures.gallery(data, {pictures: Sequence.stills(data.cells[0])}))),
       has((cell) => cell.scene) &&
           section(
               'scene', '3D view',
@@ -179,6 +180,14 @@ const Page = (() => {
     ].filter(Boolean);
     show(0);
     return sections;
+  }
+
+  function sequence(data) {
+    const found = data.is_run && data.cells[0] && Sequence.of(data.cells[0]);
+    return found ? section(
+                       'sequence', 'Sequence', 'The run frame by frame; the arrow keys move the slider by one frame.',
+                       (Page.player = new Sequence.Player(data, found)).element) :
+                   null;
   }
 
   const nothing = (what) => el('p', {class: 'note'}, 'Of this case and start no ' + what + ' was kept.');
@@ -247,6 +256,7 @@ const Page = (() => {
     const add = (...parts) => main.append(...parts.flat(2).filter(Boolean));  // at once: figures need their width
     add(summary(data));
     if (many && data.metrics.length) add(distributions(data), paired(data), capture(data), byCase(data));
+    add(sequence(data));
     add(closer(data));
     if (data.passes.length) add(section('passes', 'Passes', null, ...Passes.draw(data)));
     if (data.graph && (data.graph.nodes || []).length) {

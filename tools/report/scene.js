@@ -106,6 +106,17 @@ class SceneView {
     return {pose, kind, mesh, group, surface, rim, name: this.source.meshes[pose.mesh].name};
   }
 
+  // Moves the results of these models. poses: {model name: world_from_model}
+  moveTo(poses) {
+    if (this.failure) return;
+    for (const {pose, group, name} of this.models) {
+      if (pose.name !== 'result' || !poses[name]) continue;
+      group.matrix.set(...poses[name]);
+      group.updateMatrixWorld(true);
+    }
+    this.draw();
+  }
+
   // An X-ray: its picture as a plane behind the models, lines from the source to its corners, and a flat quad.
   view(view) {
     const K = view.intrinsics,

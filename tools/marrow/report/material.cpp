@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Collects the data of a report from the files of a run's folder. The content of a JSON or YAML file tells its kind.
+#include <algorithm>
 #include <cstdio>
 #include <fstream>
 #include <sstream>
@@ -73,6 +74,57 @@ json landscape_of(const json& file) {
   return profiles;
 }
 
+/// The cells of a line of CSV; a quoted one may hold commas and, doubled, quotes.
+std::vector<std::string> cells_of(const std::string& line) {
+  std::vector<std::string> cells(1);
+  bool quoted = false;
+  for (const char c : line) {
+    if (c == '"')
+      quoted = !quoted;
+    else if (c == ',' && !quoted)
+      cells.emplace_back();
+    else if (c != '\r')
+      cells.back() += c;
+  }
+  return cells;
+}
+
+/// The way of a bone from the table of a trajectory, by the names of its columns. Throws for another table.
+json trajectory_of(const std::string& text, const std::string& name) {
+  static const std::vector<std::string> kAxes{"frontal_deg", "lateral_deg", "axial_deg",
+                                              "frontal_mm",  "lateral_mm",  "along_mm"};
+  std::istringstream lines(text);
+  std::string line;
+  std::getline(lines, line);
+  const std::vector<std::string> header = cells_of(line);
+  const auto column = [&](const std::string& title) {
+    const auto at = std::find(header.begin(), header.end(), title);
+    if (at == header.end()) throw Error(name + ": has no column '" + title + "'");
+    return std::size_t(at - header.begin());
+  };
+  json way = {{"name", place_of(name)}};
+  while (std::getline(lines, line)) {
+    const std::vector<std::string> cells = cells_of(line);
+    const auto number = [&](const std::string& title) { return std::stod(cells.at(column(title))); };
+    json motion = json::array(), deviation = json::array();
+    for (const std::string& axis : kAxes) {
+      motion.push_back(number(axis));
+      deviation.push_back(number("deviation_" + axis));
+    }
+    json matrix = json::array();
+    for (const char row : {'1', '2', '3'})
+      for (const std::string end : {"1", "2", "3", "4_mm"}) matrix.push_back(number(std::string("m") + row + end));
+    for (const double last : {0, 0, 0, 1}) matrix.push_back(last);
+    way["world_from_model"].push_back(matrix);
+    way["frames"].push_back(cells.at(column("name")));
+    way["time_s"].push_back(number("time_s"));
+    way["found"].push_back(cells.at(column("found")) == "1");
+    way["motion"].push_back(motion);
+    way["deviation"].push_back(deviation);
+  }
+  return way;
+}
+
 /// The files that a run's record names.
 std::vector<std::string> files_in(const json& record) {
   std::vector<std::string> files;
@@ -113,6 +165,8 @@ void ReportMaterial::add_file(const fs::path& path, const std::string& name, jso
     cell["pictures"].push_back({{"name", place_of(name)}, {"picture", id}});
   } else if (extension == ".json") {
     add_json(parse_json(read_text_file(path, kMostRecordBytes), name), cell);
+  } else if (extension == ".csv") {
+    cell["trajectories"].push_back(trajectory_of(read_text_file(path, kMostRecordBytes), name));
   } else if (extension == ".yaml") {
     if (!cell.contains("convergence"))
       if (const json steps = convergence_of(read_text_file(path, kMostRecordBytes)); !steps.empty())
