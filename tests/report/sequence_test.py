@@ -26,7 +26,8 @@ class SequenceTest(PageTest):
         """The frame's name, and of each film the picture that is shown, or None."""
         label, sources = self.browser.js(
             "return [document.querySelector('.frame-name').textContent,"
-            " [...document.querySelectorAll('.films img')].map((image) => (image.style.visibility === 'hidden' ? null : image.getAttribute('src')))]"
+            " [...document.querySelectorAll('.films img')].map("
+            "(image) => (image.style.visibility === 'hidden' ? null : image.getAttribute('src')))]"
         )
         by_source = {url: name for name, url in self.data["pictures"].items()}
         return label, [source and by_source[source] for source in sources]
