@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Registration of one frame of a sequence. The prediction is a good start, so the search is short. If what it finds
-// does not agree with the prediction, poses all around it are tried, as far away as its deviations say.
+// does not agree with the prediction, or costs more than usual, poses all around it are tried, as far away as its
+// deviations say.
 #include <algorithm>
 #include <cmath>
 #include <marrow/domain/decompositions.hpp>
@@ -139,6 +140,12 @@ class Frame {
   search::Levels levels_;
 };
 
+/// After some frames without the bone the prediction is so wide that a wrong pose agrees with it, too. Its cost tells.
+bool is_unusual(const Pose& found, const track::TrackState& state) {
+  constexpr double kMostRatio = 1.5;
+  return found.cost > kMostRatio * state.usual_cost;  // not if there is no usual cost yet: it is not a number
+}
+
 Result tracked(const Cost& cost, const Cost* finer_cost, const Optimizer& optimizer, const Optimizer* finer_optimizer,
                const Pose& initial, const track::TrackState* state, const Options& options, Context& context) {
   check_rigid(initial.world_from_model, "the predicted pose");
@@ -150,7 +157,7 @@ Result tracked(const Cost& cost, const Cost* finer_cost, const Optimizer& optimi
   Result result;
   result.stages.add("predicted", initial);
   result.pose = frame.near();
-  if (!frame.agrees(result.pose)) {
+  if (!frame.agrees(result.pose) || (state && is_unusual(result.pose, *state))) {
     result.stages.add("near", result.pose);
     const Pose wide = frame.wide();
     if (wide.cost < result.pose.cost) result.pose = wide;

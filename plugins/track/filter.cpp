@@ -13,7 +13,7 @@ using track::Measurement;
 using track::TrackState;
 
 struct Options {
-  double gate = 22.46;
+  double gate = 38.26;
   double most_cost_ratio = 2;
   double first_scale = 2;
   double least_deg = 0.02;
@@ -97,10 +97,12 @@ MARROW_PLUGIN(plugin) {
       .in("verdict", "verdict on this pose: a wrong one is not taken")
       .out("state", &Frame::state, "what is known after the frame")
       .out("pose", &Frame::pose, "best pose of the frame with its covariance; where the bone is lost, the prediction")
-      .option("gate", &Options::gate,
-              "largest squared Mahalanobis distance between the registered and the predicted pose (22.46: 99.9 % of "
-              "right poses)",
-              at_least(0), unit(""))
+      .option(
+          "gate", &Options::gate,
+          "largest squared Mahalanobis distance between the registered and the predicted pose (38.26: one right pose "
+          "in "
+          "a million is farther off); it is larger than that of register.tracked, beyond which the search is widened",
+          at_least(0), unit(""))
       .option("most_cost_ratio", &Options::most_cost_ratio,
               "largest cost of a pose that is taken, as a multiple of that of the frames so far", at_least(0), unit(""))
       .option("first_scale", &Options::first_scale,

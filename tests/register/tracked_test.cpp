@@ -63,6 +63,29 @@ TEST(Tracked, LooksFurtherWhereTheResultIsUnlikely) {
   EXPECT_LE(apart(out.at("pose").as<Pose>()), apart(stages[1]));
 }
 
+TEST(Tracked, LooksFurtherWhereTheCostIsMoreThanUsual) {
+  // Any pose agrees with the prediction. Only the cost tells that it ended in a wave of the well.
+  const auto well = std::make_shared<const well::Well>(truth().world_from_model, truth().frame, 60, 6);
+  const Pose far = predicted({2, -2, 9, 3, -3, 9}, 10, 20);
+  const auto stages = [&](double usual_cost) {
+    marrow::track::TrackState state;
+    state.usual_cost = usual_cost;
+    state.usual_covariance = Matrix6d(Matrix6d::Identity());  // taken over: it need not be found in a wave
+    state.frame = 3;
+    shipped::Inputs in = inputs(well, far);
+    in["state"] = shipped::item(state);
+    return shipped::call("register.tracked", in, {{"gate", 1e9}}).at("stages").as_list<Pose>();
+  };
+  const std::vector<std::string> near{"predicted", "final"}, wide{"predicted", "near", "final"};
+  const auto not_yet_known = stages(std::nan(""));
+  EXPECT_EQ(not_yet_known.names(), near);
+  const double cost = not_yet_known[1].cost;
+  EXPECT_EQ(stages(cost).names(), near);
+  const auto looked = stages(cost / 2);
+  ASSERT_EQ(looked.names(), wide);
+  EXPECT_LE(looked[2].cost, looked[1].cost);
+}
+
 TEST(Tracked, MostFramesTakeOverACovariance) {
   marrow::track::TrackState state;
   state.usual_covariance = Matrix6d(7 * Matrix6d::Identity());
