@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // A sequence of X-ray images: of each view a folder of images, a file with several frames, or a video.
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
-#include "marrow/toolbox/files/calibration_file.hpp"
-#include "marrow/toolbox/files/camera_file.hpp"
 #include "marrow/toolbox/files/sequence_files.hpp"
+#include "marrow/toolbox/files/view_file.hpp"
 #include "marrow/toolbox/files/volume_file.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 #include "video.hpp"
@@ -50,39 +48,6 @@ std::vector<Image> read_images(const fs::path& path, const std::string& pattern,
   return images;
 }
 
-DistortedCamera camera_of(const std::string& name, std::size_t i, const List<Camera>* cameras, const Options& options) {
-  if (!cameras) return files::read_camera_file(options.cameras.at(i));
-  const Camera* camera = cameras->find(name);
-  if (!camera) throw Error("view '" + name + "' has no camera of that name; give the cameras the views' names");
-  DistortedCamera result;
-  result.camera = *camera;
-  return result;
-}
-
-/// Adds a view to each frame.
-void add_view(const std::string& name, std::vector<Image> images, const DistortedCamera& camera, const Options& options,
-              std::vector<SequenceFrame>& frames, Context& context) {
-  std::optional<Calibration> calibration;
-  if (!options.calibration.empty()) calibration = files::read_calibration_file(options.calibration);
-  if (calibration && !camera.distortion.is_none())
-    throw Error("view '" + name + "': both its camera and " + options.calibration.string() +
-                " tell of a distortion; it is removed only once: take it out of one of them");
-  for (std::size_t k = 0; k < images.size(); ++k) {
-    context.check_cancelled();
-    View view;
-    view.name = name;
-    view.image = std::move(images[k]);
-    view.camera = camera.camera;
-    check_view(view);
-    if (calibration)
-      apply_calibration(view, *calibration);
-    else if (!camera.distortion.is_none())
-      remove_distortion(view, camera.distortion);
-    frames[k].views.push_back(std::move(view));
-    context.progress(double(k + 1) / double(images.size()), name);
-  }
-}
-
 List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options, Context& context) {
   if (!cameras && options.cameras.empty()) throw Error("the node that is wired to 'camera' gave none");
   std::vector<SequenceFrame> frames;
@@ -96,14 +61,20 @@ List<SequenceFrame> sequence(const List<Camera>* cameras, const Options& options
       throw Error("view '" + name + "' has " + std::to_string(images.size()) + " frames, but view '" +
                   options.names.front() + "' has " + std::to_string(frames.size()) + " (" +
                   options.images.at(i).string() + "); all views must show the same moments");
-    add_view(name, std::move(images), camera_of(name, i, cameras, options), options, frames, context);
+    const files::ViewCamera camera = files::read_view_camera({name,
+                                                              {},
+                                                              cameras ? &files::camera_of(name, *cameras) : nullptr,
+                                                              cameras ? fs::path() : options.cameras.at(i),
+                                                              options.calibration});
+    for (std::size_t k = 0; k < images.size(); ++k) {
+      context.check_cancelled();
+      frames[k].views.push_back(files::view_of(name, std::move(images[k]), camera));
+      context.progress(double(k + 1) / double(images.size()), name);
+    }
   }
   List<SequenceFrame> result;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    char name[16];
-    std::snprintf(name, sizeof name, "%04zu", std::size_t(options.first) + k * std::size_t(options.every));
-    result.add(name, std::move(frames[k]));
-  }
+  for (std::size_t k = 0; k < frames.size(); ++k)
+    result.add(track::frame_name(std::size_t(options.first) + k * std::size_t(options.every)), std::move(frames[k]));
   return result;
 }
 

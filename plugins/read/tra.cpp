@@ -3,12 +3,12 @@
 // bone row by row, in mm. NaN stands for a frame in which the bone was not tracked.
 #include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 #include <sstream>
 
 #include "marrow/toolbox/files/input_file.hpp"
+#include "marrow/toolbox/track/sequence.hpp"
 #include "marrow/toolbox/track/track_state.hpp"
 
 namespace {
@@ -83,11 +83,9 @@ Tra read_tra(const Options& options) {
     result.track.world_from_bone.push_back(pose_of(numbers_of(line, options.path, number), options.path, number));
     const auto& pose = result.track.world_from_bone.back();
     if (!pose) continue;
-    char name[16];
-    std::snprintf(name, sizeof name, "%04zu", result.track.world_from_bone.size());
     Pose found;
     found.world_from_model = *pose;
-    result.poses.add(name, found);
+    result.poses.add(track::frame_name(result.track.world_from_bone.size()), found);
   }
   if (result.poses.empty()) throw Error(options.path.string() + ": there is no tracked frame in it");
   return result;

@@ -13,13 +13,6 @@ struct Options {
   int frame = 0;
 };
 
-const marrow::Camera& camera_of(const std::string& name, const marrow::List<marrow::Camera>& cameras) {
-  if (const marrow::Camera* camera = cameras.find(name)) return *camera;
-  std::string known;
-  for (const std::string& other : cameras.names()) known += (known.empty() ? "'" : ", '") + other + "'";
-  throw marrow::Error("view '" + name + "' has no camera of that name; there are " + known);
-}
-
 marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, const Options& options) {
   if (!cameras && options.cameras.empty()) throw marrow::Error("the node that is wired to 'camera' gave none");
   marrow::List<marrow::View> views;
@@ -27,7 +20,7 @@ marrow::List<marrow::View> views(const marrow::List<marrow::Camera>* cameras, co
     const std::string& name = options.names[i];
     views.add(name,
               marrow::files::read_view_files(
-                  {name, options.images.at(i), cameras ? &camera_of(name, *cameras) : nullptr,
+                  {name, options.images.at(i), cameras ? &marrow::files::camera_of(name, *cameras) : nullptr,
                    cameras ? std::filesystem::path() : options.cameras.at(i), options.calibration, options.frame}));
   }
   return views;

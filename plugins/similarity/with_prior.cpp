@@ -9,6 +9,8 @@
 #include <marrow/domain/decompositions.hpp>
 #include <marrow/plugin.hpp>
 
+#include "marrow/toolbox/geometry/rigid_fit.hpp"
+
 namespace {
 
 using namespace marrow;
@@ -56,11 +58,10 @@ class Prior {
 
   /// How motion() changes with a small motion of the pose in `frame`.
   Matrix6d motion_by_motion(const Vector6d& motion, const FragmentFrame& frame) const {
-    const Eigen::Matrix3d turn = pose_.frame.axes.transpose() * frame.axes;
+    const Eigen::Matrix3d axes = pose_.frame.axes.transpose();
     Matrix6d in_own_frame = Matrix6d::Zero(), change = Matrix6d::Zero();
-    in_own_frame.topLeftCorner<3, 3>() = in_own_frame.bottomRightCorner<3, 3>() = turn;
-    in_own_frame.bottomLeftCorner<3, 3>() =
-        -pose_.frame.axes.transpose() * cross_matrix(pose_.frame.origin_mm - frame.origin_mm) * frame.axes;
+    in_own_frame.topLeftCorner<3, 3>() = axes * frame.axes;
+    in_own_frame.bottomRows<3>() = axes * geometry::point_by_motion(frame, pose_.frame.origin_mm);
     change.topLeftCorner<3, 3>() = vector_by_rotation(motion.head<3>());
     change.bottomRightCorner<3, 3>() = rotation_from_vector(motion.head<3>());
     return change * in_own_frame;

@@ -2,10 +2,10 @@
 // A bone that turns and shifts to and fro, frame by frame, for studies of following bones.
 #include <array>
 #include <cmath>
-#include <cstdio>
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/track/sequence.hpp"
 
 namespace {
 
@@ -37,9 +37,7 @@ List<Phantom> bone_motion(const Phantom& phantom, const Options& options, Contex
       }
       fragment.world_from_ct = moved(fragment.world_from_ct, fragment.frame, motion);
     }
-    char name[16];
-    std::snprintf(name, sizeof name, "%04d", i + 1);
-    frames.add(name, std::move(now));
+    frames.add(track::frame_name(std::size_t(i) + 1), std::move(now));
   }
   return frames;
 }

@@ -33,10 +33,9 @@ RigidTransform held(const Options& options, int i, std::uint64_t seed) {
   pose.rotation = (Eigen::AngleAxisd(tilt, Eigen::Vector3d(std::cos(towards), std::sin(towards), 0)) *
                    Eigen::AngleAxisd(radians(within(12)), Eigen::Vector3d::UnitZ()))
                       .toRotationMatrix();
-  const Eigen::Vector3d middle(0.5 * (options.columns - 1) * options.square_mm,
-                               0.5 * (options.rows - 1) * options.square_mm, 0);
   const double right = within(options.shift_mm), down = within(options.shift_mm), ahead = within(0.15);
-  pose.translation_mm = Eigen::Vector3d(right, down, options.distance_mm * (1 + ahead)) - pose.rotation * middle;
+  pose.translation_mm = Eigen::Vector3d(right, down, options.distance_mm * (1 + ahead)) -
+                        pose.rotation * calibration::middle_of_corners_mm(options);
   return pose;
 }
 

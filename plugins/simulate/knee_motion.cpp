@@ -6,6 +6,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/knee.hpp"
+#include "marrow/toolbox/track/sequence.hpp"
 
 namespace {
 
@@ -121,9 +122,7 @@ List<ClutteredPhantom> knee_motion(const ClutteredPhantom& phantom, const Option
   List<ClutteredPhantom> frames;
   for (int i = 0; i < options.frames; ++i) {
     context.check_cancelled();
-    char name[16];
-    std::snprintf(name, sizeof name, "%04d", i + 1);
-    frames.add(name, knee.at(i));
+    frames.add(track::frame_name(std::size_t(i) + 1), knee.at(i));
   }
   return frames;
 }

@@ -80,15 +80,15 @@ void judge_by_warnings(const marrow::Pose& pose, Verdict& verdict) {
   verdict.remedies.emplace_back("a look at the overlay of each view");
 }
 
-/// The rotation about the long axis between the prior and the pose that images and prior have led to, in standard
+/// A rotation about the long axis between the prior and the pose that images and prior have led to, in standard
 /// deviations. The pose lies between the two, so its difference from the prior has the variance of the prior minus that
 /// of the pose; this is the same as comparing prior and images with the sum of their variances. Nothing if the images
 /// say hardly more than the prior.
-std::optional<double> contradiction(const marrow::Pose& pose, const marrow::Pose& prior) {
+std::optional<double> deviations_of(double apart_rad, const marrow::Pose& pose, const marrow::Pose& prior) {
   constexpr double kLeastNews = 0.01;  // of the prior's variance
   const double of_prior = (*prior.covariance)(2, 2), news = of_prior - (*pose.covariance)(2, 2);
   if (!(news > kLeastNews * of_prior)) return std::nullopt;
-  return std::abs(motion_between(prior.world_from_model, pose.world_from_model, pose.frame)[2]) / std::sqrt(news);
+  return apart_rad / std::sqrt(news);
 }
 
 /// A prior that the images contradict makes the pose doubtful: one of the two is wrong.
@@ -98,10 +98,10 @@ void judge_by_prior(const marrow::Pose& pose, const marrow::Pose& prior, const O
   if (!prior.covariance)
     throw marrow::Error("the prior has no covariance; take it from a node that predicts one, such as a fit of markers");
   if (!pose.covariance) return;
-  const double apart_deg =
-      marrow::degrees(std::abs(motion_between(prior.world_from_model, pose.world_from_model, pose.frame)[2]));
+  const double apart_rad = std::abs(motion_between(prior.world_from_model, pose.world_from_model, pose.frame)[2]),
+               apart_deg = marrow::degrees(apart_rad);
   verdict.figures.push_back({"prior_axial_deg", apart_deg, "deg"});
-  const std::optional<double> deviations = contradiction(pose, prior);
+  const std::optional<double> deviations = deviations_of(apart_rad, pose, prior);
   if (!deviations) return;
   verdict.figures.push_back({"prior_axial_deviations", *deviations, ""});
   if (*deviations <= options.contradicts_above) return;

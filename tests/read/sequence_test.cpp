@@ -196,7 +196,7 @@ TEST_F(ReadSequence, ACameraForEachName) {
   cameras.add("a", marrow::Camera{6, 4, Eigen::Vector3d(10, 10, 1).asDiagonal(), {"camera", "world"}});
   options.erase("cameras");
   EXPECT_EQ(shipped::refusal("read.sequence", {{"camera", shipped::list(cameras, "view")}}, options),
-            "view 'b' has no camera of that name; give the cameras the views' names");
+            "view 'b' has no camera of that name; there are 'a'");
   EXPECT_TRUE(shipped::declares("read.sequence", marrow::same_length({"names", "images"})));
   EXPECT_TRUE(shipped::declares("read.sequence", marrow::as_many_or_none("patterns", "names")));
   EXPECT_TRUE(shipped::declares("read.sequence", marrow::exactly_one({"in.camera", "cameras"})));

@@ -7,15 +7,42 @@
 import sys
 import time
 
+import shapes
 import synthetic
 from page import PageTest, run_tests
+
+
+def sequence(frames=6, lost=3):
+    """A run of a sequence: two films, and the way of the bone 'cube', which is lost in one frame."""
+    data = synthetic.run()
+    cell = data["cells"][0]
+    names = ["%04d" % (i + 1) for i in range(frames)]
+    for i, name in enumerate(names):
+        for view in ("frontal", "lateral"):
+            if view == "lateral" and i == lost:
+                continue
+            key = "film %s %s" % (view, name)
+            data["pictures"][key] = shapes.png(8, 8, bytes([20 * i + 9 * (view == "lateral")] * 64), 1)
+            cell["pictures"].append({"name": "overlay/%s/cube/%s" % (name, view), "picture": key})
+    cell["trajectories"] = [
+        {
+            "name": "way/cube",
+            "frames": names,
+            "time_s": [i / 10 for i in range(frames)],
+            "found": [i != lost for i in range(frames)],
+            "world_from_model": [shapes.flat(shapes.pose([0, 0, 5 * i], [i, 0, 0])) for i in range(frames)],
+            "motion": [[0, 0, 5 * i, i, 0, 0] for i in range(frames)],
+            "deviation": [[1, 1, 1 + 9 * (i == lost), 1, 1, 1] for i in range(frames)],
+        }
+    ]
+    return data
 
 
 class SequenceTest(PageTest):
     @classmethod
     def setUpClass(cls):
         super().setUpClass()
-        cls.data = synthetic.sequence()
+        cls.data = sequence()
         cls.page = cls.write("sequence", cls.data)
 
     def setUp(self):

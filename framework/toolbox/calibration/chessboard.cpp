@@ -42,15 +42,17 @@ std::vector<Eigen::Vector3d> corners_mm(const Chessboard& board) {
   return corners;
 }
 
+Eigen::Vector3d middle_of_corners_mm(const Chessboard& board) {
+  return {0.5 * (board.columns - 1) * board.square_mm, 0.5 * (board.rows - 1) * board.square_mm, 0};
+}
+
 RigidTransform world_from_board(const Chessboard& board, const ChessboardPlace& place) {
   const auto about = [&](int axis) {
     return Eigen::AngleAxisd(radians(place.turns_deg[axis]), Eigen::Vector3d::Unit(axis));
   };
   RigidTransform transform{"world", "board", (about(2) * about(1) * about(0)).toRotationMatrix(),
                            Eigen::Vector3d::Zero()};
-  const Eigen::Vector3d middle(0.5 * (board.columns - 1) * board.square_mm, 0.5 * (board.rows - 1) * board.square_mm,
-                               0);
-  transform.translation_mm = place.middle_mm - transform.rotation * middle;
+  transform.translation_mm = place.middle_mm - transform.rotation * middle_of_corners_mm(board);
   return transform;
 }
 

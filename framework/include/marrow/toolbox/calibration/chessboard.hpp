@@ -28,6 +28,9 @@ void check_chessboard(const Chessboard& board, const std::string& what);
 /// The inner corners, row by row.
 std::vector<Eigen::Vector3d> corners_mm(const Chessboard& board);
 
+/// The middle of the inner corners, in the board's frame.
+Eigen::Vector3d middle_of_corners_mm(const Chessboard& board);
+
 RigidTransform world_from_board(const Chessboard& board, const ChessboardPlace& place);
 
 /// The pixels of the inner corners in the order of corners_mm(), to a part of a pixel. Empty if the picture does not

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 #include <filesystem>
+#include <optional>
 #include <string>
 
+#include "marrow/domain/calibration.hpp"
 #include "marrow/domain/camera.hpp"
+#include "marrow/domain/list.hpp"
 
 namespace marrow::files {
 
@@ -17,9 +20,23 @@ struct ViewSource {
   int frame = 0;                      ///< of the image file, from 1; 0: the file must have only one
 };
 
-/// Reads a view. If the camera file or the calibration describes a distortion, it is removed from the image here, so
-/// the result has a plain pinhole camera. Throws Error if a file cannot be read, if sizes do not match, or if camera
-/// file and calibration both describe a distortion.
+/// The camera of this name. Throws Error, with the names that there are, if there is none.
+const Camera& camera_of(const std::string& view, const List<Camera>& cameras);
+
+/// How the images of a view were taken.
+struct ViewCamera {
+  DistortedCamera camera;
+  std::optional<Calibration> calibration;  ///< its camera matrix replaces the camera's
+};
+
+/// Reads the camera of a view, and its calibration. Throws Error if a file cannot be read, or if both describe a
+/// distortion.
+ViewCamera read_view_camera(const ViewSource& source);
+
+/// A view with a plain pinhole camera: a distortion is removed from the image. Throws Error if sizes do not match.
+View view_of(const std::string& name, Image image, const ViewCamera& camera);
+
+/// Reads a view. Throws Error as the functions above do, or if the image cannot be read.
 View read_view_files(const ViewSource& source);
 
 }  // namespace marrow::files
