@@ -251,9 +251,9 @@ double arm_pixels(const Subject& subject) {
 double warnings(const Subject& subject, const Camera& a, const Camera& b) {
   const Result result = subject.call({{"views", views_of(a, b)}});
   if (result.refusal) return 1;
-  for (std::size_t i = 0; i < result.outputs.size(); ++i)
-    if (subject.info().outputs[i].type == TypeInfo::of<Metrics>())
-      for (const Metric& metric : result.outputs[i].as<Metrics>().items)
+  for (const Value& output : result.outputs)
+    if (output.type == TypeInfo::of<Metrics>())
+      for (const Metric& metric : output.as<Metrics>().items)
         if (metric.name == "warnings") return metric.value;
   throw NotApplicable("it has no figure 'warnings'");
 }

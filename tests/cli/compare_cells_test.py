@@ -127,6 +127,25 @@ class Cells(Comparison):
                 )
                 shutil.rmtree(self.scratch / "out")
 
+    def test_the_evaluations_of_all_poses_are_counted(self):
+        pose = """marrow-pose: 1
+target: world
+source: ct
+rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+translation_mm: [0, 0, 0]
+evaluations: %d
+"""
+        nodes = "".join("  p%d: {uses: read.pose, with: {path: %d.yaml}}\n" % (n, n) for n in (70, 8))
+        self.write(
+            "p.yaml",
+            PIPELINE.replace("outputs:", nodes + "outputs:").replace("number: m", "number: m, first: p70, second: p8"),
+        )
+        for count in (70, 8):
+            self.write("%d.yaml" % count, pose % count)
+        self.marrow(0, "compare", self.file, "--out", "out")
+        rows = map(json.loads, (self.scratch / "out" / "cells.jsonl").read_text().splitlines())
+        self.assertEqual([row["evaluations"] for row in rows], [78] * 4)
+
     def test_no_half_file_is_left(self):
         self.marrow(0, "compare", self.file, "--out", "out")
         names = {path.name for path in (self.scratch / "out").rglob("*") if path.is_file()}

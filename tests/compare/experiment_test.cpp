@@ -101,6 +101,23 @@ TEST_F(ExperimentFiles, StartsMayBeDrawnByTheirDistance) {
   EXPECT_NEAR(below_10, 250, 45) << "four deviations of a uniform draw";
 }
 
+TEST_F(ExperimentFiles, AShortestDistanceIsGivenToTheNodeToo) {
+  std::string pipeline = kPipeline;
+  pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
+  scratch.write("p.yaml", pipeline);
+  const auto options = [&](const std::string& distance) {
+    const Experiment e = read(std::string(kHead) + kCases + kVariants + kMetrics +
+                              "starts: {node: s, count: 1, rotation_deg: 3" + distance + "}\n");
+    EXPECT_TRUE(diagnostics.empty()) << diagnostics.text();
+    std::string keys;
+    for (const auto& one : marrow::compare::arguments_of(e, {0, 0, 0}, e.cases[0].folder).overrides)
+      if (one.key.starts_with("s.")) keys += one.key + " ";
+    return keys;
+  };
+  EXPECT_EQ(options(", distance_mm: 0.5"), "s.rotation_deg s.translation_mm s.distance_mm ");
+  EXPECT_EQ(options(""), "s.rotation_deg s.translation_mm ");
+}
+
 TEST_F(ExperimentFiles, StartsAreDrawnByTheirProtocol) {
   std::string pipeline = kPipeline;
   pipeline.insert(pipeline.find("  t:"), "  s: {uses: test.displaced}\n");
