@@ -103,6 +103,26 @@ TEST(RayToSurface, WhatIsFarOrOfTheOtherDirectionIsTheWorst) {
       << "but for a few rays that touch the smaller ball from the other side";
 }
 
+/// The field ends 1 mm before the larger ball does. The column of voxels at its other end has this distance.
+shipped::Inputs ends_in_the_ball(float first_column_mm) {
+  marrow::SignedField cut = field();
+  const marrow::SignedField whole = cut;
+  cut.grid.size[0] = 43;
+  cut.values_mm.clear();
+  for (int z = 0; z < cut.grid.size[2]; ++z)
+    for (int y = 0; y < cut.grid.size[1]; ++y)
+      for (int x = 0; x < cut.grid.size[0]; ++x) cut.values_mm.push_back(x == 0 ? first_column_mm : whole.at(x, y, z));
+  shipped::Inputs in = inputs();
+  in.at("field") = shipped::item(cut);
+  return in;
+}
+
+TEST(RayToSurface, NothingIsReadBeyondTheField) {
+  // Voxels lie row after row: what follows the last one of a row is the first one of the next.
+  EXPECT_NEAR((*Made(ends_in_the_ball(5.9f))).value(shifted(0, 0, 0)),
+                   (*Made(ends_in_the_ball(4.1f))).value(shifted(0, 0, 0)), 1e-6);
+}
+
 TEST(RayToSurface, KnowsItsDerivatives) {
   const Made cost(inputs());
   RigidTransform pose = shifted(0.8, -0.6, 0.7);
