@@ -164,6 +164,25 @@ TEST(WithPrior, ItsSixResidualsStandForItsCovariance) {
   EXPECT_NEAR(squares / (kUnit * kUnit), 10.0 / 11, 1e-6) << "q = 1, and the weight of Student's t is 10 / 11";
 }
 
+/// Tells its derivatives, but not those without each block.
+class Whole : public Differentiable {
+ public:
+  using Differentiable::Differentiable;
+  std::vector<Expansion> expansion_without_each_block(const marrow::RigidTransform&,
+                                                      const marrow::FragmentFrame&) const override {
+    return {};
+  }
+};
+
+TEST(WithPrior, ResidualsAloneAreNoDivisionIntoBlocks) {
+  Trial trial(with_deviations(truth(), six(2, 5, 3)));
+  trial.inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<Whole>(truth().world_from_model, truth().frame,
+                                                                         Matrix6d::Identity(), kInformation));
+  const auto cost = trial.cost();
+  ASSERT_TRUE(cost->expansion(truth().world_from_model, truth().frame));
+  EXPECT_EQ(cost->expansion_without_each_block(truth().world_from_model, truth().frame).size(), 0u);
+}
+
 TEST(WithPrior, CannotBeSplitIntoViews) {
   EXPECT_EQ(Trial(with_deviations(truth(), six(1, 5, 3))).cost()->view_count(), 0u);
 }
