@@ -120,7 +120,7 @@ shipped::Inputs ends_in_the_ball(float first_column_mm) {
 TEST(RayToSurface, NothingIsReadBeyondTheField) {
   // Voxels lie row after row: what follows the last one of a row is the first one of the next.
   EXPECT_NEAR((*Made(ends_in_the_ball(5.9f))).value(shifted(0, 0, 0)),
-                   (*Made(ends_in_the_ball(4.1f))).value(shifted(0, 0, 0)), 1e-6);
+              (*Made(ends_in_the_ball(4.1f))).value(shifted(0, 0, 0)), 1e-6);
 }
 
 TEST(RayToSurface, KnowsItsDerivatives) {

@@ -176,8 +176,8 @@ class Whole : public Differentiable {
 
 TEST(WithPrior, ResidualsAloneAreNoDivisionIntoBlocks) {
   Trial trial(with_deviations(truth(), six(2, 5, 3)));
-  trial.inputs["cost"] = marrow::Value::of<Cost>(std::make_shared<Whole>(truth().world_from_model, truth().frame,
-                                                                         Matrix6d::Identity(), kInformation));
+  trial.inputs["cost"] = marrow::Value::of<Cost>(
+      std::make_shared<Whole>(truth().world_from_model, truth().frame, Matrix6d::Identity(), kInformation));
   const auto cost = trial.cost();
   ASSERT_TRUE(cost->expansion(truth().world_from_model, truth().frame));
   EXPECT_EQ(cost->expansion_without_each_block(truth().world_from_model, truth().frame).size(), 0u);
