@@ -8,6 +8,7 @@ import sys
 import dicom
 import images
 import records
+import sequences
 import surfaces
 import texts
 import volumes
@@ -17,6 +18,7 @@ SEEDS = {
     "image": images.seeds,
     "dicom": dicom.seeds,
     "mesh": surfaces.seeds,
+    "sequence": sequences.seeds,
     "case": texts.case_seeds,
     "pipeline": texts.pipeline_seeds,
     "experiment": texts.experiment_seeds,
