@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The installed program: it is whole wherever it lies, and knows its plugins without describing them anew."""
+import os
+import subprocess
+
+from marrow_cli import BUILD, Case, main
+
+
+class Install(Case):
+    def setUp(self):
+        super().setUp()
+        subprocess.run(
+            ["cmake", "--install", BUILD, "--prefix", self.scratch / "first"], check=True, stdout=subprocess.DEVNULL
+        )
+        (self.scratch / "first").rename(self.scratch / "moved")
+        self.root = self.scratch / "moved"
+
+    def marrow(self, *arguments):
+        # Without a home folder nothing that was found out before is used.
+        environment = {key: value for key, value in os.environ.items() if key not in ("HOME", "XDG_CACHE_HOME")}
+        result = subprocess.run(
+            [self.root / "bin" / "marrow", *arguments],
+            env=environment,
+            cwd=self.scratch,
+            capture_output=True,
+            text=True,
+        )
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_it_may_be_moved(self):
+        said = self.marrow("doctor")
+        self.assertIn("moved/lib", said)
+        self.assertNotIn("note:", said, "no manifest is stale")
+        self.assertIn("edges.canny", self.marrow("list", "edges"))
+        pipelines = self.root / "share" / "marrow" / "pipelines"
+        self.marrow("check", pipelines / "femur.yaml")
+        self.assertTrue((self.root / "share" / "marrow" / "schemas" / "pipeline.schema.json").is_file())
+
+
+if __name__ == "__main__":
+    main()
