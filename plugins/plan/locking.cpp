@@ -1,0 +1,215 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where a drill has to go to lock a nail, from the nail's pose: the axis of each hole with its deviations, the place of
+// the drill guide, and the C-arm's angles at which the hole is seen as a circle.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/geometry/implant.hpp"
+#include "marrow/toolbox/geometry/locking_plan.hpp"
+
+namespace {
+
+using namespace marrow;
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using geometry::Hole;
+using geometry::Implant;
+using geometry::LockingPlan;
+
+struct LockingOptions {
+  Vector3d from{1, -0.5, 0};
+  double guide_mm = 100;
+  double most_deg = 1;
+  double most_mm = 0.5;
+  double most_cost = 0;
+  Vector3d isocentre_mm = Vector3d::Zero();
+  double source_to_isocentre_mm = 600;
+};
+
+struct Result {
+  LockingPlan plan;
+  Verdict verdict;
+};
+
+/// For a normal distribution in a plane that is the same in all directions, 95 % lie within this many root mean squares.
+const double kWithin95 = std::sqrt(-std::log(0.05));
+
+std::string shown(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.2f", value);
+  return text;
+}
+
+/// [v] with [v] w = v x w.
+Matrix3d cross(const Vector3d& v) {
+  Matrix3d matrix;
+  matrix << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return matrix;
+}
+
+/// A small motion (r, t) of the pose in its frame turns the axis by r x axis and moves the centre by r x arm + t. Only
+/// what lies across the axis counts.
+void predict(const Pose& pose, const Hole& hole, LockingPlan::Drill& drill) {
+  drill.deviation_deg = drill.deviation_mm = std::nan("");
+  if (!pose.covariance) return;
+  const Vector3d axis = pose.frame.axes.transpose() * hole.axis,
+                 arm = pose.frame.axes.transpose() * (hole.centre_mm - pose.frame.origin_mm);
+  const Matrix3d across = Matrix3d::Identity() - axis * axis.transpose();
+  Eigen::Matrix<double, 3, 6> turn, shift;
+  turn << -cross(axis), Matrix3d::Zero();
+  shift << -across * cross(arm), across;
+  drill.deviation_deg = degrees(std::sqrt(std::max(0.0, (turn * *pose.covariance * turn.transpose()).trace())));
+  drill.deviation_mm = std::sqrt(std::max(0.0, (shift * *pose.covariance * shift.transpose()).trace()));
+}
+
+/// The C-arm turned so that the ray through the hole's centre runs along its axis. With the viewing direction w, the
+/// source lies at isocentre - distance * w. The ray runs along the axis if centre - source = s * axis, so |w| = 1 gives
+/// s. Of the two sides that the source may be on, the one that needs less turning.
+void aim(const LockingOptions& options, LockingPlan::Drill& drill) {
+  const double distance = options.source_to_isocentre_mm;
+  const Vector3d off = drill.centre_mm - options.isocentre_mm, &axis = drill.direction;
+  const double along = axis.dot(off), root = along * along - off.squaredNorm() + distance * distance;
+  if (!(off.norm() < distance))
+    throw Error("plan.locking: hole '" + drill.hole + "' lies " + shown(off.norm()) + " mm from the isocentre, but the " +
+                "C-arm's source is only " + shown(distance) + " mm from it; check isocentre_mm and the pose");
+  double least = 1e9;
+  for (const double s : {along + std::sqrt(root), along - std::sqrt(root)}) {
+    const Vector3d w = (s * axis - off) / distance;
+    const double alpha = std::asin(std::clamp(w.z(), -1.0, 1.0)), beta = std::atan2(w.x(), -w.y());
+    if (std::abs(alpha) + std::abs(beta) >= least) continue;
+    least = std::abs(alpha) + std::abs(beta);
+    drill.alpha_deg = degrees(alpha);
+    drill.beta_deg = degrees(beta);
+  }
+}
+
+int views_that_show(const Vector3d& point, const List<View>& views) {
+  int count = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Eigen::Vector2d pixel = project(views[i].camera, point);
+    count += pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() <= views[i].camera.width_px - 1 &&
+             pixel.y() <= views[i].camera.height_px - 1;
+  }
+  return count;
+}
+
+void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
+  if (std::isnan(drill.deviation_deg))
+    drill.doubts.push_back("the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
+  const double most_deg = kWithin95 * drill.deviation_deg, most_mm = kWithin95 * drill.deviation_mm;
+  if (!(most_deg <= options.most_deg) && !std::isnan(most_deg))
+    drill.doubts.push_back("the direction of the hole is known to " + shown(most_deg) +
+                           " degrees only (95 %), and the limit is " + shown(options.most_deg));
+  if (!(most_mm <= options.most_mm) && !std::isnan(most_mm))
+    drill.doubts.push_back("the place of the hole is known to " + shown(most_mm) +
+                           " mm only (95 %), and the limit is " + shown(options.most_mm));
+  if (seen < 2)
+    drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
+}
+
+LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const LockingOptions& options) {
+  LockingPlan::Drill drill;
+  drill.hole = hole.name;
+  drill.diameter_mm = hole.diameter_mm;
+  drill.centre_mm = pose.world_from_model * hole.centre_mm;
+  drill.direction = pose.world_from_model.rotation * hole.axis;
+  if (drill.direction.dot(options.from) > 0) drill.direction = -drill.direction;
+  drill.guide_mm = drill.centre_mm - options.guide_mm * drill.direction;
+  predict(pose, hole, drill);
+  aim(options, drill);
+  return drill;
+}
+
+/// What concerns the whole nail.
+std::vector<std::string> doubts_about(const Pose& pose, const LockingOptions& options) {
+  std::vector<std::string> doubts;
+  for (const std::string& warning : pose.warnings) doubts.push_back("the registration warns: " + warning);
+  if (options.most_cost > 0 && !(pose.cost <= options.most_cost))
+    doubts.push_back("the nail in this pose does not look like the images: its cost is " + shown(pose.cost) +
+                     ", and the limit is " + shown(options.most_cost));
+  return doubts;
+}
+
+Verdict judge(const LockingPlan& plan, const std::vector<std::string>& about_all) {
+  Verdict verdict;
+  verdict.judgement = Judgement::trusted;
+  verdict.reasons = about_all;
+  for (const LockingPlan::Drill& drill : plan.drills) {
+    for (const std::string& doubt : drill.doubts)
+      if (std::find(about_all.begin(), about_all.end(), doubt) == about_all.end())
+        verdict.reasons.push_back(drill.hole + ": " + doubt);
+    verdict.figures.push_back({drill.hole + "_deviation_deg", drill.deviation_deg, "deg"});
+    verdict.figures.push_back({drill.hole + "_deviation_mm", drill.deviation_mm, "mm"});
+  }
+  if (!verdict.reasons.empty()) {
+    verdict.judgement = Judgement::doubtful;
+    verdict.remedies = {"a view along the hole, as planned, in which the hole must be a circle",
+                        "a look at the overlay of each view"};
+    return verdict;
+  }
+  double most_deg = 0, most_mm = 0;
+  for (const LockingPlan::Drill& drill : plan.drills) {
+    most_deg = std::max(most_deg, kWithin95 * drill.deviation_deg);
+    most_mm = std::max(most_mm, kWithin95 * drill.deviation_mm);
+  }
+  verdict.reasons = {"the axes of the holes are known to " + shown(most_deg) + " degrees and " + shown(most_mm) +
+                     " mm (95 %)"};
+  return verdict;
+}
+
+Result locking(const Implant& implant, const Pose& pose, const List<View>& views, const LockingOptions& options) {
+  geometry::check_implant(implant, "plan.locking");
+  check_rigid(pose.world_from_model, "plan.locking: the pose of the nail");
+  if (!(options.from.norm() > 0))
+    throw Error("plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
+  Result result;
+  result.plan.isocentre_mm = options.isocentre_mm;
+  result.plan.source_to_isocentre_mm = options.source_to_isocentre_mm;
+  const std::vector<std::string> about_all = doubts_about(pose, options);
+  int seen_at_all = 0;
+  for (const Hole& hole : implant.holes) {
+    LockingPlan::Drill drill = drill_of(hole, pose, options);
+    const int seen = views_that_show(drill.centre_mm, views);
+    seen_at_all += seen;
+    drill.doubts = about_all;
+    doubt(options, seen, drill);
+    result.plan.drills.push_back(std::move(drill));
+  }
+  if (seen_at_all == 0)
+    throw Error("plan.locking: no view shows any of the " + std::to_string(implant.holes.size()) +
+                " holes of the nail at its pose; take images of the nail's tip, or check the pose");
+  result.verdict = judge(result.plan, about_all);
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("plan.locking", locking)
+      .summary("Where a drill has to go to lock a nail: the axes of its holes, the drill guides, and the C-arm's angles")
+      .in("implant", "the nail with its holes")
+      .in("pose", "pose of the nail in the world, with its predicted covariance")
+      .in("views", "the views in which the nail was found", over("view"))
+      .out("plan", &Result::plan,
+           "for each hole in world coordinates: centre, direction of the drill, place of the drill guide, predicted "
+           "deviations, and the C-arm's angles at which the hole is seen as a circle")
+      .out("verdict", &Result::verdict,
+           "doubtful if the predicted deviations of a hole's axis are too large, if fewer than two views show a hole, "
+           "or if the registration warns")
+      .option("from", &LockingOptions::from, "direction in the world from which the drill comes, such as the outer side",
+              unit(""))
+      .option("guide_mm", &LockingOptions::guide_mm, "distance of the drill guide from the hole's centre", at_least(0))
+      .option("most_deg", &LockingOptions::most_deg,
+              "a hole is doubtful if its direction may be off by more than this (95 %)", at_least(0))
+      .option("most_mm", &LockingOptions::most_mm,
+              "a hole is doubtful if its axis may be off by more than this at its centre (95 %)", at_least(0))
+      .option("most_cost", &LockingOptions::most_cost,
+              "all holes are doubtful if the cost of the nail's pose is above this; 0: the cost does not matter",
+              at_least(0))
+      .option("isocentre_mm", &LockingOptions::isocentre_mm, "the C-arm's centre of rotation, as for camera.carm")
+      .option("source_to_isocentre_mm", &LockingOptions::source_to_isocentre_mm,
+              "distance from the C-arm's source to its centre of rotation, as for camera.carm", at_least(1));
+}
