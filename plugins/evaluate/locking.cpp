@@ -64,9 +64,9 @@ Result locking(const geometry::LockingPlan& plan, const geometry::Implant& impla
     is_off |= beyond;
     is_silent |= beyond && !flagged;
   }
-  result.summary.items = {{"angle_deg", worst_deg, "deg"},         {"offset_mm", worst_mm, "mm"},
-                          {"view_deg", worst_view_deg, "deg"},     {"flagged", double(is_flagged), ""},
-                          {"off", double(is_off), ""},             {"silent", double(is_silent), ""}};
+  result.summary.items = {{"angle_deg", worst_deg, "deg"},     {"offset_mm", worst_mm, "mm"},
+                          {"view_deg", worst_view_deg, "deg"}, {"flagged", double(is_flagged), ""},
+                          {"off", double(is_off), ""},         {"silent", double(is_silent), ""}};
   return result;
 }
 

@@ -27,8 +27,8 @@ Bodies bodies(const List<Mesh>* bones, const List<Pose>* bone_poses, const Mesh&
   result.meshes.add("nail", nail);
   result.poses.add("nail", pose);
   for (const auto& drill : plan.drills) {
-    Mesh rod = phantom::tube(drill.guide_mm, drill.centre_mm + kBeyondMm * drill.direction,
-                             0.35 * drill.diameter_mm, 16);
+    Mesh rod =
+        phantom::tube(drill.guide_mm, drill.centre_mm + kBeyondMm * drill.direction, 0.35 * drill.diameter_mm, 16);
     Pose here;
     here.world_from_model.source = rod.frame;
     result.meshes.add(drill.hole, std::move(rod));

@@ -34,7 +34,8 @@ struct Result {
   Verdict verdict;
 };
 
-/// For a normal distribution in a plane that is the same in all directions, 95 % lie within this many root mean squares.
+/// For a normal distribution in a plane that is the same in all directions, 95 % lie within this many root mean
+/// squares.
 const double kWithin95 = std::sqrt(-std::log(0.05));
 
 std::string shown(double value) {
@@ -73,8 +74,9 @@ void aim(const LockingOptions& options, LockingPlan::Drill& drill) {
   const Vector3d off = drill.centre_mm - options.isocentre_mm, &axis = drill.direction;
   const double along = axis.dot(off), root = along * along - off.squaredNorm() + distance * distance;
   if (!(off.norm() < distance))
-    throw Error("plan.locking: hole '" + drill.hole + "' lies " + shown(off.norm()) + " mm from the isocentre, but the " +
-                "C-arm's source is only " + shown(distance) + " mm from it; check isocentre_mm and the pose");
+    throw Error("plan.locking: hole '" + drill.hole + "' lies " + shown(off.norm()) +
+                " mm from the isocentre, but the " + "C-arm's source is only " + shown(distance) +
+                " mm from it; check isocentre_mm and the pose");
   double least = 1e9;
   for (const double s : {along + std::sqrt(root), along - std::sqrt(root)}) {
     const Vector3d w = (s * axis - off) / distance;
@@ -106,8 +108,7 @@ void doubt(const LockingOptions& options, int seen, LockingPlan::Drill& drill) {
   if (!(most_mm <= options.most_mm) && !std::isnan(most_mm))
     drill.doubts.push_back("the place of the hole is known to " + shown(most_mm) +
                            " mm only (95 %), and the limit is " + shown(options.most_mm));
-  if (seen < 2)
-    drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
+  if (seen < 2) drill.doubts.push_back(seen == 0 ? "no view shows the hole" : "only one view shows the hole");
 }
 
 LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const LockingOptions& options) {
@@ -164,7 +165,8 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
   geometry::check_implant(implant, "plan.locking");
   check_rigid(pose.world_from_model, "plan.locking: the pose of the nail");
   if (!(options.from.norm() > 0))
-    throw Error("plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
+    throw Error(
+        "plan.locking: from has the length 0; give the direction from which the drill comes, such as [1, 0, 0]");
   Result result;
   result.plan.isocentre_mm = options.isocentre_mm;
   result.plan.source_to_isocentre_mm = options.source_to_isocentre_mm;
@@ -189,7 +191,8 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
 
 MARROW_PLUGIN(plugin) {
   plugin.node("plan.locking", locking)
-      .summary("Where a drill has to go to lock a nail: the axes of its holes, the drill guides, and the C-arm's angles")
+      .summary(
+          "Where a drill has to go to lock a nail: the axes of its holes, the drill guides, and the C-arm's angles")
       .in("implant", "the nail with its holes")
       .in("pose", "pose of the nail in the world, with its predicted covariance")
       .in("views", "the views in which the nail was found", over("view"))
@@ -199,8 +202,8 @@ MARROW_PLUGIN(plugin) {
       .out("verdict", &Result::verdict,
            "doubtful if the predicted deviations of a hole's axis are too large, if fewer than two views show a hole, "
            "or if the registration warns")
-      .option("from", &LockingOptions::from, "direction in the world from which the drill comes, such as the outer side",
-              unit(""))
+      .option("from", &LockingOptions::from,
+              "direction in the world from which the drill comes, such as the outer side", unit(""))
       .option("guide_mm", &LockingOptions::guide_mm, "distance of the drill guide from the hole's centre", at_least(0))
       .option("most_deg", &LockingOptions::most_deg,
               "a hole is doubtful if its direction may be off by more than this (95 %)", at_least(0))

@@ -36,8 +36,8 @@ Vector3d on_arc(double radius, double along) {
 double metal(const NailOptions& nail, const std::vector<Hole>& holes, const Vector3d& p) {
   const double radius = nail.bow_radius_mm, to_centre = std::hypot(p.z(), radius - p.y()),
                along = radius * std::atan2(p.z(), radius - p.y()), across = std::hypot(to_centre - radius, p.x());
-  double value = std::max({across - 0.5 * nail.diameter_mm, 0.5 * nail.bore_mm - across, -along,
-                           along - nail.length_mm});
+  double value =
+      std::max({across - 0.5 * nail.diameter_mm, 0.5 * nail.bore_mm - across, -along, along - nail.length_mm});
   for (const Hole& hole : holes) {
     const Vector3d from = p - hole.centre_mm;
     value = std::max(value, 0.5 * hole.diameter_mm - (from - from.dot(hole.axis) * hole.axis).norm());
@@ -47,15 +47,19 @@ double metal(const NailOptions& nail, const std::vector<Hole>& holes, const Vect
 
 std::tuple<Implant, Mesh> nail(const NailOptions& options) {
   if (!(options.bore_mm + 1 < options.diameter_mm))
-    throw Error("simulate.nail: a bore of " + std::to_string(options.bore_mm) + " mm leaves a wall of less than 0.5 mm "
-                "in a nail of " + std::to_string(options.diameter_mm) + " mm; make the bore narrower");
+    throw Error("simulate.nail: a bore of " + std::to_string(options.bore_mm) +
+                " mm leaves a wall of less than 0.5 mm "
+                "in a nail of " +
+                std::to_string(options.diameter_mm) + " mm; make the bore narrower");
   Implant implant;
   const double radius = options.bow_radius_mm;
   for (std::size_t i = 0; i < options.hole_at_mm.size(); ++i) {
     const double at = options.hole_at_mm[i], turn = radians(options.hole_turn_deg.at(i));
     if (!(at > 0.5 * options.hole_diameter_mm && at < options.length_mm - 0.5 * options.hole_diameter_mm))
-      throw Error("simulate.nail: the hole at " + std::to_string(at) + " mm from the tip does not lie within the nail, "
-                  "which is " + std::to_string(options.length_mm) + " mm long");
+      throw Error("simulate.nail: the hole at " + std::to_string(at) +
+                  " mm from the tip does not lie within the nail, "
+                  "which is " +
+                  std::to_string(options.length_mm) + " mm long");
     const Vector3d to_back(0, std::cos(at / radius), -std::sin(at / radius));
     implant.holes.push_back({"hole-" + std::to_string(i + 1), on_arc(radius, at),
                              std::cos(turn) * Vector3d::UnitX() + std::sin(turn) * to_back, options.hole_diameter_mm});
@@ -75,9 +79,10 @@ std::tuple<Implant, Mesh> nail(const NailOptions& options) {
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.nail", nail)
       .summary("Makes an intramedullary nail: a curved tube with holes for locking screws")
-      .out("implant",
-           "closed surface and holes. z runs along the nail from its tip, at the origin; the bow is convex to the front "
-           "(-y)")
+      .out(
+          "implant",
+          "closed surface and holes. z runs along the nail from its tip, at the origin; the bow is convex to the front "
+          "(-y)")
       .out("surface", "the surface alone")
       .option("length_mm", &NailOptions::length_mm, "length along the middle line", at_least(60), at_most(500))
       .option("diameter_mm", &NailOptions::diameter_mm, "outer diameter", at_least(4), at_most(20))

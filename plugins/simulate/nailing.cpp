@@ -71,8 +71,7 @@ class BoneAt {
  public:
   explicit BoneAt(const phantom::Phantom& phantom) {
     for (const Fragment& fragment : phantom.fragments) {
-      const RigidTransform world_from_bone = fragment.world_from_bone(),
-                           bone_from_ct = inverse(fragment.ct_from_bone);
+      const RigidTransform world_from_bone = fragment.world_from_bone(), bone_from_ct = inverse(fragment.ct_from_bone);
       Part part;
       part.low = std::numeric_limits<double>::max(), part.high = -part.low;
       for (const auto& triangle : fragment.outer.triangles)
@@ -81,8 +80,8 @@ class BoneAt {
           part.low = std::min(part.low, z);
           part.high = std::max(part.high, z);
         }
-      for (const auto& [mesh, points] : {std::pair(&phantom.bone.outer, &part.outer),
-                                         std::pair(&phantom.bone.inner, &part.inner)})
+      for (const auto& [mesh, points] :
+           {std::pair(&phantom.bone.outer, &part.outer), std::pair(&phantom.bone.inner, &part.inner)})
         for (const Vector3d& vertex : mesh->vertices_mm)
           if (vertex.z() >= part.low && vertex.z() <= part.high) points->push_back(world_from_bone * vertex);
       parts_.push_back(std::move(part));
@@ -126,8 +125,7 @@ class BoneAt {
     double nearest = std::numeric_limits<double>::max();
     for (const Part& part : parts_)
       for (const Vector3d& other : part.*surface)
-        if (std::abs(other.z() - point.z()) < kNearMm)
-          nearest = std::min(nearest, (other - point).head<2>().norm());
+        if (std::abs(other.z() - point.z()) < kNearMm) nearest = std::min(nearest, (other - point).head<2>().norm());
     return nearest;
   }
   std::vector<Part> parts_;

@@ -41,7 +41,8 @@ Grid grid_around(const marrow::Mesh& mesh, double spacing) {
   }
   if (voxels > double(kMostVoxels))
     throw marrow::Error("volume.filled_surface: with spacing_mm " + std::to_string(spacing) + " the volume has " +
-                        std::to_string(voxels / 1e6) + " million voxels, and at most 100 are allowed; take a larger "
+                        std::to_string(voxels / 1e6) +
+                        " million voxels, and at most 100 are allowed; take a larger "
                         "spacing_mm");
   grid.origin_mm = grid.direction * low;
   return grid;

@@ -19,8 +19,9 @@ Eigen::Vector3d unit_axis(const Eigen::Vector3d& axis, const std::string& what, 
 void check_implant(const Implant& implant, const std::string& what) {
   check_mesh(implant.surface, what);
   if (!is_closed(implant.surface))
-    throw Error(what + ": the surface is open or not consistently oriented, so it has no inside; close its holes (each "
-                       "edge must be shared by exactly two triangles)");
+    throw Error(what +
+                ": the surface is open or not consistently oriented, so it has no inside; close its holes (each "
+                "edge must be shared by exactly two triangles)");
   if (!(enclosed_volume_mm3(implant.surface) > 0))
     throw Error(what + ": the triangles face inward (enclosed volume " +
                 std::to_string(enclosed_volume_mm3(implant.surface)) + " mm3); reverse their order");

@@ -13,8 +13,8 @@ namespace marrow::geometry {
 /// A straight hole through an implant, in the implant's frame.
 struct Hole {
   std::string name;
-  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();     ///< in the middle of the implant
-  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();         ///< of length 1; both directions mean the same
+  Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< in the middle of the implant
+  Eigen::Vector3d axis = Eigen::Vector3d::UnitX();      ///< of length 1; both directions mean the same
   double diameter_mm = 5;
   using fields = Fields<&Hole::name, &Hole::centre_mm, &Hole::axis, &Hole::diameter_mm>;
 };

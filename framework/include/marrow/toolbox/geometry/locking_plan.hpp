@@ -13,7 +13,7 @@ namespace marrow::geometry {
 struct LockingPlan {
   struct Drill {
     std::string hole;
-    Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();  ///< of the hole
+    Eigen::Vector3d centre_mm = Eigen::Vector3d::Zero();   ///< of the hole
     Eigen::Vector3d direction = Eigen::Vector3d::UnitX();  ///< in which the drill advances; of length 1
     double diameter_mm = 5;
     Eigen::Vector3d guide_mm = Eigen::Vector3d::Zero();  ///< where the drill guide stands, on the axis before the hole

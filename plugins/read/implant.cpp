@@ -1,0 +1,70 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <marrow/plugin.hpp>
+#include <tuple>
+
+#include "marrow/toolbox/files/mesh_file.hpp"
+#include "marrow/toolbox/files/yaml_values.hpp"
+#include "marrow/toolbox/geometry/implant.hpp"
+
+namespace {
+
+using namespace marrow;
+using files::FreeKeys, files::YamlFile, files::YamlMap;
+using geometry::Hole;
+using geometry::Implant;
+
+struct Options {
+  std::filesystem::path holes;
+  std::filesystem::path surface;
+  double scale = 1;
+};
+
+Hole hole_from(const YamlMap& map, const std::string& name) {
+  Hole hole;
+  hole.name = name;
+  if (const auto centre = map.vector3("centre_mm")) hole.centre_mm = *centre;
+  if (const auto axis = map.vector3("axis")) {
+    if (axis->norm() > 1e-9)
+      hole.axis = axis->normalized();
+    else
+      map.fault("axis", "axis: expected a direction, such as [1, 0, 0], got one of length 0");
+  }
+  if (const auto diameter = map.number("diameter_mm")) {
+    hole.diameter_mm = *diameter;
+    if (!(*diameter > 0)) map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + std::to_string(*diameter));
+  }
+  return hole;
+}
+
+std::tuple<Implant, Mesh> implant(const Options& options) {
+  YamlFile file(options.holes);
+  const YamlMap map(file, file.root(), "implant", {"marrow-implant", "holes"});
+  files::check_version(map, "marrow-implant");
+  Implant implant;
+  if (const auto holes = map.required("holes")) {
+    const YamlMap by_name(file, *holes, "holes", FreeKeys{});
+    if (by_name.valid() && by_name.keys().empty())
+      map.fault("holes", "holes: expected holes by name, got none; an implant without holes cannot be locked");
+    for (const std::string& name : by_name.keys())
+      implant.holes.push_back(hole_from(
+          YamlMap(file, by_name.node(name), "hole '" + name + "'", {"centre_mm", "axis", "diameter_mm"}), name));
+  }
+  file.finish();
+  implant.surface = files::read_mesh_file(options.surface, options.scale);
+  implant.surface.frame = "implant";
+  geometry::check_implant(implant, "read.implant: " + options.surface.string());
+  return {implant, implant.surface};
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("read.implant", implant)
+      .summary("Reads an implant: its closed surface from STL or PLY, and its holes from YAML")
+      .out("implant", "surface and holes, in mm")
+      .out("surface", "the surface alone")
+      .option("holes", &Options::holes, "YAML file with the centre, the axis and the diameter of each hole", required())
+      .option("surface", &Options::surface, "STL or PLY file", required())
+      .option("scale", &Options::scale, "factor that converts the surface's unit to mm: 1000 for metres",
+              at_least(1e-6));
+}
