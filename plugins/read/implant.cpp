@@ -31,7 +31,8 @@ Hole hole_from(const YamlMap& map, const std::string& name) {
   }
   if (const auto diameter = map.number("diameter_mm")) {
     hole.diameter_mm = *diameter;
-    if (!(*diameter > 0)) map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + std::to_string(*diameter));
+    if (!(*diameter > 0))
+      map.fault("diameter_mm", "diameter_mm: expected more than 0, got " + std::to_string(*diameter));
   }
   return hole;
 }

@@ -60,7 +60,8 @@ MiddleLine middle_line(const Mesh& surface) {
       if (std::abs(vertex.z() - z) < kNearMm) box.extend(vertex);
     if (box.isEmpty()) continue;
     line.points_mm.emplace_back(box.center().x(), box.center().y(), z);
-    radii.push_back(0.5 * box.sizes().head<2>().maxCoeff());
+    // Across the plane of the bow, which makes the section longer in this plane.
+    radii.push_back(0.5 * box.sizes().head<2>().minCoeff());
   }
   for (const double radius : radii) line.radius_mm = std::max(line.radius_mm, radius);
   return line;
@@ -165,12 +166,14 @@ std::string shown(double value) {
 
 void check_fit(const MiddleLine& line, const RigidTransform& pose, const BoneAt& bone, const NailingOptions& options) {
   const double wide = line.radius_mm + 0.5 * options.reaming_mm, lowest = bone.lowest_z();
+  const auto height = [&](const Vector3d& at) { return shown(at.z() - lowest) + " mm above the distal end"; };
+  for (const Vector3d& point : line.points_mm)
+    if (const Vector3d at = pose * point; !bone.canal(at.z()))
+      throw Error("simulate.nailing: the nail reaches out of the bone, to " + height(at) +
+                  ", where there is no canal; take a shorter nail");
   for (const Vector3d& point : line.points_mm) {
     const Vector3d at = pose * point;
-    const std::string where = shown(at.z() - lowest) + " mm above the distal end";
-    if (!bone.canal(at.z()))
-      throw Error("simulate.nailing: the nail reaches out of the bone, to " + where +
-                  ", where there is no canal; take a shorter nail");
+    const std::string where = height(at);
     if (options.reaming_mm > 0) {
       const double left = bone.distance_to_outer(at) - wide;
       if (left < options.least_cortex_mm)

@@ -65,11 +65,11 @@ nlohmann::ordered_json known(double value) {
 }
 
 void plan(const LockingPlan& plan, const std::string& path) {
-  nlohmann::ordered_json json = {{"frame", "world"},
-                                 {"c_arm",
-                                  {{"isocentre_mm", numbers(plan.isocentre_mm)},
-                                   {"source_to_isocentre_mm", plan.source_to_isocentre_mm}}},
-                                 {"drills", nlohmann::ordered_json::array()}};
+  nlohmann::ordered_json json = {
+      {"frame", "world"},
+      {"c_arm",
+       {{"isocentre_mm", numbers(plan.isocentre_mm)}, {"source_to_isocentre_mm", plan.source_to_isocentre_mm}}},
+      {"drills", nlohmann::ordered_json::array()}};
   for (const LockingPlan::Drill& drill : plan.drills)
     json["drills"].push_back({{"hole", drill.hole},
                               {"centre_mm", numbers(drill.centre_mm)},
@@ -87,7 +87,6 @@ void plan(const LockingPlan& plan, const std::string& path) {
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
-  plugin.writer<Implant>("", implant,
-                         "folder with holes.yaml and surface.stl, to be read by read.implant");
+  plugin.writer<Implant>("", implant, "folder with holes.yaml and surface.stl, to be read by read.implant");
   plugin.writer<LockingPlan>(".json", plan, "place, direction, deviations and C-arm angles for each hole");
 }

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "plan/implants.hpp"
+
+namespace mask_body_test {
+
+TEST(MaskBody, LeavesOutTheBodyAndAMargin) {
+  const marrow::Value volume =
+      shipped::call("volume.filled_surface", {{"mesh", shipped::item(implants::rod().surface)}}).at("volume");
+  const marrow::Value projector = shipped::call("project.joseph", {{"volume", volume}}).at("projector");
+  marrow::View view = implants::views()[0];
+  view.mask = cv::Mat(512, 512, CV_8U, cv::Scalar(255));
+  view.mask.at<std::uint8_t>(7, 9) = 0;
+  const auto mask_of = [&](int margin_px) {
+    return shipped::call("mask.body",
+                         {{"view", shipped::item(view)},
+                          {"projector", projector},
+                          {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                         {{"margin_px", margin_px}})
+        .at("view")
+        .as<marrow::View>()
+        .mask;
+  };
+  // The rod is 10 mm wide: 10 * 1000 / 600 / 0.586 = 28.4 px around the middle column 255.5.
+  const cv::Mat close = mask_of(0), wide = mask_of(6);
+  const auto at = [](const cv::Mat& mask, int u) { return int(mask.at<std::uint8_t>(256, u)); };
+  EXPECT_EQ(at(close, 255), 0);
+  EXPECT_EQ(at(close, 242), 0);
+  EXPECT_EQ(at(close, 238), 255);
+  EXPECT_EQ(at(wide, 238), 0);
+  EXPECT_EQ(at(wide, 232), 255);
+  EXPECT_EQ(int(close.at<std::uint8_t>(7, 9)), 0) << "what was left out stays so";
+  EXPECT_EQ(int(close.at<std::uint8_t>(20, 255)), 255) << "beyond the rod's end";
+}
+
+}  // namespace mask_body_test
