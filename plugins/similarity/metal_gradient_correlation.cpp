@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Behind metal hardly any direct radiation arrives, so what the image shows there is scattered radiation, and more metal
-// changes nothing. The radiograph of the implant is made alike before it is compared.
+// Behind metal hardly any direct radiation arrives, so what the image shows there is scattered radiation, and more
+// metal changes nothing. The radiograph of the implant is made alike before it is compared.
 #include <algorithm>
 #include <cmath>
 
@@ -12,7 +12,7 @@ using marrow::match::Patch;
 using marrow::match::Tally;
 
 struct MetalOptions : marrow::match::PatchOptions {
-  double opaque_mm = 6;
+  double opaque_mm = 10;
   double scatter = 0.3;
 };
 

@@ -25,9 +25,9 @@ LockingPlan plan(double turn_deg, const Vector3d& shift_mm) {
 
 shipped::Outputs errors(const LockingPlan& plan) {
   const marrow::Truth truth{implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}).world_from_model};
-  return shipped::call("evaluate.locking", {{"plan", shipped::item(plan)},
-                                            {"implant", shipped::item(implants::rod())},
-                                            {"truth", shipped::item(truth)}});
+  return shipped::call(
+      "evaluate.locking",
+      {{"plan", shipped::item(plan)}, {"implant", shipped::item(implants::rod())}, {"truth", shipped::item(truth)}});
 }
 
 TEST(EvaluateLocking, AngleOffsetAndView) {

@@ -21,8 +21,8 @@ inline marrow::geometry::Implant rod() {
 
 inline marrow::Camera camera(double alpha_deg, double beta_deg) {
   const marrow::CArm arm{512, 512, Eigen::Vector2d::Constant(0.586), 1000, 600, Vector3d::Zero()};
-  return marrow::carm_camera(
-      arm, marrow::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
+  return marrow::carm_camera(arm,
+                             marrow::world_from_camera_rotation(marrow::radians(alpha_deg), marrow::radians(beta_deg)));
 }
 
 inline marrow::List<marrow::View> views() {
@@ -47,7 +47,8 @@ inline marrow::Pose pose(const Vector3d& rotation_rad, const Vector3d& model_mm,
 }
 
 inline shipped::Inputs inputs(const marrow::geometry::Implant& implant, const marrow::Pose& pose) {
-  return {{"implant", shipped::item(implant)}, {"pose", shipped::item(pose)}, {"views", shipped::list(views(), "view")}};
+  return {
+      {"implant", shipped::item(implant)}, {"pose", shipped::item(pose)}, {"views", shipped::list(views(), "view")}};
 }
 
 }  // namespace implants

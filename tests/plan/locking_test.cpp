@@ -115,8 +115,7 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
   at.covariance->diagonal() << 0, 0, 0, 0, 0.3 * 0.3, 0;
   is_doubted("distal: the place of the hole is known to 0.52 mm only (95 %), and the limit is 0.50");
   at.covariance.reset();
-  is_doubted(
-      "distal: the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
+  is_doubted("distal: the pose of the nail has no predicted deviations, so nothing says how far the hole is off");
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   at.warnings = {"axial rotation is poorly determined"};
   is_doubted("the registration warns: axial rotation is poorly determined");
@@ -135,12 +134,14 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   };
   Implant without = rod();
   without.holes.clear();
-  EXPECT_EQ(refusal(without, at), "plan.locking: the implant has no holes, so there is nothing to lock; give each "
-                                  "hole's centre and axis");
+  EXPECT_EQ(refusal(without, at),
+            "plan.locking: the implant has no holes, so there is nothing to lock; give each "
+            "hole's centre and axis");
   Implant flat = rod();
   flat.holes[0].axis.setZero();
-  EXPECT_EQ(refusal(flat, at), "plan.locking: the axis of hole 'distal' has the length 0.000000, so it has no "
-                               "direction; give the direction of the hole, such as [1, 0, 0]");
+  EXPECT_EQ(refusal(flat, at),
+            "plan.locking: the axis of hole 'distal' has the length 0.000000, so it has no "
+            "direction; give the direction of the hole, such as [1, 0, 0]");
   flat.holes[0].axis = {0.5, 0, 0};
   EXPECT_EQ(refusal(flat, at), "plan.locking: the axis of hole 'distal' must have length 1, got 0.500000");
   Implant twice = rod();
@@ -148,15 +149,15 @@ TEST(PlanLocking, RefusesWhatCannotBePlanned) {
   EXPECT_EQ(refusal(twice, at), "plan.locking: two holes are named 'distal'; rename one");
   Implant narrow = rod();
   narrow.holes[0].diameter_mm = 0;
-  EXPECT_EQ(refusal(narrow, at),
-            "plan.locking: the diameter of hole 'distal' must be above 0 mm, got 0.000000");
+  EXPECT_EQ(refusal(narrow, at), "plan.locking: the diameter of hole 'distal' must be above 0 mm, got 0.000000");
   Implant nowhere = rod();
   nowhere.holes[0].centre_mm.x() = std::nan("");
   EXPECT_EQ(refusal(nowhere, at), "plan.locking: the centre of hole 'distal' is not finite");
   Implant open = rod();
   open.surface.triangles.pop_back();
-  EXPECT_EQ(refusal(open, at), "plan.locking: the surface is open or not consistently oriented, so it has no inside; "
-                               "close its holes (each edge must be shared by exactly two triangles)");
+  EXPECT_EQ(refusal(open, at),
+            "plan.locking: the surface is open or not consistently oriented, so it has no inside; "
+            "close its holes (each edge must be shared by exactly two triangles)");
   Implant inward = rod();
   for (auto& triangle : inward.surface.triangles) std::swap(triangle[0], triangle[1]);
   EXPECT_NE(refusal(inward, at).find("plan.locking: the triangles face inward (enclosed volume -"), std::string::npos);

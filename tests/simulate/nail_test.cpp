@@ -45,17 +45,21 @@ TEST(SimulateNail, RefusesWhatIsNoNail) {
                              {{"hole_at_mm", std::vector<double>{310}}, {"hole_turn_deg", std::vector<double>{0}}}),
             "simulate.nail: the hole at 310.000000 mm from the tip does not lie within the nail, which is 300.000000 "
             "mm long");
-  EXPECT_EQ(shipped::refusal("simulate.nail", {},
-                             {{"hole_at_mm", std::vector<double>{}}, {"hole_turn_deg", std::vector<double>{}},
-                              {"resolution_mm", 2.0}}),
-            "simulate.nail: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
+  EXPECT_EQ(
+      shipped::refusal(
+          "simulate.nail", {},
+          {{"hole_at_mm", std::vector<double>{}}, {"hole_turn_deg", std::vector<double>{}}, {"resolution_mm", 2.0}}),
+      "simulate.nail: the implant has no holes, so there is nothing to lock; give each hole's centre and axis");
 }
 
 const std::vector<double> kNone{0, 0, 0};
 
 const ClutteredPhantom& femur() {
   static const ClutteredPhantom phantom{
-      simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}), {{"level", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}}), {}, {}};
+      simulated::fracture(simulated::femur({{"resolution_mm", 2.0}}),
+                          {{"level", 0.4}, {"rotation_deg", kNone}, {"translation_mm", kNone}, {"ct_gap_mm", kNone}}),
+      {},
+      {}};
   return phantom;
 }
 
@@ -100,9 +104,9 @@ TEST(SimulateNailing, RefusesANailThatDoesNotFit) {
   EXPECT_NE(long_one.find("where there is no canal; take a shorter nail"), std::string::npos) << long_one;
   ClutteredPhantom solid = femur();
   solid.phantom.bone.inner = {};
-  EXPECT_EQ(shipped::refusal("simulate.nailing",
-                             {{"phantom", shipped::item(solid)}, {"implant", shipped::item(nail())}}),
-            "simulate.nailing: the bone is solid, so it has no canal; give it an inner surface");
+  EXPECT_EQ(
+      shipped::refusal("simulate.nailing", {{"phantom", shipped::item(solid)}, {"implant", shipped::item(nail())}}),
+      "simulate.nailing: the bone is solid, so it has no canal; give it an inner surface");
 }
 
 }  // namespace nail_test

@@ -32,10 +32,14 @@ TEST(FilledSurface, HoldsTheVolumeOfTheSurface) {
 /// What a straight nail, whose bore and hole are known, takes from a ray across it.
 TEST(FilledSurface, LineIntegralsThroughANailAreThoseByHand) {
   const auto nail = shipped::call("simulate.nail", {},
-                                  {{"length_mm", 80.0}, {"bow_radius_mm", 1e7}, {"resolution_mm", 0.4},
-                                   {"hole_at_mm", std::vector<double>{40}}, {"hole_turn_deg", std::vector<double>{90}}})
+                                  {{"length_mm", 80.0},
+                                   {"bow_radius_mm", 1e7},
+                                   {"resolution_mm", 0.4},
+                                   {"hole_at_mm", std::vector<double>{40}},
+                                   {"hole_turn_deg", std::vector<double>{90}}})
                         .at("surface");
-  const marrow::Value volume = shipped::call("volume.filled_surface", {{"mesh", nail}}, {{"spacing_mm", 0.3}}).at("volume");
+  const marrow::Value volume =
+      shipped::call("volume.filled_surface", {{"mesh", nail}}, {{"spacing_mm", 0.3}}).at("volume");
   const marrow::Value projector = shipped::call("project.joseph", {{"volume", volume}}).at("projector");
   // The nail's middle is at the isocentre, seen along its hole.
   const marrow::Pose pose = implants::pose({0, 0, 0}, {0, 0, 40}, {0, 0, 0});
@@ -60,8 +64,8 @@ TEST(FilledSurface, RefusesWhatHasNoInside) {
             "volume.filled_surface: the surface is open, so it has no inside; close its holes");
   marrow::Mesh large = implants::rod().surface;
   for (Vector3d& vertex : large.vertices_mm) vertex *= 9;
-  const std::string said = shipped::refusal("volume.filled_surface", {{"mesh", shipped::item(large)}},
-                                            {{"spacing_mm", 0.1}});
+  const std::string said =
+      shipped::refusal("volume.filled_surface", {{"mesh", shipped::item(large)}}, {{"spacing_mm", 0.1}});
   EXPECT_EQ(said.rfind("volume.filled_surface: with spacing_mm 0.100000 the volume has ", 0), 0u) << said;
   EXPECT_NE(said.find(" million voxels, and at most 100 are allowed; take a larger spacing_mm"), std::string::npos);
 }
