@@ -37,20 +37,26 @@ Hole hole_from(const YamlMap& map, const std::string& name) {
   return hole;
 }
 
-std::tuple<Implant, Mesh> implant(const Options& options) {
-  YamlFile file(options.holes);
+std::vector<Hole> read_holes(const std::filesystem::path& path) {
+  YamlFile file(path);
   const YamlMap map(file, file.root(), "implant", {"marrow-implant", "holes"});
   files::check_version(map, "marrow-implant");
-  Implant implant;
+  std::vector<Hole> read;
   if (const auto holes = map.required("holes")) {
     const YamlMap by_name(file, *holes, "holes", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty())
       map.fault("holes", "holes: expected holes by name, got none; an implant without holes cannot be locked");
     for (const std::string& name : by_name.keys())
-      implant.holes.push_back(hole_from(
+      read.push_back(hole_from(
           YamlMap(file, by_name.node(name), "hole '" + name + "'", {"centre_mm", "axis", "diameter_mm"}), name));
   }
   file.finish();
+  return read;
+}
+
+std::tuple<Implant, Mesh> implant(const Options& options) {
+  Implant implant;
+  implant.holes = read_holes(options.holes);
   implant.surface = files::read_mesh_file(options.surface, options.scale);
   implant.surface.frame = "implant";
   geometry::check_implant(implant, "read.implant: " + options.surface.string());

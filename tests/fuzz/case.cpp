@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// A case and all smaller files of YAML or text: cameras, calibrations, boards, points, landmarks, seeds, poses.
+// A case and all smaller files of YAML or text: cameras, calibrations, boards, points, landmarks, seeds, poses,
+// holes of implants.
 #include "tests/without_registration.hpp"  // before the nodes
 
 #include "plugins/read/case.cpp"
 
+#include "implant_node.hpp"
 #include "landmarks_node.hpp"
 #include "marrow/toolbox/calibration/board.hpp"
 #include "marrow/toolbox/files/calibration_file.hpp"
@@ -37,6 +39,7 @@ void read(char format, std::string_view text) {
   if (format == 'b') marrow::calibration::read_board_file(put("a.yaml", text));
   if (format == 'p') marrow::files::read_points_file(put("a.yaml", text));
   if (format == 'l') marrow::fuzz::read_landmarks(put("a.yaml", text));
+  if (format == 'h') marrow::fuzz::read_implant_holes(put("a.yaml", text));
   if (format == 's') marrow::files::read_seeds_file(put("a.yaml", text));
   if (format == 'o') marrow::files::read_pose_file(put("a.yaml", text));
 }
@@ -47,7 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   static const bool once = (put_case_files(), true);
   (void)once;
   marrow::fuzz::Input input(data, size);
-  const char format = input.choice("cmxkbplso");
+  const char format = input.choice("cmxkbplsoh");
   marrow::fuzz::expect_value_or_error([&] { read(format, input.rest); });
   return 0;
 }

@@ -60,6 +60,11 @@ fragments:
     seen: {frontal: {medial: [10, 20], lateral: [30, 40]}}
     tracked: {medial: [1, 2, 3], notch: [3, 2, 1]}
 """
+HOLES = """marrow-implant: 1
+holes:
+  distal: {centre_mm: [0, 0.1, 15], axis: [1, 0, 0], diameter_mm: 5}
+  oblique: {centre_mm: [0, 0.7, 40], axis: [0, 1, -2], diameter_mm: 4.5}
+"""
 SEEDS = (
     "marrow-seeds: 1\nfragments:\n  radius: {seeds: [[12.68, 31.3038, 18.75], [1, 2, 3]]}\n  ulna: {seeds: [[0, 0, 0]],"
     " register: false}\n"
@@ -148,6 +153,7 @@ def case_seeds():
         "b_board": BOARD,
         "p_points": POINTS,
         "l_landmarks": LANDMARKS,
+        "h_holes": HOLES,
         "s_seeds": SEEDS,
         "o_pose": POSE,
         "m_unknown_keys": "marrow-camera: 1\n" + CAMERA + "".join(f"key{i}: {i}\n" for i in range(300)),
