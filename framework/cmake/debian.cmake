@@ -40,7 +40,8 @@ function(marrow_debian_package name section summary description)
   set(MARROW_LICENCE_TEXT "/usr/share/common-licenses/Apache-2.0")
   if(name STREQUAL "marrow-cgal")
     set(MARROW_LICENCE "Apache-2.0 and GPL-3+")
-    set(MARROW_LICENCE_TEXT "/usr/share/common-licenses/Apache-2.0 and, as it contains CGAL's surface mesher,\n in /usr/share/common-licenses/GPL-3")
+    string(APPEND MARROW_LICENCE_TEXT
+      " and, as it contains CGAL's surface mesher,\n in /usr/share/common-licenses/GPL-3")
   endif()
   file(CONFIGURE OUTPUT ${folder}/copyright @ONLY CONTENT [[
 Format: https://www.debian.org/doc/packaging-manuals/copyright-format/1.0/
@@ -64,7 +65,7 @@ marrow_debian_package(marrow-dev libdevel "files to write plugins for marrow"
 "Headers, the toolbox of static libraries, and the CMake package by which a
 plugin of your own is built.")
 marrow_debian_package(marrow-cgal science "node of marrow that is under the GPL"
-"mesh.delaunay makes surfaces by CGAL's mesher. CGAL is under the GPL, so this
+"A node that makes surfaces by CGAL's mesher. CGAL is under the GPL, so this
 node is not in the package marrow, which is under the Apache License.")
 marrow_debian_package(marrow-doc doc "documentation of marrow"
 "How pipelines, plugins, comparisons, cases and repetition work, the method, and
@@ -85,6 +86,8 @@ set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_DEPENDS
   "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libopencv-dev, libtbb-dev")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS
-  "libcgal-dev, libinsighttoolkit5-dev, libjpeg-dev, libnlopt-dev, libpcl-dev, libpng-dev, libvtk9-dev, libyaml-cpp-dev, zlib1g-dev")
+  libcgal-dev libinsighttoolkit5-dev libjpeg-dev libnlopt-dev libpcl-dev libpng-dev libvtk9-dev libyaml-cpp-dev
+  zlib1g-dev)
+list(JOIN CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS ", " CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS)
 set(CPACK_DEBIAN_MARROW-DOC_PACKAGE_ARCHITECTURE all)
 include(CPack)
