@@ -4,7 +4,7 @@
 #include <cmath>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 
 namespace {
@@ -12,6 +12,7 @@ namespace {
 using namespace marrow;
 using phantom::Fragment;
 using phantom::Phantom;
+using phantom::Posture;
 
 struct Options {
   int frames = 100;
@@ -21,34 +22,32 @@ struct Options {
   std::array<double, 3> shift_mm{4, 3, 6};
 };
 
-List<Phantom> bone_motion(const Phantom& phantom, const Options& options, Context& context) {
+List<Posture> bone_motion(const Phantom& phantom, const Options& options) {
   phantom::check_phantom(phantom, "simulate.bone_motion");
-  List<Phantom> frames;
+  List<Posture> postures;
   for (int i = 0; i < options.frames; ++i) {
-    context.check_cancelled();
     const double phase = 2 * kPi * i / options.frame_rate_hz / options.period_s;
     const double turned = 0.5 * (1 - std::cos(phase)), shifted = std::sin(phase);
-    Phantom now = phantom;
-    for (Fragment& fragment : now.fragments) {
-      Vector6d motion;
-      for (int axis = 0; axis < 3; ++axis) {
-        motion[axis] = turned * radians(options.rotation_deg[std::size_t(axis)]);
-        motion[3 + axis] = shifted * options.shift_mm[std::size_t(axis)];
-      }
-      fragment.world_from_ct = moved(fragment.world_from_ct, fragment.frame, motion);
+    Vector6d motion;
+    for (int axis = 0; axis < 3; ++axis) {
+      motion[axis] = turned * radians(options.rotation_deg[std::size_t(axis)]);
+      motion[3 + axis] = shifted * options.shift_mm[std::size_t(axis)];
     }
-    frames.add(track::frame_name(std::size_t(i) + 1), std::move(now));
+    Posture posture;
+    for (const Fragment& fragment : phantom.fragments)
+      posture.world_from_ct.push_back(moved(fragment.world_from_ct, fragment.frame, motion));
+    postures.add(track::frame_name(std::size_t(i) + 1), posture);
   }
-  return frames;
+  return postures;
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.bone_motion", bone_motion)
-      .summary("A bone that turns and shifts to and fro: the phantom in each frame of a sequence")
+      .summary("A bone that turns and shifts to and fro: its posture in each frame of a sequence")
       .in("phantom", "a bone; each fragment moves about its own axes")
-      .out("phantoms", "the phantom frame by frame; the soft tissue keeps its place", over("frame"))
+      .out("postures", "where it is, frame by frame; the soft tissue keeps its place", over("frame"))
       .option("frames", &Options::frames, "number of frames", at_least(1), at_most(100000))
       .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-3), unit("Hz"))
       .option("period_s", &Options::period_s, "time from one end of the motion to the other and back", at_least(1e-3),

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 
 namespace {
 
@@ -40,8 +40,9 @@ std::vector<Eigen::Vector3d> seeds_of(const Body& body) {
   return seeds;
 }
 
-Bones bones(const ClutteredPhantom& phantom, const Volume* ct, const Options& options) {
-  phantom::check_phantom(phantom, "simulate.bones");
+Bones bones(const ClutteredPhantom& given, const phantom::Posture* posture, const Volume* ct, const Options& options) {
+  phantom::check_phantom(given, "simulate.bones");
+  const ClutteredPhantom phantom = phantom::in_posture(given, posture);
   Bones bones;
   const auto add = [&](const std::string& name, const RigidTransform& world_from_ct,
                        std::vector<Eigen::Vector3d> seeds_mm) {
@@ -73,6 +74,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.bones", bones)
       .summary("Gives exact poses and seeds of the fragments of a phantom, and of further bones among its bodies")
       .in("phantom", "phantom with tissues and bodies")
+      .in("posture", "where it is; none: as the phantom says")
       .in("volume", "CT of the phantom: then only seeds in it are given")
       .out("truths", &Bones::truths, "exact pose of each bone", over("fragment"))
       .out("seeds", &Bones::seeds, "points inside each bone, in the CT", over("fragment"))

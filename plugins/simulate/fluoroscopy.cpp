@@ -12,6 +12,7 @@
 
 #include "marrow/domain/random.hpp"
 #include "marrow/toolbox/phantom/materials.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 #include "marrow/toolbox/phantom/solid.hpp"
 
 namespace {
@@ -20,6 +21,7 @@ using namespace marrow;
 using phantom::ClutteredPhantom;
 using phantom::Interval;
 using phantom::Phantom;
+using phantom::Posture;
 
 struct FluoroscopyOptions {
   double photons = 2000;
@@ -285,9 +287,10 @@ View expose(const std::string& name, const ClutteredPhantom& cluttered, const Ca
   return view;
 }
 
-List<View> cluttered_fluoroscopy(const ClutteredPhantom& phantom, const List<Camera>& cameras,
+List<View> cluttered_fluoroscopy(const ClutteredPhantom& given, const List<Camera>& cameras, const Posture* posture,
                                  const FluoroscopyOptions& options, Context& context) {
-  phantom::check_phantom(phantom, "simulate.fluoroscopy");
+  phantom::check_phantom(given, "simulate.fluoroscopy");
+  const ClutteredPhantom phantom = phantom::in_posture(given, posture);
   List<View> views;
   for (std::size_t i = 0; i < cameras.size(); ++i) {
     const std::uint64_t seed = marrow::Random(context.seed(), i)();
@@ -297,15 +300,16 @@ List<View> cluttered_fluoroscopy(const ClutteredPhantom& phantom, const List<Cam
   return views;
 }
 
-List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const FluoroscopyOptions& options,
-                       Context& context) {
-  return cluttered_fluoroscopy({phantom, {}, {}}, cameras, options, context);
+List<View> fluoroscopy(const Phantom& phantom, const List<Camera>& cameras, const Posture* posture,
+                       const FluoroscopyOptions& options, Context& context) {
+  return cluttered_fluoroscopy({phantom, {}, {}}, cameras, posture, options, context);
 }
 
 /// What both nodes have.
 void declare(auto&& node) {
   node.random()
       .in("cameras", "camera of each view", over("view"))
+      .in("posture", "where the phantom's parts are; none: as the phantom says")
       .out("views", "16-bit images, bright = air", over("view"))
       .option("photons", &FluoroscopyOptions::photons, "photons per pixel behind soft tissue alone; 0: no noise",
               at_least(0), unit("1/px"))

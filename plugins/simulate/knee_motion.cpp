@@ -6,6 +6,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/phantom/knee.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 #include "marrow/toolbox/track/sequence.hpp"
 
 namespace {
@@ -14,6 +15,7 @@ using namespace marrow;
 using phantom::Body;
 using phantom::ClutteredPhantom;
 using phantom::Fragment;
+using phantom::Posture;
 
 struct Options {
   int frames = 100;
@@ -38,11 +40,13 @@ RigidTransform turned_about(const Eigen::Vector3d& point_mm, const Eigen::Vector
 
 bool is_of_lower_leg(const Body& body) { return body.name.starts_with("tibia") || body.name.starts_with("fibula"); }
 
+constexpr const char* kShutter = "shutter";
+
 /// A closed shutter: steel that fills the field of view.
 Body shutter() {
   constexpr double kHalf_mm = 170;
   Body body;
-  body.name = "shutter";
+  body.name = kShutter;
   body.material = "steel";
   body.surface.frame = "world";
   for (int i = 0; i < 8; ++i)
@@ -53,40 +57,55 @@ Body shutter() {
   return body;
 }
 
+struct Motion {
+  ClutteredPhantom phantom;
+  List<Posture> postures;
+};
+
+/// The other leg's shin, in the place of this leg's. Only the images show it.
+std::vector<Body> other_leg(const ClutteredPhantom& phantom) {
+  std::vector<Body> bodies;
+  for (Body body : phantom.bodies) {
+    if (!is_of_lower_leg(body)) continue;
+    body.name = "other " + body.name;
+    body.moves_with.clear();
+    body.in_ct = false;
+    bodies.push_back(std::move(body));
+  }
+  return bodies;
+}
+
 class Knee {
  public:
   Knee(const ClutteredPhantom& phantom, const Options& options)
-      : rest_(phantom), options_(options), fragment_(phantom::distal_fragment(phantom.phantom)) {
-    for (const Body& body : phantom.bodies)
-      if (is_of_lower_leg(body)) leg_.push_back(body);
-    if (leg_.empty())
-      throw Error("simulate.knee_motion: the phantom has no lower leg; add it by simulate.clutter with knee: mild");
-  }
+      : phantom_(phantom), options_(options), fragment_(phantom::distal_fragment(phantom.phantom)) {}
 
-  ClutteredPhantom at(int frame) const {
+  Posture at(int frame) const {
     const double phase = 2 * kPi * frame / options_.frame_rate_hz / options_.period_s;
     const double bent = 0.5 * (1 - std::cos(phase));
-    ClutteredPhantom now = rest_;
     const RigidTransform world_from_bone = fragment_.world_from_bone();
-    const Eigen::Vector3d knee_mm = world_from_bone * phantom::knee_axis_at(rest_.phantom.bone.outer);
+    const Eigen::Vector3d knee_mm = world_from_bone * phantom::knee_axis_at(phantom_.phantom.bone.outer);
     const Eigen::Matrix3d& axes = world_from_bone.rotation;
     RigidTransform femur = turned_about(
         knee_mm, axes * radians(options_.swing_deg) * Eigen::Vector3d(-bent, 0.2 * bent, 0.4 * bent), "world");
     femur.translation_mm += options_.shift_mm * Eigen::Vector3d(0.3 * std::sin(phase), 0.5 * bent, std::sin(phase));
-    for (Fragment& fragment : now.phantom.fragments)
-      if (fragment.name == fragment_.name) fragment.world_from_ct = femur * fragment.world_from_ct;
     const RigidTransform bend =
         turned_about(knee_mm, axes * Eigen::Vector3d(radians(options_.flexion_deg) * bent, 0, 0), "world");
     const RigidTransform turn =
         turned_about(knee_mm, axes * Eigen::Vector3d(0, 0, radians(options_.axial_deg) * bent), "world");
-    for (Body& body : now.bodies)
-      if (is_of_lower_leg(body))
-        phantom::move(body, femur * bend * turn);
-      else if (body.moves_with == fragment_.name)
-        phantom::move(body, femur);
-    if (options_.crossing) add_crossing(frame, now);
-    if (is_blank(frame)) now.bodies.push_back(shutter());
-    return now;
+    const RigidTransform stays{"world", "world"}, lower_leg = femur * bend * turn;
+
+    Posture posture;
+    for (const Fragment& fragment : phantom_.phantom.fragments)
+      posture.world_from_ct.push_back((fragment.name == fragment_.name ? femur : stays) * fragment.world_from_ct);
+    for (const Body& body : phantom_.bodies)
+      if (body.name == kShutter)
+        posture.bodies.push_back(is_blank(frame) ? std::optional(stays) : std::nullopt);
+      else if (body.name.starts_with("other "))
+        posture.bodies.push_back(crossing(frame));
+      else
+        posture.bodies.push_back(is_of_lower_leg(body) ? lower_leg : body.moves_with == fragment_.name ? femur : stays);
+    return posture;
   }
 
  private:
@@ -94,46 +113,43 @@ class Knee {
     return options_.blank.size() == 2 && frame + 1 >= options_.blank[0] && frame + 1 <= options_.blank[1];
   }
 
-  /// The other leg's shin, which swings through behind the knee.
-  void add_crossing(int frame, ClutteredPhantom& now) const {
+  /// The other leg swings through behind the knee.
+  RigidTransform crossing(int frame) const {
     constexpr double kBehind_mm = 110, kWay_mm = 240;
-    for (Body body : leg_) {
-      RigidTransform shift{"world", "world"};
-      shift.translation_mm = {kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm, 60};
-      phantom::move(body, shift);
-      body.name = "other " + body.name;
-      body.moves_with.clear();
-      body.in_ct = false;
-      now.bodies.push_back(std::move(body));
-    }
+    RigidTransform shift{"world", "world"};
+    shift.translation_mm = {kWay_mm * (double(frame) / std::max(1, options_.frames - 1) - 0.5), kBehind_mm, 60};
+    return shift;
   }
 
-  const ClutteredPhantom& rest_;
+  const ClutteredPhantom& phantom_;
   const Options& options_;
   Fragment fragment_;
-  std::vector<Body> leg_;
 };
 
-List<ClutteredPhantom> knee_motion(const ClutteredPhantom& phantom, const Options& options, Context& context) {
+Motion knee_motion(const ClutteredPhantom& phantom, const Options& options) {
   phantom::check_phantom(phantom, "simulate.knee_motion");
   if (!options.blank.empty() && (options.blank.size() != 2 || options.blank[0] > options.blank[1]))
     throw Error("simulate.knee_motion: 'blank' takes the first and the last blank frame, as [40, 49]");
-  const Knee knee(phantom, options);
-  List<ClutteredPhantom> frames;
-  for (int i = 0; i < options.frames; ++i) {
-    context.check_cancelled();
-    frames.add(track::frame_name(std::size_t(i) + 1), knee.at(i));
-  }
-  return frames;
+  const std::vector<Body> other = other_leg(phantom);
+  if (other.empty())
+    throw Error("simulate.knee_motion: the phantom has no lower leg; add it by simulate.clutter with knee: mild");
+  Motion motion{phantom, {}};
+  std::vector<Body>& bodies = motion.phantom.bodies;
+  if (options.crossing) bodies.insert(bodies.end(), other.begin(), other.end());
+  if (!options.blank.empty()) bodies.push_back(shutter());
+  const Knee knee(motion.phantom, options);
+  for (int i = 0; i < options.frames; ++i) motion.postures.add(track::frame_name(std::size_t(i) + 1), knee.at(i));
+  return motion;
 }
 
 }  // namespace
 
 MARROW_PLUGIN(plugin) {
   plugin.node("simulate.knee_motion", knee_motion)
-      .summary("A knee that bends and stretches: the phantom in each frame of a sequence")
+      .summary("A knee that bends and stretches: the posture of the phantom in each frame of a sequence")
       .in("phantom", "femur with the lower leg of simulate.clutter")
-      .out("phantoms", "the phantom frame by frame; the soft tissue keeps its place", over("frame"))
+      .out("phantom", &Motion::phantom, "the same, with the other leg and the shutter, if there are any")
+      .out("postures", &Motion::postures, "where it is, frame by frame; the soft tissue keeps its place", over("frame"))
       .option("frames", &Options::frames, "number of frames", at_least(1), at_most(100000))
       .option("frame_rate_hz", &Options::frame_rate_hz, "frames a second", at_least(1e-3), unit("Hz"))
       .option("period_s", &Options::period_s, "time from stretched to bent and back", at_least(1e-3), unit("s"))

@@ -2,7 +2,7 @@
 // The exact surfaces and poses of a phantom's fragments, for studies whose images are not those of a case.
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/phantom/phantom.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 
 namespace {
 
@@ -14,8 +14,9 @@ struct Known {
   List<Seeds> seeds;
 };
 
-Known truth(const phantom::Phantom& phantom, const Volume* volume) {
-  phantom::check_phantom(phantom, "simulate.truth");
+Known truth(const phantom::Phantom& given, const phantom::Posture* posture, const Volume* volume) {
+  phantom::check_phantom(given, "simulate.truth");
+  const phantom::Phantom phantom = phantom::in_posture({given, {}, {}}, posture).phantom;
   Known known;
   for (const phantom::Fragment& fragment : phantom.fragments) {
     if (fragment.outer.triangles.empty())
@@ -35,6 +36,7 @@ MARROW_PLUGIN(plugin) {
   plugin.node("simulate.truth", truth)
       .summary("Gives the exact surface and pose of each fragment of a phantom")
       .in("phantom", "fragments with their surfaces and exact poses")
+      .in("posture", "where they are; none: as the phantom says")
       .in("volume", "CT of the phantom, for the seeds")
       .out("models", &Known::models, "outer surface in CT coordinates, open at the fracture", over("fragment"))
       .out("truths", &Known::truths, "exact pose in the images", over("fragment"))

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
+#include "marrow/toolbox/phantom/posture.hpp"
 #include "nodes.hpp"
 
 namespace bone_motion_test {
@@ -18,12 +19,12 @@ TEST(BoneMotion, IsAsFarAsAskedHalfAPeriodLater) {
                                      {"period_s", 1.0},
                                      {"rotation_deg", std::vector<double>{0, 0, 40}},
                                      {"shift_mm", std::vector<double>{0, 0, 7}}})
-                          .at("phantoms")
-                          .as_list<Phantom>();
+                          .at("postures")
+                          .as_list<phantom::Posture>();
   ASSERT_EQ(frames.names().back(), "0009");
   const auto& rest = whole.as<Phantom>().fragments[0];
   const auto motion = [&](std::size_t frame) {
-    return motion_between(rest.world_from_ct, frames[frame].fragments[0].world_from_ct, rest.frame);
+    return motion_between(rest.world_from_ct, frames[frame].world_from_ct[0], rest.frame);
   };
   EXPECT_LT(motion(0).norm(), 1e-9);
   EXPECT_NEAR(degrees(motion(2)[2]), 20, 1e-6);

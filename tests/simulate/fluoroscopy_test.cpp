@@ -16,7 +16,7 @@ View exposed(const Phantom& phantom, const FluoroscopyOptions& options, std::uin
   List<Camera> cameras;
   cameras.add("frontal", test::camera(0, size_px));
   Context context(seed);
-  return fluoroscopy(phantom, cameras, options, context)[0];
+  return fluoroscopy(phantom, cameras, nullptr, options, context)[0];
 }
 
 TEST(SimulateFluoroscopy, TransmissionIsBeersLawOverTheSpectrum) {

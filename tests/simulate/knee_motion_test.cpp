@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "marrow/toolbox/phantom/knee.hpp"
+#include "marrow/toolbox/phantom/posture.hpp"
 #include "nodes.hpp"
 
 namespace knee_motion_test {
@@ -23,9 +24,12 @@ const ClutteredPhantom& leg() {
 }
 
 List<ClutteredPhantom> moving(const shipped::Options& options) {
-  return shipped::call("simulate.knee_motion", {{"phantom", shipped::item(leg())}}, options)
-      .at("phantoms")
-      .as_list<ClutteredPhantom>();
+  const auto out = shipped::call("simulate.knee_motion", {{"phantom", shipped::item(leg())}}, options);
+  const auto postures = out.at("postures").as_list<phantom::Posture>();
+  List<ClutteredPhantom> frames;
+  for (std::size_t i = 0; i < postures.size(); ++i)
+    frames.add(postures.name(i), phantom::in_posture(out.at("phantom").as<ClutteredPhantom>(), &postures[i]));
+  return frames;
 }
 
 shipped::Outputs bones(const ClutteredPhantom& phantom) {
@@ -100,6 +104,29 @@ TEST(KneeMotion, AnotherLegCrosses) {
                last = body(frames[2], "other tibia").surface.vertices_mm[0].x();
   EXPECT_NEAR(last - first, 240, 1e-9);
   EXPECT_FALSE(body(frames[0], "other tibia").in_ct);
+}
+
+TEST(KneeMotion, ImagesAndTruthsAreThoseOfThePosture) {
+  const auto out = shipped::call("simulate.knee_motion", {{"phantom", shipped::item(leg())}});
+  const auto postures = out.at("postures").as_list<phantom::Posture>();
+  const auto truths =
+      shipped::call("simulate.bones", {{"phantom", out.at("phantom")}, {"posture", shipped::item(postures[7])}},
+                    {{"bodies", std::vector<std::string>{"tibia"}}})
+          .at("truths")
+          .as_list<Truth>();
+  const auto expected = bones(moving({})[7]).at("truths").as_list<Truth>();
+  for (const char* bone : {"bone", "tibia"})
+    EXPECT_EQ(truths.find(bone)->world_from_model.translation_mm, expected.find(bone)->world_from_model.translation_mm)
+        << bone;
+}
+
+TEST(KneeMotion, APostureBelongsToOnePhantom) {
+  phantom::Posture posture;
+  posture.world_from_ct.resize(1);
+  EXPECT_EQ(
+      shipped::refusal("simulate.bones", {{"phantom", shipped::item(leg())}, {"posture", shipped::item(posture)}}),
+      "the posture is that of another phantom: it is for 1 fragments and 0 bodies, but the phantom has 1 fragments "
+      "and 6 bodies; take both from the same node");
 }
 
 TEST(KneeMotion, SaysWhatIsMissing) {
