@@ -2,6 +2,7 @@
 // Exact poses and seeds of the bones in a phantom with bodies: its fragments, and those bodies that are bones, too.
 #include <algorithm>
 #include <marrow/plugin.hpp>
+#include <sstream>
 
 #include "marrow/toolbox/phantom/posture.hpp"
 
@@ -40,6 +41,23 @@ std::vector<Eigen::Vector3d> seeds_of(const Body& body) {
   return seeds;
 }
 
+/// 'tibia+fibula' is tibia and fibula.
+std::vector<std::string> parts_of(const std::string& together) {
+  std::vector<std::string> parts;
+  std::stringstream stream(together);
+  for (std::string part; std::getline(stream, part, '+');) parts.push_back(part);
+  return parts;
+}
+
+const Body& body_named(const ClutteredPhantom& phantom, const std::string& name) {
+  std::string known;
+  for (const Body& body : phantom.bodies) {
+    if (body.name == name) return body;
+    known += (known.empty() ? "'" : ", '") + body.name + "'";
+  }
+  throw Error("simulate.bones: the phantom has no body '" + name + "'; there are " + known);
+}
+
 Bones bones(const ClutteredPhantom& given, const phantom::Posture* posture, const Volume* ct, const Options& options) {
   phantom::check_phantom(given, "simulate.bones");
   const ClutteredPhantom phantom = phantom::in_posture(given, posture);
@@ -55,15 +73,17 @@ Bones bones(const ClutteredPhantom& given, const phantom::Posture* posture, cons
   };
   for (const Fragment& fragment : phantom.phantom.fragments)
     add(fragment.name, fragment.world_from_ct, fragment.seeds_mm);
-  for (const std::string& name : options.bodies) {
-    const auto found =
-        std::find_if(phantom.bodies.begin(), phantom.bodies.end(), [&](const Body& body) { return body.name == name; });
-    if (found == phantom.bodies.end()) {
-      std::string known;
-      for (const Body& body : phantom.bodies) known += (known.empty() ? "'" : ", '") + body.name + "'";
-      throw Error("simulate.bones: the phantom has no body '" + name + "'; there are " + known);
+  for (const std::string& together : options.bodies) {
+    std::string first;
+    RigidTransform world_from_ct;
+    std::vector<Eigen::Vector3d> seeds_mm;
+    for (const std::string& name : parts_of(together)) {
+      const Body& body = body_named(phantom, name);
+      if (first.empty()) first = name, world_from_ct = inverse(body.ct_from_world);
+      const auto more = seeds_of(body);
+      seeds_mm.insert(seeds_mm.end(), more.begin(), more.end());
     }
-    add(name, inverse(found->ct_from_world), seeds_of(*found));
+    add(first, world_from_ct, seeds_mm);
   }
   return bones;
 }
@@ -79,5 +99,7 @@ MARROW_PLUGIN(plugin) {
       .out("truths", &Bones::truths, "exact pose of each bone", over("fragment"))
       .out("seeds", &Bones::seeds, "points inside each bone, in the CT", over("fragment"))
       .out("starts", &Bones::starts, "the same poses, as starts for experiments that displace them", over("fragment"))
-      .option("bodies", &Options::bodies, "names of the bodies that are bones, such as tibia");
+      .option("bodies", &Options::bodies,
+              "names of the bodies that are bones, such as tibia; those that move together are joined by +, such as "
+              "tibia+fibula, and named after the first");
 }

@@ -69,12 +69,12 @@ Frame filter(const TrackState& predicted, const Pose* pose, const Verdict* verdi
   if (lost.empty()) {
     state = track::updated(predicted, *measured);
     state.usual_covariance = pose->covariance;
-    constexpr double kShare = 0.1;  // of the newest frame in the usual cost and in the scale
+    constexpr double kShare = 0.1, kShareOfCost = 0.3;  // of the newest frame in the scale and in the usual cost
     constexpr double kExpected = 6;
     // If the poses scatter more than their covariances say, the surprises are too large on average.
     state.noise_scale = std::max(1.0, scale * (1 - kShare + kShare * surprise / kExpected));
     state.usual_cost =
-        std::isnan(state.usual_cost) ? pose->cost : (1 - kShare) * state.usual_cost + kShare * pose->cost;
+        std::isnan(state.usual_cost) ? pose->cost : (1 - kShareOfCost) * state.usual_cost + kShareOfCost * pose->cost;
   } else {
     ++state.frames_lost;
     state.surprise = surprise;

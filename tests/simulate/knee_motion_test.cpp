@@ -143,6 +143,18 @@ TEST(KneeMotion, SaysWhatIsMissing) {
             "simulate.bones: the phantom has no body 'tibbia'; there a");
 }
 
+TEST(KneeMotion, BonesThatMoveTogetherAreOne) {
+  const auto seeds = [](const std::vector<std::string>& bodies) {
+    return shipped::call("simulate.bones", {{"phantom", shipped::item(leg())}}, {{"bodies", bodies}})
+        .at("seeds")
+        .as_list<Seeds>();
+  };
+  const auto apart = seeds({"tibia", "fibula"}), together = seeds({"tibia+fibula"});
+  EXPECT_EQ(together.names(), (std::vector<std::string>{"bone", "tibia"}));
+  EXPECT_EQ(together[1].points_mm.size(), apart[1].points_mm.size() + apart[2].points_mm.size());
+  EXPECT_EQ(together[1].points_mm.back(), apart[2].points_mm.back());
+}
+
 TEST(KneeMotion, SeedsLieInTheBone) {
   const auto found = bones(leg());
   const Seeds* tibia = found.at("seeds").as_list<Seeds>().find("tibia");

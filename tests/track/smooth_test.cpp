@@ -41,6 +41,27 @@ TEST(Smooth, LowersTheErrorOfASteadyMotion) {
   }
 }
 
+TEST(Smooth, DoesNotRelyOnTheCovariancesOfTheRegistration) {
+  // A forearm that turns to and fro. The covariances are ten or a tenth of what they should be.
+  const Vector6d noise = six(0.05, 0.05, 0.3, 0.05, 0.05, 0.1);
+  for (const double wrong : {0.1, 1.0, 10.0}) {
+    TrackState state = sequences::begin({{"frame_rate_hz", 62.0}});
+    marrow::Random random(5, 1);
+    std::vector<TrackState> states;
+    std::vector<marrow::RigidTransform> way;
+    for (int i = 0; i < 100; ++i) {
+      const double phase = 2 * marrow::kPi * i / 62 / 0.8;
+      way.push_back(moved(sequences::begin().now.world_from_model, state.fragment,
+                          (1 - std::cos(phase)) * six(2, 1, 5, 1, 2, 3)));
+      marrow::track::Measurement measured = sequences::measured(way.back(), state, noise, random);
+      measured.covariance *= wrong;
+      state = marrow::track::updated(marrow::track::predicted(state), measured);
+      states.push_back(state);
+    }
+    EXPECT_LT(axial_rms(marrow::track::smoothed(states), way), 0.6 * marrow::radians(0.3)) << wrong;
+  }
+}
+
 TEST(Smooth, IsTheLeastSquaresSolution) {
   // Shifts along one axis: a linear problem, solved here at once with all positions and velocities as unknowns.
   constexpr int kFrames = 12;

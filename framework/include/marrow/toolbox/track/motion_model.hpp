@@ -23,8 +23,10 @@ double surprise(const TrackState& state, const Measurement& measured);
 TrackState updated(const TrackState& state, const Measurement& measured);
 
 /// The best estimate of each frame from all frames (Rauch-Tung-Striebel). `states`: of one filter, frame after frame.
-/// The accelerations along each axis are first chosen by the largest likelihood of the measurements, from a hundredth
-/// of the filter's to the filter's own. Throws Error if there is no state or their numbers do not follow each other.
-std::vector<TrackState> smoothed(const std::vector<TrackState>& states);
+/// If there are enough frames, the measurements' covariance is first replaced by how far they scatter from frame to
+/// frame: the registration's own also covers errors that are the same in all frames, which no smoothing takes away.
+/// Then the accelerations along each axis are chosen by the largest likelihood of the measurements, from a hundredth of
+/// the filter's to the filter's own. Throws Error if there is no state or their numbers do not follow each other.
+std::vector<TrackState> smoothed(std::vector<TrackState> states);
 
 }  // namespace marrow::track
