@@ -66,14 +66,6 @@ RigidTransform world_from_base(const Hexapod& hexapod, const RigidTransform& pla
   return transform;
 }
 
-/// The hexapod as it is built, which its controller does not know.
-Hexapod as_built(Hexapod hexapod, const Options& options) {
-  marrow::Random random{std::uint64_t(options.platform_seed)};
-  for (auto* joints : {&hexapod.base_mm, &hexapod.platform_mm})
-    for (Eigen::Vector3d& joint : *joints) joint += options.joint_sd_mm * normal3(random);
-  return hexapod;
-}
-
 /// The mounting's error: a turn about the fragment's middle and a shift.
 RigidTransform misplaced(const RigidTransform& platform_from_ct, const Eigen::Vector3d& middle_mm,
                          const Options& options, std::uint64_t seed) {
@@ -94,7 +86,8 @@ Metrics lengths_in_words(const Vector6d& lengths_mm) {
 Result hexapod(const phantom::Phantom& phantom, const List<Pose>& commands, const Options& options, Context& context) {
   phantom::check_phantom(phantom, "simulate.hexapod");
   const Fragment& fragment = phantom::fragment_named(phantom, options.fragment, "simulate.hexapod");
-  const Hexapod nominal = robot::make_hexapod(options), built = as_built(nominal, options);
+  const Hexapod nominal = robot::make_hexapod(options),
+                built = robot::as_built(nominal, options.joint_sd_mm, options.platform_seed);
   const RigidTransform upright = platform_from_ct(fragment, options.grip_mm),
                        world = world_from_base(nominal, upright, fragment, options),
                        mounted = misplaced(upright, fragment.frame.origin_mm, options, context.seed());

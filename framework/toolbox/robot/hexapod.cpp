@@ -7,6 +7,7 @@
 #include <cstdio>
 
 #include "marrow/domain/error.hpp"
+#include "marrow/domain/random.hpp"
 
 namespace marrow::robot {
 namespace {
@@ -51,6 +52,16 @@ Hexapod make_hexapod(const HexapodShape& shape) {
     hexapod.platform_mm[std::size_t(i)] =
         on_circle(shape.platform_radius_mm, 120 * pair + side * (60 - 0.5 * shape.platform_gap_deg));
   }
+  return hexapod;
+}
+
+Hexapod as_built(Hexapod hexapod, double joint_sd_mm, int seed) {
+  Random random{std::uint64_t(seed)};
+  for (auto* joints : {&hexapod.base_mm, &hexapod.platform_mm})
+    for (Eigen::Vector3d& joint : *joints) {
+      const double x = random.normal(), y = random.normal(), z = random.normal();
+      joint += joint_sd_mm * Eigen::Vector3d(x, y, z);
+    }
   return hexapod;
 }
 

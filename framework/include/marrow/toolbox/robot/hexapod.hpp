@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "marrow/domain/fields.hpp"
 #include "marrow/domain/transform.hpp"
 
 namespace marrow::robot {
@@ -13,6 +14,9 @@ struct HexapodShape {
   double base_radius_mm = 150, platform_radius_mm = 90;
   double base_gap_deg = 24, platform_gap_deg = 24;  ///< angle between the two joints of a pair
   double height_mm = 220;                           ///< of the platform's joints above the base's at home
+
+  using fields = Fields<&HexapodShape::base_radius_mm, &HexapodShape::platform_radius_mm, &HexapodShape::base_gap_deg,
+                        &HexapodShape::platform_gap_deg, &HexapodShape::height_mm>;
 };
 
 /// A hexapod as it is built. All legs have their middle length when the platform is at home.
@@ -26,10 +30,15 @@ struct Hexapod {
 /// from x, the platform's at 60, 180 and 300 degrees.
 Hexapod make_hexapod(const HexapodShape& shape);
 
+/// The hexapod as it is built: each coordinate of each joint is off by this standard deviation, drawn from the seed.
+Hexapod as_built(Hexapod hexapod, double joint_sd_mm, int seed);
+
 /// What a leg can do.
 struct HexapodLimits {
   double stroke_mm = 60;  ///< how far a leg's length may differ from that at home, to either side
   double joint_deg = 40;  ///< how far a leg may turn in its joints from its direction at home
+
+  using fields = Fields<&HexapodLimits::stroke_mm, &HexapodLimits::joint_deg>;
 };
 
 /// Lengths of the legs: |t + R b_i - a_i|, with a_i the joints of the base and b_i those of the platform.

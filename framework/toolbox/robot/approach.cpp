@@ -1,0 +1,137 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "marrow/toolbox/robot/approach.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "marrow/domain/error.hpp"
+
+namespace marrow::robot {
+namespace {
+
+double field_at(const SignedField& field, const Eigen::Vector3d& point_mm) {
+  return sample_trilinear(field.grid, field.values_mm, field.grid.index_from_point(point_mm));
+}
+
+/// Points of one surface within reach of the fracture: where it is near the other surface in the CT.
+std::vector<Eigen::Vector3d> points_of(const Mesh& mesh, const SignedField& other) {
+  constexpr double kReach_mm = 60, kFacing_mm = 3;
+  constexpr std::size_t kSamples = 8000;
+  const std::vector<Eigen::Vector3d> all = sample_surface(mesh, kSamples);
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double facing = 0;
+  for (const Eigen::Vector3d& point : all)
+    if (field_at(other, point) < kFacing_mm) middle += point, ++facing;
+  std::vector<Eigen::Vector3d> points;
+  for (const Eigen::Vector3d& point : all)
+    if (facing > 0 && (point - middle / facing).norm() < kReach_mm) points.push_back(point);
+  return points;
+}
+
+/// The place on the straight way from `from` to `to` after a share of it.
+RigidTransform between(const RigidTransform& from, const RigidTransform& to, const Eigen::Vector3d& centre_mm,
+                       double share) {
+  RigidTransform at = from;
+  at.rotation =
+      rotation_from_vector(share * vector_from_rotation(to.rotation * from.rotation.transpose())) * from.rotation;
+  at.translation_mm = (1 - share) * (from * centre_mm) + share * (to * centre_mm) - at.rotation * centre_mm;
+  return at;
+}
+
+class Approach {
+ public:
+  Approach(const Gap& gap, const RigidTransform& now, const FragmentFrame& frame, double clearance_mm)
+      : gap_(gap), now_(now), frame_(frame) {
+    // In the restored bone, the fragments of a CT may be nearer to each other.
+    constexpr double kTolerance_mm = 0.5;
+    least_mm_ = std::min(clearance_mm, gap.distance_mm({now.target, now.source}) - kTolerance_mm);
+  }
+
+  bool is_free(const RigidTransform& from, const RigidTransform& to) const {
+    const Eigen::Vector3d way = to * frame_.origin_mm - from * frame_.origin_mm;
+    const double turn = degrees(geodesic_angle_rad(to.rotation, from.rotation));
+    const int parts = std::clamp(int(std::ceil(std::max(way.norm(), turn))), 1, 40);
+    // Fragments that are too near at the beginning must not come nearer.
+    const double least = std::min(least_mm_, gap_.distance_mm(from) - 0.2);
+    for (int i = 1; i <= parts; ++i)
+      if (gap_.distance_mm(between(from, to, frame_.origin_mm, double(i) / parts)) < least) return false;
+    return true;
+  }
+
+ private:
+  const Gap& gap_;
+  const RigidTransform now_;
+  const FragmentFrame& frame_;
+  double least_mm_;
+};
+
+RigidTransform shifted(RigidTransform place, const Eigen::Vector3d& by_mm) {
+  place.translation_mm += by_mm;
+  return place;
+}
+
+}  // namespace
+
+Gap::Gap(const Mesh& moved, const SignedField& of_moved, const Mesh& reference, const SignedField& of_reference)
+    : of_moved_(of_moved),
+      of_reference_(of_reference),
+      on_moved_(points_of(moved, of_reference)),
+      on_reference_(points_of(reference, of_moved)) {
+  if (on_moved_.empty() || on_reference_.empty())
+    throw Error("the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");
+}
+
+double Gap::distance_mm(const RigidTransform& reference_from_fragment) const {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector3d& point : on_moved_)
+    least = std::min(least, field_at(of_reference_, reference_from_fragment * point));
+  const RigidTransform back = inverse(reference_from_fragment);
+  for (const Eigen::Vector3d& point : on_reference_) least = std::min(least, field_at(of_moved_, back * point));
+  return least;
+}
+
+Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& frame, const FragmentFrame& reference,
+             const ApproachOptions& options) {
+  constexpr double kStep_mm = 2;
+  const Approach approach(gap, now, frame, options.clearance_mm);
+  const RigidTransform place{now.target, now.source};
+  const Eigen::Vector3d shaft = reference.axes.col(2),
+                        apart = shaft.dot(frame.origin_mm - reference.origin_mm) > 0 ? shaft : Eigen::Vector3d(-shaft);
+  const auto leg_to = [&](const RigidTransform& to) {
+    Leg leg;
+    leg.error << vector_from_rotation(now.rotation * to.rotation.transpose()),
+        now * frame.origin_mm - to * frame.origin_mm;
+    return leg;
+  };
+  Leg leg = leg_to(place);
+  const double across_mm = (leg.error.tail<3>() - shaft * shaft.dot(leg.error.tail<3>())).norm();
+  const std::string next = degrees(leg.error.head<3>().norm()) > options.rotated_deg ? "rotate"
+                           : across_mm > options.aligned_mm                          ? "align"
+                                                                                     : "release";
+  leg.stage = next;
+  if (approach.is_free(now, place)) return leg;
+  for (double away = kStep_mm; away <= options.most_distraction_mm; away += kStep_mm) {
+    const RigidTransform by = shifted(place, away * apart);
+    if (!approach.is_free(by, place) || !approach.is_free(now, by)) continue;
+    leg = leg_to(by);
+    leg.stage = next == "release" ? "align" : next;
+    return leg;
+  }
+  // First away from where it is, as far as needed to get on from there.
+  for (double away = kStep_mm; away <= options.most_distraction_mm; away += kStep_mm) {
+    const RigidTransform here = shifted(now, away * apart);
+    for (double beside = kStep_mm; beside <= options.most_distraction_mm; beside += kStep_mm) {
+      const RigidTransform by = shifted(place, beside * apart);
+      if (!approach.is_free(here, by)) continue;
+      leg = leg_to(here);
+      leg.stage = "distract";
+      return leg;
+    }
+  }
+  leg = leg_to(shifted(now, options.most_distraction_mm * apart));
+  leg.stage = "distract";
+  return leg;
+}
+
+}  // namespace marrow::robot

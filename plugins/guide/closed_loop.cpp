@@ -1,0 +1,264 @@
+// SPDX-License-Identifier: Apache-2.0
+// Position-based visual servoing: the distal fragment is brought to its place beside the proximal one, which is found
+// in the same images. Where the robot stands need not be known: its own moves tell.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/geometry/fragments.hpp"
+#include "marrow/toolbox/robot/approach.hpp"
+#include "marrow/toolbox/robot/guide_state.hpp"
+#include "marrow/toolbox/robot/relative_pose.hpp"
+#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robot/servo.hpp"
+
+namespace {
+
+using namespace marrow;
+using robot::GuideState;
+using robot::Leg;
+using robot::RelativePose;
+using robot::RobotReport;
+
+struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
+  std::string hand_eye = "estimated";
+  double tolerance_deg = 0.5;
+  double tolerance_mm = 0.5;
+  int most_pairs = 8;
+};
+
+struct Result {
+  GuideState state;
+  Pose motion;
+  Stop stop;
+  List<Pose> predicted;
+  Metrics figures;
+};
+
+std::string shown(double value, const char* unit) {
+  char text[48];
+  std::snprintf(text, sizeof text, "%.2f %s", value, unit);
+  return text;
+}
+
+/// The way that remains to the fragment's place in the restored bone.
+struct Remaining {
+  double rotation_deg, shift_mm;
+  double deviation_deg, deviation_mm;
+
+  Remaining(const RelativePose& pose, const Eigen::Vector3d& centre_mm)
+      : rotation_deg(degrees(vector_from_rotation(pose.reference_from_fragment.rotation).norm())),
+        shift_mm((pose.reference_from_fragment * centre_mm - centre_mm).norm()),
+        deviation_deg(degrees(robot::rotation_deviation_rad(pose.covariance))),
+        deviation_mm(robot::shift_deviation_mm(pose.covariance)) {}
+
+  std::string in_words() const {
+    return shown(rotation_deg, "degrees") + " and " + shown(shift_mm, "mm") + " remain, known to " +
+           shown(deviation_deg, "degrees") + " and " + shown(deviation_mm, "mm");
+  }
+};
+
+/// Why a pose cannot be relied on; empty if it can.
+std::string why_not_trusted(const Pose& pose, const std::string& name, const List<Verdict>* verdicts) {
+  if (!pose.covariance || !pose.covariance->allFinite())
+    return "the pose of '" + name + "' is not trusted: the images do not determine it";
+  const Verdict* verdict = verdicts ? verdicts->find(name) : nullptr;
+  if (verdict && verdict->judgement == Judgement::wrong)
+    return "the pose of '" + name + "' is not trusted" + (verdict->reasons.empty() ? "" : ": " + verdict->reasons[0]);
+  return "";
+}
+
+/// Whether the way has not become shorter beyond its deviations in the last two pairs. The first moves may lead astray,
+/// as long as nothing is known of the robot's place.
+bool falls_no_more(const std::vector<double>& errors, double deviation) {
+  constexpr std::size_t kFirst = 5;
+  const std::size_t count = errors.size();
+  return count >= kFirst && std::min(errors[count - 1], errors[count - 2]) > errors[count - 3] - 2 * deviation;
+}
+
+Stop stop_of(const GuideState& state, const Remaining& remaining, const std::string& not_trusted,
+             const RobotReport& report, const Options& options) {
+  const double of_deg = remaining.rotation_deg / options.tolerance_deg,
+               of_mm = remaining.shift_mm / options.tolerance_mm,
+               deviation = std::max(remaining.deviation_deg / options.tolerance_deg,
+                                    remaining.deviation_mm / options.tolerance_mm);
+  if (!not_trusted.empty()) return {true, not_trusted};
+  if (of_deg + 2 * remaining.deviation_deg / options.tolerance_deg < 1 &&
+      of_mm + 2 * remaining.deviation_mm / options.tolerance_mm < 1)
+    return {true, "the fracture is reduced: " + remaining.in_words()};
+  constexpr int kMostStops = 2;
+  if (state.stops >= kMostStops)
+    return {true, "the robot stopped " + std::to_string(kMostStops) + " times in a row: " + report.stopped + "; " +
+                      remaining.in_words()};
+  if (falls_no_more(state.errors, deviation))
+    return {true, "the way has not become shorter in two pairs of images: " + remaining.in_words()};
+  if (state.pairs >= options.most_pairs)
+    return {true,
+            std::to_string(state.pairs) + " pairs of images are taken, no more are allowed: " + remaining.in_words()};
+  return {false, remaining.in_words()};
+}
+
+/// What the last move teaches.
+void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d& centre_mm, const RobotReport& report) {
+  const bool is_move = !report.done.rotation.isIdentity(1e-9) || !report.done.translation_mm.isZero(1e-6);
+  if (state.seen && is_move) {
+    const robot::Move move{report.done, seen * inverse(*state.seen), *state.seen * centre_mm};
+    state.moves.push_back(move);
+    const RigidTransform asked = inverse(state.guess) * move.told * state.guess;
+    state.jacobian = robot::broyden(state.jacobian, robot::in_mm(robot::step_of(asked, move.centre_mm)),
+                                    robot::in_mm(robot::step_of(move.seen, move.centre_mm)));
+  }
+  state.stops = report.stopped.empty() ? 0 : state.stops + 1;
+  state.seen = seen;
+}
+
+/// The poses of the next pair: as wide as the motion and what is known of the robot's place say.
+List<Pose> predicted(const List<Pose>& poses, const RigidTransform& motion, const Vector6d& step,
+                     const Matrix6d& hand_eye, const Options& options) {
+  constexpr double kLeast_deg = 0.5, kLeast_mm = 1;
+  List<Pose> result;
+  const Pose& reference = geometry::pose_of(poses, options.reference);
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    Pose pose = poses[i];
+    double turn = radians(kLeast_deg), shift = kLeast_mm;
+    if (poses.name(i) == options.moved) {
+      RigidTransform in_ct = motion;
+      in_ct.target = in_ct.source = reference.world_from_model.source;
+      pose.world_from_model =
+          reference.world_from_model * in_ct * inverse(reference.world_from_model) * pose.world_from_model;
+      const double unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye));
+      turn += step.head<3>().norm() * unknown_rad;
+      shift += step.tail<3>().norm() * unknown_rad + step.head<3>().norm() * robot::shift_deviation_mm(hand_eye);
+    }
+    pose.covariance = (Vector6d() << Eigen::Vector3d::Constant(turn * turn), Eigen::Vector3d::Constant(shift * shift))
+                          .finished()
+                          .asDiagonal();
+    pose.convergence.clear();
+    result.add(poses.name(i), pose);
+  }
+  return result;
+}
+
+/// The motion that is told, and what is expected to be seen of it.
+struct Command {
+  Vector6d step = Vector6d::Zero();
+  RigidTransform told{"robot", "robot"}, expected{"reference", "reference"};
+  Matrix6d hand_eye = Matrix6d::Zero();  ///< covariance of the robot's place
+};
+
+Command command_for(const GuideState& state, const Leg& leg, const Eigen::Vector3d& middle_mm, const Options& options) {
+  Command command;
+  const robot::HandEye hand_eye = robot::estimate_hand_eye(
+      options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
+  command.hand_eye = hand_eye.covariance;
+  command.step = robot::limited_step(leg.error, options);
+  command.expected = robot::motion_of(command.step, middle_mm);
+  Vector6d ask = command.step;
+  if (options.hand_eye == "broyden") {
+    ask = robot::from_mm(robot::ask_for(state.jacobian, robot::in_mm(command.step)));
+    ask = robot::limited_step(-ask, {1, options.most_deg, options.most_mm});
+  }
+  command.told = robot::told_for(robot::motion_of(ask, middle_mm), hand_eye.robot_from_reference);
+  return command;
+}
+
+Result closed_loop(const List<Pose>& poses, const GuideState& before, const RobotReport& report,
+                   const List<SignedField>& fields, const List<Mesh>& models, const List<Verdict>* verdicts,
+                   const List<View>* views, const Options& options, Context& context) {
+  const Pose &moved = geometry::pose_of(poses, options.moved), &reference = geometry::pose_of(poses, options.reference);
+  const auto part_of = [](const auto& list, const std::string& name, const std::string& what) -> const auto& {
+    if (const auto* item = list.find(name)) return *item;
+    throw Error("there is no " + what + " of the fragment '" + name + "'; give those of both fragments");
+  };
+  const robot::Gap gap(part_of(models, options.moved, "surface"), part_of(fields, options.moved, "field"),
+                       part_of(models, options.reference, "surface"), part_of(fields, options.reference, "field"));
+  const RelativePose relative = robot::relative_pose(moved, reference);
+  const RigidTransform& seen = relative.reference_from_fragment;
+  const Eigen::Vector3d centre_mm = moved.frame.origin_mm, middle_mm = seen * centre_mm;
+  Result result;
+  GuideState& state = result.state = before;
+  ++state.pairs;
+  state.images += views ? int(views->size()) : 2;
+  if (state.pairs == 1) {
+    RigidTransform world_from_reference = reference.world_from_model;
+    world_from_reference.source = "reference";
+    state.guess = report.robot_from_world * world_from_reference;
+  }
+  learn(state, seen, centre_mm, report);
+  const Remaining remaining(relative, centre_mm);
+  state.errors.push_back(
+      std::max(remaining.rotation_deg / options.tolerance_deg, remaining.shift_mm / options.tolerance_mm));
+  std::string not_trusted = why_not_trusted(moved, options.moved, verdicts);
+  if (not_trusted.empty()) not_trusted = why_not_trusted(reference, options.reference, verdicts);
+  result.stop = stop_of(state, remaining, not_trusted, report, options);
+  Command command;
+  if (!result.stop.stops) {
+    const Leg leg = robot::next_leg(gap, seen, moved.frame, reference.frame, options);
+    command = command_for(state, leg, middle_mm, options);
+    result.stop.reason = leg.stage + ": " + result.stop.reason;
+  }
+  result.motion.world_from_model = command.told;
+  result.predicted = predicted(poses, command.expected, command.step, command.hand_eye, options);
+  context.info("pair " + std::to_string(state.pairs) + ": " + result.stop.reason);
+  result.figures.items = {
+      {"pairs", double(state.pairs), ""},
+      {"images", double(state.images), ""},
+      {"rotation_deg", remaining.rotation_deg, "deg"},
+      {"shift_mm", remaining.shift_mm, "mm"},
+      {"deviation_deg", remaining.deviation_deg, "deg"},
+      {"deviation_mm", remaining.deviation_mm, "mm"},
+      {"distance_mm", gap.distance_mm(seen), "mm"},
+      {"step_deg", degrees(command.step.head<3>().norm()), "deg"},
+      {"step_mm", command.step.tail<3>().norm(), "mm"},
+      {"robot_known_to_deg", degrees(robot::rotation_deviation_rad(command.hand_eye)), "deg"},
+      {"reduced", double(result.stop.stops && result.stop.reason.starts_with("the fracture is reduced")), ""}};
+  return result;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("guide.closed_loop", closed_loop)
+      .summary(
+          "Brings a fragment to its place step by step: each pair of images gives the next motion of a robot whose "
+          "place is not known")
+      .in("poses", "poses of both fragments in the newest images, with their covariances", over("fragment"))
+      .in("state", "what is known from the pairs before")
+      .in("report", "what the robot says of its last motion")
+      .in("fields", "both fragments in the CT, to keep them apart", over("fragment"))
+      .in("models", "surfaces of both fragments", over("fragment"))
+      .in("verdicts", "verdicts on the poses; a wrong one ends the loop", over("fragment"))
+      .in("views", "the newest images, to count them; none: two in each pair", over("view"))
+      .out("state", &Result::state, "what is known after this pair")
+      .out("motion", &Result::motion, "next motion in the axes of the robot's base; none at the end")
+      .out("stop", &Result::stop, "whether the loop ends, and why; else the stage and what remains")
+      .out("predicted", &Result::predicted, "poses that are expected in the next images", over("fragment"))
+      .out("figures", &Result::figures,
+           "pairs and images so far, what remains and how exactly it is known, distance between the bones, next step")
+      .option("moved", &Options::moved, "fragment that the robot holds")
+      .option("reference", &Options::reference, "fragment that stays")
+      .option("hand_eye", &Options::hand_eye,
+              "the robot's place: estimated from its moves, fixed as planned, or replaced by Broyden's Jacobian",
+              one_of({"estimated", "fixed", "broyden"}))
+      .option("damping", &Options::damping, "part of the way that a step takes (lambda)", at_least(0.01), at_most(1),
+              unit(""))
+      .option("most_deg", &Options::most_deg, "largest rotation of a step", at_least(0.01))
+      .option("most_mm", &Options::most_mm, "largest shift of a step", at_least(0.01))
+      .option("clearance_mm", &Options::clearance_mm, "the bones are kept this far apart on the way")
+      .option("most_distraction_mm", &Options::most_distraction_mm, "how far they may be pulled apart for this",
+              at_least(0))
+      .option("rotated_deg", &Options::rotated_deg, "a smaller rotation is no stage of its own", at_least(0))
+      .option("aligned_mm", &Options::aligned_mm, "the same of a shift across the shaft", at_least(0))
+      .option("rotation_deg", &Options::rotation_deg, "deviation of a seen motion's rotation", at_least(1e-6))
+      .option("shift_mm", &Options::shift_mm, "deviation of its shift", at_least(1e-6))
+      .option("part", &Options::part, "deviation that is added, as a part of the motion", at_least(0), unit(""))
+      .option("guess_deg", &Options::guess_deg, "deviation of the robot's direction as planned", at_least(1e-3))
+      .option("guess_mm", &Options::guess_mm, "deviation of its place as planned", at_least(1e-3))
+      .option("tolerance_deg", &Options::tolerance_deg,
+              "the fracture is reduced if the rotation and two deviations are "
+              "below this",
+              at_least(1e-3))
+      .option("tolerance_mm", &Options::tolerance_mm, "and the shift and two deviations below this", at_least(1e-3))
+      .option("most_pairs", &Options::most_pairs, "largest number of pairs of images", at_least(1));
+}
