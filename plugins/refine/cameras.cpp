@@ -34,6 +34,7 @@ struct Options {
 struct Result {
   List<View> views;
   List<Pose> poses;
+  List<Pose> relative;
   List<Metrics> motions;
 };
 
@@ -132,6 +133,20 @@ class Refinement {
     return sum / double(views_.size());
   }
   Matrix6d covariance_of_pose(std::size_t bone) const { return covariance_.block<6, 6>(at_pose(bone), at_pose(bone)); }
+  /// Of the bone's small motion relative to the first bone: what both are off by in common does not count.
+  Matrix6d covariance_beside_first(std::size_t bone) const {
+    const auto axes_of = [&](std::size_t f) -> Eigen::Matrix3d {
+      return state_.poses[f].rotation * poses_[f].frame.axes;
+    };
+    const Eigen::Matrix3d to_bone = axes_of(bone).transpose(), axes = axes_of(0);
+    const Eigen::Vector3d arm =
+        state_.poses[bone] * poses_[bone].frame.origin_mm - state_.poses[0] * poses_[0].frame.origin_mm;
+    Matrix6d change = Matrix6d::Zero();  // the first bone's motion, as one of this bone
+    change.topLeftCorner<3, 3>() = change.bottomRightCorner<3, 3>() = to_bone * axes;
+    for (int i = 0; i < 3; ++i) change.block<3, 1>(3, i) = to_bone * axes.col(i).cross(arm) * radians(1);
+    const Matrix6d both = covariance_.block<6, 6>(at_pose(bone), at_pose(0)) * change.transpose();
+    return covariance_of_pose(bone) - both - both.transpose() + change * covariance_of_pose(0) * change.transpose();
+  }
   Vector6d deviation_of_motion(std::size_t view) const {
     return covariance_.diagonal().segment<6>(at_motion(view)).cwiseMax(0).cwiseSqrt();
   }
@@ -349,6 +364,8 @@ Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose
     pose.cost = refinement.cost(f);
     pose.convergence.clear();
     result.poses.add(poses.name(f), pose);
+    pose.covariance = unit.asDiagonal() * refinement.covariance_beside_first(f) * unit.asDiagonal();
+    result.relative.add(poses.name(f), pose);
   }
   return result;
 }
@@ -364,6 +381,10 @@ MARROW_PLUGIN(plugin) {
       .out("views", &Result::views, "the same images with corrected cameras", over("view"))
       .out("poses", &Result::poses,
            "poses that go with these cameras; their covariance includes what is not known about the cameras",
+           over("fragment"))
+      .out("relative", &Result::relative,
+           "the same poses with their covariances relative to the first bone, whose own is zero: what all bones are off "
+           "by in common does not count",
            over("fragment"))
       .out("motions", &Result::motions,
            "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",

@@ -44,7 +44,7 @@ class Approach {
   Approach(const Gap& gap, const RigidTransform& now, const FragmentFrame& frame, double clearance_mm)
       : gap_(gap), now_(now), frame_(frame) {
     // In the restored bone, the fragments of a CT may be nearer to each other.
-    constexpr double kTolerance_mm = 0.5;
+    constexpr double kTolerance_mm = 1;
     least_mm_ = std::min(clearance_mm, gap.distance_mm({now.target, now.source}) - kTolerance_mm);
   }
 
@@ -53,7 +53,7 @@ class Approach {
     const double turn = degrees(geodesic_angle_rad(to.rotation, from.rotation));
     const int parts = std::clamp(int(std::ceil(std::max(way.norm(), turn))), 1, 40);
     // Fragments that are too near at the beginning must not come nearer.
-    const double least = std::min(least_mm_, gap_.distance_mm(from) - 0.2);
+    const double least = std::min(least_mm_, gap_.distance_mm(from) - 0.5);
     for (int i = 1; i <= parts; ++i)
       if (gap_.distance_mm(between(from, to, frame_.origin_mm, double(i) / parts)) < least) return false;
     return true;

@@ -11,7 +11,7 @@ namespace marrow::robot {
 
 /// How large a step may be.
 struct StepLimits {
-  double damping = 0.9;  ///< lambda: the part of the error that a step takes away
+  double damping = 1;  ///< lambda: the part of the error that a step takes away
   double most_deg = 8, most_mm = 12;
 };
 
