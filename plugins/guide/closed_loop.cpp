@@ -23,8 +23,8 @@ using robot::RobotReport;
 
 struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
-  double tolerance_deg = 0.5;
-  double tolerance_mm = 0.5;
+  double tolerance_deg = 0.75;
+  double tolerance_mm = 0.75;
   int most_pairs = 8;
 };
 

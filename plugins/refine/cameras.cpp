@@ -382,10 +382,11 @@ MARROW_PLUGIN(plugin) {
       .out("poses", &Result::poses,
            "poses that go with these cameras; their covariance includes what is not known about the cameras",
            over("fragment"))
-      .out("relative", &Result::relative,
-           "the same poses with their covariances relative to the first bone, whose own is zero: what all bones are off "
-           "by in common does not count",
-           over("fragment"))
+      .out(
+          "relative", &Result::relative,
+          "the same poses with their covariances relative to the first bone, whose own is zero: what all bones are off "
+          "by in common does not count",
+          over("fragment"))
       .out("motions", &Result::motions,
            "motion of each camera, about and along the axes of its image (u, v, depth), and its predicted deviations",
            over("view"))

@@ -68,7 +68,7 @@ Result hexapod(const phantom::Phantom& phantom, const Options& options) {
     throw Error(what + ": the force on the fragment is already " + text +
                 "; does its bone stick in the other fragment? Begin with the fragments apart");
   }
-  result.report.load = result.report.largest_load = state.load_at_grip;
+  result.report.load = result.report.largest_load = state.largest_load = state.load_at_grip;
   return result;
 }
 

@@ -73,11 +73,11 @@ RigidTransform part_of(const RigidTransform& motion, const Eigen::Vector3d& hand
   return part;
 }
 
-Metrics figures_of(const RobotReport& report) {
+Metrics figures_of(const RobotReport& report, const Load& largest) {
   return {{{"force_n", report.load.force_n, "N"},
            {"torque_nm", report.load.torque_nm, "Nm"},
-           {"largest_force_n", report.largest_load.force_n, "N"},
-           {"largest_torque_nm", report.largest_load.torque_nm, "Nm"},
+           {"largest_force_n", largest.force_n, "N"},
+           {"largest_torque_nm", largest.torque_nm, "Nm"},
            {"warned", double(report.is_warning), ""},
            {"stopped", double(!report.stopped.empty()), ""}}};
 }
@@ -130,7 +130,10 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
     context.warn("the load is large: " + with_unit(report.largest_load.force_n, "N") + " (warning at " +
                  with_unit(state.force.warn_n, "N") + "), " + with_unit(report.largest_load.torque_nm, "Nm"));
   if (!report.stopped.empty()) context.warn("the robot stopped: " + report.stopped);
-  result.figures = figures_of(report);
+  Load& largest = result.state.largest_load;
+  largest.force_n = std::max(largest.force_n, report.largest_load.force_n);
+  largest.torque_nm = std::max(largest.torque_nm, report.largest_load.torque_nm);
+  result.figures = figures_of(report, largest);
   return result;
 }
 
@@ -146,5 +149,5 @@ MARROW_PLUGIN(plugin) {
       .in("report", "what the robot said before")
       .out("state", &Result::state, "the robot after the motion")
       .out("report", &Result::report, "the motion by its encoders, the load, and why it stopped early, if it did")
-      .out("figures", &Result::figures, "load at the end and largest load on the way");
+      .out("figures", &Result::figures, "load at the end; largest load since the robot gripped the fragment");
 }

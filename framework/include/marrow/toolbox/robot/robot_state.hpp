@@ -35,12 +35,13 @@ struct RobotState {
   RigidTransform world_from_ct{"world", "ct"};            ///< exact, of the fragment
   RigidTransform base_from_platform{"base", "platform"};  ///< as its encoders say
   Load load_at_grip;                                      ///< it yields to what is added to this
+  Load largest_load;                                      ///< since then
   int moves = 0;
 
   using fields = Fields<&RobotState::fragment, &RobotState::reference, &RobotState::shape, &RobotState::limits,
                         &RobotState::errors, &RobotState::tissue, &RobotState::force, &RobotState::world_from_base,
                         &RobotState::platform_from_ct, &RobotState::world_from_ct, &RobotState::base_from_platform,
-                        &RobotState::load_at_grip, &RobotState::moves>;
+                        &RobotState::load_at_grip, &RobotState::largest_load, &RobotState::moves>;
 };
 
 /// What a robot says after a motion.
