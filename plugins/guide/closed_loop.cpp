@@ -26,6 +26,8 @@ struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptio
   double tolerance_deg = 0.75;
   double tolerance_mm = 0.75;
   int most_pairs = 8;
+  double most_deviation_deg = 2;
+  double most_deviation_mm = 2;
 };
 
 struct Result {
@@ -84,6 +86,11 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
                deviation = std::max(remaining.deviation_deg / options.tolerance_deg,
                                     remaining.deviation_mm / options.tolerance_mm);
   if (!not_trusted.empty()) return {true, not_trusted};
+  if (remaining.deviation_deg > options.most_deviation_deg || remaining.deviation_mm > options.most_deviation_mm)
+    return {true, "the poses are not trusted: they are known to " + shown(remaining.deviation_deg, "degrees") +
+                      " and " + shown(remaining.deviation_mm, "mm") + " only, at most " +
+                      shown(options.most_deviation_deg, "degrees") + " and " + shown(options.most_deviation_mm, "mm") +
+                      " are allowed"};
   if (of_deg + 2 * remaining.deviation_deg / options.tolerance_deg < 1 &&
       of_mm + 2 * remaining.deviation_mm / options.tolerance_mm < 1)
     return {true, "the fracture is reduced: " + remaining.in_words()};
@@ -260,5 +267,8 @@ MARROW_PLUGIN(plugin) {
               "below this",
               at_least(1e-3))
       .option("tolerance_mm", &Options::tolerance_mm, "and the shift and two deviations below this", at_least(1e-3))
+      .option("most_deviation_deg", &Options::most_deviation_deg, "poses with a larger deviation are not trusted",
+              at_least(0))
+      .option("most_deviation_mm", &Options::most_deviation_mm, "the same of the shift", at_least(0))
       .option("most_pairs", &Options::most_pairs, "largest number of pairs of images", at_least(1));
 }

@@ -12,6 +12,7 @@ struct Known {
   List<Mesh> models;
   List<Truth> truths;
   List<Seeds> seeds;
+  List<Pose> starts;
 };
 
 Known truth(const phantom::Phantom& given, const phantom::Posture* posture, const Volume* volume) {
@@ -24,6 +25,9 @@ Known truth(const phantom::Phantom& given, const phantom::Posture* posture, cons
                   "' has no surface of its own; make it with simulate.fracture");
     known.models.add(fragment.name, fragment.outer);
     known.truths.add(fragment.name, Truth{fragment.world_from_ct});
+    Pose start;
+    start.world_from_model = fragment.world_from_ct;
+    known.starts.add(fragment.name, start);
     if (volume)
       known.seeds.add(fragment.name, {fragment.name, phantom::points_within(volume->grid, fragment.seeds_mm), true});
   }
@@ -40,5 +44,6 @@ MARROW_PLUGIN(plugin) {
       .in("volume", "CT of the phantom, for the seeds")
       .out("models", &Known::models, "outer surface in CT coordinates, open at the fracture", over("fragment"))
       .out("truths", &Known::truths, "exact pose in the images", over("fragment"))
-      .out("seeds", &Known::seeds, "points inside each fragment, if its CT is given", over("fragment"));
+      .out("seeds", &Known::seeds, "points inside each fragment, if its CT is given", over("fragment"))
+      .out("starts", &Known::starts, "the same poses, as starts for experiments that displace them", over("fragment"));
 }

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+// The pose of a robot's target with beads, from one image of a calibrated C-arm.
+#include <cstdio>
+#include <marrow/plugin.hpp>
+
+#include "marrow/toolbox/calibration/board_pose.hpp"
+#include "marrow/toolbox/calibration/correspondence.hpp"
+
+namespace {
+
+using namespace marrow;
+
+struct Options {
+  std::filesystem::path board;
+  double most_residual_px = 1;
+};
+
+Pose target(const View& view, const Options& options, Context& context) {
+  check_view(view);
+  const calibration::Board board = calibration::read_board_file(options.board);
+  const auto discs = calibration::find_beads(view.image, {});
+  constexpr std::size_t kFewest = 6;
+  if (discs.size() < kFewest)
+    throw Error("the target is not seen in view '" + view.name + "': it shows " + std::to_string(discs.size()) +
+                " round dark discs, at least " + std::to_string(kFewest) +
+                " are needed; bring the robot's hand into the beam");
+  const calibration::ViewPoints points =
+      calibration::match_board(board, discs, view.camera.width_px, view.camera.height_px, view.name);
+  const calibration::BoardPose found = calibration::board_pose(points, view.camera);
+  char text[160];
+  std::snprintf(text, sizeof text, "%zu beads, residual %.3f px", points.pixels.size(), found.residual_px);
+  context.info(text);
+  if (found.residual_px > options.most_residual_px) {
+    std::snprintf(text, sizeof text,
+                  "': its beads are %.2f px off where its pose shows them, at most %.2f px are allowed",
+                  found.residual_px, options.most_residual_px);
+    throw Error("the target does not fit view '" + view.name + text +
+                "; is it this target, and the camera of this image?");
+  }
+  Pose pose;
+  RigidTransform camera_from_target = found.camera_from_board;
+  camera_from_target.source = "target";
+  pose.world_from_model = inverse(view.camera.camera_from_world) * camera_from_target;
+  pose.cost = found.residual_px;
+  return pose;
+}
+
+}  // namespace
+
+MARROW_PLUGIN(plugin) {
+  plugin.node("guide.target", target)
+      .summary("The pose of a robot's target with beads in an image (SQPnP, then least squares)")
+      .in("view", "image of the target, with its camera")
+      .out("pose", "pose of the target in the world; its cost is the residual in px")
+      .option("board", &Options::board, "file with the positions of the target's beads (YAML, docs/case.md)",
+              required())
+      .option("most_residual_px", &Options::most_residual_px, "a larger residual is an error", at_least(0));
+}
