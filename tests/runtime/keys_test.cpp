@@ -227,6 +227,18 @@ TEST_F(Keys, WritesThroughMemoryDoNotPass) {
   munmap(text, 10000);
 }
 
+TEST_F(Keys, AFileThatGrowsWithinATickOfTheClockHasAnotherState) {
+  const std::string file = write("file", "x");
+  std::ofstream stream(file, std::ios::app);
+  Digest before = states_of_files(node_);
+  for (int i = 0; i < 200; ++i) {  // many of these writes have the same time
+    stream << 'x' << std::flush;
+    const Digest now = states_of_files(node_);
+    ASSERT_NE(now, before) << i;
+    before = now;
+  }
+}
+
 TEST_F(Keys, FilesInMemoryAreReadEachTime) {
   struct statfs system {};
   if (statfs("/dev/shm", &system) != 0 || system.f_type != TMPFS_MAGIC) GTEST_SKIP() << "there is no tmpfs";
