@@ -24,7 +24,7 @@ struct LockingOptions {
   double guide_mm = 100;
   double most_deg = 1;
   double most_mm = 0.5;
-  double most_cost = 0;
+  double most_cost = 0.35;
   Vector3d isocentre_mm = Vector3d::Zero();
   double source_to_isocentre_mm = 600;
 };
@@ -124,12 +124,12 @@ LockingPlan::Drill drill_of(const Hole& hole, const Pose& pose, const LockingOpt
   return drill;
 }
 
-/// What concerns the whole nail.
-std::vector<std::string> doubts_about(const Pose& pose, const LockingOptions& options) {
+/// What concerns the whole nail. `cost`: at the pose; NaN if it is not known.
+std::vector<std::string> doubts_about(const Pose& pose, double cost, const LockingOptions& options) {
   std::vector<std::string> doubts;
   for (const std::string& warning : pose.warnings) doubts.push_back("the registration warns: " + warning);
-  if (options.most_cost > 0 && !(pose.cost <= options.most_cost))
-    doubts.push_back("the nail in this pose does not look like the images: its cost is " + shown(pose.cost) +
+  if (cost > options.most_cost)
+    doubts.push_back("the images do not show the holes where this pose has them: the cost there is " + shown(cost) +
                      ", and the limit is " + shown(options.most_cost));
   return doubts;
 }
@@ -161,7 +161,8 @@ Verdict judge(const LockingPlan& plan, const std::vector<std::string>& about_all
   return verdict;
 }
 
-Result locking(const Implant& implant, const Pose& pose, const List<View>& views, const LockingOptions& options) {
+Result locking(const Implant& implant, const Pose& pose, const List<View>& views, const Cost* cost,
+               const LockingOptions& options) {
   geometry::check_implant(implant, "plan.locking");
   check_rigid(pose.world_from_model, "plan.locking: the pose of the nail");
   if (!(options.from.norm() > 0))
@@ -170,7 +171,8 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
   Result result;
   result.plan.isocentre_mm = options.isocentre_mm;
   result.plan.source_to_isocentre_mm = options.source_to_isocentre_mm;
-  const std::vector<std::string> about_all = doubts_about(pose, options);
+  const double at_holes = cost ? cost->value(pose.world_from_model) : std::nan("");
+  const std::vector<std::string> about_all = doubts_about(pose, at_holes, options);
   int seen_at_all = 0;
   for (const Hole& hole : implant.holes) {
     LockingPlan::Drill drill = drill_of(hole, pose, options);
@@ -184,6 +186,7 @@ Result locking(const Implant& implant, const Pose& pose, const List<View>& views
     throw Error("plan.locking: no view shows any of the " + std::to_string(implant.holes.size()) +
                 " holes of the nail at its pose; take images of the nail's tip, or check the pose");
   result.verdict = judge(result.plan, about_all);
+  if (cost) result.verdict.figures.push_back({"cost_at_holes", at_holes, ""});
   return result;
 }
 
@@ -196,12 +199,13 @@ MARROW_PLUGIN(plugin) {
       .in("implant", "the nail with its holes")
       .in("pose", "pose of the nail in the world, with its predicted covariance")
       .in("views", "the views in which the nail was found", over("view"))
+      .in("cost", "cost of the nail's pose in the surroundings of its holes (mask.near_holes)")
       .out("plan", &Result::plan,
            "for each hole in world coordinates: centre, direction of the drill, place of the drill guide, predicted "
            "deviations, and the C-arm's angles at which the hole is seen as a circle")
       .out("verdict", &Result::verdict,
            "doubtful if the predicted deviations of a hole's axis are too large, if fewer than two views show a hole, "
-           "or if the registration warns")
+           "if the registration warns, or if `cost` is too large")
       .option("from", &LockingOptions::from,
               "direction in the world from which the drill comes, such as the outer side", unit(""))
       .option("guide_mm", &LockingOptions::guide_mm, "distance of the drill guide from the hole's centre", at_least(0))
@@ -210,8 +214,7 @@ MARROW_PLUGIN(plugin) {
       .option("most_mm", &LockingOptions::most_mm,
               "a hole is doubtful if its axis may be off by more than this at its centre (95 %)", at_least(0))
       .option("most_cost", &LockingOptions::most_cost,
-              "all holes are doubtful if the cost of the nail's pose is above this; 0: the cost does not matter",
-              at_least(0))
+              "all holes are doubtful if `cost` at the nail's pose is above this", at_least(0))
       .option("isocentre_mm", &LockingOptions::isocentre_mm, "the C-arm's centre of rotation, as for camera.carm")
       .option("source_to_isocentre_mm", &LockingOptions::source_to_isocentre_mm,
               "distance from the C-arm's source to its centre of rotation, as for camera.carm", at_least(1));

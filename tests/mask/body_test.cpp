@@ -37,4 +37,24 @@ TEST(MaskBody, LeavesOutTheBodyAndAMargin) {
   EXPECT_EQ(int(close.at<std::uint8_t>(20, 255)), 255) << "beyond the rod's end";
 }
 
+TEST(MaskNearHoles, KeepsOnlyWhatIsNearAHole) {
+  marrow::View view = implants::views()[0];
+  view.mask = cv::Mat(512, 512, CV_8U, cv::Scalar(255));
+  view.mask.at<std::uint8_t>(256, 256) = 0;
+  const cv::Mat mask = shipped::call("mask.near_holes",
+                                     {{"view", shipped::item(view)},
+                                      {"implant", shipped::item(implants::rod())},
+                                      {"pose", shipped::item(implants::pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0}))}},
+                                     {{"radius_mm", 10.0}})
+                           .at("view")
+                           .as<marrow::View>()
+                           .mask;
+  // The hole is in the middle of the image. 10 mm are 10 * 1000 / 600 / 0.586 = 28.4 px.
+  EXPECT_EQ(int(mask.at<std::uint8_t>(256, 250)), 255);
+  EXPECT_EQ(int(mask.at<std::uint8_t>(256, 256)), 0) << "what was left out stays so";
+  EXPECT_EQ(int(mask.at<std::uint8_t>(256 + 26, 256)), 255);
+  EXPECT_EQ(int(mask.at<std::uint8_t>(256 + 32, 256)), 0);
+  EXPECT_EQ(int(mask.at<std::uint8_t>(256, 256 - 32)), 0);
+}
+
 }  // namespace mask_body_test

@@ -3,6 +3,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <marrow/domain/functions.hpp>
 #include <marrow/domain/verdict.hpp>
 
 #include "plan/implants.hpp"
@@ -99,6 +100,19 @@ marrow::Verdict verdict_of(const marrow::Pose& at, const shipped::Options& optio
   return shipped::call("plan.locking", inputs(rod(), at), options).at("verdict").as<marrow::Verdict>();
 }
 
+/// A cost that is the same everywhere.
+class Constant : public marrow::Cost {
+ public:
+  explicit Constant(double value) : value_(value) {}
+  double value(const marrow::RigidTransform&) const override { return value_; }
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel&) const override {
+    return std::make_shared<Constant>(value_);
+  }
+
+ private:
+  double value_;
+};
+
 TEST(PlanLocking, DoubtsAreSaidInWords) {
   marrow::Pose at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
   EXPECT_EQ(verdict_of(at).judgement, marrow::Judgement::trusted);
@@ -122,9 +136,14 @@ TEST(PlanLocking, DoubtsAreSaidInWords) {
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 110, 0});  // out of the lateral view
   is_doubted("distal: only one view shows the hole");
   at = pose({0, 0, 0}, {0, 0, 50}, {0, 0, 0});
-  at.cost = 0.6;
-  is_doubted("the nail in this pose does not look like the images: its cost is 0.60, and the limit is 0.40",
-             {{"most_cost", 0.4}});
+  shipped::Inputs with_cost = inputs(rod(), at);
+  with_cost["cost"] = marrow::Value::of<marrow::Cost>(std::make_shared<const Constant>(0.6));
+  const marrow::Verdict verdict = shipped::call("plan.locking", with_cost).at("verdict").as<marrow::Verdict>();
+  EXPECT_EQ(verdict.reasons.at(0),
+            "the images do not show the holes where this pose has them: the cost there is 0.60, and the limit is 0.35");
+  EXPECT_EQ(
+      shipped::call("plan.locking", with_cost, {{"most_cost", 0.7}}).at("verdict").as<marrow::Verdict>().judgement,
+      marrow::Judgement::trusted);
 }
 
 TEST(PlanLocking, RefusesWhatCannotBePlanned) {
