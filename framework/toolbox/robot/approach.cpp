@@ -119,18 +119,21 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
     return leg;
   }
   // First away from where it is, as far as needed to get on from there.
-  for (double away = kStep_mm; away <= options.most_distraction_mm; away += kStep_mm) {
+  const double room_mm =
+      options.most_distraction_mm - apart.dot(Eigen::Vector3d(now * frame.origin_mm - frame.origin_mm));
+  for (double away = kStep_mm; away <= room_mm; away += kStep_mm) {
     const RigidTransform here = shifted(now, away * apart);
     for (double beside = kStep_mm; beside <= options.most_distraction_mm; beside += kStep_mm) {
-      const RigidTransform by = shifted(place, beside * apart);
-      if (!approach.is_free(here, by)) continue;
+      if (!approach.is_free(here, shifted(place, beside * apart))) continue;
       leg = leg_to(here);
       leg.stage = "distract";
       return leg;
     }
   }
-  leg = leg_to(shifted(now, options.most_distraction_mm * apart));
-  leg.stage = "distract";
+  // No way is free by this margin. The fragment is turned where it is farthest apart; the robot feels if bones touch.
+  const bool is_apart = room_mm < kStep_mm;
+  leg = leg_to(is_apart ? shifted(place, options.most_distraction_mm * apart) : shifted(now, room_mm * apart));
+  leg.stage = is_apart ? next : "distract";
   return leg;
 }
 

@@ -35,14 +35,15 @@ struct Leg {
 
 struct ApproachOptions {
   double clearance_mm = 1;  ///< bones are kept this far apart, but not farther than they are in the restored bone
-  double most_distraction_mm = 20;
-  double rotated_deg = 2;  ///< smaller rotations do not count as a stage of their own
-  double aligned_mm = 2;   ///< the same of shifts across the shaft
+  double most_distraction_mm = 14;  ///< from its place
+  double rotated_deg = 2;           ///< smaller rotations do not count as a stage of their own
+  double aligned_mm = 2;            ///< the same of shifts across the shaft
 };
 
 /// If the straight way is free, it is taken. Otherwise the fragment goes by a place that is pulled away from its own
 /// along the shaft, as little as possible; and if the way to this place is not free, it is first pulled away from where
-/// it is. `frame`: of the fragment; its long axis leads away from or to the other one.
+/// it is. If no way is free, it is turned where it is pulled away as far as allowed. `frame`: of the fragment; its long
+/// axis leads away from or to the other one.
 Leg next_leg(const Gap& gap, const RigidTransform& reference_from_fragment, const FragmentFrame& frame,
              const FragmentFrame& reference, const ApproachOptions& options);
 

@@ -1,0 +1,209 @@
+// SPDX-License-Identifier: Apache-2.0
+// The guide with poses that are made up, without images: a robot that does what it is told, somewhere.
+#include <gtest/gtest.h>
+
+#include "marrow/domain/random.hpp"
+#include "marrow/toolbox/robot/guide_state.hpp"
+#include "marrow/toolbox/robot/robot_state.hpp"
+#include "marrow/toolbox/robot/servo.hpp"
+#include "shipped.hpp"
+
+namespace closed_loop_test {
+
+using namespace marrow;
+using robot::GuideState;
+using robot::RobotReport;
+
+/// Two blocks, one above the other, 2 mm apart at z = 0. The distal one lies below.
+constexpr double kHalf_mm = 12, kLong_mm = 60, kGap_mm = 2;
+
+Mesh block(double from_z, double to_z) {
+  Mesh mesh;
+  mesh.frame = "ct";
+  for (int i = 0; i < 8; ++i)
+    mesh.vertices_mm.emplace_back(i & 1 ? kHalf_mm : -kHalf_mm, i & 2 ? kHalf_mm : -kHalf_mm, i & 4 ? to_z : from_z);
+  mesh.triangles = {{0, 2, 1}, {1, 2, 3}, {4, 5, 6}, {5, 7, 6}, {0, 1, 4}, {1, 5, 4},
+                    {2, 6, 3}, {3, 6, 7}, {0, 4, 2}, {2, 4, 6}, {1, 3, 5}, {3, 7, 5}};
+  return mesh;
+}
+
+SignedField field(double from_z, double to_z) {
+  SignedField field;
+  field.grid.size = {33, 33, 81};
+  field.grid.spacing_mm = {2, 2, 2};
+  field.grid.origin_mm = {-32, -32, -80};
+  for (int z = 0; z < 81; ++z)
+    for (int y = 0; y < 33; ++y)
+      for (int x = 0; x < 33; ++x) {
+        const Eigen::Vector3d at = field.grid.point_from_index(Eigen::Vector3d(x, y, z));
+        field.values_mm.push_back(float(
+            std::max({std::abs(at.x()) - kHalf_mm, std::abs(at.y()) - kHalf_mm, from_z - at.z(), at.z() - to_z})));
+      }
+  return field;
+}
+
+List<Mesh> models() {
+  List<Mesh> all;
+  all.add("proximal", block(0, kLong_mm));
+  all.add("distal", block(-kGap_mm - kLong_mm, -kGap_mm));
+  return all;
+}
+
+List<SignedField> fields() {
+  List<SignedField> all;
+  all.add("proximal", field(0, kLong_mm));
+  all.add("distal", field(-kGap_mm - kLong_mm, -kGap_mm));
+  return all;
+}
+
+const RigidTransform kProximal{"world", "ct", rotation_from_vector({0.2, 0.1, -0.3}), {5, 6, 7}};
+
+/// Both poses; `place`: of the distal fragment beside the proximal one.
+List<Pose> poses(const RigidTransform& place, double deviation_deg = 0.1, double deviation_mm = 0.06) {
+  List<Pose> all;
+  for (const std::string name : {"proximal", "distal"}) {
+    Pose pose;
+    pose.frame = fragment_frame(*models().find(name));
+    pose.world_from_model = name == "distal" ? kProximal * place : kProximal;
+    Vector6d deviation;
+    deviation << Eigen::Vector3d::Constant(radians(deviation_deg)), Eigen::Vector3d::Constant(deviation_mm);
+    pose.covariance = deviation.cwiseAbs2().asDiagonal();
+    all.add(name, pose);
+  }
+  return all;
+}
+
+RigidTransform displaced(Eigen::Vector3d turn_deg, Eigen::Vector3d shift_mm) {
+  FragmentFrame frame = fragment_frame(*models().find("distal"));
+  Vector6d motion;
+  motion << turn_deg * radians(1), shift_mm;
+  return moved({"ct", "ct"}, frame, motion);
+}
+
+shipped::Inputs inputs(const List<Pose>& poses, const GuideState& state = {}, const RobotReport& report = {}) {
+  return {{"poses", shipped::list(poses, "fragment")},
+          {"state", shipped::item(state)},
+          {"report", shipped::item(report)},
+          {"fields", shipped::list(fields(), "fragment")},
+          {"models", shipped::list(models(), "fragment")}};
+}
+
+Stop stop_of(const shipped::Outputs& outputs) { return outputs.at("stop").as<Stop>(); }
+
+/// The loop, closed by a robot that stands anywhere. Each pair's outputs.
+std::vector<shipped::Outputs> loop(const std::string& hand_eye, const Eigen::Vector3d& stand_deg) {
+  RigidTransform robot_from_world{"robot", "world", rotation_from_vector(stand_deg * radians(1)), {20, -30, 25}};
+  RobotReport report;
+  RigidTransform place = displaced({6, -5, 9}, {8, -6, -10});
+  GuideState state;
+  Random random(5);
+  std::vector<shipped::Outputs> pairs;
+  for (int pair = 0; pair < 8; ++pair) {
+    Vector6d noise;
+    for (int k = 0; k < 6; ++k) noise[k] = random.normal() * (k < 3 ? radians(0.1) : 0.06);
+    const RigidTransform seen = moved(place, fragment_frame(*models().find("distal")), noise);
+    pairs.push_back(shipped::call("guide.closed_loop", inputs(poses(seen), state, report), {{"hand_eye", hand_eye}}));
+    if (stop_of(pairs.back()).stops) break;
+    state = pairs.back().at("state").as<GuideState>();
+    report.done = pairs.back().at("motion").as<Pose>().world_from_model;
+    RigidTransform world_motion = inverse(robot_from_world) * report.done * robot_from_world;
+    RigidTransform in_ct = inverse(kProximal) * world_motion * kProximal;
+    place = in_ct * place;
+  }
+  return pairs;
+}
+
+TEST(ClosedLoop, ReducesTheFractureWhereverTheRobotStands) {
+  for (const Eigen::Vector3d stand :
+       {Eigen::Vector3d(0, 5, 0), Eigen::Vector3d(60, -50, 40), Eigen::Vector3d(-100, 90, 60)}) {
+    const auto pairs = loop("estimated", stand);
+    EXPECT_TRUE(stop_of(pairs.back()).reason.starts_with("the fracture is reduced: ")) << stop_of(pairs.back()).reason;
+    EXPECT_LE(pairs.size(), 7u);
+    EXPECT_LT(shipped::figure(pairs.back().at("figures"), "rotation_deg"), 0.5);
+    EXPECT_LT(shipped::figure(pairs.back().at("figures"), "shift_mm"), 0.5);
+    EXPECT_EQ(shipped::figure(pairs.back().at("figures"), "images"), 2 * double(pairs.size()));
+    EXPECT_EQ(shipped::figure(pairs.back().at("figures"), "reduced"), 1);
+    const RigidTransform none = pairs.back().at("motion").as<Pose>().world_from_model;
+    EXPECT_TRUE(none.rotation.isIdentity() && none.translation_mm.isZero());
+  }
+}
+
+TEST(ClosedLoop, AFixedPlaceThatIsWrongEndsWithAReason) {
+  const auto pairs = loop("fixed", {-100, 90, 60});
+  EXPECT_TRUE(stop_of(pairs.back()).reason.starts_with("the way has not become shorter in two pairs of images: ") ||
+              stop_of(pairs.back()).reason.starts_with("8 pairs of images are taken, no more are allowed: "))
+      << stop_of(pairs.back()).reason;
+}
+
+TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
+  for (const std::string hand_eye : {"estimated", "broyden", "fixed"})
+    for (const auto& pair : loop(hand_eye, {60, -50, 40})) {
+      EXPECT_LE(shipped::figure(pair.at("figures"), "step_deg"), 8 + 1e-9);
+      EXPECT_LE(shipped::figure(pair.at("figures"), "step_mm"), 12 + 1e-9);
+    }
+}
+
+TEST(ClosedLoop, FragmentsThatOverlapAreFirstPulledApart) {
+  const auto pair = shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
+  EXPECT_TRUE(stop_of(pair).reason.starts_with("distract: ")) << stop_of(pair).reason;
+  // Away from the proximal fragment, which lies at larger z of its own frame.
+  const RigidTransform told = pair.at("motion").as<Pose>().world_from_model;
+  EXPECT_LT((kProximal.rotation.transpose() * told.translation_mm).z(), -1);
+}
+
+TEST(ClosedLoop, StopsForAReason) {
+  GuideState state;
+  RobotReport report;
+  state.stops = 1;
+  report.stopped = "the force would pass 400 N";
+  EXPECT_TRUE(
+      stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report)))
+          .reason.starts_with("the robot stopped 2 times in a row: the force would pass 400 N; "));
+  EXPECT_TRUE(stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))))
+                  .reason.starts_with("the poses are not trusted: they are known to 4.24 degrees and "));
+  List<Pose> unknown = poses(displaced({5, 0, 0}, {5, 0, -5}));
+  List<Pose> without;
+  for (std::size_t i = 0; i < unknown.size(); ++i) {
+    Pose pose = unknown[i];
+    if (unknown.name(i) == "distal") pose.covariance.reset();
+    without.add(unknown.name(i), pose);
+  }
+  EXPECT_EQ(stop_of(shipped::call("guide.closed_loop", inputs(without))).reason,
+            "the pose of 'distal' is not trusted: the images do not determine it");
+  Verdict verdict;
+  verdict.judgement = Judgement::wrong;
+  verdict.reasons = {"it lies on no edge"};
+  List<Verdict> verdicts;
+  verdicts.add("distal", verdict);
+  shipped::Inputs judged = inputs(unknown);
+  judged["verdicts"] = shipped::list(verdicts, "fragment");
+  EXPECT_EQ(stop_of(shipped::call("guide.closed_loop", judged)).reason,
+            "the pose of 'distal' is not trusted: it lies on no edge");
+}
+
+TEST(ClosedLoop, SaysWhatIsMissing) {
+  shipped::Inputs lacking = inputs(poses(displaced({1, 0, 0}, {0, 0, -5})));
+  List<Mesh> one;
+  one.add("proximal", block(0, kLong_mm));
+  lacking["models"] = shipped::list(one, "fragment");
+  EXPECT_EQ(shipped::refusal("guide.closed_loop", lacking),
+            "there is no surface of the fragment 'distal'; give those of both fragments");
+  List<Mesh> apart = one;
+  apart.add("distal", block(-80, -40));
+  lacking["models"] = shipped::list(apart, "fragment");
+  List<SignedField> fields;
+  fields.add("proximal", field(0, kLong_mm));
+  fields.add("distal", field(-80, -40));
+  lacking["fields"] = shipped::list(fields, "fragment");
+  EXPECT_EQ(shipped::refusal("guide.closed_loop", lacking),
+            "the two fragments are nowhere within 3 mm of each other in the CT; are they sides of one fracture?");
+}
+
+TEST(GuideWay, HasAPoseForEachPair) {
+  List<Pose> pairs;
+  for (int i = 0; i < 3; ++i) pairs.add(std::to_string(i + 1), poses(displaced({double(i), 0, 0}, {0, 0, 0}))[1]);
+  const Value way = shipped::call("guide.way", {{"poses", shipped::list(pairs, "pass")}}).at("trajectory");
+  EXPECT_FALSE(way.is_absent());
+}
+
+}  // namespace closed_loop_test

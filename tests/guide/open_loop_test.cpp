@@ -1,0 +1,109 @@
+// SPDX-License-Identifier: Apache-2.0
+// The target on a robot's hand, and the one move that follows from it.
+#include <gtest/gtest.h>
+
+#include "marrow/toolbox/phantom/board_views.hpp"
+#include "shipped.hpp"
+
+namespace open_loop_test {
+
+using namespace marrow;
+
+const std::string kBoard = std::string(MARROW_SOURCE_DIR) + "/pipelines/calibration/board.yaml";
+
+Calibration device() {
+  phantom::DeviceOptions options;
+  options.pincushion_percent = 0;
+  options.pixel_mm = 0.35;
+  return phantom::make_device(options);
+}
+
+View view_of(const RigidTransform& camera_from_target) {
+  View view;
+  view.name = "frontal";
+  view.camera = {device().width_px, device().height_px, device().intrinsics, {"camera", "world"}};
+  view.camera.camera_from_world.translation_mm = {0, 0, 600};
+  view.image = phantom::expose_board(calibration::read_board_file(kBoard), device(), camera_from_target, {}, 3);
+  return view;
+}
+
+TEST(GuideTarget, IsFoundToAHundredthOfADegree) {
+  const RigidTransform exact{"camera", "world", rotation_from_vector({0.1, -0.05, 0.4}), {5, -4, 560}};
+  const View view = view_of(exact);
+  const Pose found =
+      shipped::call("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}}).at("pose").as<Pose>();
+  const RigidTransform camera_from_target = view.camera.camera_from_world * found.world_from_model;
+  EXPECT_LT(degrees(geodesic_angle_rad(camera_from_target.rotation, exact.rotation)), 0.02);
+  EXPECT_LT((camera_from_target.translation_mm - exact.translation_mm).norm(), 0.2);
+  EXPECT_EQ(found.world_from_model.source, "target");
+  EXPECT_LT(found.cost, 0.1);
+}
+
+TEST(GuideTarget, SaysThatItIsNotSeen) {
+  View view = view_of({"camera", "world", Eigen::Matrix3d::Identity(), {2000, 0, 600}});
+  EXPECT_EQ(shipped::refusal("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}}),
+            "the target is not seen in view 'frontal': it shows 0 round dark discs, at least 6 are needed; bring the "
+            "robot's hand into the beam");
+}
+
+TEST(GuideTarget, SaysThatTheCameraIsAnotherOne) {
+  View view = view_of({"camera", "world", rotation_from_vector({0.1, -0.05, 0.4}), {5, -4, 560}});
+  view.camera.intrinsics(0, 0) *= 1.3;
+  const std::string text = shipped::refusal("guide.target", {{"view", shipped::item(view)}}, {{"board", kBoard}});
+  EXPECT_TRUE(text.starts_with("the target does not fit view 'frontal': its beads are ")) << text;
+  EXPECT_TRUE(text.ends_with("at most 1.00 px are allowed; is it this target, and the camera of this image?")) << text;
+}
+
+struct Scene {
+  List<Pose> poses, hands, targets;
+};
+
+const RigidTransform kBase{"robot", "world", rotation_from_vector({1, -2, 0.5}), {300, 40, -200}};
+
+Scene scene() {
+  Scene scene;
+  Pose proximal, distal;
+  proximal.world_from_model = {"world", "ct", rotation_from_vector({0.1, 0.2, 0.3}), {1, 2, 3}};
+  distal.world_from_model = {"world", "ct", rotation_from_vector({0.2, 0.1, 0.4}), {9, -2, -3}};
+  scene.poses.add("proximal", proximal);
+  scene.poses.add("distal", distal);
+  const RigidTransform hand_from_target{"hand", "target", rotation_from_vector({0.5, 0, 1}), {10, 20, 90}};
+  for (int i = 0; i < 4; ++i) {
+    Pose hand, target;
+    hand.world_from_model = {"robot", "hand", rotation_from_vector({0.2 * i, 0.1 * i * i, -0.1}), {5.0 * i, 3, 200}};
+    target.world_from_model = inverse(kBase) * hand.world_from_model * hand_from_target;
+    const std::string name = "station" + std::to_string(i + 1);
+    scene.hands.add(name, hand);
+    scene.targets.add(name, target);
+  }
+  return scene;
+}
+
+shipped::Inputs inputs(const Scene& scene) {
+  return {{"poses", shipped::list(scene.poses, "fragment")},
+          {"hands", shipped::list(scene.hands, "station")},
+          {"targets", shipped::list(scene.targets, "station")}};
+}
+
+TEST(OpenLoop, OneMoveBringsTheFragmentToItsPlace) {
+  for (const std::string method : {"ax_zb", "ax_xb"}) {
+    const Scene made = scene();
+    const Pose motion = shipped::call("guide.open_loop", inputs(made), {{"method", method}}).at("motion").as<Pose>();
+    const RigidTransform after =
+        inverse(kBase) * motion.world_from_model * kBase * made.poses.find("distal")->world_from_model;
+    const RigidTransform& place = made.poses.find("proximal")->world_from_model;
+    EXPECT_LT(degrees(geodesic_angle_rad(after.rotation, place.rotation)), 1e-4) << method;
+    EXPECT_LT((after.translation_mm - place.translation_mm).norm(), 1e-3) << method;
+  }
+}
+
+TEST(OpenLoop, NeedsHandAndTargetOfTheSameStations) {
+  Scene made = scene();
+  List<Pose> fewer;
+  fewer.add("station1", made.targets[0]);
+  made.targets = fewer;
+  EXPECT_EQ(shipped::refusal("guide.open_loop", inputs(made)),
+            "poses of the hand and of the target are not of the same stations: there are 4 and 1");
+}
+
+}  // namespace open_loop_test
