@@ -50,7 +50,7 @@ TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
   EXPECT_EQ(contact.overlap_mm(place), 0);
   place.translation_mm.z() = 4;
   EXPECT_GT(contact.overlap_mm(place), 1.5);
-  EXPECT_LT(contact.overlap_mm(place), 5);
+  EXPECT_LT(contact.overlap_mm(place), 5.5);  // 4 mm, and the relief of the fracture
   place.translation_mm = {60, 0, 30};
   EXPECT_EQ(contact.overlap_mm(place), 0);
 }
