@@ -25,7 +25,7 @@ std::size_t angle_of(const Eigen::Vector2d& from_middle) {
 
 Contact::Contact(const Phantom& phantom, const std::string& what) {
   if (phantom.fracture.vertices_mm.empty())
-    throw Error(what + ": the phantom has no fracture; make one with simulate.fracture");
+    throw Error(what + ": the phantom is of a whole bone; a broken one is needed");
   // The fracture as heights: the highest vertex in each cell of a raster. Its surface is closed far below.
   Eigen::Vector3d low = phantom.fracture.vertices_mm[0], high = low;
   for (const Eigen::Vector3d& vertex : phantom.fracture.vertices_mm)
