@@ -3,8 +3,5 @@
 #include <marrow/plugin.hpp>
 
 MARROW_PLUGIN(plugin) {
-  plugin.kind("robot")
-      .summary("a simulated robot that holds a fragment and moves it")
-      .sees_truth()
-      .runs_apart(marrow::Apart::computes);
+  plugin.kind("robot").summary("a simulated robot that holds a fragment and moves it").sees_truth();
 }
