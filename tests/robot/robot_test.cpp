@@ -55,6 +55,15 @@ TEST(Contact, WholeBoneIsApartAndPressedBoneIsNot) {
   EXPECT_EQ(contact.overlap_mm(place), 0);
 }
 
+TEST(Contact, NeedsAFracture) {
+  try {
+    phantom::Contact(Phantom{}, "test");
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_STREQ(error.what(), "test: the phantom is of a whole bone; a broken one is needed");
+  }
+}
+
 TEST(SoftTissue, PullsAsMuchAsItShould) {
   Vector6d displacement;
   displacement << 0, 0, radians(10), 0, 0, -15;
@@ -136,8 +145,8 @@ TEST(Robot, RefusesWhatItCannotGrip) {
             "'distal'");
   Phantom whole = broken({0, 0, 0}, {0, 0, -5});
   whole.fracture = {};
-  const std::string unbroken = shipped::refusal("robot.hexapod", {{"phantom", shipped::item(whole)}});
-  EXPECT_FALSE(unbroken.empty());
+  EXPECT_EQ(shipped::refusal("robot.hexapod", {{"phantom", shipped::item(whole)}}),
+            "robot.hexapod: fragment 'proximal' lies on one side of a fracture, but there is no fracture surface");
 }
 
 TEST(RelativePose, ItsDeviationCountsBothPosesAndTheLever) {
