@@ -23,6 +23,8 @@ using robot::RobotReport;
 
 struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
+  double probe_deg = 3;
+  double probe_mm = 3;
   double tolerance_deg = 0.75;
   double tolerance_mm = 0.75;
   int most_pairs = 8;
@@ -94,7 +96,7 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
   if (of_deg + 2 * remaining.deviation_deg / options.tolerance_deg < 1 &&
       of_mm + 2 * remaining.deviation_mm / options.tolerance_mm < 1)
     return {true, "the fracture is reduced: " + remaining.in_words()};
-  constexpr int kMostStops = 2;
+  constexpr int kMostStops = 4;
   if (state.stops >= kMostStops)
     return {true, "the robot stopped " + std::to_string(kMostStops) + " times in a row: " + report.stopped + "; " +
                       remaining.in_words()};
@@ -159,7 +161,12 @@ Command command_for(const GuideState& state, const Leg& leg, const Eigen::Vector
   const robot::HandEye hand_eye = robot::estimate_hand_eye(
       options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
   command.hand_eye = hand_eye.covariance;
-  command.step = robot::limited_step(leg.error, options);
+  constexpr double kUnknown_deg = 45;  // then a step may lead anywhere
+  robot::StepLimits limits = options;
+  if (options.hand_eye == "estimated" && degrees(robot::rotation_deviation_rad(command.hand_eye)) > kUnknown_deg)
+    limits.most_deg = std::min(limits.most_deg, options.probe_deg),
+    limits.most_mm = std::min(limits.most_mm, options.probe_mm);
+  command.step = robot::limited_step(leg.error, limits);
   command.expected = robot::motion_of(command.step, middle_mm);
   Vector6d ask = command.step;
   if (options.hand_eye == "broyden") {
@@ -252,6 +259,9 @@ MARROW_PLUGIN(plugin) {
               unit(""))
       .option("most_deg", &Options::most_deg, "largest rotation of a step", at_least(0.01))
       .option("most_mm", &Options::most_mm, "largest shift of a step", at_least(0.01))
+      .option("probe_deg", &Options::probe_deg,
+              "with 'estimated': the same as long as the robot's direction is not known to 45 degrees", at_least(0.01))
+      .option("probe_mm", &Options::probe_mm, "the same of the shift", at_least(0.01))
       .option("clearance_mm", &Options::clearance_mm, "the bones are kept this far apart on the way")
       .option("most_distraction_mm", &Options::most_distraction_mm, "how far they may be pulled apart for this",
               at_least(0))

@@ -143,6 +143,16 @@ TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
     }
 }
 
+TEST(ClosedLoop, TheFirstStepIsAProbeIfTheRobotMayStandAnywhere) {
+  const auto first = [](const std::string& hand_eye) { return loop(hand_eye, {60, -50, 40}).front().at("figures"); };
+  for (const char* step : {"step_deg", "step_mm"}) {
+    EXPECT_LE(shipped::figure(first("estimated"), step), 3 + 1e-9);
+    EXPECT_GT(shipped::figure(first("fixed"), step), 3);
+  }
+  EXPECT_NEAR(std::max(shipped::figure(first("estimated"), "step_deg"), shipped::figure(first("estimated"), "step_mm")),
+              3, 1e-9);
+}
+
 TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
   const auto pair = shipped::call("guide.closed_loop", inputs(poses(displaced({0, 0, 0}, {9, 0, 10}))));
   EXPECT_LT(shipped::figure(pair.at("figures"), "distance_mm"), 0);
@@ -154,11 +164,11 @@ TEST(ClosedLoop, FragmentsThatOverlapAreMovedApart) {
 TEST(ClosedLoop, StopsForAReason) {
   GuideState state;
   RobotReport report;
-  state.stops = 1;
+  state.stops = 3;
   report.stopped = "the force would pass 400 N";
   EXPECT_TRUE(
       stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5})), state, report)))
-          .reason.starts_with("the robot stopped 2 times in a row: the force would pass 400 N; "));
+          .reason.starts_with("the robot stopped 4 times in a row: the force would pass 400 N; "));
   EXPECT_TRUE(stop_of(shipped::call("guide.closed_loop", inputs(poses(displaced({5, 0, 0}, {5, 0, -5}), 3, 0.1))))
                   .reason.starts_with("the poses are not trusted: they are known to 4.24 degrees and "));
   List<Pose> unknown = poses(displaced({5, 0, 0}, {5, 0, -5}));
