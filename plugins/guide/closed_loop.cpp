@@ -73,20 +73,24 @@ std::string why_not_trusted(const Pose& pose, const std::string& name, const Lis
   return "";
 }
 
-/// Whether the way has not become shorter beyond its deviations in the last two pairs. The first moves may lead astray,
-/// as long as nothing is known of the robot's place.
-bool falls_no_more(const std::vector<double>& errors, double deviation) {
+/// Whether the last two pairs brought nothing: near the end, the way has not become shorter beyond its deviation; far
+/// from it, where bones are held apart while they are rotated and aligned, it has become longer. The first moves may
+/// lead astray, as long as nothing is known of the robot's place.
+bool brings_nothing(const std::vector<double>& errors, double deviation) {
   constexpr std::size_t kFirst = 5;
+  constexpr double kNear = 4;  // tolerances
   const std::size_t count = errors.size();
-  return count >= kFirst && std::min(errors[count - 1], errors[count - 2]) > errors[count - 3] - 2 * deviation;
+  if (count < kFirst) return false;
+  const double least = errors[count - 3] + (errors.back() < kNear ? -2 : 2) * deviation;
+  return std::min(errors[count - 1], errors[count - 2]) > least;
 }
 
 Stop stop_of(const GuideState& state, const Remaining& remaining, const std::string& not_trusted,
              const RobotReport& report, const Options& options) {
   const double of_deg = remaining.rotation_deg / options.tolerance_deg,
                of_mm = remaining.shift_mm / options.tolerance_mm,
-               deviation = std::max(remaining.deviation_deg / options.tolerance_deg,
-                                    remaining.deviation_mm / options.tolerance_mm);
+               deviation =
+                   remaining.deviation_deg / options.tolerance_deg + remaining.deviation_mm / options.tolerance_mm;
   if (!not_trusted.empty()) return {true, not_trusted};
   if (remaining.deviation_deg > options.most_deviation_deg || remaining.deviation_mm > options.most_deviation_mm)
     return {true, "the poses are not trusted: they are known to " + shown(remaining.deviation_deg, "degrees") +
@@ -100,7 +104,7 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
   if (state.stops >= kMostStops)
     return {true, "the robot stopped " + std::to_string(kMostStops) + " times in a row: " + report.stopped + "; " +
                       remaining.in_words()};
-  if (falls_no_more(state.errors, deviation))
+  if (brings_nothing(state.errors, deviation))
     return {true, "the way has not become shorter in two pairs of images: " + remaining.in_words()};
   if (state.pairs >= options.most_pairs)
     return {true,
@@ -201,8 +205,8 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   }
   learn(state, seen, centre_mm, report);
   const Remaining remaining(relative, centre_mm);
-  state.errors.push_back(
-      std::max(remaining.rotation_deg / options.tolerance_deg, remaining.shift_mm / options.tolerance_mm));
+  // The sum: while the fragment is rotated it is held apart, and its shift becomes no smaller.
+  state.errors.push_back(remaining.rotation_deg / options.tolerance_deg + remaining.shift_mm / options.tolerance_mm);
   std::string not_trusted = why_not_trusted(moved, options.moved, verdicts);
   if (not_trusted.empty()) not_trusted = why_not_trusted(reference, options.reference, verdicts);
   result.stop = stop_of(state, remaining, not_trusted, report, options);
