@@ -23,10 +23,9 @@ using robot::RobotReport;
 
 struct Options : geometry::FragmentPair, robot::StepLimits, robot::ApproachOptions, robot::HandEyeNoise {
   std::string hand_eye = "estimated";
-  double probe_deg = 3;
-  double probe_mm = 3;
-  double tolerance_deg = 0.75;
-  double tolerance_mm = 0.75;
+  double astray_mm = 12;
+  double tolerance_deg = 0.65;
+  double tolerance_mm = 0.65;
   int most_pairs = 8;
   double most_deviation_deg = 2;
   double most_deviation_mm = 2;
@@ -100,6 +99,10 @@ Stop stop_of(const GuideState& state, const Remaining& remaining, const std::str
   if (of_deg + 2 * remaining.deviation_deg / options.tolerance_deg < 1 &&
       of_mm + 2 * remaining.deviation_mm / options.tolerance_mm < 1)
     return {true, "the fracture is reduced: " + remaining.in_words()};
+  // More images show no more: the rest is less than one deviation.
+  if (of_deg < 1 && of_mm < 1 && remaining.rotation_deg < remaining.deviation_deg &&
+      remaining.shift_mm < remaining.deviation_mm)
+    return {true, "the fragment is in its place as far as the images show: " + remaining.in_words()};
   constexpr int kMostStops = 4;
   if (state.stops >= kMostStops)
     return {true, "the robot stopped " + std::to_string(kMostStops) + " times in a row: " + report.stopped + "; " +
@@ -160,17 +163,23 @@ struct Command {
   Matrix6d hand_eye = Matrix6d::Zero();  ///< covariance of the robot's place
 };
 
-Command command_for(const GuideState& state, const Leg& leg, const Eigen::Vector3d& middle_mm, const Options& options) {
+/// A step is shortened so that what is not known of the robot's place leads the fracture no farther astray than the
+/// bones are apart, or than `astray_mm`.
+Vector6d careful(const Vector6d& step, const Matrix6d& hand_eye, double distance_mm, double astray_mm) {
+  constexpr double kArm_mm = 150;  // from the fragment's middle to the fracture
+  const double turn = step.head<3>().norm(), unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye)),
+               unknown_mm = std::min(60.0, robot::shift_deviation_mm(hand_eye)),
+               astray = unknown_rad * (step.tail<3>().norm() + kArm_mm * turn) + unknown_mm * turn;
+  return step * std::min(1.0, std::max(distance_mm, astray_mm) / std::max(astray, 1e-9));
+}
+
+Command command_for(const GuideState& state, const RobotReport& report, const robot::HandEye& hand_eye, const Leg& leg,
+                    const Eigen::Vector3d& middle_mm, double distance_mm, const Options& options) {
   Command command;
-  const robot::HandEye hand_eye = robot::estimate_hand_eye(
-      options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
   command.hand_eye = hand_eye.covariance;
-  constexpr double kUnknown_deg = 45;  // then a step may lead anywhere
-  robot::StepLimits limits = options;
-  if (options.hand_eye == "estimated" && degrees(robot::rotation_deviation_rad(command.hand_eye)) > kUnknown_deg)
-    limits.most_deg = std::min(limits.most_deg, options.probe_deg),
-    limits.most_mm = std::min(limits.most_mm, options.probe_mm);
-  command.step = robot::limited_step(leg.error, limits);
+  command.step = robot::limited_step(leg.error, options);
+  if (options.hand_eye == "estimated")
+    command.step = careful(command.step, hand_eye.covariance, distance_mm, options.astray_mm);
   command.expected = robot::motion_of(command.step, middle_mm);
   Vector6d ask = command.step;
   if (options.hand_eye == "broyden") {
@@ -178,6 +187,14 @@ Command command_for(const GuideState& state, const Leg& leg, const Eigen::Vector
     ask = robot::limited_step(-ask, {1, options.most_deg, options.most_mm});
   }
   command.told = robot::told_for(robot::motion_of(ask, middle_mm), hand_eye.robot_from_reference);
+  constexpr double kUnknown_deg = 45;  // of the robot's direction: a step may lead anywhere
+  const bool is_lost = degrees(robot::rotation_deviation_rad(hand_eye.covariance)) > kUnknown_deg;
+  if (options.hand_eye == "estimated" && is_lost && report.is_pressed) {
+    // What presses on the way to somewhere lets go on the way back.
+    command.told = inverse(state.told);
+    command.expected = inverse(hand_eye.robot_from_reference) * command.told * hand_eye.robot_from_reference;
+    command.step = robot::step_of(command.expected, middle_mm);
+  }
   return command;
 }
 
@@ -212,8 +229,13 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   result.stop = stop_of(state, remaining, not_trusted, report, options);
   Command command;
   if (!result.stop.stops) {
-    const Leg leg = robot::next_leg(gap, seen, moved.frame, reference.frame, options);
-    command = command_for(state, leg, middle_mm, options);
+    const robot::HandEye hand_eye = robot::estimate_hand_eye(
+        options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
+    constexpr double kBack_mm = 4;  // after bones have touched
+    const Leg leg = report.is_pressed ? robot::leg_apart(moved.frame, reference.frame, kBack_mm)
+                                      : robot::next_leg(gap, seen, moved.frame, reference.frame, options);
+    command = command_for(state, report, hand_eye, leg, middle_mm, gap.distance_mm(seen), options);
+    state.told = command.told;
     result.stop.reason = leg.stage + ": " + result.stop.reason;
   }
   result.motion.world_from_model = command.told;
@@ -263,9 +285,10 @@ MARROW_PLUGIN(plugin) {
               unit(""))
       .option("most_deg", &Options::most_deg, "largest rotation of a step", at_least(0.01))
       .option("most_mm", &Options::most_mm, "largest shift of a step", at_least(0.01))
-      .option("probe_deg", &Options::probe_deg,
-              "with 'estimated': the same as long as the robot's direction is not known to 45 degrees", at_least(0.01))
-      .option("probe_mm", &Options::probe_mm, "the same of the shift", at_least(0.01))
+      .option("astray_mm", &Options::astray_mm,
+              "with 'estimated': a step is so short that what is not known of the robot's place leads it at most this "
+              "far astray, or as far as the bones are apart",
+              at_least(0.1))
       .option("clearance_mm", &Options::clearance_mm, "the bones are kept this far apart on the way")
       .option("most_distraction_mm", &Options::most_distraction_mm, "how far they may be pulled apart for this",
               at_least(0))

@@ -94,6 +94,7 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
   const int parts = int(std::ceil(std::max({turn_deg / 0.5, way_mm / 0.5, 1.0})));
   Result result{state, before, {}};
   result.report.stopped.clear();
+  result.report.is_pressed = false;
   RigidTransform at = robot.held().fragment().world_from_ct;
   Load load = robot.held().load_at(at);
   result.report.largest_load = load;
@@ -111,6 +112,7 @@ Result move(const phantom::Phantom& phantom, const RobotState& state, const Pose
     const Load there = robot.held().load_at(next);
     if (there.force_n > state.force.stop_n && there.force_n > load.force_n) {
       result.report.stopped = "the force would pass " + with_unit(state.force.stop_n, "N");
+      result.report.is_pressed = true;
       break;
     }
     at = next, load = there;

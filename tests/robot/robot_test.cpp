@@ -110,6 +110,7 @@ TEST(Robot, StopsBeforeTheForceThatIsTooLarge) {
   const shipped::Outputs after = move(phantom, gripped(phantom, options), shift(0, 0, 30));
   const RobotReport report = after.at("report").as<RobotReport>();
   EXPECT_EQ(report.stopped, "the force would pass 400 N");
+  EXPECT_TRUE(report.is_pressed);
   EXPECT_LE(report.largest_load.force_n, 400);
   EXPECT_LT(report.done.translation_mm.z(), 29);
   EXPECT_GT(report.done.translation_mm.z(), 2);
@@ -122,6 +123,7 @@ TEST(Robot, StopsAtItsWorkspace) {
   options["stroke_mm"] = 3.0;
   const RobotReport report = move(phantom, gripped(phantom, options), shift(12, 0, 0)).at("report").as<RobotReport>();
   EXPECT_TRUE(report.stopped.starts_with("the motion is outside the hexapod's workspace: leg ")) << report.stopped;
+  EXPECT_FALSE(report.is_pressed);
 }
 
 TEST(Robot, WarnsOfALargeLoad) {

@@ -42,10 +42,10 @@ RigidTransform between(const RigidTransform& from, const RigidTransform& to, con
 class Approach {
  public:
   Approach(const Gap& gap, const RigidTransform& now, const FragmentFrame& frame, double clearance_mm)
-      : gap_(gap), now_(now), frame_(frame) {
-    // In the restored bone, the fragments of a CT may be nearer to each other.
+      : gap_(gap), frame_(frame), clearance_mm_(clearance_mm) {
+    // In the restored bone, the fragments of a CT touch.
     constexpr double kTolerance_mm = 1;
-    least_mm_ = std::min(clearance_mm, gap.distance_mm({now.target, now.source}) - kTolerance_mm);
+    in_place_mm_ = gap.distance_mm({now.target, now.source}) - kTolerance_mm;
   }
 
   bool is_free(const RigidTransform& from, const RigidTransform& to) const {
@@ -53,17 +53,27 @@ class Approach {
     const double turn = degrees(geodesic_angle_rad(to.rotation, from.rotation));
     const int parts = std::clamp(int(std::ceil(std::max(way.norm(), turn))), 1, 40);
     // Fragments that are too near at the beginning must not come nearer.
-    const double least = std::min(least_mm_, gap_.distance_mm(from) - 0.5);
-    for (int i = 1; i <= parts; ++i)
-      if (gap_.distance_mm(between(from, to, frame_.origin_mm, double(i) / parts)) < least) return false;
+    const double at_first = gap_.distance_mm(from) - 0.5;
+    for (int i = 1; i <= parts; ++i) {
+      const RigidTransform at = between(from, to, frame_.origin_mm, double(i) / parts);
+      if (gap_.distance_mm(at) < std::min(least_at(at), at_first)) return false;
+    }
     return true;
   }
 
  private:
+  /// How far the bones are kept apart at a place: the less, the nearer it is to that in the restored bone.
+  double least_at(const RigidTransform& at) const {
+    constexpr double kPart = 0.3, kArm_mm = 100;
+    const double way =
+        (at * frame_.origin_mm - frame_.origin_mm).norm() + kArm_mm * vector_from_rotation(at.rotation).norm();
+    return std::min(clearance_mm_, in_place_mm_ + kPart * way);
+  }
+
   const Gap& gap_;
-  const RigidTransform now_;
   const FragmentFrame& frame_;
-  double least_mm_;
+  const double clearance_mm_;
+  double in_place_mm_;
 };
 
 RigidTransform shifted(RigidTransform place, const Eigen::Vector3d& by_mm) {
@@ -91,13 +101,28 @@ double Gap::distance_mm(const RigidTransform& reference_from_fragment) const {
   return least;
 }
 
+namespace {
+
+/// Along the shaft of the reference, away from it.
+Eigen::Vector3d away_from(const FragmentFrame& reference, const FragmentFrame& frame) {
+  const Eigen::Vector3d shaft = reference.axes.col(2);
+  return shaft.dot(frame.origin_mm - reference.origin_mm) > 0 ? shaft : Eigen::Vector3d(-shaft);
+}
+
+}  // namespace
+
+Leg leg_apart(const FragmentFrame& frame, const FragmentFrame& reference, double by_mm) {
+  Leg leg{Vector6d::Zero(), "distract"};
+  leg.error.tail<3>() = -by_mm * away_from(reference, frame);
+  return leg;
+}
+
 Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& frame, const FragmentFrame& reference,
              const ApproachOptions& options) {
   constexpr double kStep_mm = 2;
   const Approach approach(gap, now, frame, options.clearance_mm);
   const RigidTransform place{now.target, now.source};
-  const Eigen::Vector3d shaft = reference.axes.col(2),
-                        apart = shaft.dot(frame.origin_mm - reference.origin_mm) > 0 ? shaft : Eigen::Vector3d(-shaft);
+  const Eigen::Vector3d shaft = reference.axes.col(2), apart = away_from(reference, frame);
   const auto leg_to = [&](const RigidTransform& to) {
     Leg leg;
     leg.error << vector_from_rotation(now.rotation * to.rotation.transpose()),

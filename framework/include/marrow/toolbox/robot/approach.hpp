@@ -34,11 +34,14 @@ struct Leg {
 };
 
 struct ApproachOptions {
-  double clearance_mm = 1;  ///< bones are kept this far apart, but not farther than they are in the restored bone
+  double clearance_mm = 1;          ///< bones are kept this far apart, but less near their place in the restored bone
   double most_distraction_mm = 14;  ///< from its place
   double rotated_deg = 2;           ///< smaller rotations do not count as a stage of their own
   double aligned_mm = 2;            ///< the same of shifts across the shaft
 };
+
+/// Straight away from the other fragment, along its shaft.
+Leg leg_apart(const FragmentFrame& frame, const FragmentFrame& reference, double by_mm);
 
 /// If the straight way is free, it is taken. Otherwise the fragment goes by a place that is pulled away from its own
 /// along the shaft, as little as possible; and if the way to this place is not free, it is first pulled away from where

@@ -52,13 +52,15 @@ struct RobotReport {
   Load load;          ///< now
   Load largest_load;  ///< during the motion
   bool is_warning = false;
-  std::string stopped;  ///< why it stopped before the end of the motion; empty if it did not
+  std::string stopped;      ///< why it stopped before the end of the motion; empty if it did not
+  bool is_pressed = false;  ///< it stopped before too large a force
 
-  using fields = Fields<&RobotReport::done, &RobotReport::robot_from_world, &RobotReport::load,
-                        &RobotReport::largest_load, &RobotReport::is_warning, &RobotReport::stopped>;
+  using fields =
+      Fields<&RobotReport::done, &RobotReport::robot_from_world, &RobotReport::load, &RobotReport::largest_load,
+             &RobotReport::is_warning, &RobotReport::stopped, &RobotReport::is_pressed>;
 };
 
 }  // namespace marrow::robot
 
 MARROW_VALUE_TYPE(marrow::robot::RobotState, "robot_state", 1)
-MARROW_VALUE_TYPE(marrow::robot::RobotReport, "robot_report", 1)
+MARROW_VALUE_TYPE(marrow::robot::RobotReport, "robot_report", 2)
