@@ -70,7 +70,8 @@ class RepetitionResolver {
     body_ = &read.pipeline;
     if (diagnostics_.size() > faults_before || body_->nodes.empty()) return;
     made_->alone = *body_;
-    made_->axis = repeat_.over.empty() ? "pass" : repeat_.over;
+    // A pipeline within a pipeline may have repetitions of its own.
+    made_->axis = !repeat_.over.empty() ? repeat_.over : repeat_.at_most == 1 ? "once" : "pass";
     made_->is_loop = repeat_.over.empty();
     made_->at_most = repeat_.at_most;
     made_->goes_on = repeat_.goes_on;
@@ -164,9 +165,9 @@ class RepetitionResolver {
                                           axes_text(body_->axes_of(source)) + ", but takes the place of " +
                                           in_quotes(name) + ", which is " + axes_text(given->axes));
     }
-    if (made_->is_loop && repeat_.carry.empty())
+    if (made_->is_loop && repeat_.at_most > 1 && repeat_.carry.empty())
       diagnostics_.add(written_.place, "node " + in_quotes(written_.id) + " carries nothing from pass to pass",
-                       "all passes would be the same; add  carry: {NODE: OUTPUT OF THE BODY}");
+                       "all passes would be the same; add  carry: {NODE: OUTPUT OF THE BODY}, or set  at_most: 1");
     return diagnostics_.size() == before;
   }
 

@@ -172,6 +172,28 @@ outputs: {total: inner.last_sum}
   EXPECT_EQ(numbers(output(run(nodes, "all: r.total"))), (std::vector<double>{130, 230, 330}));
 }
 
+TEST_F(RepetitionTest, OnePassCarriesNothing) {
+  const RunResult result =
+      run("  c: {uses: test.constant, with: {value: 7}}\n"
+          "  r: {repeat: sum.yaml, at_most: 1, in: {item: c}}\n",
+          "one: r.sum, last: r.last_sum");
+  EXPECT_EQ(messages, "");
+  EXPECT_EQ(output(result).axis, "once");
+  EXPECT_EQ(numbers(output(result)), (std::vector<double>{8}));
+  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 8);
+}
+
+TEST_F(RepetitionTest, OnePassMayHoldALoop) {
+  scratch.write("loop.yaml",
+                "marrow: 1\nnodes:\n  r: {repeat: sum.yaml, at_most: 3, carry: {before: sum}}\n"
+                "outputs: {all: r.sum, last: r.last_sum}\n");
+  const RunResult result = run("  o: {repeat: loop.yaml, at_most: 1}\n", "all: o.last_all, last: o.last_last");
+  EXPECT_EQ(messages, "");
+  EXPECT_EQ(output(result).axis, "pass");
+  EXPECT_EQ(numbers(output(result)), (std::vector<double>{3, 5, 7}));
+  EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 7);
+}
+
 TEST_F(RepetitionTest, OverridesReachIntoTheBody) {
   marrow::Diagnostics diagnostics;
   marrow::PipelineArguments arguments;

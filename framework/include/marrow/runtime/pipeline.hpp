@@ -83,7 +83,7 @@ struct Repetition {
   /// The same for the first pass. It makes those carried values itself that the node's inputs do not give.
   Pipeline first;
   std::vector<Given> given;  ///< in the order of the node's inputs; then those that are only carried
-  std::string axis;          ///< of the passes: that of the items, or "pass"
+  std::string axis;          ///< of the passes: that of the items; of a loop "pass", or "once" if it has one pass only
   bool is_loop = false;      ///< not over the items of an axis; passes are named 1, 2, 3...
   int at_most = 0;           ///< passes; 0: as many as there are items
   int until = -1;            ///< the output of the body, of type stop, that ends the passes; -1: none
