@@ -41,18 +41,13 @@ std::string own_axis(const Pipeline& pipeline, const PipelineNode& node, const W
 }
 
 std::string broken_without(const PipelineNode& node, const std::set<std::string>& left_out) {
-  const auto value = [&](const std::string& name) -> const OptionValue* {
-    for (std::size_t i = 0; i < node.options.size(); ++i)
-      if (node.info.options[i].name == name) return &node.options[i];
-    return nullptr;
-  };
   const auto is_wired = [&](const std::string& name) {
     return !left_out.contains(name) && std::any_of(node.wires.begin(), node.wires.end(), [&](const Wire& wire) {
       return node.info.inputs[std::size_t(wire.port)].name == name;
     });
   };
   for (const RelationInfo& relation : node.info.relations)
-    if (const auto fault = broken(relation, node.info.name, value, is_wired)) return fault->message;
+    if (const auto fault = broken(relation, node, is_wired)) return fault->message;
   return "";
 }
 

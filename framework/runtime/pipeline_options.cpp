@@ -60,11 +60,6 @@ void resolve_options(const WrittenNode& written, PipelineNode& node, InputTexts&
 
 void check_relations(const WrittenNode& written, const PipelineNode& node, const UnknownValues& unknown,
                      Diagnostics& diagnostics) {
-  const auto value = [&](const std::string& name) -> const OptionValue* {
-    for (std::size_t i = 0; i < node.options.size(); ++i)
-      if (node.info.options[i].name == name) return &node.options[i];
-    return nullptr;
-  };
   const auto is_wired = [&](const std::string& name) { return is_written(written.wires, name); };
   for (const RelationInfo& relation : node.info.relations) {
     Place place = written.place;
@@ -76,8 +71,7 @@ void check_relations(const WrittenNode& written, const PipelineNode& node, const
         if (other == (is_input ? name.substr(3) : name)) place = given.place;
     }
     if (!is_known) continue;
-    if (const auto fault = broken(relation, node.info.name, value, is_wired))
-      diagnostics.add(place, fault->message, fault->hint);
+    if (const auto fault = broken(relation, node, is_wired)) diagnostics.add(place, fault->message, fault->hint);
   }
 }
 

@@ -10,6 +10,12 @@
 namespace marrow {
 namespace {
 
+const OptionValue& option_value_of(const PipelineNode& node, const std::string& name) {
+  const auto found = std::find_if(node.info.options.begin(), node.info.options.end(),
+                                  [&](const OptionInfo& option) { return option.name == name; });
+  return node.options.at(std::size_t(found - node.info.options.begin()));
+}
+
 double number_of(const OptionValue& value) {
   const auto* whole = std::get_if<std::int64_t>(&value);
   return whole ? double(*whole) : std::get<double>(value);
@@ -52,23 +58,24 @@ std::string listed(const std::vector<std::string>& parts) {
 
 }  // namespace
 
-std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::string& node,
-                                     const std::function<const OptionValue*(const std::string&)>& value,
+std::optional<BrokenRelation> broken(const RelationInfo& relation, const PipelineNode& node,
                                      const std::function<bool(const std::string&)>& is_wired) {
   const std::vector<std::string>& names = relation.names;
+  const std::string& uses = node.info.name;
   if (relation.type == RelationType::not_above || relation.type == RelationType::below) {
-    const double low = number_of(*value(names[0])), high = number_of(*value(names[1]));
+    const double low = number_of(option_value_of(node, names[0])), high = number_of(option_value_of(node, names[1]));
     const bool allows_equal = relation.type == RelationType::not_above;
     if (low < high || (allows_equal && low == high)) return std::nullopt;
-    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " is " + number_text(low) +
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + uses + " is " + number_text(low) +
                               (allows_equal ? ", which is above" : ", which is not below") + " option " +
                               in_quotes(names[1]) + " (" + number_text(high) + ")",
                           ""};
   }
   if (relation.type == RelationType::as_many_or_none) {
-    const std::size_t count = length_of(*value(names[0])), like = length_of(*value(names[1]));
+    const std::size_t count = length_of(option_value_of(node, names[0])),
+                      like = length_of(option_value_of(node, names[1]));
     if (count == 0 || count == like) return std::nullopt;
-    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " has " + std::to_string(count) + " item" +
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + uses + " has " + std::to_string(count) + " item" +
                               (count == 1 ? "" : "s") + ", but " + in_quotes(names[1]) + " has " + std::to_string(like),
                           "give one for each, or none"};
   }
@@ -76,31 +83,32 @@ std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::st
     std::vector<std::string> parts;
     bool is_same = true;
     for (const std::string& name : names) {
-      parts.push_back(in_quotes(name) + " (" + std::to_string(length_of(*value(name))) + ")");
-      is_same = is_same && length_of(*value(name)) == length_of(*value(names[0]));
+      parts.push_back(in_quotes(name) + " (" + std::to_string(length_of(option_value_of(node, name))) + ")");
+      is_same = is_same && length_of(option_value_of(node, name)) == length_of(option_value_of(node, names[0]));
     }
     if (is_same) return std::nullopt;
-    return BrokenRelation{"options " + listed(parts) + " of " + node + " must have the same length", ""};
+    return BrokenRelation{"options " + listed(parts) + " of " + uses + " must have the same length", ""};
   }
   if (relation.type == RelationType::distinct) {
-    const std::optional<std::string> item = twice(*value(names[0]));
+    const std::optional<std::string> item = twice(option_value_of(node, names[0]));
     if (!item) return std::nullopt;
-    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + node + " has " + in_quotes(*item) + " twice",
+    return BrokenRelation{"option " + in_quotes(names[0]) + " of " + uses + " has " + in_quotes(*item) + " twice",
                           "give each item once"};
   }
   std::vector<std::string> all, given;
   for (const std::string& name : names) {
     all.push_back(in_quotes(name));
-    if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(*value(name))) given.push_back(in_quotes(name));
+    if (name.starts_with("in.") ? is_wired(name.substr(3)) : !is_empty(option_value_of(node, name)))
+      given.push_back(in_quotes(name));
   }
   if (relation.type == RelationType::at_least_one) {
     if (!given.empty()) return std::nullopt;
-    if (names.size() > 1) return BrokenRelation{node + " needs at least one of " + listed(all) + ", got none", ""};
-    return BrokenRelation{"option " + all[0] + " of " + node + " is empty", "give one item or more"};
+    if (names.size() > 1) return BrokenRelation{uses + " needs at least one of " + listed(all) + ", got none", ""};
+    return BrokenRelation{"option " + all[0] + " of " + uses + " is empty", "give one item or more"};
   }
   if (given.size() == 1) return std::nullopt;
   const std::string got = given.empty() ? "none" : names.size() == 2 ? "both" : listed(given);
-  return BrokenRelation{node + " needs exactly one of " + listed(all) + ", got " + got, ""};
+  return BrokenRelation{uses + " needs exactly one of " + listed(all) + ", got " + got, ""};
 }
 
 }  // namespace marrow

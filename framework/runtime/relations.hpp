@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "marrow/runtime/node.hpp"
+#include "marrow/runtime/pipeline.hpp"
 
 namespace marrow {
 
@@ -14,10 +14,8 @@ struct BrokenRelation {
   std::string hint;  ///< may be empty
 };
 
-/// Checks a relation. Returns nothing if it holds. `value` returns the value of an option; `is_wired` says whether an
-/// input is wired.
-std::optional<BrokenRelation> broken(const RelationInfo& relation, const std::string& node,
-                                     const std::function<const OptionValue*(const std::string&)>& value,
+/// Checks a relation of a node's options. Returns nothing if it holds. `is_wired` says whether an input is wired.
+std::optional<BrokenRelation> broken(const RelationInfo& relation, const PipelineNode& node,
                                      const std::function<bool(const std::string&)>& is_wired);
 
 }  // namespace marrow

@@ -244,6 +244,24 @@ class Compare(Case):
         self.assertEqual([name for name in os.listdir(self.scratch / "cache" / "cases") if "tmp" in name], [])
         self.assertEqual(self.results("two"), self.results("one"))
 
+    def test_a_simulated_case_is_what_a_run_with_its_seed_makes(self):
+        self.write("p.yaml", PIPELINE.replace("0.05", "0"))
+        self.write("s.yaml", "marrow: 1\nnodes:\n  s: {uses: test.draw}\noutputs: {case: s}\n")
+        path = self.write(
+            "e.yaml",
+            HEAD.replace("folders: [cases/*]", "simulate: {pipeline: s.yaml, seeds: [4, 9]}") + "variants: {a: {}}\n",
+        )
+        self.assertEqual(self.compare(path, "--out", self.scratch / "out").returncode, 0)
+        made = []
+        for seed in (4, 9):
+            out = self.scratch / ("seed-%d" % seed)
+            result = marrow("run", self.scratch / "s.yaml", "--seed", seed, "--out", out, plugins=[TEST_PLUGINS])
+            self.assertEqual(result.returncode, 0, result.stderr)
+            made.append((out / "outputs" / "case.json").read_text())
+        cases = [file.read_text() for file in (self.scratch / "cache" / "cases").glob("*/outputs/case.json")]
+        self.assertEqual(sorted(cases), sorted(made))
+        self.assertNotEqual(*made)
+
     def test_a_store_that_cannot_be_used_is_one_sentence(self):
         path = self.experiment({"a": "{}"}, cases=1)
         (self.scratch / "cache").mkdir()

@@ -73,7 +73,14 @@ TEST(Yaml, Limits) {
             "1: anchors and aliases (&name, *name) are not read; write the value out");
   EXPECT_EQ(refusal("[1, 2, 3]", {true, 3}), "1: it has more than 3 values");
   EXPECT_EQ(refusal("[1, 2]", {true, 3}), "");
-  EXPECT_EQ(refusal(std::string(101, '[') + std::string(101, ']')), "1: lists and maps are nested more than 100 deep");
+  const auto nested = [](std::size_t levels, const std::string& inner) {
+    return std::string(levels, '[') + inner + std::string(levels, ']');
+  };
+  EXPECT_EQ(refusal(nested(100, "")), "");
+  EXPECT_EQ(refusal(nested(101, "")), "1: lists and maps are nested more than 100 deep");
+  const std::string sixty = "a: &sixty " + nested(60, "") + "\nb: ";  // in a map, which is one level more
+  EXPECT_EQ(refusal(sixty + nested(39, "*sixty")), "");
+  EXPECT_EQ(refusal(sixty + nested(40, "*sixty")), "2: lists and maps are nested more than 100 deep");
   EXPECT_EQ(refusal("a: 1\n---\nb: 2\n"),
             "2: the file goes on after the end of its first document; keep one document a file");
   EXPECT_EQ(refusal("a: \"\\0\"\n"), "1: a text holds the character NUL (\\0); take it out");

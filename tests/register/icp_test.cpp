@@ -123,16 +123,16 @@ TEST(Icp, WarnsWhereItWasStoppedOrHadFewPairs) {
   const marrow::Pose start = bone().start(displacement());
   EXPECT_EQ(run(start, bone().target(), {{"max_iterations", std::int64_t(3)}}).at("pose").as<marrow::Pose>().warnings,
             std::vector<std::string>{"the pairs of points still changed after 3 iterations; raise max_iterations"});
+  const marrow::Mesh part = bone().target(bone().frame.origin_mm.z() - 60);
   const auto warnings =
-      run(bone().start(marrow::Vector6d::Zero()), bone().target(bone().frame.origin_mm.z() - 60), {{"reach_mm", 2.0}})
-          .at("pose")
-          .as<marrow::Pose>()
-          .warnings;
+      run(bone().start(marrow::Vector6d::Zero()), part, {{"reach_mm", 2.0}}).at("pose").as<marrow::Pose>().warnings;
   ASSERT_EQ(warnings.size(), 1u);
   EXPECT_NE(warnings[0].find("of the model's points have one of the target within reach_mm; is the start far off, or "
                              "the target another part?"),
             std::string::npos)
       << warnings[0];
+  const double percent = 100 * surface_area_mm2(part) / surface_area_mm2(bone().target());
+  EXPECT_NEAR(std::stod(warnings[0].substr(std::string("only ").size())), percent, 5);
 }
 
 TEST(Icp, SaysWhatIsWrong) {

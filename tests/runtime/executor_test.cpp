@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <sys/mman.h>
+
 #include <atomic>
 #include <functional>
+#include <utility>
 
 #include "marrow/runtime/run_folder.hpp"
 #include "runtime/fixture.hpp"
@@ -239,7 +242,20 @@ TEST_F(ExecutorTest, IndependentNodesOverlap) {
     apart_s = std::abs(result.nodes[0].start_s - result.nodes[1].start_s);
   }
   EXPECT_LT(apart_s, 0.5);
-  EXPECT_GT(result.nodes[0].peak_memory_mb, 0);
+}
+
+TEST_F(ExecutorTest, TheLargestMemoryWhileANodeRanIsRecorded) {
+  constexpr std::size_t kBytes = 200'000'000;
+  void* held = nullptr;
+  on_event = [&](const RunEvent& event) {
+    if (event.node != "a" || event.kind != RunEvent::Kind::progress) return;
+    if (event.fraction < 0.5 && !held)
+      held = mmap(nullptr, kBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_POPULATE, -1, 0);
+    if (event.fraction > 0.5 && held) munmap(std::exchange(held, nullptr), kBytes);
+  };
+  const RunResult result = run("  a: {uses: test.work, with: {value: 1}}\n  b: {uses: test.add, in: {a: a}}\n", "b: b");
+  EXPECT_GT(result.nodes[1].peak_memory_mb, 0);
+  EXPECT_GT(result.nodes[0].peak_memory_mb, result.nodes[1].peak_memory_mb + 150);
 }
 
 TEST_F(ExecutorTest, CancelStopsWithinANode) {

@@ -21,6 +21,8 @@ nodes:
 outputs: {sum: sum}
 )";
 
+constexpr const char* kInput = "inputs: {amount: {type: number}}\n";
+
 class RepetitionTest : public store_fixture::StoreTest {
  protected:
   RepetitionTest() { scratch.write("sum.yaml", kSum); }
@@ -229,6 +231,17 @@ TEST_F(RepetitionTest, FaultsAreFoundBeforeAnythingRuns) {
   expect("uses: test.letters, repeat: sum.yaml, over: letter", "has both 'uses' and a body");
   expect("repeat: p.yaml, over: letter, in: {l: l}", "repeats itself");
   expect("repeat: sum.yaml, over: letter, in: {item: l}, if_pass_fails: goon", "must be end or go_on");
+}
+
+TEST_F(RepetitionTest, AnInputWithoutAValueIsNoFaultOfTheBody) {
+  std::string body = kSum;
+  body.replace(body.find("value: 1"), 8, "value: $amount").insert(body.find("nodes:"), kInput);
+  scratch.write("sum.yaml", body);
+  std::string outer = std::string("marrow: 1\n") + kInput + "nodes:\n" + kOver + "outputs: {all: r.sum}\n";
+  outer.insert(outer.find("in: {item"), "with: {amount: $amount}, ");
+  marrow::Diagnostics diagnostics;
+  marrow::read_pipeline(scratch.write("p.yaml", outer), {}, store_fixture::test_catalogue(), diagnostics, false);
+  EXPECT_EQ(diagnostics.text(), "") << "checked before it has its data";
 }
 
 TEST_F(RepetitionTest, WhatIsTheSameInAllPassesMustSucceed) {

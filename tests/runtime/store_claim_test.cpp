@@ -69,6 +69,8 @@ TEST_F(StoreTest, NoFileStaysOpen) {
   EXPECT_EQ(open_files(), before) << "claim";
   EXPECT_FALSE(store.find(key));
   EXPECT_EQ(open_files(), before) << "entry";
+  plan("  c: {uses: test.constant}\n", "c: c");
+  EXPECT_EQ(open_files(), before) << "plan";
 }
 
 TEST_F(StoreTest, AKilledProcessGivesItsClaimsBack) {

@@ -2,6 +2,7 @@
 // Entries that are not what their names say, or that no run ever wrote.
 #include "framework/runtime/store_entry.hpp"
 
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include "runtime/fixture.hpp"
@@ -56,6 +57,16 @@ TEST_F(StoreEntryTest, AnEntryUnderAnothersNameIsNotAccepted) {
   EXPECT_FALSE(fs::exists(file_of(other))) << "removed, as a damaged one is";
   ASSERT_TRUE(store.find(key));
   EXPECT_EQ(store.find(key)->outputs[0].as<Metrics>().items[0].value, 1);
+}
+
+TEST_F(StoreEntryTest, WhatIsNoFileIsNoEntryAndIsLeft) {
+  ASSERT_EQ(store.prepare(), "");
+  fs::create_directory(file_of(key).parent_path());
+  ASSERT_EQ(mkfifo(file_of(key).c_str(), 0600), 0);
+  EXPECT_FALSE(store.find(key));
+  EXPECT_TRUE(fs::is_fifo(file_of(key))) << "only a damaged entry is removed";
+  ASSERT_EQ(store.save(key, {number(1)}, {}), "");
+  EXPECT_TRUE(store.find(key));
 }
 
 TEST_F(StoreEntryTest, WhatWasNotMadeIsNotKept) {

@@ -28,6 +28,17 @@ class LineProjector : public marrow::OutlineProjector {
   }
 };
 
+/// The same line, of which every second point faces right.
+class TwoSidedProjector : public LineProjector {
+ public:
+  std::vector<marrow::OutlinePoint> outline(const marrow::Camera& camera, const marrow::RigidTransform& pose,
+                                            double spacing_px) const override {
+    std::vector<marrow::OutlinePoint> points = LineProjector::outline(camera, pose, spacing_px);
+    for (std::size_t i = 0; i < points.size(); i += 2) points[i].normal_u = 1;
+    return points;
+  }
+};
+
 marrow::List<marrow::View> one_view(const cv::Mat& mask = {}) {
   marrow::List<marrow::View> views;
   views.add("lateral", marrow::View{"lateral", {}, shapes::c_arm(0, 200), mask});
@@ -129,6 +140,14 @@ TEST(ContourDistance, EdgesOfTheOtherDirectionDoNotCount) {
   for (const auto& edge : line_at(103, 1).pixels) map.pixels.push_back(edge);
   const auto cost = contour_distance(one_view(), edge_maps(map), fixed_offset());
   EXPECT_NEAR(cost->value(shifted(3)), std::sqrt(10.0) - 1, 1e-5);
+}
+
+TEST(ContourDistance, PointsOfADirectionThatNoEdgeHasPayTheMost) {
+  shipped::Inputs in = inputs(one_view(), edge_maps(line_at(100, -1)));
+  in.at("projector") = marrow::Value::of<marrow::OutlineProjector>(std::make_shared<const TwoSidedProjector>());
+  const marrow::Value cost = shipped::call("similarity.contour_distance", in, fixed_offset()).at("cost");
+  const double worst = std::sqrt(101.0) - 1;
+  EXPECT_NEAR(cost.as<marrow::Cost>().value(shifted(2)), 0.5 * (std::sqrt(5.0) - 1) + 0.5 * worst, 1e-5);
 }
 
 TEST(ContourDistance, OffsetIsGivenOrFound) {

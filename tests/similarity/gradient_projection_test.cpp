@@ -74,6 +74,18 @@ TEST(GradientProjection, IsBestAtTheTruth) {
   EXPECT_NEAR(value(0, -900, 0), 1, 0.2) << "behind one of two sources";
 }
 
+TEST(GradientProjection, ALevelSmoothsTheImagesAsMuchMoreAsItsPixelsAreWider) {
+  const shipped::Inputs in = inputs();
+  const auto cost = [&](double blur_px) {
+    return shipped::call("similarity.gradient_projection", in, {{"blur_px", blur_px}}).at("cost");
+  };
+  const marrow::Value fine = cost(1.5), smooth = cost(4.5);
+  for (const double off_mm : {0.0, 2.0})
+    EXPECT_EQ(fine.as<marrow::Cost>().at_level({1, 8, 3})->value(shifted(off_mm, 0, 0)),
+              smooth.as<marrow::Cost>().value(shifted(off_mm, 0, 0)))
+        << off_mm;
+}
+
 TEST(GradientProjection, WhatLiesBehindTheSourceIsNotSeen) {
   shipped::Inputs in = inputs();
   marrow::List<marrow::View> views;

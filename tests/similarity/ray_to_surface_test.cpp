@@ -21,9 +21,10 @@ double distance_mm(const Eigen::Vector3d& p) {
   return std::clamp(std::min(p.norm() - kRadius_mm, (p - Eigen::Vector3d(8, 18, 20)).norm() - 8), -6.0, 6.0);
 }
 
-marrow::SignedField field() {
+marrow::SignedField field(const Eigen::Vector3d& spacing_mm = {1, 1, 1}) {
   marrow::SignedField field;
   field.grid.size = {60, 70, 76};
+  field.grid.spacing_mm = spacing_mm;
   field.grid.origin_mm = {-28, -26, -28};
   for (int z = 0; z < 76; ++z)
     for (int y = 0; y < 70; ++y)
@@ -148,6 +149,15 @@ TEST(RayToSurface, KnowsItsDerivatives) {
     };
     EXPECT_NEAR(bottom->curvature(k, k), (at(h) - 2 * at(0) + at(-h)) / (h * h), 0.1 * bottom->curvature(k, k)) << k;
   }
+}
+
+TEST(RayToSurface, DerivativesDoNotDependOnTheSizesOfVoxels) {
+  shipped::Inputs longer = inputs();
+  longer.at("field") = shipped::item(field({0.8, 1, 1.25}));
+  const Made cost(inputs()), other(longer);
+  const RigidTransform pose = shifted(0.8, -0.6, 0.7);
+  const auto expected = (*cost).expansion(pose, {}), found = (*other).expansion(pose, {});
+  EXPECT_LT((found->gradient - expected->gradient).tail<3>().norm(), 0.02 * expected->gradient.tail<3>().norm());
 }
 
 TEST(RayToSurface, LevelsUseFewerRays) {
