@@ -30,6 +30,21 @@ Value left_out(const TypeInfo& type) {
   return value;
 }
 
+/// The body with those values of its constant nodes as outputs that it uses. A node that is called makes all its values
+/// at once. A node with a body makes only those that are asked for.
+Pipeline with_constants(Pipeline body, const std::vector<std::string>& constant_nodes) {
+  std::vector<Reference> used;
+  for (const PipelineOutput& output : body.outputs) used.push_back(output.source);
+  for (const PipelineNode& node : body.nodes)
+    for (const Wire& wire : node.wires) used.insert(used.end(), wire.sources.begin(), wire.sources.end());
+  body.outputs.clear();
+  for (const Reference& source : used) {
+    if (source.node < 0 || !contains(constant_nodes, body.nodes[std::size_t(source.node)].id)) continue;
+    body.outputs.push_back({std::to_string(body.outputs.size()), source});
+  }
+  return body;
+}
+
 }  // namespace
 
 /// One run of the body, with what it refers to.
@@ -154,7 +169,8 @@ std::unique_ptr<Passes::Run> Passes::make_run(Pipeline pipeline, const std::stri
 bool Passes::has_next() {
   if (!repetition_.is_loop && pass_ >= names_.size()) return false;
   if (repetition_.at_most && pass_ >= std::size_t(repetition_.at_most)) {
-    record_->end = "there were " + std::to_string(pass_) + " passes, which is the limit";
+    record_->end = pass_ == 1 ? "there was one pass, which is the limit"
+                              : "there were " + std::to_string(pass_) + " passes, which is the limit";
     return false;
   }
   return true;
@@ -195,16 +211,7 @@ void Passes::begin() {
     return finish(Status::failed, error.what());
   }
   if (constant_nodes_.empty()) return go_on();
-  Pipeline pipeline = repetition_.body;
-  pipeline.outputs.clear();
-  for (std::size_t i = 0; i < pipeline.nodes.size(); ++i)
-    if (contains(constant_nodes_, pipeline.nodes[i].id)) {
-      Reference source;
-      source.node = int(i);
-      source.output = 0;
-      pipeline.outputs.push_back({pipeline.nodes[i].id, source});
-    }
-  constants_run_ = make_run(std::move(pipeline), "");
+  constants_run_ = make_run(with_constants(with_outputs(repetition_.body, needed_outputs_), constant_nodes_), "");
   for (std::size_t i = 0; i < call_.inputs.size(); ++i)
     if (!is_sliced_[i]) constants_run_->settings.given[repetition_.given[i].node] = {call_.inputs[i]};
   constants_run_->graph =

@@ -203,6 +203,10 @@ class RepetitionResolver {
     return std::any_of(made_->given.begin(), made_->given.end(), [&](const auto& one) { return one.node == id; });
   }
 
+  bool has_output(const std::string& name) const {
+    return std::any_of(body_->outputs.begin(), body_->outputs.end(), [&](const auto& one) { return one.name == name; });
+  }
+
   void name_ports() {
     const std::size_t inputs = written_.wires.size();
     for (std::size_t i = 0; i < inputs; ++i) {
@@ -222,6 +226,14 @@ class RepetitionResolver {
       if (contains(axes, made_->axis)) {
         diagnostics_.add(written_.place, "output " + in_quotes(output.name) + " of the body is itself a list over " +
                                              in_quotes(made_->axis));
+        return;
+      }
+      if (has_output("last_" + output.name)) {
+        diagnostics_.add(
+            written_.place,
+            "the body has the outputs " + in_quotes(output.name) + " and " + in_quotes("last_" + output.name),
+            in_quotes("last_" + output.name) + " is already the name of the last " + in_quotes(output.name) +
+                "; rename one of them");
         return;
       }
       node_.info.outputs.push_back({output.name, "of each pass", type, true, made_->axis});

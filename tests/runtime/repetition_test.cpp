@@ -186,14 +186,22 @@ TEST_F(RepetitionTest, OnePassCarriesNothing) {
 }
 
 TEST_F(RepetitionTest, OnePassMayHoldALoop) {
+  scratch.write("two.yaml", std::string(kSum).replace(std::string(kSum).find("outputs:"), std::string::npos,
+                                                      "  more: {uses: test.add, in: {a: sum, b: item}}\n"
+                                                      "outputs: {sum: sum, more: more}\n"));
   scratch.write("loop.yaml",
-                "marrow: 1\nnodes:\n  r: {repeat: sum.yaml, at_most: 3, carry: {before: sum}}\n"
-                "outputs: {all: r.sum, last: r.last_sum}\n");
-  const RunResult result = run("  o: {repeat: loop.yaml, at_most: 1}\n", "all: o.last_all, last: o.last_last");
+                "marrow: 1\nnodes:\n  r: {repeat: two.yaml, at_most: 3, carry: {before: sum}}\n"
+                "outputs: {all: r.sum, last: r.last_sum, more: r.more, end: r.last_more}\n");
+  const RunResult result = run("  o: {repeat: loop.yaml, at_most: 1}\n",
+                               "all: o.last_all, last: o.last_last, more: o.last_more, end: o.last_end");
   EXPECT_EQ(messages, "");
   EXPECT_EQ(output(result).axis, "pass");
   EXPECT_EQ(numbers(output(result)), (std::vector<double>{3, 5, 7}));
   EXPECT_EQ(output(result, 1).as<Metrics>().items[0].value, 7);
+  EXPECT_EQ(numbers(output(result, 2)), (std::vector<double>{5, 7, 9}));
+  ASSERT_FALSE(output(result, 3).is_absent()) << "the loop makes all that the pass gives out";
+  EXPECT_EQ(output(result, 3).as<Metrics>().items[0].value, 9);
+  EXPECT_EQ(record(result, "o").passes->end, "there was one pass, which is the limit");
 }
 
 TEST_F(RepetitionTest, OverridesReachIntoTheBody) {
@@ -225,6 +233,11 @@ TEST_F(RepetitionTest, FaultsAreFoundBeforeAnythingRuns) {
   expect("repeat: sum.yaml, over: side, in: {item: l}",
          "'item' of the body is one item, but 'l' is a list over letter");
   expect("repeat: sum.yaml, at_most: 3", "carries nothing from pass to pass");
+  scratch.write("twice.yaml", std::string(kSum).replace(std::string(kSum).find("{sum: sum}"), std::string::npos,
+                                                        "{sum: sum, last_sum: sum}\n"));
+  expect("repeat: twice.yaml, at_most: 3, carry: {before: sum}", "the body has the outputs 'sum' and 'last_sum'");
+  expect("repeat: twice.yaml, at_most: 3, carry: {before: sum}",
+         "'last_sum' is already the name of the last 'sum'; rename one of them");
   expect("repeat: sum.yaml, at_most: 3, carry: {before: sum}, until: sum", "'until' must name one value of type stop");
   expect("repeat: sum.yaml, at_most: 0, carry: {before: sum}", "must be a number of passes from 1 to 1000000");
   expect("repeat: none.yaml, over: letter, in: {item: l}", "none.yaml");
