@@ -173,9 +173,11 @@ Vector6d careful(const Vector6d& step, const Matrix6d& hand_eye, double distance
   return step * std::min(1.0, std::max(distance_mm, astray_mm) / std::max(astray, 1e-9));
 }
 
-Command command_for(const GuideState& state, const RobotReport& report, const robot::HandEye& hand_eye, const Leg& leg,
+Command command_for(const GuideState& state, const RobotReport& report, const Leg& leg,
                     const Eigen::Vector3d& middle_mm, double distance_mm, const Options& options) {
   Command command;
+  const robot::HandEye hand_eye = robot::estimate_hand_eye(
+      options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
   command.hand_eye = hand_eye.covariance;
   command.step = robot::limited_step(leg.error, options);
   if (options.hand_eye == "estimated")
@@ -229,12 +231,10 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
   result.stop = stop_of(state, remaining, not_trusted, report, options);
   Command command;
   if (!result.stop.stops) {
-    const robot::HandEye hand_eye = robot::estimate_hand_eye(
-        options.hand_eye == "estimated" ? state.moves : std::vector<robot::Move>(), state.guess, options);
     constexpr double kBack_mm = 4;  // after bones have touched
     const Leg leg = report.is_pressed ? robot::leg_apart(moved.frame, reference.frame, kBack_mm)
                                       : robot::next_leg(gap, seen, moved.frame, reference.frame, options);
-    command = command_for(state, report, hand_eye, leg, middle_mm, gap.distance_mm(seen), options);
+    command = command_for(state, report, leg, middle_mm, gap.distance_mm(seen), options);
     state.told = command.told;
     result.stop.reason = leg.stage + ": " + result.stop.reason;
   }

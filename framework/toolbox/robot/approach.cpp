@@ -81,6 +81,12 @@ RigidTransform shifted(RigidTransform place, const Eigen::Vector3d& by_mm) {
   return place;
 }
 
+/// Along the shaft of the reference, away from it.
+Eigen::Vector3d away_from(const FragmentFrame& reference, const FragmentFrame& frame) {
+  const Eigen::Vector3d shaft = reference.axes.col(2);
+  return shaft.dot(frame.origin_mm - reference.origin_mm) > 0 ? shaft : Eigen::Vector3d(-shaft);
+}
+
 }  // namespace
 
 Gap::Gap(const Mesh& moved, const SignedField& of_moved, const Mesh& reference, const SignedField& of_reference)
@@ -100,16 +106,6 @@ double Gap::distance_mm(const RigidTransform& reference_from_fragment) const {
   for (const Eigen::Vector3d& point : on_reference_) least = std::min(least, field_at(of_moved_, back * point));
   return least;
 }
-
-namespace {
-
-/// Along the shaft of the reference, away from it.
-Eigen::Vector3d away_from(const FragmentFrame& reference, const FragmentFrame& frame) {
-  const Eigen::Vector3d shaft = reference.axes.col(2);
-  return shaft.dot(frame.origin_mm - reference.origin_mm) > 0 ? shaft : Eigen::Vector3d(-shaft);
-}
-
-}  // namespace
 
 Leg leg_apart(const FragmentFrame& frame, const FragmentFrame& reference, double by_mm) {
   Leg leg{Vector6d::Zero(), "distract"};
@@ -149,16 +145,13 @@ Leg next_leg(const Gap& gap, const RigidTransform& now, const FragmentFrame& fra
   for (double away = kStep_mm; away <= room_mm; away += kStep_mm) {
     const RigidTransform here = shifted(now, away * apart);
     for (double beside = kStep_mm; beside <= options.most_distraction_mm; beside += kStep_mm) {
-      if (!approach.is_free(here, shifted(place, beside * apart))) continue;
-      leg = leg_to(here);
-      leg.stage = "distract";
-      return leg;
+      if (approach.is_free(here, shifted(place, beside * apart))) return leg_apart(frame, reference, away);
     }
   }
   // No way is free by this margin. The fragment is turned where it is farthest apart; the robot feels if bones touch.
-  const bool is_apart = room_mm < kStep_mm;
-  leg = leg_to(is_apart ? shifted(place, options.most_distraction_mm * apart) : shifted(now, room_mm * apart));
-  leg.stage = is_apart ? next : "distract";
+  if (room_mm >= kStep_mm) return leg_apart(frame, reference, room_mm);
+  leg = leg_to(shifted(place, options.most_distraction_mm * apart));
+  leg.stage = next;
   return leg;
 }
 
