@@ -42,3 +42,23 @@ function(marrow_add_plugin name)
     install(TARGETS ${target} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR}/marrow COMPONENT ${plugin_PACKAGE})
   endif()
 endfunction()
+
+# marrow_test_plugin(NAME file.cpp ... NODES node ...)
+#
+# Builds test_NAME, a GoogleTest program, and tells ctest of it and of the checks of each node's kind
+# (`marrow conformance NODE`). The tests call the plugins of this folder by the names of their nodes, see
+# marrow/testing/node.hpp. Call enable_testing() before it.
+function(marrow_test_plugin name)
+  cmake_parse_arguments(PARSE_ARGV 1 test "" "" "NODES")
+  find_package(GTest REQUIRED)
+  add_executable(test_${name} ${test_UNPARSED_ARGUMENTS})
+  target_link_libraries(test_${name} PRIVATE marrow::marrow GTest::gtest_main)
+  target_compile_features(test_${name} PRIVATE cxx_std_20)
+  add_test(NAME ${name} COMMAND test_${name})
+  set(tests ${name})
+  foreach(node ${test_NODES})
+    add_test(NAME conformance_${node} COMMAND marrow::marrow_cli conformance ${node})
+    list(APPEND tests conformance_${node})
+  endforeach()
+  set_tests_properties(${tests} PROPERTIES ENVIRONMENT MARROW_PLUGIN_PATH=${CMAKE_CURRENT_BINARY_DIR})
+endfunction()

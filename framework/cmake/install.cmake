@@ -1,5 +1,32 @@
 # What is installed beside libraries and headers, and the Debian packages that CPack makes (tools/package).
 install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow)
+install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev)
+
+# What `marrow new node` starts from, for each kind that has it: a node of marrow's own, and a test. The program looks
+# for all of this in share/marrow, in the build folder too.
+set(share ${PROJECT_BINARY_DIR}/share/marrow)
+file(MAKE_DIRECTORY ${share})
+foreach(folder pipelines schemas tools/templates)
+  get_filename_component(name ${folder} NAME)
+  file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${share}/${name} SYMBOLIC)
+endforeach()
+file(GLOB templates CONFIGURE_DEPENDS plugins/*/template/template.yaml)
+foreach(template ${templates})
+  get_filename_component(folder ${template} DIRECTORY)
+  get_filename_component(kind_folder ${folder} DIRECTORY)
+  get_filename_component(kind ${kind_folder} NAME)
+  file(STRINGS ${template} source REGEX "^source: ")
+  string(REPLACE "source: " "" source ${source})
+  file(MAKE_DIRECTORY ${share}/nodes/${kind})
+  file(CREATE_LINK ${kind_folder}/${source} ${share}/nodes/${kind}/node.cpp SYMBOLIC)
+  foreach(file template.yaml test.cpp)
+    file(CREATE_LINK ${folder}/${file} ${share}/nodes/${kind}/${file} SYMBOLIC)
+  endforeach()
+  install(FILES ${template} ${folder}/test.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind}
+    COMPONENT marrow-dev)
+  install(FILES ${kind_folder}/${source} DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} RENAME node.cpp
+    COMPONENT marrow-dev)
+endforeach()
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT marrow-doc)
 

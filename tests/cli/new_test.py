@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: Apache-2.0
+"""marrow new: what it makes works as it is, and nothing that was there is lost."""
+import os
+import pathlib
+import subprocess
+
+import yaml
+from marrow_cli import BUILD, SOURCE, Case, main, marrow
+
+KINDS = sorted(path.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/template.yaml"))
+
+
+class New(Case):
+    def new(self, *arguments):
+        return marrow("new", *arguments, cwd=self.scratch)
+
+    def refused(self, *arguments):
+        before = sorted(self.scratch.rglob("*"))
+        result = self.new(*arguments)
+        self.assertEqual(result.returncode, 2, result.stdout)
+        self.assertEqual(sorted(self.scratch.rglob("*")), before)
+        return result.stderr.strip().removeprefix("marrow: error: ")
+
+    def run_in(self, folder, *command, **environment):
+        result = subprocess.run(
+            [*map(str, command)],
+            cwd=folder,
+            env={**os.environ, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        )
+        self.assertEqual(result.returncode, 0, result.stdout)
+        return result.stdout
+
+    def test_every_kind_with_a_suite_has_a_template(self):
+        with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
+        self.assertEqual(KINDS, with_suite)
+
+    def test_nodes_of_all_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):
+        prefix = self.scratch / "installed"
+        self.run_in(self.scratch, "cmake", "--install", BUILD, "--prefix", prefix)
+        program = prefix / "bin" / "marrow"
+        for kind in KINDS:
+            said = self.run_in(self.scratch, program, "new", "node", kind + ".mine")
+            self.assertIn("%s_mine/ci builds it, tests it" % kind, said)
+        self.run_in(self.scratch, program, "new", "kind", "denoised")
+        projects = [kind + "_mine" for kind in KINDS] + ["denoised"]
+        # One project for all, so that the packages are looked for once.
+        lines = ["cmake_minimum_required(VERSION 3.25)", "project(all CXX)", "enable_testing()"]
+        lines += ["add_subdirectory(%s)" % project for project in projects]
+        self.write("CMakeLists.txt", "\n".join(lines))
+        build = self.scratch / "build"
+        self.run_in(self.scratch, "cmake", "-S", ".", "-B", build, "-G", "Ninja", "-DCMAKE_PREFIX_PATH=%s" % prefix)
+        self.run_in(self.scratch, "ninja", "-C", build)
+        said = self.run_in(self.scratch, "ctest", "--test-dir", build, "-j2", "--no-tests=error", "--output-on-failure")
+        self.assertIn("100%% tests passed, 0 tests failed out of %d" % (2 * len(projects)), said)
+        plugins = ":".join(str(build / project) for project in projects)
+        for project in projects:
+            pipeline = self.scratch / project / "pipeline.yaml"
+            self.run_in(self.scratch, program, "check", pipeline, MARROW_PLUGIN_PATH=plugins)
+            self.run_in(
+                self.scratch,
+                program,
+                "compare",
+                pipeline.with_name("compare.yaml"),
+                "--dry-run",
+                MARROW_PLUGIN_PATH=plugins,
+            )
+            about = yaml.safe_load(pipeline.with_name("plugin.yaml").read_text())
+            self.assertEqual(about["name"], project)
+            self.assertTrue(os.access(pipeline.with_name("ci"), os.X_OK))
+        row = self.run_in(
+            self.scratch, program, "compare", "edges_mine/compare.yaml", "--out", "compared", MARROW_PLUGIN_PATH=plugins
+        )
+        self.assertRegex(row, r"\nmine +2 +0 ")
+
+    def test_a_pipeline_and_an_experiment_work_where_they_are_put(self):
+        (self.scratch / "mine").mkdir()
+        self.assertEqual(self.new("pipeline", "simple").returncode, 0)
+        marrow("check", self.scratch / "simple.yaml")
+        for name in ("femur-best", "guidance-closed"):  # one names a failure model, the other a body
+            self.assertEqual(self.new("pipeline", "copy", "--from", name, "--out", "mine/%s.yaml" % name).returncode, 0)
+            result = marrow("check", self.scratch / "mine" / (name + ".yaml"))
+            self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertEqual(self.new("experiment", "try", "--from", "edges").returncode, 0)
+        result = marrow("compare", self.scratch / "try.yaml", "--dry-run")
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+    def test_a_case_says_what_is_still_missing(self):
+        self.assertEqual(self.new("case", "patient").returncode, 0)
+        result = marrow(
+            "run", SOURCE / "pipelines/femur.yaml", "case=%s" % (self.scratch / "patient"), cwd=self.scratch
+        )
+        self.assertEqual(result.returncode, 1)
+        self.assertIn("ct.mha", result.stderr)
+        for name in ("frontal", "lateral"):
+            camera = yaml.safe_load((self.scratch / "patient" / (name + ".camera.yaml")).read_text())
+            self.assertEqual(camera["marrow-camera"], 1)
+
+    def test_names_that_cannot_be(self):
+        self.assertEqual(self.refused("node", "mine"), "new node 'mine': expected KIND.NAME, such as edges.mine")
+        self.assertEqual(
+            self.refused("node", "edges.My-Node"),
+            "new node: the name 'My-Node': a name has small letters, digits and '_', begins with a letter, and is at "
+            "most 60 characters long",
+        )
+        self.assertEqual(
+            self.refused("node", "edges.canny"), "a node 'edges.canny' exists already; choose another name"
+        )
+        self.assertEqual(
+            self.refused("node", "edge.mine"),
+            "no library brings the kind 'edge'; make it by: marrow new kind edge; or did you mean 'edges'?",
+        )
+        self.assertEqual(
+            self.refused("node", "render.mine"),
+            "the kind 'render' has no template, because it has no checks; there are templates of %s. Copy a node of "
+            "this kind, or the example-plugin of the documentation" % ", ".join(KINDS),
+        )
+        self.assertEqual(
+            self.refused("kind", "edges"), "a kind 'edges' exists already; a node of it: marrow new node edges.mine"
+        )
+        self.assertEqual(
+            self.refused("case", "a/b"), "new case 'a/b': expected the name of a folder; its place is given with --out"
+        )
+        self.assertEqual(
+            self.refused("pipeline", "mine", "--from", "femr"),
+            "--from 'femr': neither a file here nor one of marrow's own; did you mean 'femur'?",
+        )
+
+    def test_what_is_there_stays(self):
+        for what, name, place in (
+            ("node", "edges.mine", "edges_mine"),
+            ("kind", "denoised", "denoised"),
+            ("case", "patient", "patient"),
+            ("pipeline", "mine", "mine.yaml"),
+            ("experiment", "mine", "mine.yaml"),
+        ):
+            path = self.write(place, "precious")
+            said = self.refused(what, name)
+            self.assertEqual(
+                said, place + ": it exists already, and nothing was written; name another place with --out"
+            )
+            self.assertEqual(path.read_text(), "precious")
+        self.assertIn(
+            "nowhere: there is no such folder; make it first",
+            self.refused("pipeline", "mine", "--out", "nowhere/mine.yaml"),
+        )
+
+    def test_an_installation_without_templates(self):
+        program = self.scratch / "bin" / "marrow"
+        program.parent.mkdir()
+        program.write_bytes((BUILD / "bin/marrow").read_bytes())
+        program.chmod(0o755)
+        library = pathlib.Path(BUILD) / "lib"
+        result = subprocess.run(
+            [program, "new", "case", "x"],
+            cwd=self.scratch,
+            capture_output=True,
+            text=True,
+            env={**os.environ, "LD_LIBRARY_PATH": str(library)},
+        )
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(
+            "share/marrow/templates/case: it is not there, so this installation is not whole; install marrow " "again",
+            result.stderr,
+        )
+
+
+if __name__ == "__main__":
+    main()

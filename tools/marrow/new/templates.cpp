@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "templates.hpp"
+
+#include <algorithm>
+#include <regex>
+
+#include "marrow/domain/error.hpp"
+#include "marrow/domain/printable.hpp"
+#include "marrow/toolbox/files/atomic_write.hpp"
+#include "runtime/text_file.hpp"
+
+namespace fs = std::filesystem;
+
+namespace marrow::cli {
+
+fs::path shared_files(const fs::path& below) {
+  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share/marrow" / below;
+  if (!fs::exists(folder))
+    throw Error(printable(folder.string()) +
+                ": it is not there, so this installation is not whole; install marrow again");
+  return folder;
+}
+
+std::string replaced(std::string text, const Replacements& replacements) {
+  std::vector<std::pair<std::string, std::string>> longest_first(replacements.begin(), replacements.end());
+  std::stable_sort(longest_first.begin(), longest_first.end(),
+                   [](const auto& a, const auto& b) { return a.first.size() > b.first.size(); });
+  for (const auto& [key, value] : longest_first)
+    for (std::size_t at = text.find(key); at != std::string::npos; at = text.find(key, at + value.size()))
+      text.replace(at, key.size(), value);
+  return text;
+}
+
+Files filled_templates(const fs::path& folder, const Replacements& replacements) {
+  Files files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const fs::path name = entry.path().filename();
+    files[name == "gitignore" ? fs::path(".gitignore") : name] =
+        replaced(read_text_file(entry.path(), kMostSourceBytes), replacements);
+  }
+  return files;
+}
+
+void write_project(const fs::path& folder, const Files& files) {
+  if (fs::exists(fs::symlink_status(folder)))
+    throw Error(printable(folder.string()) +
+                ": it exists already, and nothing was written; name another place with --out");
+  files::write_atomically(fs::absolute(folder), [&](const fs::path& unfinished) {
+    fs::create_directories(unfinished);
+    for (const auto& [name, text] : files) {
+      write_text_file(unfinished / name, text);
+      fs::permissions(unfinished / name, fs::perms(name == "ci" ? 0755 : 0644) & ~fs::perms::others_write,
+                      fs::perm_options::replace);
+    }
+  });
+}
+
+std::string moved_text(const fs::path& from, const fs::path& folder) {
+  const std::string text = read_text_file(from, kMostSourceBytes);
+  const fs::path old_folder = fs::absolute(from).parent_path();
+  static const std::regex kPath(R"([A-Za-z0-9_.\-]+(/[A-Za-z0-9_.\-]+)+|[A-Za-z0-9_\-]+\.yaml)");
+  std::string result;
+  auto end = text.cbegin();
+  for (std::sregex_iterator match(text.begin(), text.end(), kPath), none; match != none; ++match) {
+    result.append(end, text.cbegin() + match->position());
+    const fs::path there = old_folder / match->str();
+    result += fs::exists(there) ? fs::relative(there, folder).string() : match->str();
+    end = text.cbegin() + match->position() + match->length();
+  }
+  return result.append(end, text.cend());
+}
+
+void expect_name(const std::string& name, const std::string& what) {
+  static const std::regex kName("[a-z][a-z0-9_]*");
+  if (name.size() > 60 || !std::regex_match(name, kName))
+    throw Error(what + " '" + printable(name) +
+                "': a name has small letters, digits and '_', begins with a letter, and is "
+                "at most 60 characters long");
+}
+
+}  // namespace marrow::cli
