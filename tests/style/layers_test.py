@@ -12,6 +12,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*["<]([^">]+)[">]', re.M)
 LAYERS = {
     "domain": {"domain"},
     "runtime": {"domain", "runtime"},
+    "testing": {"domain", "runtime"},
     "compare": {"domain", "runtime", "compare"},
     "toolbox": {"domain", "runtime"},
     "plugins": {"domain", "runtime", "toolbox"},
@@ -30,6 +31,8 @@ TOPICS = {
 def folder_of(path):
     """(layer, topic or kind) of a file, given by its path from the source folder."""
     parts = path.parts
+    if {"template", "templates"} & set(parts):  # what a new node or kind begins with
+        return ("tests", "")
     if parts[:3] == ("framework", "include", "marrow"):
         parts = ("framework",) + (parts[3:] if len(parts) > 4 else ("runtime",))
     if parts[0] == "framework":
