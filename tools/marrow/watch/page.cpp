@@ -23,7 +23,10 @@ constexpr const char* kPage = R"(<!DOCTYPE html>
     white-space: pre-wrap; font: 12px ui-monospace, monospace; }
   #fault:empty { display: none; }
   iframe { flex: 1; border: 0; width: 100%; }
-  @media (prefers-color-scheme: dark) { #bar { background: #1d2730; color: #dde; } #fault { background: #3b1512; color: #f5b5ae; } }
+  @media (prefers-color-scheme: dark) {
+    #bar { background: #1d2730; color: #dde; }
+    #fault { background: #3b1512; color: #f5b5ae; }
+  }
 </style>
 <div id="bar" role="status">waiting for the first result</div>
 <pre id="fault" role="alert"></pre>
@@ -32,7 +35,9 @@ constexpr const char* kPage = R"(<!DOCTYPE html>
   const title = TITLE, frame = document.querySelector('iframe'), bar = document.querySelector('#bar');
   let shown = '', seen = '', place = 0;
   document.title = title;
-  frame.addEventListener('load', () => { try { frame.contentWindow.scrollTo(0, place); } catch (e) { /* other origin */ } });
+  frame.addEventListener('load', () => {
+    try { frame.contentWindow.scrollTo(0, place); } catch (e) { /* the browser keeps the files apart */ }
+  });
   function marrowState(state) {
     if (JSON.stringify(state) === seen) return;
     seen = JSON.stringify(state);
