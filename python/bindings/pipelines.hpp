@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+#include <pybind11/pybind11.h>
+
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/catalogue.hpp"
+#include "marrow/runtime/pipeline.hpp"
+
+namespace marrow::python {
+
+namespace py = pybind11;
+
+/// The catalogue of the folders that are searched now. It is made once; and again after MARROW_PLUGIN_PATH changed or
+/// after forget_catalogue().
+std::shared_ptr<const Catalogue> catalogue();
+void forget_catalogue();
+
+/// A pipeline that was read, with all that a run of it needs.
+struct ReadPipeline {
+  std::shared_ptr<const Catalogue> known;
+  Pipeline pipeline;
+  PipelineArguments arguments;
+  std::map<std::string, std::vector<Value>> given;  ///< outputs of nodes that are not called
+};
+
+/// A list of dictionaries, in the order of the file: file, line, column, message, hint, node, port, option. What is not
+/// known is None.
+py::list list_of(const Diagnostics& diagnostics);
+
+void bind_catalogue(py::module_& module);
+void bind_pipelines(py::module_& module);
+void bind_runs(py::module_& module);
+
+}  // namespace marrow::python

@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+"""marrow finds the 3D pose of bones in X-ray images, by pipelines of plugins described in YAML.
+
+p = marrow.Pipeline("pipelines/femur.yaml", case="cases/7")
+r = p.run(progress=True)
+r["pose"]["distal"].matrix
+
+Each node of a plugin is also a function: marrow.edges.canny(view, high=5).
+"""
+from . import nodes as _nodes
+from ._core import (
+    Camera,
+    Case,
+    EdgeMap,
+    Image,
+    Landmarks,
+    Landscape,
+    Mesh,
+    Metrics,
+    OtherValue,
+    Picture,
+    Pose,
+    Profile,
+    Scene,
+    Seeds,
+    ShaftLines,
+    SignedField,
+    Stop,
+    Truth,
+    Verdict,
+    View,
+    Volume,
+)
+from ._core import forget_catalogue as find_plugins_again
+from .errors import Error, Fault, PipelineError, RunError
+from .items import Items
+from .nodes import Kind, Node, node
+from .pipeline import Pipeline
+from .result import NodeReport, Result
+
+__all__ = [name for name in dir() if not name.startswith("_")]
+
+
+def __getattr__(name):
+    return getattr(_nodes, name)
+
+
+def __dir__():
+    return sorted(set(__all__) | set(dir(_nodes)))

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a run made."""
+import dataclasses
+import pathlib
+from collections.abc import Mapping
+from typing import Any, Dict, Iterator, List, Optional
+
+from .errors import Fault, RunError
+
+__all__ = ["NodeReport", "Result"]
+
+
+@dataclasses.dataclass(frozen=True)
+class NodeReport:
+    """What happened to one node in a run."""
+
+    name: str
+    uses: str
+    status: str
+    reason: str
+    seconds: float
+    calls: int
+    cached: int
+    peak_memory_mb: float
+
+
+class Result(Mapping):
+    """The outputs of a run by name: result["pose"]["distal"].matrix. An output that was not made is None."""
+
+    def __init__(self, run: Any) -> None:
+        self._run = run
+        self._names: List[str] = run.outputs
+        self._values: Dict[str, Any] = {}
+
+    def __getitem__(self, name: str) -> Any:
+        if name not in self._names:
+            raise KeyError("no output %r; there are %s" % (name, ", ".join(self._names)))
+        if name not in self._values:
+            self._values[name] = self._run.output(name)
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
+
+    @property
+    def nodes(self) -> Dict[str, NodeReport]:
+        """What happened to each node, by its name."""
+        fields = [field.name for field in dataclasses.fields(NodeReport)]
+        return {node["name"]: NodeReport(**{name: node[name] for name in fields}) for node in self._run.nodes}
+
+    @property
+    def seconds(self) -> float:
+        """The time of the run."""
+        return self._run.seconds
+
+    @property
+    def warnings(self) -> List[str]:
+        """The nodes' warnings, each with the node that gave it."""
+        return [where + ": " + text if where else text for where, text in self._run.warnings]
+
+    @property
+    def folder(self) -> Optional[pathlib.Path]:
+        """The folder that was written; None without `folder=`."""
+        return pathlib.Path(self._run.folder) if self._run.folder else None
+
+    @property
+    def files(self) -> Dict[str, List[pathlib.Path]]:
+        """The files of each output in the folder; empty without `folder=`."""
+        return {name: [self.folder / file for file in files] for name, files, _, _ in self._run.written}
+
+    def __repr__(self) -> str:
+        return "<marrow.Result of %.3f s: %s>" % (self.seconds, ", ".join(self._names))
+
+
+def checked(result: Result) -> Result:
+    """The result. Raises RunError if a node failed or an output was not written."""
+    run = result._run
+    faults = [
+        Fault(
+            node["reason"],
+            file=node["file"] or None,
+            line=node["line"] or None,
+            column=node["column"] or None,
+            node=node["name"],
+        )
+        for node in run.nodes
+        if node["is_failed"]
+    ]
+    texts = ["node '%s' (%s) failed: %s" % (n["name"], n["uses"], n["reason"]) for n in run.nodes if n["is_failed"]]
+    for name, _, fault, _ in run.written:
+        if fault and not faults:
+            faults.append(Fault(fault))
+            texts.append("output '%s': %s" % (name, fault))
+    if faults:
+        raise RunError("\n".join(texts), faults, result)
+    return result
