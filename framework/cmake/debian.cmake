@@ -1,5 +1,5 @@
 # Debian packages by CPack: marrow (program, plugins, pipelines), marrow-dev (headers, toolbox, CMake package),
-# marrow-cgal (the one node under the GPL), marrow-doc. A package is a component of the installation.
+# marrow-cgal (the one node under the GPL), marrow-doc, python3-marrow. A package is a component of the installation.
 set(MARROW_MAINTAINER "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
 if(NOT DEFINED ENV{DEBEMAIL})
   set(MARROW_MAINTAINER "The marrow developers <marrow@marrow.invalid>")
@@ -14,6 +14,9 @@ set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXE
   WORLD_READ WORLD_EXECUTE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_COMPONENTS_ALL marrow marrow-dev marrow-cgal marrow-doc)
+if(MARROW_PYTHON)
+  list(APPEND CPACK_COMPONENTS_ALL python3-marrow)
+endif()
 set(CPACK_PRE_BUILD_SCRIPTS ${CMAKE_CURRENT_LIST_DIR}/describe_packages.cmake)
 set(CPACK_MARROW_LIBRARIES ${CMAKE_INSTALL_LIBDIR})
 
@@ -70,6 +73,15 @@ node is not in the package marrow, which is under the Apache License.")
 marrow_debian_package(marrow-doc doc "documentation of marrow"
 "How pipelines, plugins, comparisons, cases and repetition work, the method, and
 what was measured.")
+
+if(MARROW_PYTHON)
+  marrow_debian_package(python3-marrow python "finds the 3D pose of bones in X-ray images (Python 3)"
+"The Python package of marrow: pipelines are run, and nodes are called, from
+Python. Volumes, images and surfaces are numpy arrays.")
+  set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION}), ${MARROW_PYTHON_DEPENDS}")
+  set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_SUGGESTS "python3-pandas, jupyter-notebook")
+endif()
 
 set(CPACK_DEBIAN_MARROW_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_GENERATE_SHLIBS ON)

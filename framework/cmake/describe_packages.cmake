@@ -5,7 +5,8 @@ set(MARROW_ROOT ${packages}/marrow/usr)
 set(MARROW_LIBRARIES ${CPACK_MARROW_LIBRARIES})
 set(plugins ${MARROW_LIBRARIES}/marrow)
 file(GLOB programs ${MARROW_ROOT}/bin/marrow ${MARROW_ROOT}/${MARROW_LIBRARIES}/libmarrow*.so.*.*.*
-  ${MARROW_ROOT}/${plugins}/marrow-worker ${packages}/*/usr/${plugins}/*.so)
+  ${MARROW_ROOT}/${plugins}/marrow-worker ${packages}/*/usr/${plugins}/*.so
+  ${packages}/*/usr/lib/python3/dist-packages/marrow/*.so)
 foreach(program IN LISTS programs)
   file(RPATH_REMOVE FILE ${program})  # the system's folders are searched anyway
 endforeach()

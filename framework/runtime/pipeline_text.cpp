@@ -136,7 +136,7 @@ class PipelineReader {
       pipeline_.missing_inputs.push_back(input.key);
       if (inputs_required_)
         yaml_.fault(input.place, "input " + in_quotes(input.key) + " has no value",
-                    "give it on the command line as  " + input.key + "=VALUE");
+                    "give it as  " + input.key + "=VALUE");
       return;
     }
     const auto no_names = [](const std::string& text, const Place&) { return std::optional(text); };

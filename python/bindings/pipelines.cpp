@@ -4,8 +4,8 @@
 #include <pybind11/stl.h>
 
 #include "marrow/domain/error.hpp"
-#include "runtime/one_node.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "runtime/one_node.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -26,7 +26,10 @@ py::tuple read(const std::string& file, const Texts& inputs, const Texts& change
   // A place that names the call. It has no slash, so relative paths start at the working folder.
   for (const auto& [key, value] : changes) made->arguments.overrides.push_back({key, value, {"set(" + key + ")"}});
   Diagnostics diagnostics;
-  made->pipeline = read_pipeline(file, made->arguments, *made->known, diagnostics, inputs_required);
+  {
+    const py::gil_scoped_release release;
+    made->pipeline = read_pipeline(file, made->arguments, *made->known, diagnostics, inputs_required);
+  }
   return with_faults(std::move(made), diagnostics);
 }
 

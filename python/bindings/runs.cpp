@@ -23,6 +23,7 @@ struct Run {
   std::vector<std::pair<std::string, std::string>> warnings;  ///< the node with its item, and the text
   std::string folder;                                         ///< empty if nothing was written
   std::vector<RunFolder::Written> written;
+  RunSettings settings;  ///< without what was only for the run itself
 };
 
 struct RunOptions {
@@ -69,9 +70,10 @@ class Observer {
   std::optional<py::error_already_set> fault_;
 };
 
-void write_folder(Run& run, const RunSettings& settings, const Catalogue& known, RunFolder& folder) {
+void write_folder(Run& run, RunFolder& folder) {
+  const Catalogue& known = *run.read->known;
   run.written = folder.write_outputs(run.read->pipeline, run.result, known);
-  folder.write_record(run.read->pipeline, run.result, settings, known, run.read->arguments, run.written);
+  folder.write_record(run.read->pipeline, run.result, run.settings, known, run.read->arguments, run.written);
   run.folder = fs::absolute(folder.path()).string();
 }
 
@@ -104,7 +106,9 @@ void run_into(Run& run, const RunOptions& options, RunSettings& settings) {
       run.warnings.emplace_back("", "results are not kept: " + fault);
   }
   run.result = run_pipeline(run.read->pipeline, known, settings);
-  if (folder) write_folder(run, settings, known, *folder);
+  run.settings.seed = settings.seed;
+  run.settings.threads = settings.threads;
+  if (folder) write_folder(run, *folder);
   if (settings.store)
     if (const std::string untidy = settings.store->tidy(); !untidy.empty())
       run.warnings.emplace_back("", "the store of results is not tidied up: " + untidy);
@@ -128,6 +132,12 @@ std::shared_ptr<Run> run(const std::shared_ptr<ReadPipeline>& read, const py::ob
   do_interruptibly(cancelled, [&] { run_into(*made, options, settings); });
   observer.rethrow();
   return made;
+}
+
+void write(Run& self, const std::string& folder) {
+  const py::gil_scoped_release release;
+  RunFolder made(folder, self.read->pipeline);
+  write_folder(self, made);
 }
 
 py::object output_of(const Run& self, const std::string& name) {
@@ -172,6 +182,7 @@ py::list written_of(const Run& self) {
 void bind_runs(py::module_& module) {
   py::class_<Run, std::shared_ptr<Run>>(module, "Run")
       .def("output", &output_of)
+      .def("write", &write)
       .def_property_readonly("outputs",
                              [](const Run& self) {
                                std::vector<std::string> names;

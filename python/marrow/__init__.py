@@ -7,6 +7,7 @@ r["pose"]["distal"].matrix
 
 Each node of a plugin is also a function: marrow.edges.canny(view, high=5).
 """
+from . import display as _display
 from . import nodes as _nodes
 from ._core import (
     Camera,
@@ -32,11 +33,14 @@ from ._core import (
     Volume,
 )
 from ._core import forget_catalogue as find_plugins_again
+from .comparison import Comparison, compare
 from .errors import Error, Fault, PipelineError, RunError
 from .items import Items
 from .nodes import Kind, Node, node
+from .pages import show
 from .pipeline import Pipeline
 from .result import NodeReport, Result
+from .tables import Table
 
 __all__ = [name for name in dir() if not name.startswith("_")]
 

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run made."""
 import dataclasses
+import os
 import pathlib
 from collections.abc import Mapping
-from typing import Any, Dict, Iterator, List, Optional
+from typing import Any, Dict, Iterator, List, Optional, Union
 
 from .errors import Fault, RunError
 
@@ -70,6 +71,16 @@ class Result(Mapping):
     def files(self) -> Dict[str, List[pathlib.Path]]:
         """The files of each output in the folder; empty without `folder=`."""
         return {name: [self.folder / file for file in files] for name, files, _, _ in self._run.written}
+
+    def write(self, folder: Union[str, "os.PathLike[str]"]) -> "Result":
+        """Writes the folder that `marrow run` would write: new or empty. Returns the result."""
+        self._run.write(os.fspath(folder))
+        return self
+
+    def _repr_html_(self) -> str:
+        from .display import result_html
+
+        return result_html(self)
 
     def __repr__(self) -> str:
         return "<marrow.Result of %.3f s: %s>" % (self.seconds, ", ".join(self._names))

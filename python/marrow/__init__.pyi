@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+from ._core import Camera as Camera
+from ._core import Case as Case
+from ._core import EdgeMap as EdgeMap
+from ._core import Image as Image
+from ._core import Landmarks as Landmarks
+from ._core import Landscape as Landscape
+from ._core import Mesh as Mesh
+from ._core import Metrics as Metrics
+from ._core import OtherValue as OtherValue
+from ._core import Picture as Picture
+from ._core import Pose as Pose
+from ._core import Profile as Profile
+from ._core import Scene as Scene
+from ._core import Seeds as Seeds
+from ._core import ShaftLines as ShaftLines
+from ._core import SignedField as SignedField
+from ._core import Stop as Stop
+from ._core import Truth as Truth
+from ._core import Verdict as Verdict
+from ._core import View as View
+from ._core import Volume as Volume
+from ._core import forget_catalogue as find_plugins_again
+from .comparison import Comparison as Comparison
+from .comparison import compare as compare
+from .errors import Error as Error
+from .errors import Fault as Fault
+from .errors import PipelineError as PipelineError
+from .errors import RunError as RunError
+from .items import Items as Items
+from .nodes import *
+from .pages import show as show
+from .pipeline import Pipeline as Pipeline
+from .result import NodeReport as NodeReport
+from .result import Result as Result
+from .tables import Table as Table

@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Values as numpy arrays: without a copy, longer alive than their owner, never changed; and arrays as values."""
+import gc
+
+import numpy
+from package import FEMUR, Case, main, marrow, small_case
+
+
+def address(array):
+    return array.__array_interface__["data"][0]
+
+
+class Arrays(Case):
+    def test_no_copy(self):
+        _, case = small_case()
+        mesh = marrow.mesh.marching_cubes(field_of_a_ball(20))
+        edges = marrow.edges.canny(case.views["frontal"])
+        owners = [
+            (case.ct, "array"),
+            (case.views["frontal"].image, "array"),
+            (mesh, "vertices_mm"),
+            (mesh, "triangles"),
+            (edges, "pixels"),
+        ]
+        for owner, name in owners:
+            one, other = getattr(owner, name), getattr(owner, name)
+            self.assertEqual(address(one), address(other), name)
+            self.assertGreater(one.size, 100)
+            self.assertFalse(one.flags.owndata)
+        self.assertEqual(address(numpy.asarray(case.ct)), address(case.ct.array))
+        self.assertEqual(
+            address(numpy.asarray(case.views["frontal"].image)), address(case.views["frontal"].image.array)
+        )
+        self.assertEqual(address(case.views["frontal"].image.array), address(case.views["frontal"].image.array[0]))
+
+    def test_arrays_outlive_their_owner(self):
+        folder, _ = small_case()
+        result = marrow.Pipeline(FEMUR, case=folder).run(only=["model", "edges"])
+        mesh = result["model"]["distal"]
+        arrays = [mesh.vertices_mm, mesh.triangles, result["edges"]["lateral"].pixels]
+        case = marrow.read.case(path=folder)
+        case = getattr(case, "case", case)
+        arrays.append(numpy.asarray(case.ct))
+        copies = [array.copy() for array in arrays]
+        del result, mesh, case
+        gc.collect()
+        rubbish = [numpy.full(array.shape, 7, array.dtype) for array in arrays for _ in range(3)]
+        for array, copy in zip(arrays, copies):
+            self.assertTrue(numpy.array_equal(array, copy))
+        del rubbish
+
+    def test_nobody_changes_a_value(self):
+        _, case = small_case()
+        for array in (case.ct.array, case.views["frontal"].image.array, numpy.asarray(case.ct)):
+            with self.assertRaisesRegex(ValueError, "read-only"):
+                array[0] = 0
+        with self.assertRaises(AttributeError):
+            case.views["frontal"].name = "other"
+
+    def test_a_volume_of_an_array(self):
+        samples = numpy.arange(24, dtype="int16").reshape(2, 3, 4)
+        volume = marrow.Volume(samples, spacing_mm=(1, 2, 3), origin_mm=(10, 20, 30))
+        self.assertEqual((volume.size, volume.spacing_mm, volume.origin_mm), ((4, 3, 2), (1, 2, 3), (10, 20, 30)))
+        self.assertTrue(numpy.array_equal(volume.array, samples))
+        samples[:] = 0
+        self.assertEqual(volume.array[1, 2, 3], 23)  # a copy
+        self.assertTrue(numpy.array_equal(marrow.Volume(samples.T, spacing_mm=[1, 1, 1]).array, samples.T))
+        for arguments, text in (
+            ((numpy.zeros((2, 2)), (1, 1, 1)), "Volume: expected an array of 3 axes, z, y and x, got 2 x 2"),
+            ((numpy.zeros((2, 2, 2)), (1, 1)), "spacing_mm: expected 3 numbers, got 2"),
+            ((numpy.zeros((2, 2, 2)), (1, 1, 0)), "spacing"),
+            ((numpy.full((2, 2, 2), numpy.nan), (1, 1, 1)), "Volume"),
+            (("air", (1, 1, 1)), "Volume: expected numbers, got str"),
+        ):
+            with self.assertRaisesRegex(marrow.Error, text):
+                marrow.Volume(arguments[0], spacing_mm=arguments[1])
+
+    def test_images_and_views_of_arrays(self):
+        for kind in ("uint8", "uint16", "float32"):
+            pixels = numpy.arange(12).reshape(3, 4).astype(kind)
+            image = marrow.Image(pixels[:, ::-1])
+            self.assertEqual((image.width, image.height, image.array.dtype), (4, 3, kind))
+            self.assertTrue(numpy.array_equal(image.array, pixels[:, ::-1]))
+        self.assertEqual(marrow.Image(numpy.zeros((2, 2))).array.dtype, "float32")
+        with self.assertRaisesRegex(marrow.Error, r"got int64; convert them with array.astype\(...\)"):
+            marrow.Image(numpy.zeros((2, 2), "int64"))
+        with self.assertRaisesRegex(marrow.Error, "expected an array of 2 axes, rows and columns, got 2 x 2 x 3"):
+            marrow.Image(numpy.zeros((2, 2, 3), "uint8"))
+        camera = marrow.Camera(4, 3, [[1000, 0, 2], [0, 1000, 1.5], [0, 0, 1]], numpy.eye(4))
+        view = marrow.View(pixels, camera, mask=pixels > 3, name="frontal")
+        self.assertEqual((view.name, view.image.width, int(view.mask.sum())), ("frontal", 4, 8))
+        with self.assertRaisesRegex(marrow.Error, "5 x 3"):
+            marrow.View(numpy.zeros((3, 5), "uint8"), camera)
+
+    def test_poses_and_meshes_of_arrays(self):
+        matrix = numpy.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1]], float)
+        self.assertTrue(numpy.array_equal(marrow.Pose(matrix).matrix, matrix))
+        for wrong, text in (
+            (2 * numpy.eye(4), "last row"),
+            (numpy.diag([2, 1, 1, 1]), "Pose"),
+            (numpy.eye(3), "Pose: expected 4 x 4 numbers, got 3 x 3"),
+        ):
+            with self.assertRaisesRegex(marrow.Error, text):
+                marrow.Pose(wrong)
+        corners = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
+        mesh = marrow.Mesh(corners, [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+        self.assertEqual((mesh.vertices_mm.tolist(), mesh.triangles[3].tolist()), (corners, [1, 2, 3]))
+        with self.assertRaisesRegex(marrow.Error, "Mesh"):
+            marrow.Mesh(corners, [[0, 1, 4]])
+        with self.assertRaisesRegex(marrow.Error, "triangles: expected indices of vertices, got 0.5"):
+            marrow.Mesh(corners, [[0, 1, 0.5]])
+
+
+def field_of_a_ball(radius_mm):
+    z, y, x = numpy.mgrid[-30:31, -30:31, -30:31]
+    return marrow.SignedField(numpy.sqrt(x**2 + y**2 + z**2) - radius_mm, spacing_mm=(1, 1, 1))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Errors in Python: all faults at once, each with its place, its node and what to do."""
+from package import FEMUR, Case, main, marrow, small_case
+
+FAULTY = """marrow: 1
+nodes:
+  a: {uses: test.constant, with: {valu: 1}}
+  b:
+    uses: test.add
+    in: {a: a, b: c}
+  d: {uses: test.constant, with: {count: -1}}
+outputs: {sum: b}
+"""
+FAILING = """marrow: 1
+nodes:
+  a: {uses: test.constant, with: {value: 5}}
+  b: {uses: test.fail_above, in: {a: a}, with: {value: 1}}
+  c: {uses: test.add, in: {a: a, b: a}}
+outputs: {failed: b, sum: c}
+"""
+
+
+class Errors(Case):
+    def test_all_faults_come_at_once_with_their_places(self):
+        file = self.write("faulty.yaml", FAULTY)
+        with self.assertRaises(marrow.PipelineError) as caught:
+            marrow.Pipeline(file)
+        error = caught.exception
+        places = [(fault.line, fault.column, fault.node, fault.port, fault.option) for fault in error.faults]
+        self.assertEqual(places, [(3, 35, "a", None, "valu"), (6, 16, "b", "b", None), (7, 35, "d", None, "count")])
+        self.assertEqual(error.faults[0].message, "'test.constant' has no option 'valu'")
+        self.assertEqual(error.faults[0].hint, "did you mean 'value'?")
+        self.assertEqual(error.faults[1].message, "there is no node 'c'")
+        self.assertIn("-1 is below the least allowed, 0", error.faults[2].message)
+        self.assertEqual((error.file, error.line, error.column), (str(file), 3, 35))
+        self.assertEqual((error.node, error.option, error.hint), ("a", "valu", "did you mean 'value'?"))
+        self.assertIn("%s:3:35: error: 'test.constant' has no option 'valu'" % file, str(error))
+        self.assertIn("\n  hint: did you mean 'value'?", str(error))
+
+    def test_a_file_that_is_not_there_or_no_yaml(self):
+        with self.assertRaisesRegex(marrow.PipelineError, "nowhere.yaml"):
+            marrow.Pipeline(self.scratch / "nowhere.yaml")
+        with self.assertRaises(marrow.PipelineError) as caught:
+            marrow.Pipeline(self.write("open.yaml", "marrow: 1\nnodes: {a: [\n"))
+        self.assertEqual(caught.exception.line, 2)
+        self.assertIsNone(caught.exception.node)
+
+    def test_inputs(self):
+        with self.assertRaises(marrow.PipelineError) as caught:
+            marrow.Pipeline(FEMUR)
+        self.assertEqual(caught.exception.faults[0].message, "input 'case' has no value")
+        self.assertEqual(caught.exception.hint, "give it as  case=VALUE")
+        with self.assertRaisesRegex(
+            marrow.PipelineError, "the pipeline has no input 'cas'\n  hint: did you mean 'case'?"
+        ):
+            marrow.Pipeline(FEMUR, case=".", cas=".")
+        with self.assertRaisesRegex(
+            marrow.Error, "case: expected a bool, number, text, path, or a list of these, got 'dict'"
+        ):
+            marrow.Pipeline(FEMUR, case={})
+
+    def test_a_wrong_change_changes_nothing(self):
+        pipeline = marrow.Pipeline(FEMUR, case=".")
+        before = pipeline.resolved()
+        with self.assertRaises(marrow.PipelineError) as caught:
+            pipeline.set("edges.hihg", 80)
+        self.assertEqual(caught.exception.file, "set(edges.hihg)")
+        self.assertEqual((caught.exception.node, caught.exception.option), ("edges", "hihg"))
+        self.assertEqual(caught.exception.hint, "did you mean 'high'?")
+        with self.assertRaisesRegex(marrow.PipelineError, "expected a number, got 'much'"):
+            pipeline.set("edges.high", "much")
+        with self.assertRaisesRegex(marrow.PipelineError, "there is no node 'cas'") as caught:
+            pipeline.set("edges.in.view", "cas.views")
+        self.assertEqual((caught.exception.node, caught.exception.port), ("edges", "view"))
+        self.assertEqual(pipeline.resolved(), before)
+
+    def test_changes_that_must_fit_each_other_are_made_together(self):
+        pipeline = marrow.Pipeline(FEMUR, case=".")
+        with self.assertRaisesRegex(marrow.PipelineError, "low"):
+            pipeline.set("edges.low", 90)
+        pipeline.set({"edges.low": 90, "edges.high": 95})
+        self.assertIn("low: 90", pipeline.resolved())
+
+    def test_a_node_that_fails(self):
+        pipeline = marrow.Pipeline(self.write("failing.yaml", FAILING))
+        with self.assertRaises(marrow.RunError) as caught:
+            pipeline.run()
+        error = caught.exception
+        self.assertEqual((error.node, error.line, error.column), ("b", 4, 3))
+        self.assertRegex(str(error), r"^node 'b' \(test.fail_above\) failed: ")
+        self.assertEqual(error.result.nodes["c"].status, "done")
+        self.assertIsNone(error.result["failed"])
+        self.assertIsNotNone(error.result["sum"])
+
+    def test_wrong_names_and_settings(self):
+        folder, _ = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder)
+        with self.assertRaisesRegex(marrow.Error, "the pipeline has no output 'poes'; did you mean 'pose'?"):
+            pipeline.run(only=["poes"])
+        with self.assertRaisesRegex(marrow.Error, "threads: expected a whole number from 0 to 1024, got -1"):
+            pipeline.run(threads=-1)
+        result = pipeline.run(only=["edges"])
+        with self.assertRaisesRegex(KeyError, "no output 'edge'; there are edges"):
+            result["edge"]
+        with self.assertRaisesRegex(KeyError, "no view 'oblique'; there are frontal, lateral"):
+            result["edges"]["oblique"]
+
+    def test_a_folder_that_the_run_reads_is_refused(self):
+        folder, _ = small_case()
+        with self.assertRaisesRegex(marrow.Error, "choose another with folder="):
+            marrow.Pipeline(FEMUR, case=folder).run(only=["edges"], folder=folder / "out")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Single nodes as Python functions."""
+import inspect
+
+import numpy
+from package import FEMUR, Case, main, marrow, small_case
+
+
+class Nodes(Case):
+    def test_a_node_gives_what_it_gives_in_a_pipeline(self):
+        folder, case = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder).set({"edges.uses": "edges.canny", "edges.high": 8})
+        expected = pipeline.run(only=["edges"])["edges"]["lateral"].pixels
+        views = marrow.read.case(path=folder).views
+        self.assertTrue(numpy.array_equal(marrow.edges.canny(views["lateral"], high=8).pixels, expected))
+        self.assertTrue(numpy.array_equal(marrow.node("edges.canny")(view=views["lateral"], high=8).pixels, expected))
+        self.assertFalse(len(marrow.edges.canny(views["lateral"]).pixels) == len(expected))
+
+    def test_a_list_means_one_call_for_each_item(self):
+        _, case = small_case()
+        edges = marrow.edges.canny(case.views)
+        self.assertEqual((edges.axis, list(edges)), ("view", ["frontal", "lateral"]))
+        of_list = marrow.edges.canny([case.views["lateral"]])
+        self.assertTrue(numpy.array_equal(of_list["lateral"].pixels, edges["lateral"].pixels))
+        of_dict = marrow.edges.canny({"one": case.views["lateral"]})
+        self.assertEqual(list(of_dict), ["one"])
+
+    def test_functions_go_from_node_to_node(self):
+        _, case = small_case()
+        start = marrow.Pose(case.truth["distal"].matrix)
+        z, y, x = numpy.mgrid[-30:31, -30:31, -30:31]
+        ball = marrow.mesh.marching_cubes(
+            marrow.SignedField(
+                numpy.sqrt(x**2 + y**2 + z**2) - 20, spacing_mm=(1, 1, 1), origin_mm=(-30, -30, -30)
+            )
+        )
+        outline = marrow.project.silhouette_edges(mesh=ball)
+        self.assertEqual((outline.type, repr(outline)), ("outline_projector", "<marrow outline_projector>"))
+        self.assertGreater(len(ball.triangles), 1000)
+        self.assertEqual(start.matrix.shape, (4, 4))
+
+    def test_it_explains_itself(self):
+        canny = marrow.edges.canny
+        self.assertIn("Canny's edge detector", canny.__doc__)
+        self.assertIn("    view (view): X-ray view", canny.__doc__)
+        self.assertIn("    edges (edge_map): edge pixels at sub-pixel positions", canny.__doc__)
+        self.assertIn(
+            "    sigma_px (number in px, at least 0.7, at most 10, default 1.5): standard deviation", canny.__doc__
+        )
+        signature = inspect.signature(canny)
+        self.assertEqual(list(signature.parameters), ["view", "sigma_px", "logarithm", "window_px", "low", "high"])
+        self.assertEqual(signature.parameters["high"].default, 5)
+        self.assertEqual(signature.parameters["high"].kind, inspect.Parameter.KEYWORD_ONLY)
+        self.assertIn("canny", dir(marrow.edges))
+        self.assertIn("edges", dir(marrow))
+        self.assertEqual(marrow.edges.__doc__, "edge pixels of an X-ray view")
+
+    def test_wrong_calls(self):
+        _, case = small_case()
+        view = case.views["lateral"]
+        for call, text in (
+            (
+                lambda: marrow.edges.canny(view, hihg=5),
+                "edges.canny has no input or option 'hihg'; did you mean 'high'?",
+            ),
+            (lambda: marrow.edges.canny(view, 5), "edges.canny takes 1 input, got 2; options are given by name"),
+            (lambda: marrow.edges.canny(view, view=view), "edges.canny: the input 'view' is given twice"),
+            (lambda: marrow.edges.canny(), "edges.canny needs the input 'view', of type view"),
+            (lambda: marrow.edges.canny([]), "input 'view': the list is empty"),
+            (lambda: marrow.edges.canny(7), "input 'view': expected view, got int"),
+            (lambda: marrow.edges.canny(view, high="much"), "expected a number, got 'much'"),
+            (lambda: marrow.edges.canny(view, high=-1), "-1 is below the least allowed, 0"),
+            (lambda: marrow.edges.canny(view, low=9, high=5), "low"),
+            (lambda: marrow.edges.canny(view.image), "input 'view' of edges.canny expects view, got image"),
+            (
+                lambda: marrow.edges.canny(view.image.array),
+                r"expected view, got ndarray; an array has no camera: give marrow.View\(array, camera\)",
+            ),
+            (
+                lambda: marrow.segment.threshold(case.ct.array),
+                r"an array has no spacing: give marrow.Volume\(array, spacing_mm=\(x, y, z\)\)",
+            ),
+            (lambda: marrow.node("edges.cany"), "unknown node 'edges.cany'; did you mean 'edges.canny'?"),
+        ):
+            with self.assertRaisesRegex(marrow.Error, text):
+                call()
+        with self.assertRaises(marrow.PipelineError) as caught:
+            marrow.edges.canny(view, high=-1)
+        self.assertEqual((caught.exception.node, caught.exception.option), ("edges.canny", "high"))
+        with self.assertRaises(marrow.PipelineError) as caught:
+            marrow.edges.canny(view.image)
+        self.assertEqual((caught.exception.node, caught.exception.port), ("edges.canny", "view"))
+        with self.assertRaisesRegex(AttributeError, "no node 'edges.cany'; did you mean 'canny'?"):
+            marrow.edges.cany
+        with self.assertRaisesRegex(AttributeError, "marrow has no attribute or kind of nodes 'egdes'"):
+            marrow.egdes
+
+    def test_a_node_that_fails(self):
+        with self.assertRaises(marrow.RunError) as caught:
+            marrow.read.case(path="/nowhere")
+        self.assertEqual(caught.exception.node, "case")
+        self.assertIn("/nowhere", str(caught.exception))
+
+    def test_settings_of_a_call(self):
+        draw = marrow.test.draw
+        self.assertEqual(draw.using(seed=3)().type, "test_number")
+        told = []
+        _, case = small_case()
+        marrow.edges.canny.using(progress=told.append)(case.views)
+        self.assertIn("finished", {event["event"] for event in told})
+
+    def test_several_outputs_are_a_named_tuple(self):
+        sides = marrow.test.sides(with_maybe=False)
+        self.assertEqual(sides._fields, ("left", "right", "both", "maybe"))
+        self.assertIsNone(sides.maybe)
+        self.assertEqual(sides.both.axis, "side")
+        self.assertEqual(marrow.test.add(sides.left, sides.right).type, sides.left.type)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of the Python package share: where things are, and a small simulated case."""
+import atexit
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE = pathlib.Path(sys.argv[1])
+BUILD = pathlib.Path(sys.argv[2])
+MARROW = BUILD / "bin" / "marrow"
+TEST_PLUGINS = BUILD / "tests" / "plugins"
+FEMUR = SOURCE / "pipelines" / "femur.yaml"
+SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
+atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
+os.environ["MARROW_CACHE"] = str(SCRATCH / "cache")  # no test sees what another run left
+os.environ["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS)
+sys.path.insert(0, str(BUILD / "python"))
+SMALL = {"ct.spacing_mm": [1.2, 1.2, 1.5], "ct.range_mm": [0, 300]}  # runs in 2 seconds instead of 7
+
+import marrow  # noqa: E402  (the path to it is set above)
+
+_made = {}
+
+
+def small_case():
+    """A simulated case, made once: its folder, and the case itself."""
+    if not _made:
+        result = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml").set(SMALL).run(folder=SCRATCH / "simulated")
+        _made["case"] = (SCRATCH / "simulated" / "outputs" / "case", result["case"])
+    return _made["case"]
+
+
+def program(*arguments, cwd=None):
+    """Runs marrow's program, which must succeed."""
+    done = subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+class Case(unittest.TestCase):
+    def setUp(self):
+        self.scratch = pathlib.Path(tempfile.mkdtemp(dir=SCRATCH))
+
+    def write(self, name, text):
+        path = self.scratch / name
+        path.write_text(text)
+        return path
+
+
+def main():
+    unittest.main(argv=sys.argv[:1], verbosity=2)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Pipelines from Python: results as those of the program, settings, folders, progress."""
+import io
+import json
+import os
+import unittest
+
+import numpy
+from package import FEMUR, SOURCE, Case, main, marrow, program, small_case
+
+ERRORS = ("mtre_mm", "rotation_deg")
+
+
+class Run(Case):
+    def test_values_are_those_of_the_program(self):
+        folder, _ = small_case()
+        result = marrow.Pipeline(FEMUR, case=folder).run(only=["pose", "errors", "edges"], keep=False)
+        program(
+            "run",
+            FEMUR,
+            "case=%s" % folder,
+            "--out",
+            self.scratch / "run",
+            "--only",
+            "pose",
+            "--only",
+            "errors",
+            "--no-cache",
+        )
+        written = json.loads((self.scratch / "run/outputs/pose/distal.json").read_text())
+        self.assertEqual(result["pose"]["distal"].matrix.tolist(), written["matrix"])
+        metrics = json.loads((self.scratch / "run/outputs/errors/distal/final.json").read_text())["metrics"]
+        final = result["errors"]["distal"]["final"]
+        self.assertEqual(dict(final.values), {metric["name"]: metric["value"] for metric in metrics})
+        self.assertLess(final["mtre_mm"], 2)
+        self.assertEqual(list(result), ["pose", "errors", "edges"])
+        self.assertEqual(result["edges"].axis, "view")
+        self.assertEqual(list(result["edges"]), ["frontal", "lateral"])
+
+    def test_an_option_is_changed(self):
+        folder, _ = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder)
+        before = pipeline.run(only=["edges"])
+        after = pipeline.set("edges.uses", "edges.canny").set("edges.high", 8).run(only=["edges"])
+        self.assertEqual(pipeline.nodes["edges"], "edges.canny")
+        self.assertIn("high: 8", pipeline.resolved())
+        self.assertNotEqual(len(before["edges"]["lateral"]), len(after["edges"]["lateral"]))
+        self.assertIn(
+            "node 'edges': the options written for edges.adaptive_relaxation are not used by edges.canny",
+            pipeline.notes,
+        )
+
+    def test_the_second_run_reads_back_what_is_kept(self):
+        folder, _ = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder).set("edges.low", 49)
+        first, second = pipeline.run(only=["edges"]), pipeline.run(only=["edges"])
+        self.assertEqual((first.nodes["edges"].calls, first.nodes["edges"].cached), (2, 0))
+        self.assertEqual((second.nodes["edges"].calls, second.nodes["edges"].cached), (0, 2))
+        self.assertTrue(numpy.array_equal(first["edges"]["frontal"].pixels, second["edges"]["frontal"].pixels))
+        self.assertEqual(pipeline.run(only=["edges"], keep=False).nodes["edges"].calls, 2)
+
+    def test_a_folder_is_written_as_by_the_program(self):
+        folder, _ = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder)
+        result = pipeline.run(only=["edges"], folder=self.scratch / "out")
+        self.assertEqual(result.folder, self.scratch / "out")
+        record = json.loads((self.scratch / "out" / "run.json").read_text())
+        self.assertEqual(record["inputs"]["case"], str(folder))
+        self.assertTrue(result.files["edges"])
+        self.assertTrue(all(file.is_file() for file in result.files["edges"]))
+        with self.assertRaisesRegex(marrow.Error, "not empty"):
+            pipeline.run(only=["edges"], folder=self.scratch / "out")
+        self.assertIsNone(pipeline.run(only=["edges"]).folder)
+
+    def test_progress_is_told(self):
+        folder, _ = small_case()
+        told = []
+        marrow.Pipeline(FEMUR, case=folder).run(only=["edges"], keep=False, progress=told.append)
+        self.assertEqual({event["node"] for event in told}, {"case", "edges"})
+        self.assertEqual({event["item"] for event in told if event["node"] == "edges"}, {"frontal", "lateral"})
+        self.assertIn("finished", {event["event"] for event in told})
+        from marrow.progress import Printer
+
+        shown = io.StringIO()
+        marrow.Pipeline(FEMUR, case=folder).run(only=["edges"], keep=False, progress=Printer(shown))
+        self.assertRegex(shown.getvalue(), r"edges \(lateral\): \d+\.\d{3} s\n")
+
+    def test_what_progress_raises_stops_the_run(self):
+        folder, _ = small_case()
+
+        def stop(event):
+            raise LookupError("enough")
+
+        with self.assertRaisesRegex(LookupError, "enough"):
+            marrow.Pipeline(FEMUR, case=folder).run(keep=False, progress=stop)
+
+    def test_a_random_run_depends_on_its_seed_only(self):
+        pipeline = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml")
+        pipeline.set(
+            {"ct.spacing_mm": [3, 3, 3], "cameras.width_px": 64, "cameras.height_px": 64, "cameras.pixel_mm": 4.7}
+        )
+
+        def image(seed):
+            return pipeline.run(seed=seed, keep=False)["case"].views["frontal"].image.array
+
+        self.assertTrue(numpy.array_equal(image(1), image(1)))
+        self.assertFalse(numpy.array_equal(image(1), image(2)))
+
+    def test_relative_paths_start_at_the_working_folder(self):
+        folder, _ = small_case()
+        os.chdir(folder.parent)
+        self.assertEqual(len(marrow.Pipeline(FEMUR, case="case").run(only=["edges"])["edges"]), 2)
+
+
+if __name__ == "__main__":
+    main()

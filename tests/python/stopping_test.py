@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Ctrl-C, and runs from several threads of Python."""
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+
+import numpy
+from package import FEMUR, Case, main, marrow, small_case
+
+LONG = """marrow: 1
+nodes:
+  a: {uses: test.constant}
+  b: {uses: test.work, in: {after: a}, with: {value: %s}}
+outputs: {b: b}
+"""
+
+
+class Stopping(Case):
+    def interrupt(self, call, signal_after_s=0.5):
+        """Calls while a SIGINT comes. Returns after how many seconds KeyboardInterrupt was raised."""
+        timer = threading.Timer(signal_after_s, os.kill, (os.getpid(), signal.SIGINT))
+        timer.start()
+        begun = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            call()
+        timer.join()
+        return time.monotonic() - begun
+
+    def test_ctrl_c_stops_a_run_and_no_handler_changes(self):
+        pipeline = marrow.Pipeline(self.write("long.yaml", LONG % 60))
+        handler = signal.getsignal(signal.SIGINT)
+        self.assertLess(self.interrupt(lambda: pipeline.run(keep=False)), 20)
+        self.assertIs(signal.getsignal(signal.SIGINT), handler)
+        self.interrupt(lambda: time.sleep(60))  # outside of a run it does what it did before
+        short = marrow.Pipeline(self.write("short.yaml", LONG % 0.01))
+        self.assertEqual(short.run(keep=False).nodes["b"].status, "done")
+
+    def test_ctrl_c_stops_a_node(self):
+        work = marrow.test.work.using()
+        self.assertLess(self.interrupt(lambda: work(marrow.test.constant(), value=60)), 20)
+
+    def test_a_handler_of_ones_own_is_called_and_may_go_on(self):
+        seen = []
+        before = signal.signal(signal.SIGINT, lambda number, frame: seen.append(number))
+        try:
+            threading.Timer(0.2, os.kill, (os.getpid(), signal.SIGINT)).start()
+            result = marrow.Pipeline(self.write("long.yaml", LONG % 1)).run(keep=False)
+        finally:
+            signal.signal(signal.SIGINT, before)
+        self.assertEqual(seen, [signal.SIGINT])
+        self.assertEqual(result.nodes["b"].status, "done")
+
+    def test_a_process_ends_by_ctrl_c(self):
+        file = self.write("long.yaml", LONG % 60)
+        code = "import marrow; print('begun', flush=True); marrow.Pipeline(%r).run(keep=False)" % str(file)
+        environment = {**os.environ, "PYTHONPATH": os.path.dirname(os.path.dirname(marrow.__file__))}
+        with subprocess.Popen(
+            [sys.executable, "-c", code], env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as process:
+            self.assertEqual(process.stdout.readline(), "begun\n")
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            _, errors = process.communicate(timeout=60)
+        self.assertIn("KeyboardInterrupt", errors)
+        self.assertEqual(process.returncode, -signal.SIGINT)
+
+    def test_other_threads_of_python_go_on(self):
+        counted, is_over = [0], threading.Event()
+
+        def count():
+            while not is_over.is_set():
+                counted[0] += 1
+                time.sleep(0.001)
+
+        counter = threading.Thread(target=count)
+        counter.start()
+        marrow.Pipeline(self.write("long.yaml", LONG % 1)).run(keep=False)
+        is_over.set()
+        counter.join()
+        self.assertGreater(counted[0], 100)
+
+    def test_runs_of_several_threads_at_once(self):
+        folder, _ = small_case()
+        expected = {
+            high: marrow.Pipeline(FEMUR, case=folder)
+            .set("edges.high", high)
+            .run(only=["edges"])["edges"]["lateral"]
+            .pixels
+            for high in (80, 85, 90, 95)
+        }
+        results, faults = {}, []
+
+        def run(high):
+            try:
+                pipeline = marrow.Pipeline(FEMUR, case=folder).set("edges.high", high)
+                for keep in (False, True, False):
+                    results[high, len(results)] = pipeline.run(only=["edges"], keep=keep)["edges"]["lateral"].pixels
+            except BaseException as fault:  # shown below, in the main thread
+                faults.append(fault)
+
+        threads = [threading.Thread(target=run, args=(high,)) for high in expected]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(faults, [])
+        self.assertEqual(len(results), 12)
+        for (high, _), pixels in results.items():
+            self.assertTrue(numpy.array_equal(pixels, expected[high]))
+
+
+if __name__ == "__main__":
+    main()
