@@ -3,6 +3,7 @@
 // place in the file, or from the name of the argument.
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <optional>
@@ -71,18 +72,23 @@ Part part_of_name(const std::string& name) {
   return part;
 }
 
+bool has_input(const NodeInfo& info, const std::string& name) {
+  return std::any_of(info.inputs.begin(), info.inputs.end(), [&](const PortInfo& port) { return port.name == name; });
+}
+
 py::object or_none(const std::string& text) { return text.empty() ? py::none() : py::object(py::str(text)); }
 py::object or_none(int number) { return number == 0 ? py::none() : py::object(py::int_(number)); }
 
 }  // namespace
 
-py::list list_of(const Diagnostics& diagnostics) {
+py::list list_of(const Diagnostics& diagnostics, const NodeInfo* called) {
   std::map<std::string, std::vector<Part>> files;
   py::list faults;
   for (const Diagnostic& one : diagnostics.sorted()) {
     Part found;
     if (one.place.line == 0) {
       found = part_of_name(one.place.file);
+      if (called && has_input(*called, found.option)) found.port.swap(found.option);
     } else {
       const auto file = files.try_emplace(one.place.file);
       if (file.second) file.first->second = parts_of(one.place.file);

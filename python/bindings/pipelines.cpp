@@ -14,8 +14,9 @@ namespace {
 using Texts = std::vector<std::pair<std::string, std::string>>;
 
 /// Returns the pipeline, its faults and all of them as one text.
-py::tuple with_faults(std::shared_ptr<ReadPipeline> read, const Diagnostics& diagnostics) {
-  return py::make_tuple(diagnostics.empty() ? py::cast(std::move(read)) : py::none(), list_of(diagnostics),
+py::tuple with_faults(std::shared_ptr<ReadPipeline> read, const Diagnostics& diagnostics,
+                      const NodeInfo* called = nullptr) {
+  return py::make_tuple(diagnostics.empty() ? py::cast(std::move(read)) : py::none(), list_of(diagnostics, called),
                         diagnostics.text());
 }
 
@@ -43,17 +44,22 @@ py::tuple read_node(const std::string& name, const py::dict& inputs, const Texts
   auto made = std::make_shared<ReadPipeline>();
   made->known = catalogue();
   const NodeInfo* info = made->known->find(name);
+  Diagnostics diagnostics;
   std::vector<std::pair<std::string, Value>> values;
   for (const auto& [key, object] : inputs) {
     const std::string port = py::str(key);
     const PortInfo* known = info ? port_of(*info, port) : nullptr;
-    values.emplace_back(port, value_of(object, known ? known->type : TypeInfo{}, known ? known->axis : "", port));
+    try {
+      values.emplace_back(port, value_of(object, known ? known->type : TypeInfo{}, known ? known->axis : "", port));
+    } catch (const Error& error) {
+      diagnostics.add({name + "(" + port + ")"}, error.what());
+    }
   }
-  Diagnostics diagnostics;
+  if (!diagnostics.empty()) return with_faults(nullptr, diagnostics, info);
   OneNode one = pipeline_of_node(name, values, options, *made->known, diagnostics);
   made->pipeline = std::move(one.pipeline);
   made->given = std::move(one.given);
-  return with_faults(std::move(made), diagnostics);
+  return with_faults(made, diagnostics, info);
 }
 
 /// Leaves only these outputs. Throws Error for a name that the pipeline does not have.

@@ -28,8 +28,8 @@ struct ReadPipeline {
 };
 
 /// A list of dictionaries, in the order of the file: file, line, column, message, hint, node, port, option. What is not
-/// known is None.
-py::list list_of(const Diagnostics& diagnostics);
+/// known is None. `called`: the node whose call has these faults.
+py::list list_of(const Diagnostics& diagnostics, const NodeInfo* called = nullptr);
 
 void bind_catalogue(py::module_& module);
 void bind_pipelines(py::module_& module);

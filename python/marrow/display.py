@@ -137,9 +137,8 @@ def result_html(result: Any) -> str:
     parts, pictures, surfaces, metrics = [], [], [], Table()
     for name, value in (leaf for output in result for leaf in leaves(result[output], output)):
         if isinstance(value, _core.Verdict):
-            parts.append(
-                "<p><b>%s: %s</b> %s</p>" % tuple(map(html.escape, (name, value.judgement, "; ".join(value.reasons))))
-            )
+            said = [html.escape(text) for text in (name, value.judgement, "; ".join(value.reasons))]
+            parts.append("<p><b>%s: %s</b> %s</p>" % (said[0], said[1], said[2]))
         elif isinstance(value, _core.Metrics):
             metrics.append({"figures": name, **value.values})
         elif isinstance(value, _core.Pose):

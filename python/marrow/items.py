@@ -1,12 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lists of named items along an axis, such as the views of a case."""
-from collections.abc import Mapping
-from typing import Any, Iterator, List
+from typing import Any, Iterator, List, Mapping
 
 __all__ = ["Items"]
 
 
-class Items(Mapping):
+class Items(Mapping[str, Any]):
     """Named items along one axis ("view", "fragment", ...), in their order. items["distal"] is the item of that name.
     An item that could not be made is None."""
 

@@ -3,10 +3,11 @@
 import collections
 import inspect
 import keyword
-from typing import Any, Dict, List, Tuple
+import os
+from typing import Any, Dict, List, Optional, Tuple
 
 from . import _core, texts
-from .errors import Error
+from .errors import Error, Fault, PipelineError
 from .pipeline import checked_pipeline
 from .progress import Printer
 from .result import Result, checked
@@ -14,17 +15,20 @@ from .result import Result, checked
 __all__ = ["Kind", "Node", "node"]
 
 
+_NO_INPUT = (str, os.PathLike, bool, int, float)
+
+
 class Node:
-    """A node as a function. Its inputs come first, by position or name; its options are keywords. A list or dictionary
-    for an input that takes one item means one call for each item. It returns the node's output, or a named tuple if
-    there are several."""
+    """A node as a function. Its inputs come first, by position or name; its options are keywords. Where an input and an
+    option have one name, a text, path or number is the option. A list or dictionary for an input that takes one item
+    means one call for each item. It returns the node's output, or a named tuple if there are several."""
 
     def __init__(self, info: Dict[str, Any], settings: Dict[str, Any]) -> None:
         self._info = info
         self._settings = settings
         self.__name__ = info["name"].split(".", 1)[1]
         self.__qualname__ = info["name"]
-        self.__doc__ = _documentation(info)
+        self.__doc__ = documentation(info)
         self.__signature__ = _signature(info)
 
     def using(self, *, seed: int = 1, threads: int = 0, keep: bool = False, progress: Any = False) -> "Node":
@@ -34,26 +38,23 @@ class Node:
     def __call__(self, *inputs: Any, **arguments: Any) -> Any:
         ports = [port["name"] for port in self._info["inputs"]]
         if len(inputs) > len(ports):
-            raise Error(
-                "%s takes %s, got %d; options are given by name"
-                % (self.__qualname__, _counted(len(ports), "input"), len(inputs))
-            )
+            takes = "%s takes %s, got %d" % (self.__qualname__, _counted(len(ports), "input"), len(inputs))
+            raise self._refused(takes, "options are given by name")
         given = dict(zip(ports, inputs))
         options: List[Tuple[str, str]] = []
         names = [option["name"] for option in self._info["options"]]
         for written, value in arguments.items():
             name = written[:-1] if written.endswith("_") and keyword.iskeyword(written[:-1]) else written
-            if name in given:
-                raise Error("%s: the input '%s' is given twice" % (self.__qualname__, name))
-            if name in ports:
-                given[name] = value
-            elif name in names:
+            is_option = name in names and (name not in ports or isinstance(value, _NO_INPUT))
+            if name in given and not is_option:
+                raise self._refused("%s: the input '%s' is given twice" % (self.__qualname__, name), port=name)
+            if is_option:
                 options.append((name, texts.of_value(name, value).replace("$", "$$")))
+            elif name in ports:
+                given[name] = value
             else:
-                raise Error(
-                    "%s has no input or option '%s'; %s"
-                    % (self.__qualname__, name, _core.suggestion(name, ports + names))
-                )
+                hint = _core.suggestion(name, ports + names)
+                raise self._refused("%s has no input or option '%s'" % (self.__qualname__, name), hint, option=name)
         wired = {name: value for name, value in given.items() if value is not None}
         read = checked_pipeline(_core.read_node(self._info["name"], wired, options))
         settings = self._settings
@@ -66,6 +67,10 @@ class Node:
             return result[outputs[0]]
         kind = collections.namedtuple(self.__name__, outputs, rename=True)  # type: ignore[misc]
         return kind(*(result[name] for name in outputs))
+
+    def _refused(self, message: str, hint: Optional[str] = None, **where: str) -> PipelineError:
+        text = message + ("; " + hint if hint else "")
+        return PipelineError(text, [Fault(message, hint, node=self.__qualname__, **where)])
 
     def __repr__(self) -> str:
         return "<marrow node %s: %s>" % (self.__qualname__, self._info["summary"])
@@ -137,11 +142,13 @@ def _signature(info: Dict[str, Any]) -> inspect.Signature:
             default=inspect.Parameter.empty if option["required"] else option["default"],
         )
         for option in info["options"]
+        if python_name(option["name"]) not in [parameter.name for parameter in parameters]
     ]
     return inspect.Signature(parameters)
 
 
-def _documentation(info: Dict[str, Any]) -> str:
+def documentation(info: Dict[str, Any]) -> str:
+    """What help() says of a node."""
     lines = [info["summary"][:1].upper() + info["summary"][1:] + "."]
     for title, ports in (("Inputs", info["inputs"]), ("Returns", info["outputs"])):
         if ports:

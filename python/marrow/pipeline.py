@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pipelines: read, changed and run."""
 import os
-from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, Union
+from typing import Any, Callable, Dict, List, Mapping, Optional, Tuple, TypeVar, Union
 
 from . import _core, texts
 from .errors import Error, Fault, PipelineError
@@ -10,10 +10,11 @@ from .result import Result, checked
 
 __all__ = ["Pipeline"]
 
+_T = TypeVar("_T")
 Progress = Union[bool, Callable[[Dict[str, Any]], None]]
 
 
-def checked_pipeline(read: Tuple[Any, List[Dict[str, Any]], str]) -> Any:
+def checked_pipeline(read: Tuple[_T, List[Dict[str, Any]], str]) -> _T:
     """The pipeline that _core read. Raises PipelineError with all faults if there are any."""
     pipeline, faults, text = read
     if faults:
@@ -38,7 +39,7 @@ class Pipeline:
         self._changes: Dict[str, str] = {}
         self._read = self._read_with(self._changes)
 
-    def _read_with(self, changes: Dict[str, str]) -> Any:
+    def _read_with(self, changes: Dict[str, str]) -> _core.ReadPipeline:
         return checked_pipeline(_core.read(self._file, self._inputs, list(changes.items()), True))
 
     def set(self, key: Union[str, Mapping[str, Any]], value: Any = None) -> "Pipeline":

@@ -2,13 +2,13 @@
 """Shows how far a run is."""
 import sys
 import time
-from typing import Any, Dict, TextIO
+from typing import Any, Dict, Optional, TextIO
 
 
 class Printer:
     """Writes a line for each node that is done, and on a terminal the progress of the node that runs."""
 
-    def __init__(self, stream: TextIO = None) -> None:
+    def __init__(self, stream: Optional[TextIO] = None) -> None:
         self._stream = stream if stream is not None else sys.stderr
         self._is_terminal = self._stream.isatty()
         self._shown = 0.0

@@ -3,9 +3,9 @@
 import dataclasses
 import os
 import pathlib
-from collections.abc import Mapping
-from typing import Any, Dict, Iterator, List, Optional, Union
+from typing import Any, Dict, Iterator, List, Mapping, Optional, Union
 
+from . import _core
 from .errors import Fault, RunError
 
 __all__ = ["NodeReport", "Result"]
@@ -25,10 +25,10 @@ class NodeReport:
     peak_memory_mb: float
 
 
-class Result(Mapping):
+class Result(Mapping[str, Any]):
     """The outputs of a run by name: result["pose"]["distal"].matrix. An output that was not made is None."""
 
-    def __init__(self, run: Any) -> None:
+    def __init__(self, run: _core.Run) -> None:
         self._run = run
         self._names: List[str] = run.outputs
         self._values: Dict[str, Any] = {}
@@ -70,7 +70,8 @@ class Result(Mapping):
     @property
     def files(self) -> Dict[str, List[pathlib.Path]]:
         """The files of each output in the folder; empty without `folder=`."""
-        return {name: [self.folder / file for file in files] for name, files, _, _ in self._run.written}
+        folder = pathlib.Path(self._run.folder)
+        return {name: [folder / file for file in files] for name, files, _, _ in self._run.written}
 
     def write(self, folder: Union[str, "os.PathLike[str]"]) -> "Result":
         """Writes the folder that `marrow run` would write: new or empty. Returns the result."""

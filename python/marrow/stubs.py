@@ -9,7 +9,7 @@ import textwrap
 from typing import Any, Dict, List
 
 from . import _core
-from .nodes import _documentation, python_name
+from .nodes import documentation, python_name
 
 _VALUES = {
     "image": "Image",
@@ -70,6 +70,7 @@ class Kind:
 def node(name: str) -> Node:
     """The node of this name, as "edges.canny"."""
 
+def documentation(info: Mapping[str, Any]) -> str: ...
 def python_name(name: str) -> str: ...
 '''
 
@@ -100,18 +101,19 @@ def _value(port: Dict[str, Any]) -> str:
 
 
 def _node(info: Any) -> str:
+    types = {option["name"]: _option(option) for option in info["options"]}
     arguments = ["self"]
-    for port in sorted(info["inputs"], key=lambda port: port["optional"]):
-        kind = "_One[%s]" % _value(port)
+    for port in sorted(info["inputs"], key=lambda port: bool(port["optional"])):
+        parts = ["_One[%s]" % _value(port), *([types.pop(port["name"])] if port["name"] in types else [])]
+        kind = parts[0] if len(parts) == 1 else "Union[%s]" % ", ".join(parts)
         arguments.append(
             python_name(port["name"]) + (": Optional[%s] = None" % kind if port["optional"] else ": " + kind)
         )
-    if info["options"]:
+    if types:
         arguments.append("*")
-    for option in info["options"]:
-        kind = "Literal[%s]" % ", ".join(map(json.dumps, option["choices"])) if option["choices"] else None
-        default = "" if option["required"] else " = ..."
-        arguments.append("%s: %s%s" % (python_name(option["name"]), kind or _OPTIONS[option["type"]], default))
+    required = {option["name"] for option in info["options"] if option["required"]}
+    for name, kind in types.items():
+        arguments.append("%s: %s%s" % (python_name(name), kind, "" if name in required else " = ..."))
     outputs, made = info["outputs"], ""
     if len(outputs) == 1:
         result = _result(outputs[0])
@@ -119,15 +121,21 @@ def _node(info: Any) -> str:
         result = _class_name(info["name"]) + "Result"
         members = "".join("    %s: %s\n" % (python_name(port["name"]), _result(port)) for port in outputs)
         made = "\nclass %s(NamedTuple):\n%s" % (result, members)
-    lines = _documentation(info).replace("\\", "\\\\").split("\n")
-    documentation = textwrap.indent("\n".join(['"""' + lines[0], *lines[1:], '"""']), " " * 8)
+    lines = documentation(info).replace("\\", "\\\\").split("\n")
+    explained = textwrap.indent("\n".join(['"""' + lines[0], *lines[1:], '"""']), " " * 8)
     return "%s\nclass %s(Node):\n    def __call__(\n        %s,\n    ) -> %s:\n%s\n" % (
         made,
         _class_name(info["name"]),
         ",\n        ".join(arguments),
         result,
-        documentation,
+        explained,
     )
+
+
+def _option(option: Dict[str, Any]) -> str:
+    if option["choices"]:
+        return "Literal[%s]" % ", ".join(map(json.dumps, option["choices"]))
+    return _OPTIONS[option["type"]]
 
 
 def _result(port: Dict[str, Any]) -> str:
@@ -140,8 +148,9 @@ def main(arguments: List[str]) -> int:
     if len(arguments) != 1 or arguments[0].startswith("-"):
         print(__doc__, file=sys.stderr)
         return 2
+    text = stub()
     with open(arguments[0], "w", encoding="utf-8") as file:
-        file.write(stub())
+        file.write(text)
     return 0
 
 

@@ -11,7 +11,7 @@ class Table(List[Dict[str, Any]]):
 
     def to_pandas(self) -> Any:
         """The rows as a pandas.DataFrame; needs pandas (Debian: python3-pandas)."""
-        import pandas
+        import pandas  # type: ignore[import]
 
         return pandas.DataFrame(list(self))
 

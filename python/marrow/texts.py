@@ -27,9 +27,8 @@ def of_change(key: str, value: Any) -> str:
 
 def of_value(name: str, value: Any) -> str:
     """A value as YAML. `name` names it in messages."""
-    plain = _plain(value)
     try:
-        return json.dumps(plain, ensure_ascii=False, allow_nan=False)
+        return json.dumps(_plain(value), ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError):
         raise Error(
             "%s: expected a bool, number, text, path, or a list of these, got %r" % (name, type(value).__name__)
@@ -43,4 +42,6 @@ def _plain(value: Any) -> Any:
         return value.tolist()
     if isinstance(value, (list, tuple)):
         return [_plain(item) for item in value]
+    if isinstance(value, dict):
+        raise TypeError
     return value

@@ -67,7 +67,7 @@ class Errors(Case):
         self.assertEqual(caught.exception.file, "set(edges.hihg)")
         self.assertEqual((caught.exception.node, caught.exception.option), ("edges", "hihg"))
         self.assertEqual(caught.exception.hint, "did you mean 'high'?")
-        with self.assertRaisesRegex(marrow.PipelineError, "expected a number, got 'much'"):
+        with self.assertRaisesRegex(marrow.PipelineError, 'expected a number, got the quoted text "much"'):
             pipeline.set("edges.high", "much")
         with self.assertRaisesRegex(marrow.PipelineError, "there is no node 'cas'") as caught:
             pipeline.set("edges.in.view", "cas.views")

@@ -68,7 +68,7 @@ class Nodes(Case):
             (lambda: marrow.edges.canny(), "edges.canny needs the input 'view', of type view"),
             (lambda: marrow.edges.canny([]), "input 'view': the list is empty"),
             (lambda: marrow.edges.canny(7), "input 'view': expected view, got int"),
-            (lambda: marrow.edges.canny(view, high="much"), "expected a number, got 'much'"),
+            (lambda: marrow.edges.canny(view, high="much"), 'expected a number, got the quoted text "much"'),
             (lambda: marrow.edges.canny(view, high=-1), "-1 is below the least allowed, 0"),
             (lambda: marrow.edges.canny(view, low=9, high=5), "low"),
             (lambda: marrow.edges.canny(view.image), "input 'view' of edges.canny expects view, got image"),
@@ -103,18 +103,27 @@ class Nodes(Case):
 
     def test_settings_of_a_call(self):
         draw = marrow.test.draw
-        self.assertEqual(draw.using(seed=3)().type, "test_number")
+        self.assertEqual(draw.using(seed=3)()["value"], draw.using(seed=3)()["value"])
+        self.assertNotEqual(draw.using(seed=3)()["value"], draw.using(seed=4)()["value"])
         told = []
         _, case = small_case()
         marrow.edges.canny.using(progress=told.append)(case.views)
         self.assertIn("finished", {event["event"] for event in told})
+
+    def test_an_input_and_an_option_of_one_name(self):
+        with self.assertRaisesRegex(marrow.RunError, "nowhere.yaml"):
+            marrow.read.view(image="nowhere.png", camera="nowhere.yaml")
+        with self.assertRaisesRegex(marrow.PipelineError, "expects camera, got view"):
+            marrow.read.view(image="nowhere.png", camera=small_case()[1].views["frontal"])
+        self.assertEqual(list(inspect.signature(marrow.read.view).parameters).count("camera"), 1)
 
     def test_several_outputs_are_a_named_tuple(self):
         sides = marrow.test.sides(with_maybe=False)
         self.assertEqual(sides._fields, ("left", "right", "both", "maybe"))
         self.assertIsNone(sides.maybe)
         self.assertEqual(sides.both.axis, "side")
-        self.assertEqual(marrow.test.add(sides.left, sides.right).type, sides.left.type)
+        self.assertEqual(sides.left["value"], 1)
+        self.assertEqual(marrow.test.add(sides.left, sides.right)["value"], 3)
 
 
 if __name__ == "__main__":
