@@ -8,7 +8,7 @@ import pathlib
 import struct
 import uuid
 import zlib
-from typing import Any, Iterator, List, Tuple
+from typing import Any, Dict, Iterator, List, Tuple
 
 from . import _core
 from .items import Items
@@ -123,6 +123,14 @@ def pose_table(pose: Any) -> Table:
     return Table({name: float(value) for name, value in zip(columns, row)} for row in pose.matrix[:3])
 
 
+def figures_table(metrics: Dict[str, Dict[str, float]]) -> Table:
+    """One row for each figure, one column for each item that has it."""
+    figures = dict.fromkeys(name for values in metrics.values() for name in values)
+    return Table(
+        {"figure": figure, **{item: values.get(figure) for item, values in metrics.items()}} for figure in figures
+    )
+
+
 def leaves(value: Any, name: str) -> Iterator[Tuple[str, Any]]:
     """The items of a value with their names, as "pose distal"."""
     if isinstance(value, Items):
@@ -134,13 +142,14 @@ def leaves(value: Any, name: str) -> Iterator[Tuple[str, Any]]:
 
 def result_html(result: Any) -> str:
     """Verdicts, figures, poses, pictures, and the surfaces of a result."""
-    parts, pictures, surfaces, metrics = [], [], [], Table()
+    parts, pictures, surfaces = [], [], []
+    metrics: Dict[str, Dict[str, float]] = {}
     for name, value in (leaf for output in result for leaf in leaves(result[output], output)):
         if isinstance(value, _core.Verdict):
             said = [html.escape(text) for text in (name, value.judgement, "; ".join(value.reasons))]
             parts.append("<p><b>%s: %s</b> %s</p>" % (said[0], said[1], said[2]))
         elif isinstance(value, _core.Metrics):
-            metrics.append({"figures": name, **value.values})
+            metrics[name] = value.values
         elif isinstance(value, _core.Pose):
             parts.append("<p>%s</p>%s" % (html.escape(name), pose_table(value)._repr_html_()))
         elif isinstance(value, _core.Picture):
@@ -150,8 +159,7 @@ def result_html(result: Any) -> str:
         elif isinstance(value, _core.Mesh) and not surfaces:
             surfaces = [(value.vertices_mm, value.triangles)]
     if metrics:
-        columns = list(dict.fromkeys(column for row in metrics for column in row))
-        parts.append(Table({column: row.get(column) for column in columns} for row in metrics)._repr_html_())
+        parts.append(figures_table(metrics)._repr_html_())
     pictures.sort(key=lambda one: not one[0].startswith("overlay"))
     parts += [picture_html(picture.array, name) for name, picture in pictures[:MOST_PICTURES]]
     if surfaces:

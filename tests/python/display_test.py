@@ -68,6 +68,17 @@ class Display(Case):
             curves.count("stroke-dasharray"), 6 if result["profiles"]["distal"].profiles[0].truth is not None else 0
         )
 
+    def test_figures_have_a_row_each(self):
+        table = marrow.display.figures_table({"start": {"mm": 3.0, "deg": 1.0}, "final": {"mm": 0.5, "px": 2.0}})
+        self.assertEqual(
+            table,
+            [
+                {"figure": "mm", "start": 3.0, "final": 0.5},
+                {"figure": "deg", "start": 1.0, "final": None},
+                {"figure": "px", "start": None, "final": 2.0},
+            ],
+        )
+
     def test_names_cannot_become_markup(self):
         table = marrow.Table([{"<b>": "<script>", "value": 0.123456}])
         self.assertEqual(

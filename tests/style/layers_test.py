@@ -17,6 +17,7 @@ LAYERS = {
     "toolbox": {"domain", "runtime"},
     "plugins": {"domain", "runtime", "toolbox"},
     "tools": {"domain", "runtime", "compare", "toolbox", "tools"},
+    "python": {"domain", "runtime", "compare", "python"},
 }
 TOPICS = {
     "analytic": {"image"},
@@ -64,7 +65,7 @@ def fault(path, other):
 class Layers(unittest.TestCase):
     def test_each_layer_includes_only_what_lies_below(self):
         faults, seen = [], 0
-        for pattern in ("framework", "plugins", "tools"):
+        for pattern in ("framework", "plugins", "tools", "python"):
             for file in sorted((SOURCE / pattern).rglob("*.?pp")):
                 path = file.relative_to(SOURCE)
                 for name in INCLUDE.findall(file.read_text()):
@@ -84,6 +85,10 @@ class Layers(unittest.TestCase):
         self.assertIn(
             "does not build on",
             fault(path("framework/toolbox/files/a.cpp"), path("framework/include/marrow/toolbox/image/b.hpp")),
+        )
+        self.assertIn(
+            "may not include toolbox",
+            fault(path("python/bindings/a.cpp"), path("framework/include/marrow/toolbox/image/b.hpp")),
         )
         self.assertIsNone(fault(path("framework/toolbox/files/a.cpp"), path("framework/toolbox/files/b.hpp")))
         self.assertIsNone(fault(path("plugins/camera/a.cpp"), path("framework/include/marrow/plugin.hpp")))
