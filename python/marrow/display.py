@@ -126,9 +126,12 @@ def pose_table(pose: Any) -> Table:
 def figures_table(metrics: Dict[str, Dict[str, float]]) -> Table:
     """One row for each figure, one column for each item that has it."""
     figures = dict.fromkeys(name for values in metrics.values() for name in values)
-    return Table(
-        {"figure": figure, **{item: values.get(figure) for item, values in metrics.items()}} for figure in figures
-    )
+    table = Table()
+    for figure in figures:
+        row: Dict[str, Any] = {"figure": figure}
+        row.update({item: values.get(figure) for item, values in metrics.items()})
+        table.append(row)
+    return table
 
 
 def leaves(value: Any, name: str) -> Iterator[Tuple[str, Any]]:

@@ -49,8 +49,8 @@ function marrowSurfaceView(canvas, surfaces) {
     for (const facet of sorted) {
       context.beginPath();
       for (const corner of [facet.a, facet.b, facet.c])
-        context.lineTo(canvas.width / 2 + size * facet.points[corner],
-            canvas.height / 2 + size * facet.points[corner + 1]);
+        context.lineTo(
+            canvas.width / 2 + size * facet.points[corner], canvas.height / 2 + size * facet.points[corner + 1]);
       context.closePath();
       context.fillStyle = context.strokeStyle = `hsl(${facet.hue} 40% ${25 + 55 * facet.light}%)`;
       context.fill();
