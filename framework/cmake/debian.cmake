@@ -81,6 +81,17 @@ Python. Volumes, images and surfaces are numpy arrays.")
   set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_SHLIBDEPS ON)
   set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION}), ${MARROW_PYTHON_DEPENDS}")
   set(CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_SUGGESTS "python3-pandas, jupyter-notebook")
+  # Python's compiled files are made when the package is installed, and go with it.
+  foreach(step "postinst py3compile" "prerm py3clean")
+    separate_arguments(step)
+    list(GET step 0 script)
+    list(GET step 1 program)
+    set(script ${PROJECT_BINARY_DIR}/debian/python3-marrow/${script})
+    file(WRITE ${script} "#!/bin/sh\nset -e\nif command -v ${program} >/dev/null; then ${program} -p python3-marrow; fi\n")
+    file(CHMOD ${script} PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
+      WORLD_EXECUTE)
+    list(APPEND CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_CONTROL_EXTRA ${script})
+  endforeach()
 endif()
 
 set(CPACK_DEBIAN_MARROW_PACKAGE_SHLIBDEPS ON)
