@@ -111,7 +111,7 @@ class Nodes(Case):
         self.assertIn("finished", {event["event"] for event in told})
 
     def test_an_input_and_an_option_of_one_name(self):
-        with self.assertRaisesRegex(marrow.RunError, "nowhere.yaml"):
+        with self.assertRaisesRegex(marrow.RunError, "nowhere\\.(png|yaml): there is no such file"):
             marrow.read.view(image="nowhere.png", camera="nowhere.yaml")
         with self.assertRaisesRegex(marrow.PipelineError, "expects camera, got view"):
             marrow.read.view(image="nowhere.png", camera=small_case()[1].views["frontal"])
