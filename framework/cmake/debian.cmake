@@ -87,7 +87,8 @@ Python. Volumes, images and surfaces are numpy arrays.")
     list(GET step 0 script)
     list(GET step 1 program)
     set(script ${PROJECT_BINARY_DIR}/debian/python3-marrow/${script})
-    file(WRITE ${script} "#!/bin/sh\nset -e\nif command -v ${program} >/dev/null; then ${program} -p python3-marrow; fi\n")
+    file(WRITE ${script} "#!/bin/sh\nset -e\n"
+      "if command -v ${program} >/dev/null; then ${program} -p python3-marrow; fi\n")
     file(CHMOD ${script} PERMISSIONS OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ
       WORLD_EXECUTE)
     list(APPEND CPACK_DEBIAN_PYTHON3-MARROW_PACKAGE_CONTROL_EXTRA ${script})
@@ -109,8 +110,8 @@ set(CPACK_DEBIAN_MARROW-CGAL_PACKAGE_DEPENDS "marrow (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_DEPENDS
   "marrow (= ${PROJECT_VERSION}), g++, cmake, libeigen3-dev, libopencv-dev, libtbb-dev")
 set(CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS
-  libcgal-dev libgtest-dev libinsighttoolkit5-dev libjpeg-dev libnlopt-dev libpcl-dev libpng-dev libvtk9-dev libyaml-cpp-dev
-  zlib1g-dev)
+  libcgal-dev libgtest-dev libinsighttoolkit5-dev libjpeg-dev libnlopt-dev libpcl-dev libpng-dev libvtk9-dev
+  libyaml-cpp-dev zlib1g-dev)
 list(JOIN CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS ", " CPACK_DEBIAN_MARROW-DEV_PACKAGE_RECOMMENDS)
 set(CPACK_DEBIAN_MARROW-DOC_PACKAGE_ARCHITECTURE all)
 include(CPack)

@@ -1,6 +1,7 @@
 # What is installed beside libraries and headers, and the Debian packages that CPack makes (tools/package).
 install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow)
-install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev)
+install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev
+  USE_SOURCE_PERMISSIONS)
 
 # What `marrow new node` starts from, for each kind that has it: a node of marrow's own, and a test. The program looks
 # for all of this in share/marrow, in the build folder too.
