@@ -35,14 +35,15 @@ class Mutations(Case):
         chance = random.Random(20261121)
         files = sorted((SOURCE / "pipelines").glob("*.yaml"))
         self.assertGreater(len(files), 2)
-        shutil.copytree(SOURCE / "pipelines" / "track", self.scratch / "track")  # bodies of pipelines
+        folder = shutil.copytree(SOURCE / "pipelines", self.scratch / "pipelines")  # with the files that they name
         good = at_line = elsewhere = 0
         for number in range(200):
             path = files[number % len(files)]
             text, line = mutated(path.read_text(), chance)
-            copy = self.scratch / path.name
+            copy = folder / path.name
             copy.write_text(text)
             result = marrow("check", copy, "--json")
+            copy.write_text(path.read_text())
             self.assertIn(result.returncode, (0, 2), "%s\n%s" % (text, result.stderr))
             faults = json.loads(result.stdout)
             self.assertEqual(bool(faults), result.returncode == 2)
