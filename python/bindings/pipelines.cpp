@@ -50,7 +50,8 @@ py::tuple read_node(const std::string& name, const py::dict& inputs, const Texts
     const std::string port = py::str(key);
     const PortInfo* known = info ? port_of(*info, port) : nullptr;
     try {
-      values.emplace_back(port, value_of(object, known ? known->type : TypeInfo{}, known ? known->axis : "", port));
+      values.emplace_back(
+          port, value_of(object, known ? known->type : TypeInfo{}, known ? known->axis : "", "input '" + port + "'"));
     } catch (const Error& error) {
       diagnostics.add({name + "(" + port + ")"}, error.what());
     }
@@ -76,6 +77,64 @@ std::shared_ptr<ReadPipeline> with_only(const ReadPipeline& read, const std::vec
   return made;
 }
 
+std::vector<std::string> axes_of(const Value& value) {
+  std::vector<std::string> axes;
+  for (const Value* one = &value; one->is_list(); one = &one->items[0]) axes.push_back(one->axis);
+  return axes;
+}
+
+std::string text_of(const std::vector<std::string>& axes) {
+  std::string text;
+  for (const std::string& axis : axes) text += (text.empty() ? "a list over " : " and ") + axis;
+  return text.empty() ? "one item" : text;
+}
+
+/// An object as an output of a node. Throws Error if it has another type or other axes.
+Value output_value(const Pipeline& pipeline, std::size_t node, std::size_t output, const py::handle& object) {
+  const PortInfo& port = pipeline.nodes[node].info.outputs[output];
+  const std::string what = "given '" + pipeline.nodes[node].id + "." + port.name + "'";
+  Value absent;
+  absent.type = port.type;
+  if (object.is_none()) return absent;
+  const std::vector<std::string> axes = pipeline.axes_of({"", {}, int(node), int(output), {}});
+  const Value value = value_of(object, port.type, axes.empty() ? "" : axes[0], what);
+  if (value.type != port.type) throw Error(what + ": expected " + port.type.id + ", got " + value.type.id);
+  if (axes_of(value) != axes) throw Error(what + ": expected " + text_of(axes) + ", got " + text_of(axes_of(value)));
+  return value;
+}
+
+/// The same pipeline with values in the place of nodes. `given` is by node: a value, or for a node with several outputs
+/// a dictionary or a named tuple of them. Throws Error for what the pipeline does not have.
+std::shared_ptr<ReadPipeline> with_given(const ReadPipeline& read, const py::dict& given) {
+  auto made = std::make_shared<ReadPipeline>(read);
+  const std::vector<PipelineNode>& nodes = made->pipeline.nodes;
+  std::vector<std::string> ids;
+  for (const PipelineNode& node : nodes) ids.push_back(node.id);
+  for (const auto& [key, object] : given) {
+    const std::string id = py::str(key);
+    const auto index = std::size_t(std::find(ids.begin(), ids.end(), id) - ids.begin());
+    if (index == ids.size()) throw Error("given: the pipeline has no node '" + id + "'; " + suggestion(id, ids));
+    const std::vector<PortInfo>& outputs = nodes[index].info.outputs;
+    std::vector<Value>& values = made->given[id];
+    if (outputs.size() == 1) {
+      values = {output_value(made->pipeline, index, 0, object)};
+      continue;
+    }
+    py::object parts = py::reinterpret_borrow<py::object>(object);
+    if (py::hasattr(parts, "_asdict")) parts = parts.attr("_asdict")();
+    if (!py::isinstance<py::dict>(parts))
+      throw Error("given '" + id + "': the node has several outputs; give a dictionary of them");
+    std::vector<std::string> names;
+    for (const PortInfo& port : outputs) names.push_back(port.name);
+    for (const auto& [name, value] : py::reinterpret_borrow<py::dict>(parts))
+      if (const std::string text = py::str(name); std::find(names.begin(), names.end(), text) == names.end())
+        throw Error("given '" + id + "': the node has no output '" + text + "'; " + suggestion(text, names));
+    for (std::size_t i = 0; i < names.size(); ++i)
+      values.push_back(output_value(made->pipeline, index, i, parts.attr("get")(names[i])));
+  }
+  return made;
+}
+
 py::list nodes_of(const ReadPipeline& read) {
   py::list nodes;
   for (const PipelineNode& node : read.pipeline.nodes) nodes.append(py::make_tuple(node.id, node.info.name));
@@ -97,6 +156,7 @@ void bind_pipelines(py::module_& module) {
                                return names;
                              })
       .def("with_only", &with_only)
+      .def("with_given", &with_given)
       .def("resolved_yaml", [](const ReadPipeline& self) { return resolved_yaml(self.pipeline); });
   module.def("read", &read, py::arg("file"), py::arg("inputs"), py::arg("changes"), py::arg("inputs_required"));
   module.def("read_node", &read_node, py::arg("name"), py::arg("inputs"), py::arg("options"));

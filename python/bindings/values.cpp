@@ -33,18 +33,18 @@ std::string advice_for_array(const std::string& type) {
 }
 
 Value list_of(const std::vector<std::string>& names, const std::vector<py::object>& objects, const std::string& axis,
-              const TypeInfo& type, const std::string& port) {
-  if (objects.empty()) throw Error("input '" + port + "': the list is empty; leave the input out, or give it an item");
+              const TypeInfo& type, const std::string& what) {
+  if (objects.empty()) throw Error(what + ": the list is empty; leave it out, or give it an item");
   Value list;
   list.axis = axis;
   list.names = names;
   for (const py::object& object : objects) {
-    check_item_name("list item of the input '" + port + "'", list.names[list.items.size()]);
-    list.items.push_back(value_of(object, type, "", port));
+    check_item_name("list item of " + what, list.names[list.items.size()]);
+    list.items.push_back(value_of(object, type, "", what));
     list.type = list.items.back().type;
     if (list.type != list.items[0].type)
-      throw Error("input '" + port + "': the items of a list must have one type, got " + list.items[0].type.id +
-                  " and " + list.type.id);
+      throw Error(what + ": the items of a list must have one type, got " + list.items[0].type.id + " and " +
+                  list.type.id);
   }
   return list;
 }
@@ -74,7 +74,7 @@ py::object python_of(const Value& value) {
   return py::cast(OtherValue{value});
 }
 
-Value value_of(const py::handle& object, const TypeInfo& type, const std::string& axis, const std::string& port) {
+Value value_of(const py::handle& object, const TypeInfo& type, const std::string& axis, const std::string& what) {
   if (auto value = known_value(object)) return *value;
   const std::string axis_here = !axis.empty() ? axis : type.id == "view" ? "view" : "item";
   if (py::hasattr(object, "items") && py::hasattr(object, "keys")) {
@@ -85,7 +85,7 @@ Value value_of(const py::handle& object, const TypeInfo& type, const std::string
       objects.push_back(object.attr("__getitem__")(key));
     }
     const std::string own = py::hasattr(object, "axis") ? object.attr("axis").cast<std::string>() : axis_here;
-    return list_of(names, objects, own, type, port);
+    return list_of(names, objects, own, type, what);
   }
   if (py::isinstance<py::list>(object) || py::isinstance<py::tuple>(object)) {
     std::vector<std::string> names;
@@ -94,11 +94,11 @@ Value value_of(const py::handle& object, const TypeInfo& type, const std::string
       names.push_back(name_of_item(item, objects.size()));
       objects.push_back(py::reinterpret_borrow<py::object>(item));
     }
-    return list_of(names, objects, axis_here, type, port);
+    return list_of(names, objects, axis_here, type, what);
   }
   if (is_array(object) && type.id == "image")
-    return Value::of<Image>(std::make_shared<const Image>(Image{pixels_of(object, "input '" + port + "'")}));
-  throw Error("input '" + port + "': expected " + type.id + ", got " + type_name(object) +
+    return Value::of<Image>(std::make_shared<const Image>(Image{pixels_of(object, what)}));
+  throw Error(what + ": expected " + type.id + ", got " + type_name(object) +
               (is_array(object) ? advice_for_array(type.id) : ""));
 }
 

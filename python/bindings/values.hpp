@@ -47,8 +47,8 @@ py::object python_of(const Value& value);
 
 /// The value of an object for a port. A list or dictionary becomes a list over the axis of the port, or, if the port
 /// takes one item, over "view" for views and over "item" for others. Throws Error if the object is no value of a type
-/// that marrow knows.
-Value value_of(const py::handle& object, const TypeInfo& type, const std::string& axis, const std::string& port);
+/// that marrow knows. `what` names the port in the message ("input 'view'").
+Value value_of(const py::handle& object, const TypeInfo& type, const std::string& axis, const std::string& what);
 
 /// Image, Picture, Volume, SignedField.
 void bind_images(py::module_& module);

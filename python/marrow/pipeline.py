@@ -29,18 +29,19 @@ class Pipeline:
     p.set("edges.high", 80)
     r = p.run(progress=True)
 
-    The keywords are the pipeline's inputs. Relative paths start at the working folder. Raises PipelineError with all
-    faults of the file.
+    The keywords are the pipeline's inputs. Relative paths start at the working folder. An input that is None stays
+    without a value, for runs that are given what would be made of it. Raises PipelineError with all faults of the file.
     """
 
     def __init__(self, file: Union[str, "os.PathLike[str]"], /, **inputs: Any) -> None:
         self._file = os.fspath(file)
-        self._inputs = [(name, texts.of_input(name, value)) for name, value in inputs.items()]
+        self._inputs = [(name, texts.of_input(name, value)) for name, value in inputs.items() if value is not None]
+        self._is_complete = None not in inputs.values()
         self._changes: Dict[str, str] = {}
         self._read = self._read_with(self._changes)
 
     def _read_with(self, changes: Dict[str, str]) -> _core.ReadPipeline:
-        return checked_pipeline(_core.read(self._file, self._inputs, list(changes.items()), True))
+        return checked_pipeline(_core.read(self._file, self._inputs, list(changes.items()), self._is_complete))
 
     def set(self, key: Union[str, Mapping[str, Any]], value: Any = None) -> "Pipeline":
         """Changes the pipeline: node.option, node.uses, node.may_fail or node.in.port. A dictionary makes several
@@ -57,6 +58,7 @@ class Pipeline:
         *,
         progress: Progress = False,
         only: Optional[List[str]] = None,
+        given: Optional[Mapping[str, Any]] = None,
         folder: Union[None, bool, str, "os.PathLike[str]"] = None,
         seed: int = 1,
         threads: int = 0,
@@ -66,6 +68,8 @@ class Pipeline:
 
         progress: True writes a line for each node; a function is called with each event, a dictionary.
         only: the outputs to compute.
+        given: values in the place of nodes, which are not run then: {"model": mesh}. For a node with several outputs, a
+        dictionary or a named tuple of them.
         folder: where to write the run as `marrow run` does, new or empty; True for runs/NAME.
         seed: of all randomness. threads: 0 for all processors.
         keep: whether results of nodes are looked up in the store, and kept there.
@@ -74,6 +78,8 @@ class Pipeline:
         `progress`, which is raised then. Raises RunError if a node fails.
         """
         read = self._read if only is None else self._read.with_only(list(only))
+        if given:
+            read = read.with_given(dict(given))
         place = None if folder is None or folder is False else "" if folder is True else os.fspath(folder)
         observer = Printer() if progress is True else progress or None
         return checked(

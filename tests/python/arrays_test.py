@@ -39,7 +39,6 @@ class Arrays(Case):
         mesh = result["model"]["distal"]
         arrays = [mesh.vertices_mm, mesh.triangles, result["edges"]["lateral"].pixels]
         case = marrow.read.case(path=folder)
-        case = getattr(case, "case", case)
         arrays.append(numpy.asarray(case.ct))
         copies = [array.copy() for array in arrays]
         del result, mesh, case

@@ -111,8 +111,12 @@ class Nodes(Case):
         self.assertIn("finished", {event["event"] for event in told})
 
     def test_an_input_and_an_option_of_one_name(self):
-        with self.assertRaisesRegex(marrow.RunError, "nowhere\\.(png|yaml): there is no such file"):
-            marrow.read.view(image="nowhere.png", camera="nowhere.yaml")
+        image = self.scratch / "image.png"
+        image.write_bytes(marrow.display.png(numpy.zeros((8, 8), "uint8")))
+        with self.assertRaisesRegex(marrow.RunError, "nowhere.yaml"):
+            marrow.read.view(image=image, camera="nowhere.yaml")
+        camera = marrow.Camera(8, 8, [[1000, 0, 4], [0, 1000, 4], [0, 0, 1]], numpy.eye(4))
+        self.assertEqual(marrow.read.view(camera, image=image).image.width, 8)
         with self.assertRaisesRegex(marrow.PipelineError, "expects camera, got view"):
             marrow.read.view(image="nowhere.png", camera=small_case()[1].views["frontal"])
         self.assertEqual(list(inspect.signature(marrow.read.view).parameters).count("camera"), 1)

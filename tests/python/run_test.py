@@ -92,6 +92,36 @@ class Run(Case):
         with self.assertRaisesRegex(LookupError, "enough"):
             marrow.Pipeline(FEMUR, case=folder).run(keep=False, progress=stop)
 
+    def test_values_of_memory_take_the_place_of_nodes(self):
+        folder, _ = small_case()
+        expected = marrow.Pipeline(FEMUR, case=folder).run(only=["pose", "edges"], keep=False)
+        pipeline = marrow.Pipeline(FEMUR, case=None)
+        read = marrow.read.case(path=folder)
+        result = pipeline.run(given={"case": read}, only=["pose", "edges"], keep=False)
+        self.assertEqual(result["pose"]["distal"].matrix.tolist(), expected["pose"]["distal"].matrix.tolist())
+        self.assertNotIn("case", result.nodes)
+
+        camera = read.views["lateral"].camera
+        pixels = numpy.array(read.views["lateral"].image.array)
+        views = {"lateral": marrow.View(pixels, camera, name="lateral")}
+        result = pipeline.run(given={"case": {"views": views}}, only=["edges"])
+        self.assertEqual(list(result["edges"]), ["lateral"])
+        self.assertTrue(numpy.array_equal(result["edges"]["lateral"].pixels, expected["edges"]["lateral"].pixels))
+
+        result = pipeline.run(given={"edges": expected["edges"], "case": read}, only=["shaft"])
+        self.assertNotIn("edges", result.nodes)
+        self.assertEqual(list(result["shaft"]), ["frontal", "lateral"])
+        for given, text in (
+            ({"cas": read}, "given: the pipeline has no node 'cas'; did you mean 'case'?"),
+            ({"case": read.ct}, "given 'case': the node has several outputs; give a dictionary of them"),
+            ({"case": {"vievs": views}}, "given 'case': the node has no output 'vievs'; did you mean 'views'?"),
+            ({"case": {"ct": read.views}}, "given 'case.ct': expected volume, got view"),
+            ({"case": {"views": views["lateral"]}}, "given 'case.views': expected a list over view, got one item"),
+            ({"edges": 5}, "given 'edges.edges': expected edge_map, got int"),
+        ):
+            with self.assertRaisesRegex(marrow.Error, text.replace("?", r"\?")):
+                pipeline.run(given=given, only=["edges"])
+
     def test_a_random_run_depends_on_its_seed_only(self):
         pipeline = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml")
         pipeline.set(
