@@ -2,6 +2,7 @@
 #include <pybind11/stl.h>
 
 #include <atomic>
+#include <cstdio>
 #include <exception>
 
 #include "interruptible.hpp"
@@ -37,9 +38,12 @@ class Observer {
   Observer(py::object function, std::atomic<bool>& cancelled, Run& run)
       : function_(std::move(function)), cancelled_(cancelled), run_(run) {}
 
+  /// From now on, events are kept in the log of a folder, too.
+  void log_to(RunLog& log) { log_ = &log; }
+
   void operator()(const RunEvent& event) {
-    if (event.kind == RunEvent::Kind::warning)
-      run_.warnings.emplace_back(event.node + (event.item.empty() ? "" : " (" + event.item + ")"), event.text);
+    keep_in_log(event);
+    if (event.kind == RunEvent::Kind::warning) run_.warnings.emplace_back(place_of(event), event.text);
     if (function_.is_none() || fault_) return;
     static constexpr const char* kNames[] = {"started", "progress", "finished", "failed",  "skipped",
                                              "message", "warning",  "cached",   "waiting", "waited"};
@@ -64,9 +68,26 @@ class Observer {
   }
 
  private:
+  static std::string place_of(const RunEvent& event) {
+    return event.item.empty() ? event.node : event.node + " (" + event.item + ")";
+  }
+  void keep_in_log(const RunEvent& event) {
+    if (!log_) return;
+    if (event.kind == RunEvent::Kind::finished) {
+      char seconds[32];
+      std::snprintf(seconds, sizeof seconds, "%.3f s", event.seconds);
+      log_->keep(LogLevel::info, place_of(event), seconds);
+    } else if (event.kind == RunEvent::Kind::failed) {
+      log_->keep(event.level, "", event.text);
+    } else if (event.kind != RunEvent::Kind::progress && !event.text.empty()) {
+      log_->keep(event.level, place_of(event), event.text);
+    }
+  }
+
   py::object function_;
   std::atomic<bool>& cancelled_;
   Run& run_;
+  RunLog* log_ = nullptr;
   std::optional<py::error_already_set> fault_;
 };
 
@@ -94,16 +115,22 @@ void drop_other_values(Run& run) {
     if (!is_output[i]) run.result.nodes[i].outputs.clear();
 }
 
-void run_into(Run& run, const RunOptions& options, RunSettings& settings) {
+void run_into(Run& run, const RunOptions& options, RunSettings& settings, Observer& observer) {
   const Catalogue& known = *run.read->known;
   const std::unique_ptr<RunFolder> folder = folder_of(options, run.read->pipeline);
+  if (folder) {
+    observer.log_to(folder->log());
+    for (const std::string& note : run.read->pipeline.notes) folder->log().keep(LogLevel::info, "", "note: " + note);
+  }
   std::optional<Store> store;
   if (options.keep) {
     const std::string fault = store.emplace().prepare();
-    if (fault.empty())
+    if (fault.empty()) {
       settings.store = &*store;
-    else
-      run.warnings.emplace_back("", "results are not kept: " + fault);
+      expect_nothing_reads(run.read->pipeline, store->folder(), "the store of results",
+                           "set MARROW_CACHE to another folder, or give keep=False");
+    }
+    if (!fault.empty()) run.warnings.emplace_back("", "results are not kept: " + fault);
   }
   run.result = run_pipeline(run.read->pipeline, known, settings);
   run.settings.seed = settings.seed;
@@ -129,7 +156,7 @@ std::shared_ptr<Run> run(const std::shared_ptr<ReadPipeline>& read, const py::ob
   settings.remember = read->given.empty();
   settings.observer = [&](const RunEvent& event) { observer(event); };
   const RunOptions options{keep, folder};
-  do_interruptibly(cancelled, [&] { run_into(*made, options, settings); });
+  do_interruptibly(cancelled, [&] { run_into(*made, options, settings, observer); });
   observer.rethrow();
   return made;
 }

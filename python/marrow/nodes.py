@@ -108,8 +108,9 @@ def node(name: str) -> Node:
 
 
 def __getattr__(name: str) -> Kind:
-    if name not in _core.kind_names():
-        raise AttributeError("marrow has no attribute or kind of nodes '%s'" % name)
+    if name.startswith("__") or name not in _core.kind_names():  # an import asks for __path__
+        hint = "" if name.startswith("_") else "; " + _core.suggestion(name, _core.kind_names())
+        raise AttributeError("marrow has no attribute or kind of nodes '%s'%s" % (name, hint))
     return Kind(name)
 
 

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Errors in Python: all faults at once, each with its place, its node and what to do."""
+import os
+import shutil
+
 from package import FEMUR, Case, main, marrow, small_case
 
 FAULTY = """marrow: 1
@@ -107,8 +110,30 @@ class Errors(Case):
 
     def test_a_folder_that_the_run_reads_is_refused(self):
         folder, _ = small_case()
+        pipeline = marrow.Pipeline(FEMUR, case=folder)
         with self.assertRaisesRegex(marrow.Error, "choose another with folder="):
-            marrow.Pipeline(FEMUR, case=folder).run(only=["edges"], folder=folder / "out")
+            pipeline.run(only=["edges"], folder=folder / "out")
+        before = os.environ["MARROW_CACHE"]
+        try:
+            os.environ["MARROW_CACHE"] = str(folder / "store")
+            with self.assertRaisesRegex(marrow.Error, "set MARROW_CACHE to another folder, or give keep=False"):
+                pipeline.run(only=["edges"])
+            self.assertEqual(len(pipeline.run(only=["edges"], keep=False)["edges"]), 2)
+        finally:
+            os.environ["MARROW_CACHE"] = before
+            shutil.rmtree(folder / "store", ignore_errors=True)
+
+    def test_a_store_that_cannot_be_used_is_a_warning(self):
+        other = self.scratch / "others"
+        other.mkdir()
+        (other / "letter.txt").write_text("of somebody")
+        before = os.environ["MARROW_CACHE"]
+        try:
+            os.environ["MARROW_CACHE"] = str(other)
+            result = marrow.Pipeline(FEMUR, case=small_case()[0]).run(only=["edges"])
+        finally:
+            os.environ["MARROW_CACHE"] = before
+        self.assertRegex(result.warnings[0], "^results are not kept: ")
 
 
 if __name__ == "__main__":

@@ -92,7 +92,9 @@ class Nodes(Case):
         self.assertEqual((caught.exception.node, caught.exception.port), ("edges.canny", "view"))
         with self.assertRaisesRegex(AttributeError, "no node 'edges.cany'; did you mean 'canny'?"):
             marrow.edges.cany
-        with self.assertRaisesRegex(AttributeError, "marrow has no attribute or kind of nodes 'egdes'"):
+        with self.assertRaisesRegex(
+            AttributeError, "marrow has no attribute or kind of nodes 'egdes'; did you mean 'edges'"
+        ):
             marrow.egdes
 
     def test_a_node_that_fails(self):

@@ -60,7 +60,9 @@ class Run(Case):
     def test_a_folder_is_written_as_by_the_program(self):
         folder, _ = small_case()
         pipeline = marrow.Pipeline(FEMUR, case=folder)
-        result = pipeline.run(only=["edges"], folder=self.scratch / "out")
+        result = pipeline.run(only=["edges"], folder=self.scratch / "out", keep=False)
+        log = (self.scratch / "out" / "log.txt").read_text()
+        self.assertRegex(log, r"\[info\] edges \(lateral\): \d+\.\d{3} s\n")
         self.assertEqual(result.folder, self.scratch / "out")
         record = json.loads((self.scratch / "out" / "run.json").read_text())
         self.assertEqual(record["inputs"]["case"], str(folder))
