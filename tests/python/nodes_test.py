@@ -26,18 +26,24 @@ class Nodes(Case):
         self.assertEqual(list(of_dict), ["one"])
 
     def test_functions_go_from_node_to_node(self):
-        _, case = small_case()
-        start = marrow.Pose(case.truth["distal"].matrix)
-        z, y, x = numpy.mgrid[-30:31, -30:31, -30:31]
-        ball = marrow.mesh.marching_cubes(
-            marrow.SignedField(
-                numpy.sqrt(x**2 + y**2 + z**2) - 20, spacing_mm=(1, 1, 1), origin_mm=(-30, -30, -30)
-            )
+        adder = marrow.test.adder(marrow.test.constant(value=2))
+        self.assertEqual((adder.type, repr(adder)), ("adder", "<marrow adder>"))
+        self.assertEqual(marrow.test.apply(adder, marrow.test.constant(value=3))["value"], 5)
+
+    def test_a_whole_pipeline_as_functions(self):
+        folder, _ = small_case()
+        case = marrow.read.case(path=folder)
+        model = marrow.mesh.marching_cubes(marrow.segment.level_set(volume=case.ct, seeds=case.seeds))
+        edges = marrow.edges.adaptive_relaxation(case.views, low=50, high=75)
+        shaft = marrow.shaft.hough_pairs(edges=edges, view=case.views)
+        start = marrow.initial.shaft_axis(model=model, lines=shaft, views=case.views)
+        outline = marrow.project.silhouette_edges(mesh=model, volume=case.ct)
+        cost = marrow.similarity.contour_distance(projector=outline, views=case.views, edges=edges)
+        found = marrow.register.multiresolution(
+            cost=cost, optimizer=marrow.optimizer.levenberg_marquardt(), initial=start
         )
-        outline = marrow.project.silhouette_edges(mesh=ball)
-        self.assertEqual((outline.type, repr(outline)), ("outline_projector", "<marrow outline_projector>"))
-        self.assertGreater(len(ball.triangles), 1000)
-        self.assertEqual(start.matrix.shape, (4, 4))
+        expected = marrow.Pipeline(FEMUR, case=folder).run(only=["pose"], keep=False)["pose"]
+        self.assertEqual(found.pose["distal"].matrix.tolist(), expected["distal"].matrix.tolist())
 
     def test_it_explains_itself(self):
         canny = marrow.edges.canny
