@@ -8,13 +8,14 @@ from typing import Any, Dict, List, Optional, Tuple
 
 from . import _core, texts
 from .errors import Error, Fault, PipelineError
-from .pipeline import checked_pipeline
+from .pipeline import checked_pipeline, natural
 from .progress import Printer
 from .result import Result, checked
 
 __all__ = ["Kind", "Node", "node"]
 
 
+_DEFAULTS = {"seed": 1, "threads": 0, "keep": False, "progress": False}
 _NO_INPUT = (str, os.PathLike, bool, int, float)
 
 
@@ -33,7 +34,8 @@ class Node:
 
     def using(self, *, seed: int = 1, threads: int = 0, keep: bool = False, progress: Any = False) -> "Node":
         """The same node with other settings of its runs, which Pipeline.run() explains."""
-        return Node(self._info, {"seed": seed, "threads": threads, "keep": keep, "progress": progress})
+        settings = {"seed": natural("seed", seed), "threads": natural("threads", threads)}
+        return Node(self._info, {**settings, "keep": keep, "progress": progress})
 
     def __call__(self, *inputs: Any, **arguments: Any) -> Any:
         ports = [port["name"] for port in self._info["inputs"]]
@@ -59,9 +61,8 @@ class Node:
         read = checked_pipeline(_core.read_node(self._info["name"], wired, options))
         settings = self._settings
         observer = Printer() if settings["progress"] is True else settings["progress"] or None
-        result = checked(
-            Result(_core.run(read, observer, settings["seed"], settings["threads"], settings["keep"], None))
-        )
+        run = _core.run(read, observer, settings["seed"], settings["threads"], settings["keep"], None)
+        result = checked(Result(run), self.__qualname__)
         outputs = [port["name"] for port in self._info["outputs"]]
         if len(outputs) == 1:
             return result[outputs[0]]
@@ -89,7 +90,7 @@ class Kind:
         info = _core.node_info(self._name + "." + name)
         if info is None:
             raise AttributeError("no node '%s.%s'; %s" % (self._name, name, _core.suggestion(name, self.__dir__())))
-        return Node(info, {"seed": 1, "threads": 0, "keep": False, "progress": False})
+        return Node(info, _DEFAULTS)
 
     def __dir__(self) -> List[str]:
         start = self._name + "."
@@ -104,7 +105,7 @@ def node(name: str) -> Node:
     info = _core.node_info(name)
     if info is None:
         raise Error("unknown node '%s'; %s" % (name, _core.suggestion(name, _core.node_names())))
-    return Node(info, {"seed": 1, "threads": 0, "keep": False, "progress": False})
+    return Node(info, _DEFAULTS)
 
 
 def __getattr__(name: str) -> Kind:

@@ -83,7 +83,7 @@ class Pipeline:
         place = None if folder is None or folder is False else "" if folder is True else os.fspath(folder)
         observer = Printer() if progress is True else progress or None
         return checked(
-            Result(_core.run(read, observer, _natural("seed", seed), _natural("threads", threads), keep, place))
+            Result(_core.run(read, observer, natural("seed", seed), natural("threads", threads), keep, place))
         )
 
     @property
@@ -119,7 +119,8 @@ class Pipeline:
         return "<marrow.Pipeline %s: %d nodes; outputs %s>" % (self.name, len(self.nodes), ", ".join(self.outputs))
 
 
-def _natural(name: str, value: int) -> int:
+def natural(name: str, value: int) -> int:
+    """A seed or a number of threads. Raises Error for what cannot be one."""
     limit = 2**64 if name == "seed" else 1025
     if not isinstance(value, int) or not 0 <= value < limit:
         raise Error("%s: expected a whole number from 0 to %d, got %r" % (name, limit - 1, value))

@@ -87,21 +87,21 @@ class Result(Mapping[str, Any]):
         return "<marrow.Result of %.3f s: %s>" % (self.seconds, ", ".join(self._names))
 
 
-def checked(result: Result) -> Result:
-    """The result. Raises RunError if a node failed or an output was not written."""
+def checked(result: Result, called: Optional[str] = None) -> Result:
+    """The result. Raises RunError if a node failed or an output was not written. `called`: the node, if it was called as
+    a function: it then has no name and no place in a file."""
     run = result._run
-    faults = [
-        Fault(
-            node["reason"],
-            file=node["file"] or None,
-            line=node["line"] or None,
-            column=node["column"] or None,
-            node=node["name"],
-        )
-        for node in run.nodes
-        if node["is_failed"]
-    ]
-    texts = ["node '%s' (%s) failed: %s" % (n["name"], n["uses"], n["reason"]) for n in run.nodes if n["is_failed"]]
+    faults, texts = [], []
+    for node in run.nodes:
+        if not node["is_failed"]:
+            continue
+        if called is not None:
+            faults.append(Fault(node["reason"], node=called))
+            texts.append("%s failed: %s" % (called, node["reason"]))
+            continue
+        place = {name: node[name] or None for name in ("file", "line", "column")}
+        faults.append(Fault(node["reason"], node=node["name"], **place))
+        texts.append("node '%s' (%s) failed: %s" % (node["name"], node["uses"], node["reason"]))
     for name, _, fault, _ in run.written:
         if fault and not faults:
             faults.append(Fault(fault))

@@ -106,13 +106,15 @@ class Nodes(Case):
     def test_a_node_that_fails(self):
         with self.assertRaises(marrow.RunError) as caught:
             marrow.read.case(path="/nowhere")
-        self.assertEqual(caught.exception.node, "case")
-        self.assertIn("/nowhere", str(caught.exception))
+        self.assertEqual((caught.exception.node, caught.exception.file), ("read.case", None))
+        self.assertRegex(str(caught.exception), "^read.case failed: /nowhere: expected the folder of a case")
 
     def test_settings_of_a_call(self):
         draw = marrow.test.draw
         self.assertEqual(draw.using(seed=3)()["value"], draw.using(seed=3)()["value"])
         self.assertNotEqual(draw.using(seed=3)()["value"], draw.using(seed=4)()["value"])
+        with self.assertRaisesRegex(marrow.Error, "threads: expected a whole number from 0 to 1024, got 1.5"):
+            draw.using(threads=1.5)
         told = []
         _, case = small_case()
         marrow.edges.canny.using(progress=told.append)(case.views)
