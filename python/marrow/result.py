@@ -88,8 +88,8 @@ class Result(Mapping[str, Any]):
 
 
 def checked(result: Result, called: Optional[str] = None) -> Result:
-    """The result. Raises RunError if a node failed or an output was not written. `called`: the node, if it was called as
-    a function: it then has no name and no place in a file."""
+    """The result. Raises RunError if a node failed or an output was not written. `called`: the node, if it was called
+    as a function: it then has no name and no place in a file."""
     run = result._run
     faults, texts = [], []
     for node in run.nodes:
