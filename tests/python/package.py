@@ -16,6 +16,7 @@ TEST_PLUGINS = BUILD / "tests" / "plugins"
 FEMUR = SOURCE / "pipelines" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
 atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
+tempfile.tempdir = str(SCRATCH)  # whatever is left there goes with it
 os.environ["MARROW_CACHE"] = str(SCRATCH / "cache")  # no test sees what another run left
 os.environ["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS)
 sys.path.insert(0, str(BUILD / "python"))
