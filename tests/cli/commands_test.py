@@ -323,6 +323,21 @@ class Commands(Case):
         self.assertTrue(dot.startswith("digraph"))
         self.assertIn("style=dashed", dot)
 
+    def test_other_files_are_not_taken_for_pipelines(self):
+        experiment = SOURCE / "pipelines/experiments/demo.yaml"
+        said = "marrow: error: %s: this is an experiment, not a pipeline; look at it by: marrow compare %s --dry-run\n"
+        for command in ("check", "run", "plan", "graph"):
+            result = marrow(command, experiment, cwd=self.scratch)
+            self.assertEqual((result.returncode, result.stderr), (2, said % (experiment, experiment)))
+        pose = SOURCE / "pipelines/wrist/radius-0002.pose.yaml"
+        result = marrow("check", pose)
+        self.assertEqual(result.returncode, 2)
+        self.assertIn(
+            ": this is a file of the format marrow-pose, not a pipeline; a pipeline names it in an option or "
+            "an input",
+            result.stderr,
+        )
+
     def test_no_name_of_a_node_in_framework_or_tools(self):
         names = [node["name"] for node in json.loads(marrow("list", "--json").stdout)]
         self.assertGreater(len(names), 20)
