@@ -52,11 +52,9 @@ void put(YAML::Emitter& out, const std::vector<Item>& items) {
 }
 
 json option_json(const OptionInfo& option) {
-  json j = {{"name", option.name},
-            {"help", option.help},
-            {"unit", option.unit},
-            {"type", type_name(option.type)},
-            {"required", option.required}};
+  json j = {{"name", option.name},         {"help", option.help},
+            {"unit", option.unit},         {"type", type_name(option.type)},
+            {"range", range_text(option)}, {"required", option.required}};
   std::visit([&](const auto& value) { j["default"] = value; }, option.default_value);
   if (option.minimum) j["minimum"] = *option.minimum;
   if (option.maximum) j["maximum"] = *option.maximum;
@@ -64,11 +62,22 @@ json option_json(const OptionInfo& option) {
   return j;
 }
 
+json ports_json(const std::vector<KindPort>& ports) {
+  json all = json::array();
+  for (const KindPort& port : ports) {
+    json types = json::array();
+    for (const TypeInfo& type : port.types) types.push_back(type.id);
+    all.push_back({{"name", port.name}, {"types", types}, {"axis", port.axis}, {"help", port.help}});
+  }
+  return all;
+}
+
 }  // namespace
 
 json node_json(const NodeInfo& node) {
-  json j = {{"name", node.name},       {"summary", node.summary},  {"random", node.random},   {"traits", node.traits},
-            {"inputs", json::array()}, {"outputs", json::array()}, {"options", json::array()}};
+  json j = {{"name", node.name},        {"summary", node.summary},   {"random", node.random},
+            {"traits", node.traits},    {"inputs", json::array()},   {"outputs", json::array()},
+            {"options", json::array()}, {"relations", json::array()}};
   for (const PortInfo& port : node.inputs)
     j["inputs"].push_back({{"name", port.name},
                            {"type", port.type.id},
@@ -78,6 +87,24 @@ json node_json(const NodeInfo& node) {
   for (const PortInfo& port : node.outputs)
     j["outputs"].push_back({{"name", port.name}, {"type", port.type.id}, {"axis", port.axis}, {"help", port.help}});
   for (const OptionInfo& option : node.options) j["options"].push_back(option_json(option));
+  for (const RelationInfo& relation : node.relations) j["relations"].push_back(relation_text(relation));
+  return j;
+}
+
+json kind_json(const KindInfo& kind) {
+  json j = {{"name", kind.name},
+            {"summary", kind.summary},
+            {"inputs", ports_json(kind.inputs)},
+            {"outputs", ports_json(kind.outputs)},
+            {"sees_truth", kind.sees_truth},
+            {"apart", kind.apart != Apart::no},
+            {"traits", json::array()},
+            {"checks", json::array()}};
+  for (const TraitInfo& trait : kind.traits) j["traits"].push_back({{"name", trait.name}, {"help", trait.help}});
+  for (const CheckInfo& check : kind.checks) {
+    j["checks"].push_back({{"name", check.name}, {"what", check.what}, {"unit", check.unit}});
+    if (!check.unit.empty()) j["checks"].back()["limit"] = check.limit;
+  }
   return j;
 }
 
@@ -96,6 +123,29 @@ std::optional<double> bound_told(const OptionInfo& option, std::optional<double>
   using Limits = std::numeric_limits<int>;
   const bool is_of_int = option.type == OptionType::integer && (bound == Limits::min() || bound == Limits::max());
   return is_of_int ? std::nullopt : bound;
+}
+
+std::string relation_text(const RelationInfo& relation) {
+  const std::vector<std::string>& names = relation.names;
+  std::string all;
+  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  switch (relation.type) {
+    case RelationType::not_above:
+      return names[0] + " is not above " + names[1];
+    case RelationType::below:
+      return names[0] + " is below " + names[1];
+    case RelationType::same_length:
+      return all + " have the same length";
+    case RelationType::as_many_or_none:
+      return names[0] + " has as many items as " + names[1] + ", or none";
+    case RelationType::exactly_one:
+      return "exactly one of " + all + " is given";
+    case RelationType::at_least_one:
+      return names.size() > 1 ? "at least one of " + all + " is given" : all + " is not empty";
+    case RelationType::distinct:
+      return all + " has no item twice";
+  }
+  return all;
 }
 
 std::string range_text(const OptionInfo& option) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// The description of a node, as JSON and in words.
+// The description of a node and of a kind, as JSON and in words.
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
@@ -10,6 +10,8 @@
 namespace marrow::cli {
 
 nlohmann::json node_json(const NodeInfo& node);
+/// The contract of a kind, with the limits of its checks.
+nlohmann::json kind_json(const KindInfo& kind);
 /// "edge_map", "list of view over view".
 std::string port_text(const PortInfo& port);
 std::string port_text(const KindPort& port);
@@ -17,5 +19,7 @@ std::string port_text(const KindPort& port);
 std::string yaml_text(const OptionValue& value);
 /// "number, 0 to 100 px", "one of: a, b".
 std::string range_text(const OptionInfo& option);
+/// "low is not above high".
+std::string relation_text(const RelationInfo& relation);
 
 }  // namespace marrow::cli

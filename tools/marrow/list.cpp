@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// The command list: shows all nodes that can be used, or those that fit a place in a pipeline.
+// The command list: shows all nodes that can be used, those that fit a place in a pipeline, or the kinds.
 #include <algorithm>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -19,6 +19,7 @@ struct ListRequest {
   std::string kind;
   std::vector<std::string> fits;  ///< FILE and NODE
   std::vector<std::string> overrides;
+  bool kinds = false;
   bool as_json = false;
 };
 
@@ -57,6 +58,22 @@ int list(const std::string& kind, bool as_json) {
                  known ? "" : printable("; " + suggestion(kind, catalogue.kind_names())).c_str());
     return 2;
   }
+  if (!as_json) note_refused(catalogue);
+  return 0;
+}
+
+int list_kinds(bool as_json) {
+  const Catalogue catalogue;
+  json all = json::array();
+  for (const std::string& name : catalogue.kind_names()) {
+    KindInfo kind;
+    kind.name = name;
+    kind.summary = "no library brings this kind, so its nodes have no contract";
+    if (const KindInfo* known = catalogue.find_kind(name)) kind = *known;
+    all.push_back(kind_json(kind));
+    if (!as_json) std::printf("  %-14s %s\n", printable(name).c_str(), printable(kind.summary).c_str());
+  }
+  if (as_json) std::printf("%s\n", all.dump(1, ' ', false, json::error_handler_t::replace).c_str());
   if (!as_json) note_refused(catalogue);
   return 0;
 }
@@ -122,9 +139,14 @@ void add_list(CLI::App& app, int& code) {
           "--set", request->overrides,
           "node.option=value, node.uses=kind.name, node.may_fail=true or node.in.port=reference in that pipeline")
       ->allow_extra_args(false);
+  command->add_flag("--kinds", request->kinds, "the kinds instead of the nodes; as JSON with ports, traits and checks")
+      ->excludes("kind", "--fits");
   command->add_flag("--json", request->as_json, "as JSON");
-  command->callback(
-      [request, &code] { code = request->fits.empty() ? list(request->kind, request->as_json) : list_fits(*request); });
+  command->callback([request, &code] {
+    code = request->kinds          ? list_kinds(request->as_json)
+           : request->fits.empty() ? list(request->kind, request->as_json)
+                                   : list_fits(*request);
+  });
   say_that_libraries_are_described(command);
 }
 
