@@ -3,7 +3,7 @@
 import re
 import shutil
 
-from markdown import block, sections, toctree
+from markdown import ORPHAN, block, sections, toctree
 
 # Captions of the navigation, and the pages under each. A page of docs/ that is not here comes last, under MORE.
 GROUPS = {
@@ -97,4 +97,4 @@ def write(catalogue, facts, folder):
     shutil.copytree(facts.root / "docs" / "images", folder / "docs" / "images")
     examples = [path for path in sorted((facts.root / "docs").glob("example-*")) if path.is_dir()]
     for path in examples:
-        (folder / "docs" / (path.name + ".md")).write_text("---\norphan: true\n---\n" + folder_page(path))
+        (folder / "docs" / (path.name + ".md")).write_text(ORPHAN + folder_page(path))

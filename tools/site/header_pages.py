@@ -6,7 +6,7 @@ a line, and those inside a type, stay where they are in the code.
 """
 import re
 
-from markdown import block, plain, sections, toctree
+from markdown import ORPHAN, block, plain, sections
 from node_pages import comment_text
 from sources import leading_comment
 
@@ -71,7 +71,7 @@ def names_of(code):
 
 
 def header_page(path, text):
-    parts = ["# " + str(path), block("#include <marrow/%s>" % path, "cpp")]
+    parts = [ORPHAN, "# " + str(path), block("#include <marrow/%s>" % path, "cpp")]
     parts.append(comment_text(leading_comment(text)))
     for comment, code in chunks(text):
         names = names_of(code)
@@ -110,4 +110,4 @@ def write(catalogue, facts, folder):
             told = " ".join(leading_comment(found[path]).split()).split(". ")[0].rstrip(".:")
             lines.append("- [%s](%s.md)%s" % (path, page_of(path), ": " + plain(told) if told else ""))
         parts += ["## " + title, "\n".join(lines)]
-    (folder / "cpp" / "index.md").write_text(sections(*parts, toctree([page_of(path) for path in found])))
+    (folder / "cpp" / "index.md").write_text(sections(*parts))

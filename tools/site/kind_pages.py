@@ -116,7 +116,6 @@ def kind_page(kind, catalogue, facts):
         section("Traits", traits_part(kind, nodes)),
         section("Conformance", kind["checks"] and checks_table(kind)),
         section("On the command line", block("marrow list %s" % kind["name"], "console")),
-        toctree(["../nodes/" + node["name"] for node in nodes]) if nodes else "",
     )
 
 

@@ -2,6 +2,8 @@
 """Pieces of Markdown (MyST), of which the pages are put together."""
 import re
 
+# In front of a page that is not in the navigation, which would be too long to read, and slow to make for each page.
+ORPHAN = "---\norphan: true\n---\n"
 SPECIAL = re.compile(r"([\\`*_\[\]<>|#$~])")
 
 

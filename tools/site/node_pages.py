@@ -2,7 +2,7 @@
 """A page for each node, made from its manifest and from what the repository tells of it."""
 import json
 
-from markdown import block, code, entry, plain, section, sections, table
+from markdown import ORPHAN, block, code, entry, plain, section, sections, table
 
 
 def type_text(type_name, axis):
@@ -103,6 +103,7 @@ def node_page(node, catalogue, facts):
         head += " It draws random numbers: its result depends on the run's seed."
     uses = ["- [%s](../%s.md)" % (code(page), page) for page in facts.uses.get(name, [])]
     return sections(
+        ORPHAN,
         "# " + name,
         plain(node["summary"]) + ".",
         head,

@@ -2,7 +2,7 @@
 """A page for each shipped pipeline and experiment: what it is for, its inputs, its nodes and its text."""
 import yaml
 
-from markdown import block, code, plain, section, sections, table, toctree
+from markdown import ORPHAN, block, code, plain, section, sections, table
 from sources import USES
 
 
@@ -52,6 +52,7 @@ def file_page(path, kind, text, content, up):
     pipeline = "" if kind == "pipeline" else "It compares variants of %s." % code(str(content["pipeline"]))
     outputs = content.get("outputs") if kind == "pipeline" else None
     return sections(
+        ORPHAN,
         "# " + path.name,
         plain(content.get("help", "")),
         pipeline,
@@ -68,16 +69,15 @@ def first_sentence(text):
 
 
 def index_page(found):
-    parts, pages = ["# Pipelines and experiments"], []
+    parts = ["# Pipelines and experiments"]
     for kind, title in (("pipeline", "Pipelines"), ("experiment", "Experiments")):
         rows = []
         for path, (its_kind, _, content) in found.items():
             if its_kind == kind:
                 page = page_of(path)[len("pipelines/") :]
-                pages.append(page)
                 rows.append(["[%s](%s.md)" % (page, page), plain(first_sentence(content.get("help", "")))])
         parts.append(section(title, table(["file", "what it is for"], rows)))
-    return sections(*parts, toctree(pages))
+    return sections(*parts)
 
 
 def write(catalogue, facts, folder):
