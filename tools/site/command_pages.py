@@ -8,9 +8,12 @@ def page_of(name):
 
 
 def rows_part(command, part):
-    entries = [
-        entry("command-option", command.name + " " + given, "", plain(told)) for given, told in command.rows(part)
-    ]
+    entries = []
+    for given, told in command.rows(part):
+        names, _, value = given.partition(" ")
+        names = names.split("=")[0].split(",")
+        shown = " ".join([*("or " + name for name in names[:-1]), value]).strip()
+        entries.append(entry("command-option", command.name + " " + names[-1], shown, plain(told)))
     return sections(*entries)
 
 

@@ -13,7 +13,10 @@ SPAN = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
 WORD = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)+")
 NODE = re.compile(r"([a-z_]+)\.[a-z_0-9]+")
 USES = re.compile(r"\buses(?:: +|=)([a-z_0-9]+\.[a-z_0-9]+)")
-IDENTIFIER = re.compile(r"\b[A-Za-z_]\w+\b")
+OPTION = re.compile(r"\boptions? (?:of type \w+ )?`([a-z_0-9]+)`")
+OF_NODE = re.compile(r"`([a-z_0-9]+)` of `([a-z_0-9]+\.[a-z_0-9]+)`")
+# Words of the field that look like names of marrow.
+OF_THE_FIELD = {"target_from_source", "qform_code", "sform_code"}
 
 
 class Names:
@@ -22,7 +25,9 @@ class Names:
     def __init__(self, catalogue, root):
         self.catalogue, self.root = catalogue, root
         self.options = {option["name"] for node in catalogue.nodes.values() for option in node["options"]}
-        self.words = set(self.options)
+        self.examples = nodes_of_examples(root)
+        self.inputs = set()
+        self.words = self.options | OF_THE_FIELD
         for node in catalogue.nodes.values():
             for port in node["inputs"] + node["outputs"]:
                 self.words |= {port["name"], port["type"], port["axis"]}
@@ -40,8 +45,9 @@ class Names:
 
     def _add_pipelines(self):
         for path, (_, _, content) in pipeline_pages.files(self.root).items():
-            for part in ("inputs", "nodes", "outputs"):
+            for part in ("inputs", "nodes", "outputs", "variants"):
                 self.words |= set(content.get(part) or {})
+            self.inputs |= set(content.get("inputs") or {})
             self.words |= {path.stem, *path.parts[1:-1]}
 
     def _add_sources(self):
@@ -50,6 +56,8 @@ class Names:
             for path in self.root.glob(pattern):
                 if path.is_file() and path.suffix in (".hpp", ".cpp", ".cmake", "", ".js"):
                     self.words |= set(declared_in(path))
+        for path in [*self.root.glob("framework/runtime/*.*"), *self.root.glob("framework/cmake/*")]:
+            self.words |= set(re.findall(r"\w+", path.read_text()))  # it knows no node, so no option either
         for path in self.root.glob("[a-z]*/**/*"):
             if "build" not in path.parts[: len(self.root.parts) + 1]:
                 self.words |= {path.name, path.stem}
@@ -60,6 +68,13 @@ def declared_in(path):
     text = path.read_text(errors="replace")
     found = re.findall(r"\b(\w+)\(", text) + re.findall(r"\b(?:class|struct|enum|enum class) (\w+)", text)
     return found + re.findall(r'"([a-z][a-z0-9_]*)"(?=[,:\]}] |\])', re.sub(r'option\("\w+"', "", text))
+
+
+def nodes_of_examples(root):
+    """Nodes that the examples in docs/ declare, in files and in blocks of C++."""
+    texts = [path.read_text() for path in sorted((root / "docs").rglob("*.cpp"))]
+    texts += [path.read_text() for path in sorted((root / "docs").rglob("*.md"))]
+    return {name for text in texts for name in re.findall(r'\.node\("([a-z_0-9.]+)"', text)}
 
 
 def near(name, known):
@@ -125,8 +140,21 @@ def faults_of_spans(line, names):
             found += faults_of_shell(span, names)
         if WORD.fullmatch(span) and span not in names.words:
             found.append("nothing is named '%s': no option, port, key or function%s" % (span, near(span, names.words)))
+    for name in OPTION.findall(line):
+        if name not in names.options | names.inputs:
+            found.append("no node has the option '%s'%s" % (name, near(name, names.options)))
+    for name, owner in OF_NODE.findall(line):
+        node = names.catalogue.nodes.get(owner)
+        parts = [part["name"] for part in node["options"] + node["inputs"] + node["outputs"]] if node else []
+        if node and name in names.options and name not in parts:
+            found.append("%s has no option '%s'%s" % (owner, name, near(name, parts)))
+    return found + faults_of_uses(line, names)
+
+
+def faults_of_uses(line, names):
+    found = []
     for uses in USES.findall(line):
-        if uses.split(".")[0] in names.catalogue.kinds and uses not in names.catalogue.nodes:
+        if uses.split(".")[0] in names.catalogue.kinds and uses not in names.catalogue.nodes.keys() | names.examples:
             found.append("there is no node '%s'%s" % (uses, near(uses, names.catalogue.nodes)))
     return found
 

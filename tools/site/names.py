@@ -18,8 +18,7 @@ def parse_entry(environment, text, signature):
     elif signature.parent["objtype"] == "file-key":
         shown = name.split(": ", 1)[1]
     elif signature.parent["objtype"] == "command-option":
-        shown = re.search(r" (-.*|[^- ]+( TEXT| LEVEL| NUMBER| OUTPUT).*)$", name)
-        shown = shown.group(1) if shown else name
+        shown = name.rsplit(" ", 1)[1]
     signature += addnodes.desc_name(shown, shown)
     if told:
         signature += addnodes.desc_annotation(told, " " + told)

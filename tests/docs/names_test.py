@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Names in the documents: where marrow has no such node, option, command or key, the site is not built."""
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+sys.path.insert(0, str(SOURCE / "tools" / "site"))
+import catalogue  # noqa: E402
+import document_pages  # noqa: E402
+import mentions  # noqa: E402
+
+# A marrow in which one option has another name.
+RENAMED = """#!/bin/sh
+"%s" "$@" | sed 's/"name": "pixel_step"/"name": "pixel_stride"/'
+"""
+
+
+class Names(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.names = mentions.Names(catalogue.Catalogue(BUILD / "bin" / "marrow"), SOURCE)
+
+    def faults(self, text):
+        return [fault for _, fault in mentions.faults_of(text, self.names)]
+
+    def test_the_documents_have_no_fault(self):
+        documents = document_pages.documents(SOURCE)
+        self.assertGreater(len(documents), 12)
+        self.assertEqual(mentions.faults(documents, self.names), [])
+
+    def test_what_is_not_there_is_named(self):
+        for text, fault in (
+            ("The node `edges.cany` finds.", "there is no node 'edges.cany'; did you mean 'edges.canny'?"),
+            ("The option `sigma_pix` is.", "no node has the option 'sigma_pix'; did you mean 'sigma_px'?"),
+            ("`window_px` of `edges.sobel`", None),
+            ("`board` of `edges.sobel`", "edges.sobel has no option 'board'"),
+            ("Give `widnow_px`.", "nothing is named 'widnow_px': no option, port, key or function"),
+            ("See `marrow rnu FILE`.", "there is no command 'marrow rnu'; did you mean 'run'?"),
+            ("    marrow run a.yaml --sed 2", "marrow run has no option '--sed'; did you mean '--seed'?"),
+            ("    marrow run a.yaml --set edges.hihg=2", "no node has the option 'hihg'; did you mean 'high'?"),
+            ("    marrow cache cg", None),
+            ("```yaml\na: {uses: edges.canny, with: {hihg: 1}}\n```", "edges.canny has no option 'hihg'"),
+            ("```yaml\na: {uses: edges.cany}\n```", "there is no node 'edges.cany'; did you mean 'edges.canny'?"),
+        ):
+            found = self.faults(text)
+            if fault is None:
+                self.assertEqual([one for one in found if "window_px" in one], [], text)
+            else:
+                self.assertTrue(any(fault in one for one in found), (text, found))
+        self.assertEqual(self.faults("`edges.canny`, `low`, `marrow run FILE --seed 2`, `Cost::value`"), [])
+
+    def test_an_option_that_is_renamed_stops_the_site(self):
+        folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-renamed-"))
+        self.addCleanup(shutil.rmtree, folder, ignore_errors=True)
+        (folder / "bin").mkdir()
+        program = folder / "bin" / "marrow"
+        program.write_text(RENAMED % (BUILD / "bin" / "marrow"))
+        program.chmod(0o755)
+        made = subprocess.run(
+            [SOURCE / "tools" / "docs", "--build", folder, "--out", folder / "site"], capture_output=True, text=True
+        )
+        self.assertEqual(made.returncode, 1)
+        self.assertRegex(made.stderr, r"docs/method\.md:\d+: nothing is named 'pixel_step'")
+        self.assertTrue(made.stderr.endswith("tools/docs: mend these names; marrow does not know them\n"), made.stderr)
+        self.assertFalse((folder / "site").exists())
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
