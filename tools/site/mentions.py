@@ -64,10 +64,12 @@ class Names:
 
 
 def declared_in(path):
-    """Names that a source file declares as function, type or key of a file: those of options are left out."""
+    """Names of functions and types of a source file, and the figures and keys that it writes. The names of options are
+    left out: where a node's option is renamed, its old name is known no more."""
     text = path.read_text(errors="replace")
     found = re.findall(r"\b(\w+)\(", text) + re.findall(r"\b(?:class|struct|enum|enum class) (\w+)", text)
-    return found + re.findall(r'"([a-z][a-z0-9_]*)"(?=[,:\]}] |\])', re.sub(r'option\("\w+"', "", text))
+    lines = [line for line in text.splitlines() if not re.search(r"option|relation\(", line)]
+    return found + re.findall(r'"([a-z][a-z0-9_]*)"', "\n".join(lines))
 
 
 def nodes_of_examples(root):
