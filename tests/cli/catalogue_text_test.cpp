@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "marrow/domain/yaml.hpp"
+#include "marrow/runtime/attributes.hpp"
 
 namespace {
 
@@ -44,6 +45,32 @@ TEST(CatalogueText, ListsAreInOneLine) {
   EXPECT_EQ(yaml_text(OptionValue(std::vector<double>{})), "[]");
   EXPECT_EQ(yaml_text(OptionValue(std::vector<double>{1, -0.5, 1e7})), "[1, -0.5, 10000000]");
   EXPECT_EQ(yaml_text(OptionValue(std::vector<std::string>{"a", "b, c", ""})), R"([a, "b, c", ""])");
+}
+
+TEST(CatalogueText, RelationsInWords) {
+  using marrow::cli::relation_text;
+  EXPECT_EQ(relation_text(marrow::not_above("low", "high")), "'low' is not above 'high'");
+  EXPECT_EQ(relation_text(marrow::below("a", "b")), "'a' is below 'b'");
+  EXPECT_EQ(relation_text(marrow::same_length({"a", "b", "c"})), "'a', 'b', 'c' have the same length");
+  EXPECT_EQ(relation_text(marrow::as_many_or_none("a", "b")), "'a' has as many items as 'b', or none");
+  EXPECT_EQ(relation_text(marrow::exactly_one({"a", "in.b"})), "exactly one of 'a', 'in.b' is given");
+  EXPECT_EQ(relation_text(marrow::at_least_one({"a", "b"})), "at least one of 'a', 'b' is given");
+  EXPECT_EQ(relation_text(marrow::at_least_one({"a"})), "'a' is not empty");
+  EXPECT_EQ(relation_text(marrow::distinct("a")), "'a' has no item twice");
+}
+
+TEST(CatalogueText, AKindWithItsLimits) {
+  marrow::KindInfo kind;
+  kind.name = "edges";
+  kind.checks = {{"bias", "how far off", 0.25, "px"}, {"contract", "what it gives", 0, ""}};
+  kind.traits = {{"steady", "does not move"}};
+  kind.outputs = {{"edges", "the edges", {{"edge_map", {}}}, "view"}};
+  const nlohmann::json j = marrow::cli::kind_json(kind);
+  EXPECT_EQ(j["checks"][0]["limit"], 0.25);
+  EXPECT_FALSE(j["checks"][1].contains("limit"));
+  EXPECT_EQ(j["traits"][0]["name"], "steady");
+  EXPECT_EQ(j["outputs"][0]["types"][0], "edge_map");
+  EXPECT_EQ(j["outputs"][0]["axis"], "view");
 }
 
 }  // namespace

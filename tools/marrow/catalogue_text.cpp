@@ -126,9 +126,12 @@ std::optional<double> bound_told(const OptionInfo& option, std::optional<double>
 }
 
 std::string relation_text(const RelationInfo& relation) {
-  const std::vector<std::string>& names = relation.names;
+  std::vector<std::string> names;
   std::string all;
-  for (const std::string& name : names) all += (all.empty() ? "" : ", ") + name;
+  for (const std::string& name : relation.names) {
+    names.push_back("'" + name + "'");
+    all += (all.empty() ? "" : ", ") + names.back();
+  }
   switch (relation.type) {
     case RelationType::not_above:
       return names[0] + " is not above " + names[1];

@@ -19,7 +19,7 @@ std::string port_text(const KindPort& port);
 std::string yaml_text(const OptionValue& value);
 /// "number, 0 to 100 px", "one of: a, b".
 std::string range_text(const OptionInfo& option);
-/// "low is not above high".
+/// "'low' is not above 'high'".
 std::string relation_text(const RelationInfo& relation);
 
 }  // namespace marrow::cli

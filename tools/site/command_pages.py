@@ -34,7 +34,7 @@ def command_page(command, documents):
     return sections(
         "# marrow " + command.name,
         plain(command.summary[:1].upper() + command.summary[1:]) + ".",
-        block(command.usage, "console"),
+        block(command.usage, "bash"),
         section("Commands", subcommands_table(command)),
         section("What is given", rows_part(command, "Positionals")),
         section("Options", rows_part(command, "Options")),

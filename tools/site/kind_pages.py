@@ -115,7 +115,7 @@ def kind_page(kind, catalogue, facts):
         section("Options side by side", options),
         section("Traits", traits_part(kind, nodes)),
         section("Conformance", kind["checks"] and checks_table(kind)),
-        section("On the command line", block("marrow list %s" % kind["name"], "console")),
+        section("On the command line", block("marrow list %s" % kind["name"], "bash")),
     )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """A page for each node, made from its manifest and from what the repository tells of it."""
 import json
+import re
 
 from markdown import ORPHAN, block, code, entry, plain, section, sections, table
 
@@ -36,8 +37,8 @@ def options_part(node):
     for option in node["options"]:
         told = "%s; %s" % (option["range"], default_text(option))
         entries.append(entry("node-option", node["name"] + "." + option["name"], told, plain(option["help"])))
-    relations = [plain(relation[:1].upper() + relation[1:]) + "." for relation in node["relations"]]
-    return sections(*entries, " ".join(relations))
+    relations = ["- " + re.sub(r"'(?:in\.)?([^']*)'", r"`\1`", relation) for relation in node["relations"]]
+    return sections(*entries, relations and "What must hold:", "\n".join(relations))
 
 
 def checks_table(kind):
@@ -54,7 +55,7 @@ def conformance_part(node, kind):
     return sections(
         "Each node of the kind must pass these checks. They run in a process of their own, wherever the node was"
         " compiled.",
-        block("marrow conformance " + node["name"], "console"),
+        block("marrow conformance " + node["name"], "bash"),
         checks_table(kind),
     )
 

@@ -56,7 +56,7 @@ def file_page(path, kind, text, content, up):
         "# " + path.name,
         plain(content.get("help", "")),
         pipeline,
-        block(command_for(path, kind, content), "console"),
+        block(command_for(path, kind, content), "bash"),
         section("Inputs", inputs_table(content) if kind == "pipeline" else ""),
         section("Outputs", ", ".join(code(name) for name in outputs or {})),
         section("Nodes", nodes),
