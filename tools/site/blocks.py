@@ -4,7 +4,7 @@ import dataclasses
 import re
 
 SHELL = re.compile(
-    r"^\s*(?:\$ )?(marrow|tools/|tests/|build/bin/|build-\w+/|cmake|ctest|export|cd|cp|mkdir|sudo|apt-get)"
+    r"^\s*(?:\$ )?(marrow|tools/|tests/|build/bin/|build-\w+/|cmake|ctest|export|cd|cp|mkdir|sudo|apt-get|python3)"
 )
 CPP = re.compile(r"^\s*(plugin\.|\.option\(|shipped::|#include|[A-Z_]+\()", re.M)
 FENCE = re.compile(r"^(`{3,})(\S*)\s*(.*)$")

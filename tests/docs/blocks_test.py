@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The blocks of code in docs/ and the README. Those of the tutorials are run, one after the other, in a new folder. Of
+all others, pipelines, experiments and files of cases are checked by the program, commands by what they name, and C++ is
+compiled. What needs data that are not there, or takes long, is named as not run."""
+import os
+import pathlib
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import yaml
+
+SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
+sys.path.insert(0, str(SOURCE / "tools" / "site"))
+import blocks  # noqa: E402
+import document_pages  # noqa: E402
+
+MARROW = BUILD / "bin" / "marrow"
+NOT_RUN = re.compile(r"<!-- not run: (.*) -->")
+# A word in capitals stands for what the reader has: FOLDER, FILE, NODE. So do names of the reader's own files.
+OF_THE_READER = re.compile(r"\b[A-Z]{3,}\b|\.\.\.|\.(stl|tif|dcm)\b|\bruns/|\bmetacarpal\b|\.\./shared")
+IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
+# What varies in a message: names in quotes, numbers, names of nodes and files, and what is put in between.
+VARYING = r"'[^']*'|[-+]?\b\d[\w.]*|\b[a-z_0-9]+\.[a-z_]+\b|[;:(),]|\b(?:is|has|of|mm|option|signed_field|case|sim)\b"
+# What stands around a piece of C++ from the documents, so that it can be compiled.
+PLUGIN = """#include <marrow/plugin.hpp>
+namespace { struct Options { double low = 1, high = 2; };
+marrow::View one(const marrow::View& view, const Options&) { return view; }
+struct Suite {}; marrow::conformance::Suite denoise_suite() { return {}; } }
+MARROW_PLUGIN(plugin) { %s }
+"""
+
+
+class Documents(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        cls.documents = document_pages.documents(SOURCE)
+        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-blocks-"))
+        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
+        for name in ("pipelines", "docs", "tools", "tests", "schemas"):
+            os.symlink(SOURCE / name, cls.folder / name)
+        os.symlink(BUILD, cls.folder / "build")
+        environment = {"MARROW_CACHE": str(cls.folder / "store"), "MARROW_PLUGIN_PATH": ""}
+        cls.environment = {**os.environ, **environment}
+
+    def run_here(self, *command, folder=None, **options):
+        return subprocess.run(
+            [*map(str, command)],
+            cwd=folder or self.folder,
+            env=self.environment,
+            capture_output=True,
+            text=True,
+            **options
+        )
+
+    def blocks(self, *languages):
+        """(place, block) of all documents."""
+        for page, text in self.documents.items():
+            for block in blocks.blocks_of(text):
+                if block.language in languages:
+                    yield "%s:%d" % (page, block.line), block
+
+    def reason_not_to_run(self, page, block):
+        """What a comment right in front of the block's fence says."""
+        above = self.documents[page].splitlines()[: block.line - 2]
+        match = NOT_RUN.fullmatch(above[-1]) if above else None
+        return match and match.group(1)
+
+
+class Tutorials(Documents):
+    """Each tutorial in a folder of its own, with one store for all."""
+
+    def follow(self, page):
+        folder = self.folder / pathlib.Path(page).name
+        folder.mkdir()
+        for name in ("pipelines", "docs", "tools", "build"):
+            os.symlink(self.folder / name, folder / name)
+        lines = ["set -euo pipefail", "export PATH=%s/bin:$PATH" % BUILD]
+        for block in blocks.blocks_of(self.documents[page]):
+            reason = self.reason_not_to_run(page, block)
+            if block.about and block.language != "shell":
+                parent = pathlib.Path(block.about).parent
+                lines.append("mkdir -p %s; cat > %s <<'END_OF_FILE'" % (parent, block.about))
+                lines.append(block.text + "\nEND_OF_FILE")
+            elif block.language == "shell" and reason:
+                print("%s:%d not run: %s" % (page, block.line, reason))
+            elif block.language == "shell":
+                lines.append(re.sub(r"^(marrow diff .*)$", r"\1 || [ $? = 1 ]", block.text, flags=re.M))
+        result = self.run_here("bash", "-c", "\n".join(lines), folder=folder, timeout=600)
+        self.assertEqual(result.returncode, 0, page + "\n" + result.stdout[-3000:] + result.stderr[-3000:])
+        return folder, result.stdout
+
+    def test_first_registration(self):
+        folder, told = self.follow("docs/tutorials/first-registration")
+        self.assertIn("verdict  distal: TRUSTED", told)
+        self.assertIn("edges.canny", told)
+        self.assertTrue((folder / "runs" / "femur" / "report.html").exists())
+        self.assertRegex(told, r"the first node with another result|edges .*(differ|other|changed)|edges")
+
+    def test_own_data(self):
+        folder, told = self.follow("docs/tutorials/own-data")
+        self.assertIn("verdict  distal: TRUSTED", told)
+        self.assertNotIn("errors distal", told)
+        self.assertTrue((folder / "runs" / "femur" / "outputs" / "model" / "distal.ply").exists())
+
+    @unittest.skipIf(
+        IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse"
+    )
+    def test_first_node(self):
+        folder, told = self.follow("docs/tutorials/first-node")
+        self.assertIn("share_percent", told)
+        self.assertIn("edges.strongest", (folder / "runs" / "femur" / "pipeline.yaml").read_text())
+
+    def test_first_comparison(self):
+        _, told = self.follow("docs/tutorials/first-comparison")
+        self.assertIn("16 cells: 2 variants, 8 cases", told)
+
+    def test_reading_a_report(self):
+        folder, _ = self.follow("docs/tutorials/reading-a-report")
+        page = (folder / "runs" / "femur" / "report.html").read_text()
+        told = self.documents["docs/tutorials/reading-a-report"]
+        of_a_run, of_a_comparison = told.split("## The page of a comparison")
+        named = re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_run, re.M)
+        self.assertGreater(len(named), 6)
+        for title in named + re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_comparison, re.M):
+            self.assertRegex(page, "['\">]%s['\"<]" % title, "the page has no part of this name")
+
+
+class Yaml(Documents):
+    def checked(self, command, text, folder):
+        file = folder / "from-docs.yaml"
+        file.write_text(text)
+        result = self.run_here(MARROW, *command, file)
+        file.unlink()
+        return result.returncode, result.stdout + result.stderr
+
+    def pipelines_folder(self):
+        """A folder beside the pipelines, so that paths in a block lead where they lead in a file of pipelines/."""
+        copy = self.folder / "copy"
+        if not copy.exists():
+            shutil.copytree(SOURCE / "pipelines", copy / "pipelines")
+        return copy / "pipelines"
+
+    def test_every_block_is_what_it_says(self):
+        count = {"pipeline": 0, "experiment": 0, "part": 0, "data": 0}
+        for place, block in self.blocks("yaml"):
+            with self.subTest(place):
+                text = re.sub(r"^\s*\.\.\.\s*$", "", block.text, flags=re.M)
+                text = "nodes:\n" + text if text.startswith(" ") else text
+                content = yaml.safe_load(text)
+                self.assertIsInstance(content, dict)
+                count[self.check(content, text)] += 1
+        print(count)
+        self.assertGreater(min(count.values()), 0)
+
+    def check(self, content, text):
+        folder = self.pipelines_folder()
+        if "nodes" in content and "marrow" in content:
+            code, told = self.checked(["check"], text, folder)
+            self.assertEqual(code, 0, told)
+            return "pipeline"
+        if "experiment" in content:
+            if "pipelines/" in content["pipeline"]:
+                folder = folder.parent
+            elif content["pipeline"].startswith("../"):
+                folder = folder / "experiments"
+            code, told = self.checked(["compare", "--dry-run"], text, folder)
+            self.assertEqual(code, 0, told)
+            return "experiment"
+        if "nodes" in content:
+            self.check_part(content["nodes"])
+            return "part"
+        self.assertTrue(any(str(key).startswith("marrow-") for key in content), "it is no file of marrow")
+        return "data"
+
+    def check_part(self, nodes):
+        """Some nodes of a pipeline: all that may be wrong with them is that what they are wired to is not there."""
+        text = yaml.safe_dump({"marrow": 1, "nodes": nodes, "outputs": {name: name for name in nodes}})
+        _, told = self.checked(["check"], text, self.pipelines_folder())
+        for fault in re.findall(r"error: (.*)", told):
+            self.assertRegex(fault, r"^there is no node '\w+'|^'\w+' has \d+ outputs|^nothing uses node")
+
+    def test_the_files_of_a_case_are_read(self):
+        text = self.documents["docs/case"]
+        found = {}
+        for block in blocks.blocks_of(text):
+            if block.language == "yaml" and block.text.startswith("marrow-"):
+                found[block.text.split(":")[0]] = block.text
+        for name, node in (
+            ("marrow-pose", "read.pose"),
+            ("marrow-seeds", "read.seeds"),
+            ("marrow-landmarks", "read.landmarks"),
+        ):
+            with self.subTest(name):
+                (self.folder / "data.yaml").write_text(found[name])
+                pipeline = "marrow: 1\nnodes:\n  a: {uses: %s, with: {path: data.yaml}}\noutputs: {a: a}\n" % node
+                (self.folder / "read.yaml").write_text(pipeline)
+                result = self.run_here(MARROW, "run", "read.yaml", "--out", self.folder / name)
+                self.assertEqual(result.returncode, 0, result.stdout + result.stderr)
+
+
+class Shell(Documents):
+    def test_every_line_is_shell(self):
+        for place, block in self.blocks("shell"):
+            result = self.run_here("bash", "-n", input=block.text)
+            self.assertEqual(result.returncode, 0, place + ": " + result.stderr)
+
+    def test_every_command_names_what_is_there(self):
+        checked, not_run = 0, []
+        for place, block in self.blocks("shell"):
+            for line in block.text.replace("\\\n", " ").splitlines():
+                words = shlex.split(line, comments=True)
+                if not words:
+                    continue
+                checked += 1
+                with self.subTest(place + ": " + line):
+                    if not self.check(words, place):
+                        not_run.append("%s: %s" % (place, line.split("  #")[0]))
+        print("%d commands; not run, only their names checked:" % checked)
+        print("\n".join(not_run))
+        self.assertGreater(checked, 80)
+
+    def check(self, words, place):
+        """Whether the command was tried, so far as it is quick."""
+        if words[0] in ("marrow", "build/bin/marrow") and len(words) > 1:
+            return self.check_marrow(words[1:], place)
+        if words[0] == "python3":
+            self.assertTrue((SOURCE / words[1]).exists(), "there is no " + words[1])
+        if words[0].startswith(("tools/", "tests/")):
+            self.assertTrue(os.access(SOURCE / words[0], os.X_OK), "there is no program " + words[0])
+            text = (SOURCE / words[0]).read_text()
+            for word in words[1:]:
+                if word.startswith("--"):
+                    self.assertIn(word.split("=")[0], text)
+        elif "--preset" in words:
+            self.assertIn('"%s"' % words[words.index("--preset") + 1], (SOURCE / "CMakePresets.json").read_text())
+        return False
+
+    def check_marrow(self, words, place):
+        own = OF_THE_READER.search(" ".join(words)) or "tutorials/" in place
+        files = [word for word in words if word.startswith("pipelines/")]
+        for file in files:
+            self.assertTrue((SOURCE / file).exists(), "there is no " + file)
+        if words[0] == "compare" and files:
+            result = self.run_here(MARROW, "compare", *files, "--dry-run", *(["--out", "x"] if own else []))
+        elif words[0] in ("run", "check", "plan", "graph") and files:
+            result = self.run_here(MARROW, "check", *self.without_own_options(words[1:]))
+        elif words[0] in ("list", "inspect", "doctor") and not own:
+            result = self.run_here(MARROW, *words)
+        else:
+            return False
+        told = result.stdout + result.stderr
+        known = [line for line in told.splitlines() if "error:" in line and not self.needs_data(line)]
+        self.assertEqual(known, [], told)
+        return True
+
+    @staticmethod
+    def needs_data(line):
+        """Whether an error is about files or a node that the reader has, and not about the command."""
+        return re.search(
+            r"no such file|matches no|nothing matches|steepest|strongest|denoise|there is no folder|is no folder", line
+        )
+
+    @staticmethod
+    def without_own_options(words):
+        """The words of `run` that `check` takes too: the file, inputs and --set."""
+        kept, words = [], list(words)
+        while words:
+            word = words.pop(0)
+            if word == "--set":
+                kept += [word, words.pop(0)]
+            elif word in ("--seed", "--out", "--only", "--threads"):
+                words.pop(0)
+            elif not word.startswith("--"):
+                kept.append(word)
+        return kept
+
+
+class Messages(Documents):
+    def test_every_message_of_the_faq_is_one_of_the_program(self):
+        sources = []
+        for folder in ("framework", "plugins", "tools/marrow"):
+            for path in sorted((SOURCE / folder).rglob("*.?pp")):
+                sources.append(path.read_text())
+        # What a sentence is put together from: the pieces of text, without what stands between them in the source.
+        everything = re.sub(r'"\s*"', "", "\n".join(sources)).replace('\\"', '"')
+        count = 0
+        for block in blocks.blocks_of(self.documents["docs/faq"]):
+            if block.language != "text":
+                continue
+            for line in block.text.splitlines():
+                for piece in re.split(VARYING, line):
+                    if len(piece.strip()) > 12:
+                        count += 1
+                        self.assertIn(piece.strip(), everything, line)
+        self.assertGreater(count, 40)
+
+
+@unittest.skipIf(IS_SANITIZED, "the headers are compiled without the sanitizer")
+class Cpp(Documents):
+    def test_pieces_of_a_declaration_compile(self):
+        text = "".join(
+            PLUGIN_PART(block.text) for place, block in self.blocks("cpp") if place.startswith("docs/plugins")
+        )
+        self.assertIn("denoise", text)
+        file = self.folder / "pieces.cpp"
+        file.write_text(
+            PLUGIN.replace(
+                "#include <marrow/plugin.hpp>", "#include <marrow/conformance.hpp>\n#include <marrow/plugin.hpp>"
+            )
+            % text
+        )
+        digest = next(BUILD.rglob("marrow/runtime/headers_digest.hpp")).parent.parent.parent
+        flags = ["-std=c++20", "-fsyntax-only", "-I", SOURCE / "framework/include", "-I", digest]
+        flags += ["-isystem", "/usr/include/eigen3"]
+        result = self.run_here("c++", *flags, "-isystem", "/usr/include/opencv4", file)
+        self.assertEqual(result.returncode, 0, result.stderr)
+
+
+def PLUGIN_PART(text):
+    if text.startswith("."):
+        text = 'plugin.node("denoise.one", one).summary("s").in("view", "v").out("view", "v")\n' + text
+    return text if text.rstrip().endswith(";") else text + ";"
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
