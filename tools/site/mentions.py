@@ -110,7 +110,9 @@ def faults_of_shell(text, names):
         words = line.split("  #")[0].split(" # ")[0].split()
         if words and words[0] == "$":
             words = words[1:]
-        if not words or words[0] not in ("marrow", "build/bin/marrow") or len(words) < 2 or words[1].startswith("-"):
+        if not words or words[0] not in ("marrow", "build/bin/marrow") or len(words) < 2:
+            continue
+        if words[1].startswith("-") or words[1].isupper():  # COMMAND: any of them
             continue
         count = 3 if " ".join(words[1:3]) in names.catalogue.commands else 2
         command = names.catalogue.commands.get(" ".join(words[1:count]))
