@@ -30,6 +30,9 @@ foreach(template ${templates})
 endforeach()
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT marrow-doc)
+# The site, if tools/docs has built one here.
+install(DIRECTORY ${PROJECT_BINARY_DIR}/docs/site/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/html COMPONENT marrow-doc
+  OPTIONAL)
 
 # A library changes when it is installed: its search path is set, its symbols are stripped. So its manifest is written
 # then. Of single components it is not: describe_packages.cmake does this when all of them are there.

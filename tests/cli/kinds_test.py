@@ -98,6 +98,20 @@ class Kinds(Case):
         schema = json.loads(self.marrow("schema").stdout)
         self.assertIn("denoise.median", json.dumps(schema))
 
+    def test_its_contract_is_listed(self):
+        self.assertIn("  denoise        less noise in an X-ray view\n", self.marrow("list", "--kinds").stdout)
+        kinds = {kind["name"]: kind for kind in json.loads(self.marrow("list", "--kinds", "--json").stdout)}
+        self.assertEqual([port["types"] for port in kinds["denoise"]["inputs"]], [["view"]])
+        limits = {check["name"]: check.get("limit") for check in kinds["denoise"]["checks"]}
+        self.assertEqual((limits["noise"], limits["contract"]), (6, None))
+        self.assertEqual(
+            [port["types"] for port in kinds["project"]["outputs"]], [["outline_projector", "radiograph_projector"]]
+        )
+        self.assertTrue(kinds["evaluate"]["sees_truth"])
+        self.assertFalse(kinds["denoise"]["sees_truth"])
+        result = self.marrow("list", "--kinds", "edges")
+        self.assertEqual(result.returncode, 2)
+
     def test_check_says_what_a_decorator_needs(self):
         checked = self.marrow("check", FEMUR, "--set", "optimizer.uses=optimizer.restarts")
         self.assertEqual(checked.returncode, 2)

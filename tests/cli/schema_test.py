@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The schemas for editors, held against the shipped pipelines and experiments by an independent validator."""
 import json
+import shutil
 
 import jsonschema
 import yaml
@@ -172,6 +173,85 @@ class ExperimentSchema(Case):
             ("edges.low: 40", "edges.low: 40.5"),
         ):
             self.assertEqual(self.errors(EXPERIMENT.replace(*change)), [])
+
+
+# All that a case file can say, but for the two ways to write a transform and a camera.
+CASE = """marrow-case: 1
+ct: {file: ct.mha, voxel_size_mm: [1, 1, 1], flip: [z], value_offset_hu: 0, series_uid: "1.2"}
+views:
+  - {name: frontal, image: frontal.png, camera: frontal.camera.yaml, mask: frontal.mask.png}
+  - name: lateral
+    image: lateral.png
+    camera:
+      marrow-camera: 1
+      width_px: 8
+      height_px: 8
+      intrinsics: [[1000, 0, 3.5], [0, 1000, 3.5], [0, 0, 1]]
+      radial_distortion: [0, 0, 0]
+      camera_from_world: {target: camera, source: world, rotation: ROTATION, translation_mm: [0, 0, 600]}
+fragments:
+  distal:
+    seeds: [[1, 2, 3]]
+    register: true
+    start: {target: world, source: ct, rotation: ROTATION, translation_mm: [0, 0, 0]}
+    truth: {target: world, source: ct, matrix: [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]}
+""".replace(
+    "ROTATION", "[[1, 0, 0], [0, 1, 0], [0, 0, 1]]"
+)
+# What of it becomes what, and is then refused by the schema and by the program alike.
+WRONG_CASE = {
+    "marrow-case: 1": "marrow-case: 2",
+    "ct: {file": "ct: {fiel",
+    "flip: [z]": "flip: z",
+    "value_offset_hu: 0": "value_offset_hu: none",
+    "{name: frontal, ": "{",
+    "mask: frontal": "maks: frontal",
+    "width_px: 8": "width_px: 0",
+    "[0, 0, 1]]\n      radial": "[0, 0]]\n      radial",
+    "radial_distortion: [0, 0, 0]": "radial_distortion: [0, 0]",
+    "{target: camera": "{target: world",
+    "fragments:": "fragment:",
+    "    seeds: [[1, 2, 3]]": "    seeds: [[1, 2]]",
+    "register: true": "register: yes please",
+    "translation_mm: [0, 0, 0]}": "translation: [0, 0, 0]}",
+    "truth: {target: world, source: ct": "truth: {target: world, source: camera",
+    "matrix: [[1, 0, 0, 0], ": "matrix: [",
+}
+
+
+class CaseSchema(Case):
+    @classmethod
+    def setUpClass(cls):
+        cls.schema = json.loads((SOURCE / "schemas" / "case.schema.json").read_text())
+        jsonschema.Draft7Validator.check_schema(cls.schema)
+        cls.validator = jsonschema.Draft7Validator(cls.schema)
+
+    def faults(self, text):
+        """What the program says of the file itself: its other files are not there, which counts for nothing here."""
+        folder = self.scratch / "case"
+        folder.mkdir(exist_ok=True)
+        (folder / "case.yaml").write_text(text)
+        pipeline = self.write(
+            "p.yaml", "marrow: 1\nnodes:\n  c: {uses: read.case, with: {path: case}}\noutputs: {c: c.ct}\n"
+        )
+        result = marrow("run", pipeline, "--out", self.scratch / "out", "--no-cache", cwd=self.scratch)
+        self.assertEqual(result.returncode, 1, result.stderr)
+        said = [line for line in result.stderr.splitlines() if "case.yaml" in line]
+        self.assertGreater(len(said), 0, result.stderr)
+        return [line for line in said if "there is no '" not in line]
+
+    def test_one_file_has_every_key(self):
+        self.assertEqual([error.message for error in self.validator.iter_errors(yaml.safe_load(CASE))], [])
+        self.assertEqual(self.faults(CASE), [])
+
+    def test_what_is_wrong_is_refused_by_schema_and_program(self):
+        for right, wrong in WRONG_CASE.items():
+            with self.subTest(wrong):
+                self.assertEqual(CASE.count(right), 1, right)
+                text = CASE.replace(right, wrong)
+                self.assertFalse(self.validator.is_valid(yaml.safe_load(text)))
+                shutil.rmtree(self.scratch / "out", ignore_errors=True)
+                self.assertNotEqual(self.faults(text), [])
 
 
 if __name__ == "__main__":

@@ -19,7 +19,8 @@ GROUPS = {
     "Method": ["method", "results"],
     "Development": ["plugins", "architecture", "testing", "site"],
 }
-REFERENCE = ["kinds/index", "commands/index", "keys/index", "pipelines/index", "cpp/index"]
+# A page of these is in the navigation if it has been written. python/index is for a reference of a Python module.
+REFERENCE = ["kinds/index", "commands/index", "keys/index", "pipelines/index", "cpp/index", "python/index"]
 MORE = "More"
 AT_TOP = ["CONTRIBUTING", "CHANGELOG"]
 LINK = re.compile(r"\]\(([^)#\s]+)(#[^)\s]*)?\)")
@@ -72,8 +73,8 @@ def folder_page(folder):
     return sections(*parts)
 
 
-def navigation(pages, has_headers):
-    reference = [page for page in REFERENCE if has_headers or page != "cpp/index"]
+def navigation(pages, folder):
+    reference = [page for page in REFERENCE if (folder / (page + ".md")).exists()]
     by_caption = groups(pages)
     order = [caption for caption in ("Tutorials", "Guides") if by_caption.get(caption)]
     trees = [toctree(by_caption[caption], caption) for caption in order]
@@ -86,12 +87,13 @@ def navigation(pages, has_headers):
 
 
 def write(catalogue, facts, folder):
-    """Writes index.md and the pages of docs/, with their pictures, and a page for each folder of examples."""
+    """Writes index.md and the pages of docs/, with their pictures, and a page for each folder of examples. Comes last,
+    because the navigation in index.md has the pages that are there."""
     for page, text in facts.documents.items():
         source = "README" if page == "index" else page
         text = with_links(text, source, facts.root)
         if page == "index":
-            text = sections(text, navigation(facts.documents, facts.has_headers))
+            text = sections(text, navigation(facts.documents, folder))
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / (page + ".md")).write_text(text)
     shutil.copytree(facts.root / "docs" / "images", folder / "docs" / "images")

@@ -7,8 +7,15 @@ import pipeline_pages
 import sources
 from markdown import plain
 
+FIGURE = (
+    "<figure><a href='../nodes/{name}.html'><img src='../_images/{file}' alt='{name}'></a>"
+    "<figcaption>{name}</figcaption></figure>"
+)
+
 
 class Facts:
+    """`pictures` are {node: (file, legend, whether it is much wider than high)}."""
+
     def __init__(self, root, pictures=None):
         self.root = pathlib.Path(root)
         self.documents = document_pages.documents(self.root)
@@ -18,25 +25,17 @@ class Facts:
         read = {page: text for page, text in self.documents.items() if page != "CHANGELOG"}
         self.mentions = sources.sections_that_mention(read)
         self.pictures = pictures or {}
-        self.has_headers = True
 
     def picture(self, name):
         """The picture of a node with its legend, or nothing."""
         if name not in self.pictures:
             return ""
-        file, legend = self.pictures[name]
+        file, legend, _ = self.pictures[name]
         return "![%s](../pictures/%s)\n\n*%s*" % (plain(name), file, plain(legend))
 
     def pictures_of_kind(self, kind):
         """The pictures of a kind's nodes, side by side."""
-        names = [name for name in self.pictures if name.split(".")[0] == kind]
-        if not names:
-            return ""
-        cells = []
-        for name in names:
-            file = self.pictures[name][0]
-            cells.append(
-                "<figure><a href='../nodes/%s.html'><img src='../_images/%s' alt='%s'></a>" % (name, file, name)
-            )
-            cells[-1] += "<figcaption>%s</figcaption></figure>" % name
-        return "<div class='pictures'>%s</div>" % "".join(cells)
+        names = sorted(name for name in self.pictures if name.split(".")[0] == kind)
+        figures = "".join(FIGURE.format(name=name, file=self.pictures[name][0]) for name in names)
+        is_wide = any(self.pictures[name][2] for name in names)
+        return "<div class='pictures%s'>%s</div>" % (" wide" if is_wide else "", figures) if names else ""

@@ -7,9 +7,12 @@ ORPHAN = "---\norphan: true\n---\n"
 SPECIAL = re.compile(r"([\\`*_\[\]<>|#$~])")
 
 
-def plain(text):
+def plain(text, keeps_ends=False):
     """The text as it is: nothing in it is taken for Markdown."""
-    return SPECIAL.sub(r"\\\1", " ".join(text.split()))
+    words = " ".join(text.split())
+    if keeps_ends:
+        words = (" " if text[:1].isspace() else "") + words + (" " if words and text[-1:].isspace() else "")
+    return SPECIAL.sub(r"\\\1", words)
 
 
 def code(text):

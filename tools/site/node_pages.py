@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A page for each node, made from its manifest and from what the repository tells of it."""
+import itertools
 import json
 import re
 
@@ -72,13 +73,26 @@ def comment_part(comment):
     return sections(comment_text(text), "The source is %s." % code(path))
 
 
+def is_set_off(paragraph):
+    return any(line.startswith("  ") for line in paragraph.splitlines())
+
+
+def with_code(text):
+    """Plain text, but what stands between backticks is code."""
+    parts = text.split("`")
+    if len(parts) % 2 == 0:
+        return plain(text)
+    return "".join("`%s`" % part if i % 2 else plain(part, keeps_ends=True) for i, part in enumerate(parts))
+
+
 def comment_text(text):
-    """A comment of a source file as Markdown: lines that are set off stay as they are, all else is plain text."""
+    """A comment of a source file as Markdown: lines that are set off stay as they are, all else is text."""
     parts = []
-    for paragraph in text.split("\n\n"):
-        lines = paragraph.splitlines()
-        is_set_off = any(line.startswith("  ") for line in lines)
-        parts.append(block(paragraph) if is_set_off else plain(paragraph))
+    for set_off, paragraphs in itertools.groupby(text.split("\n\n"), is_set_off):
+        if set_off:
+            parts.append(block("\n\n".join(paragraphs)))
+        else:
+            parts += [with_code(paragraph) for paragraph in paragraphs]
     return sections(*parts)
 
 

@@ -3,8 +3,8 @@
 `shown`. The name of the file begins with the kind. Its help is the legend."""
 import concurrent.futures
 import json
-import pathlib
 import shutil
+import struct
 import subprocess
 
 import yaml
@@ -63,8 +63,15 @@ def make_one(marrow, folder, file, name, case):
     return place, None
 
 
+def is_wide(path):
+    """Whether a PNG is more than 1.5 times as wide as it is high."""
+    width, height = struct.unpack(">II", path.read_bytes()[16:24])
+    return width > 1.5 * height
+
+
 def make(marrow, root, catalogue, folder):
-    """Makes folder/NAME.png for all nodes that can have one. Returns {name: (file, legend)} and [why a node has none]."""
+    """Makes folder/NAME.png for all nodes that can have one. Returns {name: (file, legend, whether it is
+    much wider than high)} and [why a node has none]."""
     folder.mkdir(parents=True, exist_ok=True)
     outputs, fault = run(marrow, folder / "runs" / "case", root / "pipelines" / "simulate.yaml")
     if fault is not None:
@@ -83,7 +90,7 @@ def make(marrow, root, catalogue, folder):
         for name, made in makes.items():
             path, why = made.result()
             if path:
-                found[name] = (path.name, tasks[name][1])
+                found[name] = (path.name, tasks[name][1], is_wide(path))
             else:
                 without.append("%s: %s" % (name, why))
     shutil.rmtree(folder / "runs", ignore_errors=True)
