@@ -6,7 +6,7 @@ import subprocess
 
 # A line of a help text: what is given, and after two spaces or more what it means.
 LINE = re.compile(r"^  (\S.*?)(?:\s{2,}(\S.*))?$")
-# In front of the meanings there are this many columns. Where the first column is wider, its meaning is on the next line.
+# So many columns are in front of the meanings. Where the first column is wider, its meaning is on the next line.
 WIDTH = 30
 
 
