@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The documentation site: everything that marrow has is on it, every link leads somewhere, and its search finds."""
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -15,6 +16,9 @@ MARROW = BUILD / "bin" / "marrow"
 LINK = re.compile(r'<(?:a|img|link|script)\b[^>]*?\b(?:href|src)="([^"#]*)(?:#([^"]*))?"')
 ID = re.compile(r'\bid="([^"]+)"')
 MISSING_PACKAGES = 77
+# Nodes of other libraries have their pages, too.
+OTHERS = BUILD / "tests" / "plugins"
+os.environ["MARROW_PLUGIN_PATH"] = str(OTHERS)
 
 
 def told(*arguments):
@@ -82,6 +86,7 @@ class Site(unittest.TestCase):
                 self.assertIn('<span class="pre">%s</span>' % port["name"], page, node["name"])
             options |= {"%s.%s" % (node["name"], option["name"]) for option in node["options"]}
         self.assertEqual(self.entries["std:node-option"], options)
+        self.assertIn("test.add", [node["name"] for node in nodes], "a node of another library")
         print("%d nodes and %d options" % (len(nodes), len(options)))
 
     def test_every_kind_lists_its_nodes(self):
@@ -120,6 +125,12 @@ class Site(unittest.TestCase):
             last = {entry.split(".")[-1] for entry in entries}
             self.assertEqual({key for _, key in keys} - last, set(), name)
             self.assertGreaterEqual(len(entries), len(keys), name)
+            without_text = re.findall(
+                r'class="sig-name[^>]*><span class="pre">([^<]+)<(?:(?!</dt>).)*</dt>\s*<dd></dd>',
+                self.page("keys/%s.html" % name),
+                re.S,
+            )
+            self.assertEqual(without_text, [], name)
             print("%s: %d keys" % (name, len(entries)))
 
     def test_every_document_pipeline_and_header_has_its_page(self):

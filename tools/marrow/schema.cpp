@@ -109,15 +109,24 @@ Json pipeline_schema(const Catalogue& catalogue) {
         {"if_pass_fails",
          {{"enum", {"end", "go_on"}}, {"default", "end"}, {"description", "what follows a failed pass"}}}}},
       {"allOf", conditions}};
-  const Json input = {{"type", "object"},
-                      {"additionalProperties", false},
-                      {"properties",
-                       {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}}},
-                        {"default", {{"type", {"string", "number", "boolean"}}}},
-                        {"help", {{"type", "string"}}}}}};
-  const Json inputs = {{"type", "object"}, {"additionalProperties", input}};
-  const Json nodes = {{"type", "object"}, {"additionalProperties", {{"$ref", "#/definitions/node"}}}};
-  const Json outputs = {{"type", "object"}, {"additionalProperties", place}};
+  const Json input = {
+      {"type", "object"},
+      {"additionalProperties", false},
+      {"properties",
+       {{"type", {{"enum", {"path", "text", "number", "integer", "boolean"}}, {"description", "type of its values"}}},
+        {"default",
+         {{"type", {"string", "number", "boolean"}},
+          {"description", "its value if none is given; without it, one must be given"}}},
+        {"help", {{"type", "string"}, {"description", "what it means, for those who give it"}}}}}};
+  const Json inputs = {{"type", "object"},
+                       {"description", "values that are given on the command line as name=value; $name stands for one"},
+                       {"additionalProperties", input}};
+  const Json nodes = {{"type", "object"},
+                      {"description", "the nodes by their names, in any order"},
+                      {"additionalProperties", {{"$ref", "#/definitions/node"}}}};
+  const Json outputs = {{"type", "object"},
+                        {"description", "what is computed and written: name of the output, and node or node.output"},
+                        {"additionalProperties", place}};
   return {{"$schema", "http://json-schema.org/draft-07/schema#"},
           {"title", "marrow pipeline"},
           {"type", "object"},
@@ -132,8 +141,10 @@ Json pipeline_schema(const Catalogue& catalogue) {
               {"properties", {{"inputs", inputs}, {"nodes", nodes}, {"outputs", outputs}}}}}}},
           {"properties",
            {{"marrow", {{"const", 1}, {"description", "version of the format"}}},
-            {"name", {{"type", "string"}}},
-            {"help", {{"type", "string"}}},
+            {"name",
+             {{"type", "string"},
+              {"description", "of the folder that a run writes, runs/NAME (default: the file's name)"}}},
+            {"help", {{"type", "string"}, {"description", "what the pipeline does, and for which data"}}},
             {"inputs", inputs},
             {"nodes", nodes},
             {"outputs", outputs}}}};

@@ -28,8 +28,9 @@ def ports_table(ports):
     rows = []
     for port in ports:
         optional = "optional: " if port.get("optional") else ""
-        rows.append([code(port["name"]), type_text(port["type"], port["axis"]), optional + plain(port["help"])])
-    return table(["name", "type", "meaning"], rows)
+        type_name = plain(type_text(port["type"], port["axis"]))
+        rows.append([code(port["name"]) + "<br>" + type_name, optional + plain(port["help"])])
+    return table(["name and type", "meaning"], rows)
 
 
 def options_part(node):
