@@ -72,8 +72,8 @@ marrow_debian_package(marrow-cgal science "node of marrow that is under the GPL"
 node is not in the package marrow, which is under the Apache License.")
 marrow_debian_package(marrow-doc doc "documentation of marrow"
 "How pipelines, plugins, comparisons, cases and repetition work, the method, and
-what was measured. The site in /usr/share/doc/marrow/html, if it is there, has a
-page for each node, command and key.")
+what was measured. If the site was built, it is in /usr/share/doc/marrow/html,
+with a page for each node and command.")
 
 if(MARROW_PYTHON)
   marrow_debian_package(python3-marrow python "finds the 3D pose of bones in X-ray images (Python 3)"
