@@ -6,8 +6,8 @@ a line, and those inside a type, stay where they are in the code.
 """
 import re
 
-from markdown import ORPHAN, block, plain, sections
-from node_pages import comment_text
+from markdown import ORPHAN, block, plain, sections, table
+from node_pages import comment_text, with_code
 from sources import leading_comment
 
 FOLDERS = {
@@ -91,6 +91,14 @@ def page_of(path):
     return str(path.with_suffix(""))
 
 
+def index_row(path, text):
+    """A row of the index: the header, its first sentence, and the names that it declares."""
+    told = " ".join(leading_comment(text).split()).split(". ")[0].rstrip(".:")
+    names = [name for _, code in chunks(text) for name in names_of(code)]
+    shown = ", ".join("`%s`" % name for name in dict.fromkeys(names))
+    return ["[%s](%s.md)" % (path, page_of(path)), with_code(told) + (": " if told and shown else "") + shown]
+
+
 def write(catalogue, facts, folder):
     """Writes cpp/PATH.md for each public header, and cpp/index.md."""
     found = headers(facts.root)
@@ -105,9 +113,6 @@ def write(catalogue, facts, folder):
         "A plugin needs only [marrow/plugin.hpp](plugin.md); [Writing plugins](../docs/plugins.md) is the guide.",
     ]
     for name, title in FOLDERS.items():
-        lines = []
-        for path in by_folder.get(name, []):
-            told = " ".join(leading_comment(found[path]).split()).split(". ")[0].rstrip(".:")
-            lines.append("- [%s](%s.md)%s" % (path, page_of(path), ": " + plain(told) if told else ""))
-        parts += ["## " + title, "\n".join(lines)]
+        rows = [index_row(path, found[path]) for path in by_folder.get(name, [])]
+        parts += ["## " + title, table(["header", "what it declares"], rows)]
     (folder / "cpp" / "index.md").write_text(sections(*parts))
