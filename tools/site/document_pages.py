@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pages of docs/, the README and the like, as they are in the repository. Their links lead to the same places."""
+import json
 import re
 import shutil
 
@@ -15,7 +16,7 @@ GROUPS = {
         "tutorials/reading-a-report",
         "faq",
     ],
-    "Guides": ["case", "comparing", "verdict", "repetition", "simulation", "nailing", "guidance"],
+    "Guides": ["case", "comparing", "python", "verdict", "repetition", "simulation", "nailing", "guidance"],
     "Method": ["method", "results"],
     "Development": ["plugins", "architecture", "testing", "site"],
 }
@@ -57,6 +58,8 @@ def with_links(text, page, root):
         place = (root / page).parent / target
         if place.is_dir():
             target = target.rstrip("/") + ".md"
+        elif place.suffix == ".ipynb":
+            target = target.removesuffix(".ipynb") + ".md"
         elif place.name == "README.md":
             target = target.replace("README.md", "index.md")
         return "](%s%s)" % (target, anchor)
@@ -70,6 +73,14 @@ def folder_page(folder):
     for path in sorted(folder.iterdir()):
         if path.is_file():
             parts += ["## " + path.name, block(path.read_text(), LANGUAGES.get(path.suffix, "text"))]
+    return sections(*parts)
+
+
+def notebook_page(path):
+    """The cells of a notebook: text as it is, code as blocks."""
+    cells = json.loads(path.read_text())["cells"]
+    texts = ["".join(cell["source"]) for cell in cells]
+    parts = [text if cell["cell_type"] == "markdown" else block(text, "python") for cell, text in zip(cells, texts)]
     return sections(*parts)
 
 
@@ -97,6 +108,10 @@ def write(catalogue, facts, folder):
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / (page + ".md")).write_text(text)
     shutil.copytree(facts.root / "docs" / "images", folder / "docs" / "images")
+    for path in sorted((facts.root / "docs").rglob("*.ipynb")):
+        page = folder / path.relative_to(facts.root).with_suffix(".md")
+        page.parent.mkdir(parents=True, exist_ok=True)
+        page.write_text(ORPHAN + notebook_page(path))
     examples = [path for path in sorted((facts.root / "docs").glob("example-*")) if path.is_dir()]
     for path in examples:
         (folder / "docs" / (path.name + ".md")).write_text(ORPHAN + folder_page(path))

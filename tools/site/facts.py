@@ -14,10 +14,12 @@ FIGURE = (
 
 
 class Facts:
-    """`pictures` are {node: (file, legend, whether it is much wider than high)}."""
+    """`pictures` are {node: (file, legend, whether it is much wider than high)}. `python_package` is the folder in
+    which the package marrow is, if it was built."""
 
-    def __init__(self, root, pictures=None):
+    def __init__(self, root, python_package, pictures=None):
         self.root = pathlib.Path(root)
+        self.python_package = pathlib.Path(python_package)
         self.documents = document_pages.documents(self.root)
         self.comments = sources.comments_of_nodes(self.root)
         texts = {pipeline_pages.page_of(path): text for path, (_, text, _) in pipeline_pages.files(self.root).items()}
