@@ -1,29 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The blocks of code in docs/ and the README. Those of the tutorials are run, one after the other, in a new folder. Of
-all others, pipelines, experiments and files of cases are checked by the program, commands by what they name, and C++ is
-compiled. What needs data that are not there, or takes long, is named as not run."""
+"""The blocks of code in docs/ and the README: pipelines, experiments and files of cases are checked by the program,
+commands by what they name, and C++ is compiled. What needs data that are not there, or takes long, is named as not run.
+tutorials_test.py runs the blocks of the tutorials."""
 import os
-import pathlib
 import re
 import shlex
 import shutil
-import subprocess
 import sys
-import tempfile
 import unittest
 
 import yaml
 
-SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-sys.path.insert(0, str(SOURCE / "tools" / "site"))
-import blocks  # noqa: E402
-import document_pages  # noqa: E402
+from documents import BUILD, IS_SANITIZED, MARROW, SOURCE, Documents, blocks
 
-MARROW = BUILD / "bin" / "marrow"
-NOT_RUN = re.compile(r"<!-- not run: (.*) -->")
 # A word in capitals stands for what the reader has: FOLDER, FILE, NODE. So do names of the reader's own files.
 OF_THE_READER = re.compile(r"\b[A-Z]{3,}\b|\.\.\.|\.(stl|tif|dcm)\b|\bruns/|\bmetacarpal\b|\.\./shared")
-IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 # What varies in a message: names in quotes, numbers, names of nodes and files, and what is put in between.
 VARYING = r"'[^']*'|[-+]?\b\d[\w.]*|\b[a-z_0-9]+\.[a-z_]+\b|[;:(),]|\b(?:is|has|of|mm|option|signed_field|case|sim)\b"
 # What stands around a piece of C++ from the documents, so that it can be compiled.
@@ -40,101 +31,6 @@ MARROW_PLUGIN(plugin) {
   %s
 }
 """
-
-
-class Documents(unittest.TestCase):
-    @classmethod
-    def setUpClass(cls):
-        cls.documents = document_pages.documents(SOURCE)
-        cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="marrow-blocks-"))
-        cls.addClassCleanup(shutil.rmtree, cls.folder, ignore_errors=True)
-        for name in ("pipelines", "docs", "tools", "tests", "schemas"):
-            os.symlink(SOURCE / name, cls.folder / name)
-        os.symlink(BUILD, cls.folder / "build")
-        environment = {"MARROW_CACHE": str(cls.folder / "store"), "MARROW_PLUGIN_PATH": ""}
-        cls.environment = {**os.environ, **environment}
-
-    def run_here(self, *command, folder=None, **options):
-        return subprocess.run(
-            [*map(str, command)],
-            cwd=folder or self.folder,
-            env=self.environment,
-            capture_output=True,
-            text=True,
-            **options
-        )
-
-    def blocks(self, *languages):
-        """(place, block) of all documents."""
-        for page, text in self.documents.items():
-            for block in blocks.blocks_of(text):
-                if block.language in languages:
-                    yield "%s:%d" % (page, block.line), block
-
-    def reason_not_to_run(self, page, block):
-        """What a comment right in front of the block's fence says."""
-        above = self.documents[page].splitlines()[: block.line - 2]
-        match = NOT_RUN.fullmatch(above[-1]) if above else None
-        return match and match.group(1)
-
-
-class Tutorials(Documents):
-    """Each tutorial in a folder of its own, with one store for all."""
-
-    def follow(self, page):
-        folder = self.folder / pathlib.Path(page).name
-        folder.mkdir()
-        for name in ("pipelines", "docs", "tools", "build"):
-            os.symlink(self.folder / name, folder / name)
-        lines = ["set -euo pipefail", "export PATH=%s/bin:$PATH" % BUILD]
-        for block in blocks.blocks_of(self.documents[page]):
-            reason = self.reason_not_to_run(page, block)
-            if block.about and block.language != "shell":
-                parent = pathlib.Path(block.about).parent
-                lines.append("mkdir -p %s; cat > %s <<'END_OF_FILE'" % (parent, block.about))
-                lines.append(block.text + "\nEND_OF_FILE")
-            elif block.language == "shell" and reason:
-                print("%s:%d not run: %s" % (page, block.line, reason))
-            elif block.language == "shell":
-                lines.append(re.sub(r"^(marrow diff .*)$", r"\1 || [ $? = 1 ]", block.text, flags=re.M))
-        result = self.run_here("bash", "-c", "\n".join(lines), folder=folder, timeout=600)
-        self.assertEqual(result.returncode, 0, page + "\n" + result.stdout[-3000:] + result.stderr[-3000:])
-        return folder, result.stdout
-
-    def test_first_registration(self):
-        folder, told = self.follow("docs/tutorials/first-registration")
-        self.assertIn("verdict  distal: TRUSTED", told)
-        self.assertIn("edges.canny", told)
-        self.assertTrue((folder / "runs" / "femur" / "report.html").exists())
-        self.assertIn("First difference: node 'edges' (edges.canny)", told)
-
-    def test_own_data(self):
-        folder, told = self.follow("docs/tutorials/own-data")
-        self.assertIn("verdict  distal: TRUSTED", told)
-        self.assertNotIn("errors distal", told)
-        self.assertTrue((folder / "runs" / "femur" / "outputs" / "model" / "distal.ply").exists())
-
-    @unittest.skipIf(
-        IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse"
-    )
-    def test_first_node(self):
-        folder, told = self.follow("docs/tutorials/first-node")
-        self.assertIn("share_percent", told)
-        self.assertIn("edges.strongest", (folder / "runs" / "femur" / "pipeline.yaml").read_text())
-
-    def test_first_comparison(self):
-        _, told = self.follow("docs/tutorials/first-comparison")
-        self.assertIn("16 cells: 2 variants, 8 cases", told)
-
-    def test_reading_a_report(self):
-        folder, _ = self.follow("docs/tutorials/reading-a-report")
-        page = (folder / "runs" / "femur" / "report.html").read_text()
-        told = self.documents["docs/tutorials/reading-a-report"]
-        of_a_run, of_a_comparison = told.split("## The page of a comparison")
-        named = re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_run, re.M)
-        self.assertGreater(len(named), 6)
-        for title in named + re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_comparison, re.M):
-            self.assertRegex(page, "['\">]%s['\"<]" % title, "the page has no part of this name")
 
 
 class Yaml(Documents):

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: Apache-2.0
+"""The tutorials, followed as a reader follows them: each block is run, or becomes the file that it is."""
+import concurrent.futures
+import os
+import pathlib
+import re
+import sys
+import unittest
+
+from documents import BUILD, IS_SANITIZED, SOURCE, Documents, blocks
+
+AT_ONCE = 2
+
+
+class Tutorials(Documents):
+    """Each tutorial in a folder of its own, with one store for all."""
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass()
+        pages = [page for page in cls.documents if page.startswith("docs/tutorials/")]
+        if IS_SANITIZED:  # a plugin outside the tree is built without the sanitizer, which marrow would refuse
+            pages.remove("docs/tutorials/first-node")
+        with concurrent.futures.ThreadPoolExecutor(AT_ONCE) as pool:
+            cls.followed = dict(zip(pages, pool.map(cls.follow, pages)))
+
+    @classmethod
+    def script(cls, page):
+        """All that the reader does, as one script."""
+        lines = ["set -euo pipefail", "export PATH=%s/bin:$PATH" % BUILD]
+        for block in blocks.blocks_of(cls.documents[page]):
+            reason = cls.reason_not_to_run(page, block)
+            if block.about and block.language != "shell":
+                parent = pathlib.Path(block.about).parent
+                lines.append("mkdir -p %s; cat > %s <<'END_OF_FILE'" % (parent, block.about))
+                lines.append(block.text + "\nEND_OF_FILE")
+            elif block.language == "shell" and reason:
+                print("%s:%d not run: %s" % (page, block.line, reason))
+            elif block.language == "shell":  # two runs that differ are what diff is for: it ends with 1
+                lines.append(re.sub(r"^(marrow diff .*)$", r"\1 || [ $? = 1 ]", block.text, flags=re.M))
+        return "\n".join(lines)
+
+    @classmethod
+    def follow(cls, page):
+        folder = cls.folder / pathlib.Path(page).name
+        folder.mkdir()
+        for name in ("pipelines", "docs", "tools", "build"):
+            os.symlink(cls.folder / name, folder / name)
+        return folder, cls.run_here("bash", "-c", cls.script(page), folder=folder, timeout=900)
+
+    def told(self, name):
+        """(folder, what was printed) of a tutorial, all of whose commands ended well."""
+        folder, result = self.followed["docs/tutorials/" + name]
+        self.assertEqual(result.returncode, 0, name + "\n" + result.stdout[-3000:] + result.stderr[-3000:])
+        return folder, result.stdout
+
+    def test_every_tutorial_can_be_followed(self):
+        self.assertGreater(len(self.followed), 3)
+        for page in self.followed:
+            self.told(pathlib.Path(page).name)
+
+    def test_first_registration(self):
+        folder, told = self.told("first-registration")
+        self.assertIn("verdict  distal: TRUSTED", told)
+        self.assertIn("edges.canny", told)
+        self.assertTrue((folder / "runs" / "femur" / "report.html").exists())
+        self.assertIn("First difference: node 'edges' (edges.canny)", told)
+
+    def test_own_data(self):
+        folder, told = self.told("own-data")
+        self.assertIn("verdict  distal: TRUSTED", told)
+        self.assertNotIn("errors distal", told)
+        self.assertTrue((folder / "runs" / "femur" / "outputs" / "model" / "distal.ply").exists())
+
+    @unittest.skipIf(
+        IS_SANITIZED, "a plugin outside the tree is built without the sanitizer, which marrow would refuse"
+    )
+    def test_first_node(self):
+        folder, told = self.told("first-node")
+        self.assertIn("share_percent", told)
+        self.assertIn("edges.strongest", (folder / "runs" / "femur" / "pipeline.yaml").read_text())
+
+    def test_first_comparison(self):
+        _, told = self.told("first-comparison")
+        self.assertIn("16 cells: 2 variants, 8 cases", told)
+
+    def test_reading_a_report(self):
+        folder, _ = self.told("reading-a-report")
+        page = (folder / "runs" / "femur" / "report.html").read_text()
+        told = self.documents["docs/tutorials/reading-a-report"]
+        of_a_run, of_a_comparison = told.split("## The page of a comparison")
+        named = re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_run, re.M)
+        self.assertGreater(len(named), 6)
+        for title in named + re.findall(r"^- \*\*([A-Z][A-Za-z0-9 ]+)\.\*\*", of_a_comparison, re.M):
+            self.assertRegex(page, "['\">]%s['\"<]" % title, "the page has no part of this name")
+
+
+if __name__ == "__main__":
+    unittest.main(argv=sys.argv[:1], verbosity=2)
