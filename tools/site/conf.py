@@ -6,7 +6,7 @@ import sys
 sys.path.insert(0, str(pathlib.Path(__file__).parent))
 
 project = "marrow"
-extensions = ["myst_parser", "names"]
+extensions = ["myst_parser", "names", "navigation"]
 myst_heading_anchors = 4
 smartquotes = False
 highlight_language = "text"
