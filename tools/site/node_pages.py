@@ -132,7 +132,7 @@ def node_page(node, catalogue, facts):
         section("Conformance", conformance_part(node, kind)),
         section("Pipelines that use it", "\n".join(uses)),
         section("Read more", mentions_part(facts.mentions.get(name, []))),
-        section("In its place", siblings_part(node, catalogue)),
+        section("Other nodes of the kind", siblings_part(node, catalogue)),
     )
 
 
