@@ -16,7 +16,7 @@ GROUPS = {
         "tutorials/reading-a-report",
         "faq",
     ],
-    "Guides": ["case", "comparing", "python", "verdict", "repetition", "simulation", "nailing", "guidance"],
+    "Guides": ["case", "comparing", "verdict", "repetition", "python", "simulation", "nailing", "guidance"],
     "Method": ["method", "results"],
     "Development": ["plugins", "architecture", "testing", "site"],
 }
@@ -67,12 +67,18 @@ def with_links(text, page, root):
     return LINK.sub(changed, text)
 
 
+def linked_places(text, page, root):
+    """Files and folders of the repository that a document links to."""
+    places = [(root / page).parent / target for target, _ in LINK.findall(text) if ":" not in target]
+    return [place.resolve() for place in places if place.exists()]
+
+
 def folder_page(folder):
-    """A page with all files of an example."""
-    parts = ["# " + folder.name]
-    for path in sorted(folder.iterdir()):
-        if path.is_file():
-            parts += ["## " + path.name, block(path.read_text(), LANGUAGES.get(path.suffix, "text"))]
+    """A page with all files of a folder. Of those that are no source, it has the names."""
+    parts = [ORPHAN, "# " + folder.name]
+    for path in sorted(path for path in folder.iterdir() if path.is_file()):
+        language = LANGUAGES.get(path.suffix)
+        parts += ["## " + path.name, block(path.read_text(), language) if language else ""]
     return sections(*parts)
 
 
@@ -81,7 +87,22 @@ def notebook_page(path):
     cells = json.loads(path.read_text())["cells"]
     texts = ["".join(cell["source"]) for cell in cells]
     parts = [text if cell["cell_type"] == "markdown" else block(text, "python") for cell, text in zip(cells, texts)]
-    return sections(*parts)
+    return sections(ORPHAN, *parts)
+
+
+def bring(place, root, folder):
+    """Makes what a link leads to be on the site: a page for a folder or a notebook, and a copy of a file that is no
+    page."""
+    page = folder / place.relative_to(root).with_suffix(".md")
+    page.parent.mkdir(parents=True, exist_ok=True)
+    if place.is_dir():
+        page.write_text(folder_page(place))
+    elif place.suffix == ".ipynb":
+        page.write_text(notebook_page(place))
+    elif place.suffix != ".md":
+        copy = folder / place.relative_to(root)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(place, copy)
 
 
 def navigation(pages, folder):
@@ -98,20 +119,14 @@ def navigation(pages, folder):
 
 
 def write(catalogue, facts, folder):
-    """Writes index.md and the pages of docs/, with their pictures, and a page for each folder of examples. Comes last,
-    because the navigation in index.md has the pages that are there."""
+    """Writes index.md and the pages of docs/, with all that they link to. Comes last, because the navigation in index.md
+    has the pages that are there."""
     for page, text in facts.documents.items():
         source = "README" if page == "index" else page
+        for place in linked_places(text, source, facts.root):
+            bring(place, facts.root.resolve(), folder)
         text = with_links(text, source, facts.root)
         if page == "index":
             text = sections(text, navigation(facts.documents, folder))
         (folder / page).parent.mkdir(parents=True, exist_ok=True)
         (folder / (page + ".md")).write_text(text)
-    shutil.copytree(facts.root / "docs" / "images", folder / "docs" / "images")
-    for path in sorted((facts.root / "docs").rglob("*.ipynb")):
-        page = folder / path.relative_to(facts.root).with_suffix(".md")
-        page.parent.mkdir(parents=True, exist_ok=True)
-        page.write_text(ORPHAN + notebook_page(path))
-    examples = [path for path in sorted((facts.root / "docs").glob("example-*")) if path.is_dir()]
-    for path in examples:
-        (folder / "docs" / (path.name + ".md")).write_text(ORPHAN + folder_page(path))

@@ -58,8 +58,8 @@ class Names:
                     self.words |= set(declared_in(path))
         for path in [*self.root.glob("framework/runtime/*.*"), *self.root.glob("framework/cmake/*")]:
             self.words |= set(re.findall(r"\w+", path.read_text()))  # it knows no node, so no option either
-        for path in self.root.glob("[a-z]*/**/*"):
-            if "build" not in path.parts[: len(self.root.parts) + 1]:
+        for part in ("docs", "framework", "pipelines", "plugins", "schemas", "tests", "tools"):
+            for path in (self.root / part).rglob("*"):
                 self.words |= {path.name, path.stem}
 
 
