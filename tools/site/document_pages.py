@@ -119,8 +119,8 @@ def navigation(pages, folder):
 
 
 def write(catalogue, facts, folder):
-    """Writes index.md and the pages of docs/, with all that they link to. Comes last, because the navigation in index.md
-    has the pages that are there."""
+    """Writes index.md and the pages of docs/, with all that they link to. Comes last, because the navigation in
+    index.md has the pages that are there."""
     for page, text in facts.documents.items():
         source = "README" if page == "index" else page
         for place in linked_places(text, source, facts.root):
