@@ -43,15 +43,6 @@ double bytes_named_by(const PipelineNode& node) {
   return bytes;
 }
 
-json json_of_option(const OptionValue& value) {
-  if (const auto* text = std::get_if<std::string>(&value)) return json_of_bytes(*text);
-  const auto* texts = std::get_if<std::vector<std::string>>(&value);
-  if (!texts) return json_of(value);
-  json list = json::array();
-  for (const std::string& text : *texts) list.push_back(json_of_bytes(text));
-  return list;
-}
-
 json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_inputs, const Context::Hooks& hooks,
                 const CallLimits& limits) {
   const LibraryInfo& library = *catalogue.library_of(node.info.name);
@@ -186,6 +177,25 @@ std::string without_place(std::string end, const std::string& place) {
 
 }  // namespace
 
+json json_of_option(const OptionValue& value) {
+  if (const auto* text = std::get_if<std::string>(&value)) return json_of_bytes(*text);
+  const auto* texts = std::get_if<std::vector<std::string>>(&value);
+  if (!texts) return json_of(value);
+  json list = json::array();
+  for (const std::string& text : *texts) list.push_back(json_of_bytes(text));
+  return list;
+}
+
+void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo>& outputs) {
+  if (values.size() != outputs.size())
+    throw Error("the process that was started for it handed over " + std::to_string(values.size()) +
+                " values, expected " + std::to_string(outputs.size()));
+  for (std::size_t i = 0; i < values.size(); ++i)
+    if (!(values[i].type == outputs[i].type) || (!values[i].is_absent() && values[i].axis != outputs[i].axis))
+      throw Error("the process that was started for it handed over a '" + values[i].type.id + "', expected a '" +
+                  outputs[i].type.id + "'");
+}
+
 std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits) {
   if (end.is_out_of_memory)
     return file + ": to read it takes more than " + std::to_string(std::lround(limits.memory_mb)) +
@@ -246,14 +256,7 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
                                     [&](const json& report) { pass_on(report, hooks); });
   if (!end.failed.empty()) throw Error(failure_of(file_of(node, worker), end, limits));
   std::vector<Value> outputs = handed_over(catalogue, node, worker, made);
-  if (outputs.size() != node.info.outputs.size())
-    throw Error("the process that was started for it handed over " + std::to_string(outputs.size()) +
-                " values, expected " + std::to_string(node.info.outputs.size()));
-  for (std::size_t i = 0; i < outputs.size(); ++i)
-    if (!(outputs[i].type == node.info.outputs[i].type) ||
-        (!outputs[i].is_absent() && outputs[i].axis != node.info.outputs[i].axis))
-      throw Error("the process that was started for it handed over a '" + outputs[i].type.id + "', expected a '" +
-                  node.info.outputs[i].type.id + "'");
+  expect_outputs(outputs, node.info.outputs);
   return outputs;
 }
 

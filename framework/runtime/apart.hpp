@@ -34,6 +34,12 @@ CallLimits limits_of(const PipelineNode& node, double bytes, const RunSettings& 
 std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& node, const std::vector<Value>& inputs,
                               const Context::Hooks& hooks, const RunSettings& settings);
 
+/// An option's value as JSON, for the request of a call.
+nlohmann::json json_of_option(const OptionValue& value);
+
+/// Throws Error unless the values have the types and axes of the outputs.
+void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo>& outputs);
+
 /// A sentence that says why the file could not be read. `end` is how the process ended.
 std::string failure_of(const std::string& file, const WorkerEnd& end, const CallLimits& limits);
 

@@ -8,6 +8,7 @@
 
 #include "contract.hpp"
 #include "marrow/plugin.hpp"
+#include "python_file.hpp"
 
 namespace marrow {
 
@@ -42,7 +43,7 @@ void Catalogue::find_libraries() {
     std::vector<fs::path> files;
     std::error_code error;
     for (fs::directory_iterator at(folder, error), end; !error && at != end; at.increment(error))
-      if (at->path().extension() == ".so") files.push_back(at->path());
+      if (at->path().extension() == ".so" || is_python_plugin(at->path())) files.push_back(at->path());
     if (error && error != std::errc::no_such_file_or_directory)
       refuse(folder, "cannot be searched for libraries: " + error.message());
     std::sort(files.begin(), files.end());

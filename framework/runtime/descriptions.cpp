@@ -12,6 +12,7 @@
 #include "linked_libraries.hpp"
 #include "manifest.hpp"
 #include "marrow/domain/error.hpp"
+#include "python_file.hpp"
 #include "regular_file.hpp"
 #include "text_file.hpp"
 #include "trust.hpp"
@@ -109,34 +110,14 @@ std::optional<LibraryInfo> from_manifest(const fs::path& library, const Digest& 
 
 /// The description of a library from the cache; nothing if the cache has none that can be used.
 std::optional<LibraryInfo> from_cache(const Digest& digest, const Digest& framework) {
-  const fs::path file = cached_file(digest, framework, false);
-  if (file.empty()) return std::nullopt;
-  try {
-    const RegularFile source(file);
-    if (source.status().st_uid != geteuid()) return std::nullopt;
-    LibraryInfo info = manifest_from_text(read_text(source, kMostManifest_bytes));
-    if (stale(info, digest).empty()) return info;
-  } catch (const Error&) {
-    // This is only a cache: the library is described anew, and that description is kept instead.
-  }
-  return std::nullopt;
-}
-
-void keep(const LibraryInfo& info, const Digest& framework) {
-  // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
-  if (info.refused.starts_with("cannot be")) return;
-  try {
-    if (const fs::path file = cached_file(info.digest, framework, true); !file.empty())
-      write_text(file, manifest_text(info), 0600);
-  } catch (const Error&) {
-    // This is only a cache: the library is described again next time.
-  }
+  std::optional<LibraryInfo> info = kept_description(digest, framework);
+  return info && stale(*info, digest).empty() ? info : std::nullopt;
 }
 
 LibraryInfo describe_anew(const fs::path& file, const Digest& digest, const Digest& framework) {
   LibraryInfo info = describe_library(file);
   if (info.refused.empty() && info.digest != digest) throw Error("was changed while it was described; start again");
-  if (info.digest == digest) keep(info, framework);
+  if (info.digest == digest) keep_description(info, digest, framework);
   return info;
 }
 
@@ -151,7 +132,32 @@ bool is_manifest(const fs::path& file) {
 
 }  // namespace
 
+std::optional<LibraryInfo> kept_description(const Digest& name, const Digest& framework) {
+  const fs::path file = cached_file(name, framework, false);
+  if (file.empty()) return std::nullopt;
+  try {
+    const RegularFile source(file);
+    if (source.status().st_uid != geteuid()) return std::nullopt;
+    return manifest_from_text(read_text(source, kMostManifest_bytes));
+  } catch (const Error&) {
+    // This is only a cache: the library is described anew, and that description is kept instead.
+    return std::nullopt;
+  }
+}
+
+void keep_description(const LibraryInfo& info, const Digest& name, const Digest& framework) {
+  // The reason may be outside of the library, such as another library that it needs, and may be gone next time.
+  if (info.refused.starts_with("cannot be")) return;
+  try {
+    if (const fs::path file = cached_file(name, framework, true); !file.empty())
+      write_text(file, manifest_text(info), 0600);
+  } catch (const Error&) {
+    // This is only a cache: the library is described again next time.
+  }
+}
+
 LibraryInfo library_info(const fs::path& file, const Digest& framework) {
+  if (is_python_plugin(file)) return python_file_info(file, framework);
   const Digest digest = digest_of(RegularFile(trusted_path(file)));
   std::string note;
   std::optional<LibraryInfo> known = from_manifest(file, digest, note);

@@ -11,6 +11,7 @@
 #include "keys.hpp"
 #include "named_files.hpp"
 #include "no_process.hpp"
+#include "python_file.hpp"
 #include "resident_memory.hpp"
 #include "stopwatch.hpp"
 
@@ -116,7 +117,7 @@ void Evaluation::make_inputs(const NodeDefinition& definition, std::vector<Value
 std::vector<Value> Evaluation::call_node(std::size_t node, std::vector<Value>& inputs, const std::string& item,
                                          const Recipe& recipe, std::vector<std::string>& warnings) {
   const PipelineNode& called = pipeline_.nodes[node];
-  const bool apart = runs_apart(called);
+  const bool apart = runs_apart(called) && !is_python_plugin(catalogue_.library_of(called.info.name)->file);
   if (!apart || !inputs.empty()) make_inputs(catalogue_.load(called.info.name), inputs);
   report(RunEvent::Kind::started, node, item, "");
   const Context::Hooks hooks = make_hooks(node, item, seed_of(recipe.recipe, settings_.seed), warnings);
@@ -134,6 +135,8 @@ void Evaluation::save(std::size_t node, const std::vector<Value>& inputs, const 
   if (!settings_.store ||
       std::any_of(outputs.begin(), outputs.end(), [](const PortInfo& output) { return output.type.is_function; }))
     return;
+  // It depends on files that its key does not cover. The next run knows them.
+  if (!is_fully_described(*catalogue_.library_of(pipeline_.nodes[node].info.name))) return;
   Provenance made_from = provenance(node, inputs);
   made_from.seconds = seconds;
   made_from.warnings = std::move(warnings);

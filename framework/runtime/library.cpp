@@ -19,6 +19,7 @@
 #include "manifest.hpp"
 #include "marrow/plugin.hpp"
 #include "marrow/runtime/worker.hpp"
+#include "python_file.hpp"
 #include "regular_file.hpp"
 #include "trust.hpp"
 
@@ -220,6 +221,7 @@ fs::path framework_file() {
 std::unique_ptr<Plugin> load_library(const LibraryInfo& described) {
   const fs::path& file = described.file;
   try {
+    if (is_python_plugin(file)) return load_python_file(described);
     const fs::path real = trusted_path(file);
     check_elf(RegularFile(real));
     void* handle = open_library(real, RTLD_NOW);
@@ -242,6 +244,7 @@ LibraryInfo describe_library(const fs::path& file) {
   LibraryInfo info;
   Digest digest;
   try {
+    if (is_python_plugin(file)) return describe_python_file(file);
     const fs::path real = trusted_path(file);
     const RegularFile library(real);
     check_elf(library);

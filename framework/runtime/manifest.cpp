@@ -360,6 +360,14 @@ LibraryInfo manifest_from_text(const std::string& text) {
   return info;
 }
 
+LibraryInfo info_of_nodes(const json& nodes) {
+  json j = json::parse(manifest_text({}));
+  j.erase("checksum");
+  j["nodes"] = nodes;
+  j["checksum"] = hash_of(j.dump()).hex();
+  return manifest_from_text(j.dump());
+}
+
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered) {
   const auto document = [](const LibraryInfo& info) {
     json j = {{"kinds", json::object()}, {"nodes", json::object()}, {"writers", json::object()}};

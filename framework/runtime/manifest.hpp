@@ -15,6 +15,10 @@ constexpr std::size_t kMostManifest_bytes = 4 << 20;
 /// is returned. Throws Error, with a text that begins with "it", for any other text.
 LibraryInfo manifest_from_text(const std::string& text);
 
+/// What a process that is no library says about its nodes, a list of json_of(). It is checked as strictly as a
+/// manifest.
+LibraryInfo info_of_nodes(const nlohmann::json& nodes);
+
 /// The first difference between what a library registers and its description, with both values; empty if there is none.
 /// The files of the library, and of those that it links, are not compared.
 std::string difference(const LibraryInfo& described, const LibraryInfo& registered);

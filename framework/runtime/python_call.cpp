@@ -1,0 +1,236 @@
+// SPDX-License-Identifier: Apache-2.0
+// Calls of nodes written in Python, in processes that stay for the next call.
+#include <poll.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <mutex>
+#include <set>
+
+#include "apart.hpp"
+#include "marrow/runtime/run_log.hpp"
+#include "marrow/runtime/types.hpp"
+#include "python_file.hpp"
+#include "python_process.hpp"
+#include "shared_inputs.hpp"
+#include "trust.hpp"
+
+namespace marrow {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+constexpr double kLoadLimit_s = 20, kShareLimit_s = 600, kStopLimit_s = 2;
+
+/// A process that holds the nodes of one Python file, and the memory through which it hands values over.
+struct PythonProcess {
+  SharedMemory made;
+  Worker worker;
+  json limits;  ///< of each node: {"seconds": ..., "memory_mb": ...}
+  explicit PythonProcess(const fs::path& file) : worker(python_process(file, made.descriptor())) {}
+};
+
+/// The inputs as a request has them. `kept` keeps the memory that the request names until the call has ended.
+json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedInput>>& kept) {
+  if (value.is_list()) {
+    json items = json::array();
+    for (const Value& item : value.items) items.push_back(json_of_input(item, kept));
+    return {{"axis", value.axis}, {"names", value.names}, {"items", items}};
+  }
+  if (value.is_absent()) return nullptr;
+  const std::shared_ptr<const SharedInput> shared = SharedInputs::all().share(value);
+  kept.push_back(shared);
+  return {{"type", value.type.id},
+          {"memory", "/proc/" + std::to_string(getpid()) + "/fd/" + std::to_string(shared->memory.descriptor())},
+          {"number", shared->number},
+          {"samples_bytes", shared->samples_bytes}};
+}
+
+void pass_on_to(Context& context, const json& report) {
+  const std::string what = report.value("say", ""), text = report.value("text", "");
+  if (what == "progress") context.progress(report.value("fraction", 0.0), text);
+  for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
+    if (what == level_name(level)) context.log(level, text);
+}
+
+/// Asks the process to end, so that it can clean up, and ends it if it does not.
+void stop(Worker& worker) {
+  kill(worker.process(), SIGTERM);
+  const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(kStopLimit_s);
+  while (!worker.is_dead() && std::chrono::steady_clock::now() < end) {
+    pollfd polled{worker.descriptor(), POLLIN, 0};
+    poll(&polled, 1, 20);
+    if (worker.take(nullptr)) break;
+  }
+  worker.close();
+}
+
+WorkerEnd wait_for(Worker& worker, const WorkerLimits& limits, Context& context) {
+  const auto said = [&](const json& report) { pass_on_to(context, report); };
+  for (;;) {
+    try {
+      context.check_cancelled();
+    } catch (const Cancelled&) {
+      stop(worker);
+      throw;
+    }
+    pollfd polled{worker.descriptor(), POLLIN, 0};
+    poll(&polled, 1, 20);
+    if (auto end = worker.take(said)) return *end;
+    if (auto end = worker.check(limits)) return *end;
+  }
+}
+
+std::string short_text(double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", number);
+  return text;
+}
+
+/// Why a call failed, in one sentence.
+std::string failure_of_call(const fs::path& file, const WorkerEnd& end, const WorkerLimits& limits) {
+  const std::string name = file.filename().string();
+  if (end.is_late)
+    return name + " took longer than " + short_text(limits.seconds) +
+           " s, and its process was ended; if it needs more, give it more in @marrow.node(..., seconds=...)";
+  if (end.is_out_of_memory && end.died)
+    return name + " used more than " + short_text(limits.memory_mb) +
+           " MB of memory, and its process was ended; if it needs more, give it more in @marrow.node(..., "
+           "memory_mb=...)";
+  if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
+  if (end.died) return name + " ended its process; a node must return or raise an exception";
+  return end.failed;
+}
+
+/// The nodes of one file. A process does one call at a time, and waits for the next one when it has done so.
+class PythonNodes {
+ public:
+  explicit PythonNodes(LibraryInfo described) : described_(std::move(described)) {}
+
+  std::vector<Value> call(const NodeInfo& node, const std::vector<Value>& inputs,
+                          const std::vector<OptionValue>& options, Context& context) {
+    std::unique_ptr<PythonProcess> process = take(context);
+    std::vector<std::shared_ptr<const SharedInput>> kept;
+    json request = {{"do", "call"}, {"node", node.name}, {"seed", context.seed()}};
+    request["inputs"] = request["options"] = json::array();
+    for (const Value& input : inputs) request["inputs"].push_back(json_of_input(input, kept));
+    for (const OptionValue& value : options) request["options"].push_back(json_of_option(value));
+    request["kept"] = SharedInputs::all().numbers();
+    WorkerLimits limits;
+    limits.seconds = process->limits.at(node.name).at("seconds");
+    limits.memory_mb = process->limits.at(node.name).at("memory_mb");
+    for (const auto& one : kept) limits.memory_mb += 2e-6 * double(one->bytes);
+    process->worker.ask(std::move(request));
+    const WorkerEnd end = wait_for(process->worker, limits, context);
+    if (!end.failed.empty()) {
+      if (!end.died) give_back(std::move(process));
+      throw Error(failure_of_call(described_.file, end, limits));
+    }
+    std::vector<Value> outputs = handed_over(*process);
+    learn(end.answer.at("files"));
+    give_back(std::move(process));
+    expect_outputs(outputs, node.outputs);
+    return outputs;
+  }
+
+ private:
+  std::unique_ptr<PythonProcess> take(Context& context) {
+    {
+      const std::scoped_lock lock(mutex_);
+      while (!idle_.empty()) {
+        std::unique_ptr<PythonProcess> process = std::move(idle_.back());
+        idle_.pop_back();
+        process->worker.take(nullptr);  // notices that it has ended meanwhile
+        if (!process->worker.is_dead()) return process;
+      }
+    }
+    auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));
+    process->worker.ask({{"do", "load"}});
+    const WorkerEnd end = wait_for(process->worker, {kLoadLimit_s}, context);
+    if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
+    process->limits = end.answer;
+    if (digest_of_python(described_) != described_.digest) throw Error(changed());
+    for (const NodeInfo& node : described_.nodes)
+      if (!process->limits.contains(node.name)) throw Error(changed());
+    return process;
+  }
+  void give_back(std::unique_ptr<PythonProcess> process) {
+    const std::scoped_lock lock(mutex_);
+    idle_.push_back(std::move(process));
+  }
+  std::string changed() const {
+    return described_.file.string() +
+           " or a module that it imports was changed since this program began; start it again";
+  }
+  static std::vector<Value> handed_over(PythonProcess& process) {
+    try {
+      return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
+    } catch (const NoAccess&) {
+      process.worker.ask({{"do", "share"}});
+      const WorkerEnd end = process.worker.wait({kShareLimit_s}, nullptr, nullptr);
+      if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
+      return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
+    }
+  }
+  /// Takes note of files that the process has loaded during the call and that the description does not name.
+  void learn(const std::vector<std::string>& files) {
+    const std::scoped_lock lock(mutex_);
+    for (const std::string& file : files) {
+      const bool is_known = std::any_of(described_.linked.begin(), described_.linked.end(),
+                                        [&](const LinkedLibrary& one) { return one.path == file; });
+      if (!is_known) new_files_.insert(file);
+    }
+    if (new_files_.size() == learnt_) {
+      if (!files.empty() && digest_of_python(described_) != described_.digest) throw Error(changed());
+      return;
+    }
+    learnt_ = new_files_.size();
+    add_to_description(described_, {new_files_.begin(), new_files_.end()});
+  }
+
+  LibraryInfo described_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<PythonProcess>> idle_;
+  std::set<std::string> new_files_;
+  std::size_t learnt_ = 0;
+};
+
+/// The node with Contents for its types, which a description does not have.
+NodeInfo with_contents(NodeInfo node) {
+  for (std::vector<PortInfo>* ports : {&node.inputs, &node.outputs})
+    for (PortInfo& port : *ports) {
+      port.type.content = content_of_own(port.type);
+      if (!port.type.content) throw Error("has a port of type '" + port.type.id + "', which Python does not know");
+    }
+  return node;
+}
+
+}  // namespace
+
+std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {
+  auto plugin = std::make_unique<Plugin>();
+  const auto nodes = std::make_shared<PythonNodes>(described);
+  for (const NodeInfo& info : described.nodes) {
+    NodeDefinition& node = plugin->nodes.emplace_back();
+    node.info = with_contents(info);
+    node.make_options = [options = node.info.options]() -> std::shared_ptr<void> {
+      auto values = std::make_shared<std::vector<OptionValue>>();
+      for (const OptionInfo& option : options) values->push_back(option.default_value);
+      return values;
+    };
+    for (std::size_t i = 0; i < node.info.options.size(); ++i)
+      node.set_option.push_back([i](void* options, const OptionValue& value) {
+        (*static_cast<std::vector<OptionValue>*>(options))[i] = value;
+      });
+    node.call = [nodes, info = node.info](const std::vector<Value>& inputs, const void* options, Context& context) {
+      return nodes->call(info, inputs, *static_cast<const std::vector<OptionValue>*>(options), context);
+    };
+  }
+  return plugin;
+}
+
+}  // namespace marrow

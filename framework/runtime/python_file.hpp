@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// Python files that declare nodes, as if they were plugin libraries.
+#include <memory>
+
+#include "marrow/plugin.hpp"
+#include "marrow/runtime/library.hpp"
+
+namespace marrow {
+
+/// Whether the file's name ends in .py and it holds @marrow.node or @marrow.cost. False in a process of a Python node,
+/// which would otherwise start another one, and so on.
+bool is_python_plugin(const std::filesystem::path& file);
+
+/// Describes a file by a Python process with limits of time and memory. `linked` has the interpreter, the modules that
+/// the file needs from outside of the standard library, and the libraries of its kinds; `digest` is made from the file
+/// and from all of these. The description may be a refusal. Throws Error, with a text that begins with a verb, if there
+/// is no Python or the file is not trusted.
+LibraryInfo describe_python_file(const std::filesystem::path& file);
+
+/// The same from the user's cache of descriptions, unless one of these files has changed, with the build id.
+LibraryInfo python_file_info(const std::filesystem::path& file, const Digest& framework);
+
+/// The nodes of a file. Their calls start Python processes. Throws Error if the file is not as `described`.
+std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described);
+
+/// Digest of a Python file and of all that its description links. Throws Error if one of them is gone.
+Digest digest_of_python(const LibraryInfo& described);
+
+/// Adds files that a process loaded only while it was called to the kept description. From now on is_fully_described()
+/// is false for this description: its build id does not cover these files.
+void add_to_description(const LibraryInfo& described, const std::vector<std::string>& files);
+bool is_fully_described(const LibraryInfo& described);
+
+}  // namespace marrow
