@@ -48,6 +48,17 @@ py::dict dict_of(const OptionInfo& option) {
   return made;
 }
 
+py::dict dict_of(const KindPort& port) {
+  py::dict made;
+  made["name"] = port.name;
+  made["help"] = port.help;
+  made["axis"] = port.axis;
+  py::list types;
+  for (const TypeInfo& type : port.types) types.append(type.id);
+  made["types"] = types;
+  return made;
+}
+
 template <class T>
 py::list list_of_dicts(const std::vector<T>& items) {
   py::list made;
@@ -66,6 +77,17 @@ py::object node_info(const std::string& name) {
   made["outputs"] = list_of_dicts(info->outputs);
   made["options"] = list_of_dicts(info->options);
   made["random"] = info->random;
+  return made;
+}
+
+py::object kind_info(const std::string& name) {
+  const auto known = catalogue();
+  const KindInfo* kind = known->find_kind(name);
+  if (!kind) return py::none();
+  py::dict made;
+  made["inputs"] = list_of_dicts(kind->inputs);
+  made["outputs"] = list_of_dicts(kind->outputs);
+  made["library"] = std::filesystem::canonical(known->library_of_kind(name)->file).string();
   return made;
 }
 
@@ -100,6 +122,7 @@ void bind_catalogue(py::module_& module) {
         return kind ? kind->summary : std::string();
       },
       "What a kind does; empty if no library says it.");
+  module.def("kind_info", &kind_info, "A kind's contract and the library that brings it; None if there is none.");
   module.def("node_info", &node_info, "All that a manifest says about a node, as a dictionary; None if there is none.");
   module.def("suggestion", &suggestion, "\"did you mean ...\" for a wrong name, or the known names.");
   module.def(

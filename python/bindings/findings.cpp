@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "marrow/domain/error.hpp"
 #include "values.hpp"
 
 namespace marrow::python {
@@ -18,8 +20,40 @@ py::tuple ends_of(const LineSegment& line) {
   return py::make_tuple(py::make_tuple(line.from_px[0], line.from_px[1]), py::make_tuple(line.to_px[0], line.to_px[1]));
 }
 
+LineSegment line_of(const py::handle& ends, const std::string& what) {
+  const std::vector<double> numbers = numbers_of(ends, {2, 2}, what);
+  LineSegment line;
+  line.from_px = {numbers[0], numbers[1]};
+  line.to_px = {numbers[2], numbers[3]};
+  return line;
+}
+
+EdgeMap edge_map_of(const py::handle& pixels, int width_px, int height_px) {
+  const std::vector<double> numbers = numbers_of(pixels, {-1, 5}, "pixels of the edge map");
+  if (width_px < 1 || height_px < 1)
+    throw Error("EdgeMap: expected a width and a height of at least 1 px, got " + std::to_string(width_px) + " x " +
+                std::to_string(height_px));
+  EdgeMap edges{width_px, height_px, {}};
+  for (std::size_t i = 0; i < numbers.size(); i += 5) {
+    const double* at = numbers.data() + i;
+    const bool is_inside = at[0] >= -0.5 && at[1] >= -0.5 && at[0] <= width_px - 0.5 && at[1] <= height_px - 0.5;
+    if (!is_inside || !std::isfinite(at[2] + at[3] + at[4]))
+      throw Error("EdgeMap: pixel " + std::to_string(i / 5) + " is at (" + std::to_string(at[0]) + ", " +
+                  std::to_string(at[1]) + ") px, outside of the image of " + std::to_string(width_px) + " x " +
+                  std::to_string(height_px) + " px, or a number of it is not finite");
+    edges.pixels.push_back({float(at[0]), float(at[1]), float(at[2]), float(at[3]), float(at[4])});
+  }
+  const auto place = [](const EdgePixel& pixel) { return std::pair(std::lround(pixel.v_px), std::lround(pixel.u_px)); };
+  std::stable_sort(edges.pixels.begin(), edges.pixels.end(),
+                   [&](const EdgePixel& a, const EdgePixel& b) { return place(a) < place(b); });
+  return edges;
+}
+
 void bind_edges(py::module_& module) {
   value_class<EdgeMap>(module, "EdgeMap", "The edge pixels of one image.")
+      .def(py::init(&edge_map_of), py::arg("pixels"), py::kw_only(), py::arg("width_px"), py::arg("height_px"),
+           "Copies an array [edge pixel, 5]: position u and v in pixels, direction of the gradient along u and v as a "
+           "unit vector, and its magnitude. The pixels are put into the order of the rows.")
       .def_readonly("width_px", &EdgeMap::width_px, "The number of columns of the image.")
       .def_readonly("height_px", &EdgeMap::height_px, "The number of rows of the image.")
       .def_property_readonly(
@@ -35,6 +69,18 @@ void bind_edges(py::module_& module) {
       .def("__repr__",
            [](const EdgeMap& self) { return "<marrow.EdgeMap of " + std::to_string(self.pixels.size()) + " pixels>"; });
   value_class<ShaftLines>(module, "ShaftLines", "The two outer borders of the shaft in one view.")
+      .def(
+          py::init([](const py::object& left, const py::object& right, double width_mm, double width_deviation_mm) {
+            ShaftLines lines;
+            lines.left = line_of(left, "left");
+            lines.right = line_of(right, "right");
+            lines.width_mm = width_mm;
+            lines.width_deviation_mm = width_deviation_mm;
+            return lines;
+          }),
+          py::arg("left"), py::arg("right"), py::kw_only(), py::arg("width_mm"), py::arg("width_deviation_mm"),
+          "left, right: both ends ((u, v), (u, v)) of a border, in pixels. Both run in the same direction, and left is "
+          "on the left when looking along it.")
       .def_property_readonly(
           "left", [](const ShaftLines& self) { return ends_of(self.left); },
           "Both ends ((u, v), (u, v)) of the left border, in pixels.")
@@ -47,6 +93,14 @@ void bind_edges(py::module_& module) {
 
 void bind_judgements(py::module_& module) {
   value_class<Metrics>(module, "Metrics", "Figures of merit by name, as metrics[\"mtre_mm\"].")
+      .def(py::init([](const py::dict& values, const py::dict& units) {
+             Metrics metrics;
+             for (const auto& [name, value] : values)
+               metrics.items.push_back({py::str(name), value.cast<double>(),
+                                        units.contains(name) ? py::str(units[name]).cast<std::string>() : ""});
+             return metrics;
+           }),
+           py::arg("values"), py::arg("units") = py::dict(), "values: {name: number}; units: {name: unit}.")
       .def_property_readonly(
           "values", [](const Metrics& self) { return dict_of(self.items); }, "All figures, by name.")
       .def_property_readonly(

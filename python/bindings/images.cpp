@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <pybind11/stl.h>
 
+#include "mapped.hpp"
 #include "marrow/domain/error.hpp"
 #include "values.hpp"
 
@@ -27,12 +28,25 @@ Grid grid_of(const std::vector<py::ssize_t>& shape, const py::handle& spacing_mm
 template <class T>
 py::buffer_info samples_buffer(const T& volume, const std::vector<float>& values) {
   const auto& size = volume.grid.size;
-  return buffer_of(values.data(), {size[2], size[1], size[0]});
+  return buffer_of(samples_of_item(&volume, values), {size[2], size[1], size[0]});
+}
+
+/// A value for another node: with the samples in its own list, where all nodes look for them.
+template <class T>
+std::optional<Value> value_with_samples(py::handle object, std::vector<float> T::*values) {
+  if (!py::isinstance<T>(object)) return std::nullopt;
+  const std::shared_ptr<const T> item = object.cast<std::shared_ptr<T>>();
+  if (!is_mapped(item.get())) return Value::of<T>(item);
+  auto whole = std::make_shared<T>(*item);
+  const float* first = samples_of_item(item.get(), (*item).*values);
+  ((*whole).*values).assign(first, first + whole->grid.count());
+  return Value::of<T>(std::shared_ptr<const T>(whole));
 }
 
 /// What Volume and SignedField have in common.
 template <class T>
 void bind_grid(py::class_<T, std::shared_ptr<T>>& made, std::vector<float> T::*values) {
+  conversions().back().from_python = [values](py::handle object) { return value_with_samples(object, values); };
   made.def_property_readonly(
           "array",
           [values](const std::shared_ptr<T>& self) { return array_of(self, samples_buffer(*self, (*self).*values)); },

@@ -58,5 +58,7 @@ void bind_geometry(py::module_& module);
 void bind_findings(py::module_& module);
 /// Items and OtherValue; to be called last.
 void bind_values(py::module_& module);
+/// What processes of nodes written in Python need.
+void bind_worker(py::module_& module);
 
 }  // namespace marrow::python

@@ -33,7 +33,23 @@ from ._core import (
     Volume,
 )
 from ._core import forget_catalogue as find_plugins_again
+from .annotations import (
+    as_many_or_none,
+    at_least,
+    at_least_one,
+    at_most,
+    below,
+    distinct,
+    exactly_one,
+    length,
+    named,
+    not_above,
+    over,
+    same_length,
+    unit,
+)
 from .comparison import Comparison, compare
+from .context import Context
 from .errors import Error, Fault, PipelineError, RunError
 from .items import Items
 from .nodes import Kind, Node, node

@@ -7,6 +7,7 @@ import os
 from typing import Any, Dict, List, Optional, Tuple
 
 from . import _core, texts
+from .declaration import declared
 from .errors import Error, Fault, PipelineError
 from .pipeline import checked_pipeline, natural
 from .progress import Printer
@@ -100,8 +101,14 @@ class Kind:
         return "<marrow kind %s: %s>" % (self._name, ", ".join(self.__dir__()))
 
 
-def node(name: str) -> Node:
-    """The node of this name, as "edges.canny". Raises marrow.Error if no plugin has it."""
+def node(name: str, *, summary: Optional[str] = None, **declaration: Any) -> Any:
+    """The node of this name, as "edges.canny". Raises marrow.Error if no plugin has it.
+
+    With a summary, declares a new node instead: @marrow.node("edges.mine", summary="one line that says what it does").
+    The function's parameters are the node's inputs; those after a * are its options. Further arguments: random=True if
+    it draws from context.seed, traits=, relations=, and the limits of a call, seconds= (600) and memory_mb= (4096)."""
+    if summary is not None:
+        return declared(name, summary, **declaration)
     info = _core.node_info(name)
     if info is None:
         raise Error("unknown node '%s'; %s" % (name, _core.suggestion(name, _core.node_names())))

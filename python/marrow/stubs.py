@@ -45,7 +45,7 @@ _OPTIONS = {
 _HEAD = '''# SPDX-License-Identifier: Apache-2.0
 # Written by python3 -m marrow.stubs, from the manifests of the plugins.
 import os
-from typing import Any, List, Literal, Mapping, NamedTuple, Optional, Sequence, TypeVar, Union
+from typing import Any, Callable, List, Literal, Mapping, NamedTuple, Optional, Sequence, TypeVar, Union, overload
 
 from ._core import %s, OtherValue
 from .items import Items
@@ -67,8 +67,22 @@ class Kind:
 
     def __getattr__(self, name: str) -> Node: ...
 
+@overload
 def node(name: str) -> Node:
     """The node of this name, as "edges.canny"."""
+
+@overload
+def node(
+    name: str,
+    *,
+    summary: str,
+    random: bool = ...,
+    traits: Sequence[str] = ...,
+    relations: Sequence[Any] = ...,
+    seconds: float = ...,
+    memory_mb: float = ...,
+) -> Callable[[_T], _T]:
+    """Declares a function as a new node."""
 
 def documentation(info: Mapping[str, Any]) -> str: ...
 def python_name(name: str) -> str: ...
@@ -140,7 +154,7 @@ def _option(option: Dict[str, Any]) -> str:
 
 def _result(port: Dict[str, Any]) -> str:
     if port["axis"]:
-        return "Items"
+        return "Items[Any]"
     return "Union[%s, Any]" % (_value(port) if not port["optional"] else "None, " + _value(port))
 
 

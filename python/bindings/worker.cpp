@@ -1,0 +1,134 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a process that holds nodes written in Python needs: its inputs, which it maps, and a way to hand values over.
+#include <fcntl.h>
+#include <pybind11/stl.h>
+#include <signal.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <chrono>
+#include <cstring>
+#include <thread>
+
+#include "mapped.hpp"
+#include "marrow/domain/error.hpp"
+#include "pipelines.hpp"
+#include "runtime/packed_values.hpp"
+#include "values.hpp"
+
+namespace marrow::python {
+namespace {
+
+/// A file of another process, mapped for reading.
+class Mapping {
+ public:
+  explicit Mapping(const std::string& file) {
+    const int descriptor = open(file.c_str(), O_RDONLY | O_CLOEXEC);
+    if (descriptor < 0) throw Error("cannot open an input: " + std::string(std::strerror(errno)));
+    size_ = std::size_t(bytes_in(descriptor));
+    data_ = mmap(nullptr, size_, PROT_READ, MAP_SHARED, descriptor, 0);
+    close(descriptor);
+    if (data_ == MAP_FAILED) throw Error("cannot map an input: " + std::string(std::strerror(errno)));
+  }
+  ~Mapping() { munmap(data_, size_); }
+  Mapping(const Mapping&) = delete;
+  Mapping& operator=(const Mapping&) = delete;
+  std::string_view bytes() const { return {static_cast<const char*>(data_), size_}; }
+
+ private:
+  void* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
+const Conversion& conversion_of(const std::string& type) {
+  for (const Conversion& one : conversions())
+    if (one.type.id == type) return one;
+  throw Error("values of type '" + type + "' are not known in Python");
+}
+
+/// The input whose packed data are in a file. Samples stay in the file.
+py::object mapped_input(const std::string& file, const std::string& type, std::size_t samples_bytes) {
+  const auto mapping = std::make_shared<const Mapping>(file);
+  const Conversion& conversion = conversion_of(type);
+  const std::string_view bytes = mapping->bytes();
+  if (samples_bytes > bytes.size()) throw Error("an input is damaged: it ends too early");
+  Unpacker packed(bytes.substr(samples_bytes));
+  std::shared_ptr<const void> data = conversion.type.content->unpack(packed);
+  if (samples_bytes > 0) {
+    note_mapped_samples(data.get(), reinterpret_cast<const float*>(bytes.data()));
+    data = std::shared_ptr<const void>(data.get(), [data, mapping](const void* item) { forget_mapped_samples(item); });
+  }
+  return conversion.to_python(data);
+}
+
+/// What a call made. It stays here until the other process has read it.
+struct Made {
+  std::vector<Value> values;
+};
+
+void write_again(int descriptor, const std::vector<Value>& values, bool in_place) {
+  if (ftruncate(descriptor, 0) != 0 || lseek(descriptor, 0, SEEK_SET) != 0)
+    throw Error("cannot hand values to another process: " + std::string(std::strerror(errno)));
+  write_values(descriptor, values, in_place);
+}
+
+/// One output of a call.
+Value output_of(const py::handle& object, const std::string& port, const std::string& type, const std::string& axis) {
+  const Conversion& conversion = conversion_of(type);
+  Value value;
+  value.type = conversion.type;
+  if (object.is_none()) return value;
+  value = value_of(object, conversion.type, axis, "output '" + port + "'");
+  if (!(value.type == conversion.type))
+    throw Error("output '" + port + "': expected " + type + ", got " + value.type.id);
+  if (value.axis != axis)
+    throw Error("output '" + port + "': expected " +
+                (axis.empty() ? "one " + type + ", got a list" : "a list over " + axis + ", got one " + type));
+  return value;
+}
+
+/// Ends this process and all that it started if the one that started it has ended. A thread of its own looks, because
+/// Python's may be busy for ever.
+void end_with(long parent) {
+  std::thread([parent] {
+    for (;;) {
+      if (long(getppid()) != parent) kill(0, SIGKILL);
+      std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    }
+  }).detach();
+}
+
+py::object type_description(const std::string& id) {
+  const TypeInfo& type = conversion_of(id).type;
+  py::dict made;
+  made["id"] = type.id;
+  made["version"] = type.version;
+  made["size"] = type.size;
+  made["function"] = type.is_function;
+  return made;
+}
+
+}  // namespace
+
+void bind_worker(py::module_& module) {
+  module.def("type_description", &type_description, "A value type as manifests have it.");
+  module.def("end_with", &end_with, "Ends this process when its parent has another number.");
+  module.def("mapped_input", &mapped_input, "An input whose packed data are in a file.");
+  py::class_<Made>(module, "Made", "What a call made, for the process that asked for it.")
+      .def(py::init([](const py::list& outputs) {
+        Made made;
+        for (const py::handle& one : outputs) {
+          const auto output = one.cast<py::tuple>();
+          made.values.push_back(output_of(output[0], output[1].cast<std::string>(), output[2].cast<std::string>(),
+                                          output[3].cast<std::string>()));
+        }
+        return made;
+      }))
+      .def("hand_over", [](const Made& made, int descriptor, bool in_place) {
+        write_again(descriptor, made.values, in_place);
+        return made.values.size();
+      });
+}
+
+}  // namespace marrow::python

@@ -1,0 +1,35 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What marrow gives a node besides its inputs and options."""
+from typing import Any, Callable, Dict, Optional
+
+__all__ = ["Context"]
+
+
+class Context:
+    """A node takes it as a parameter `context: marrow.Context`. One that you make yourself, for tests, reports
+    nothing."""
+
+    def __init__(self, seed: int = 1, say: Optional[Callable[[Dict[str, Any]], None]] = None) -> None:
+        self.seed = seed
+        """The only source of randomness: numpy.random.default_rng(context.seed). It is made from the run's seed and
+        everything that the node was given. A node that uses it is declared with random=True."""
+        self.cancelled = False
+        """Whether the call is to end. The main thread of the node then gets a KeyboardInterrupt anyway; threads of your
+        own look here."""
+        self._say = say or (lambda report: None)
+
+    def progress(self, fraction: float, what: str = "") -> None:
+        """Reports how far a long call is, from 0 to 1."""
+        self._say({"say": "progress", "fraction": float(fraction), "text": what})
+
+    def debug(self, text: str) -> None:
+        """Writes a line to the run's log, for people who look for a fault."""
+        self._say({"say": "debug", "text": text})
+
+    def info(self, text: str) -> None:
+        """Writes a line to the run's log."""
+        self._say({"say": "info", "text": text})
+
+    def warn(self, text: str) -> None:
+        """Says what a person should know about the result. It is kept with the result."""
+        self._say({"say": "warning", "text": text})
