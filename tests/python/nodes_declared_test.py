@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Nodes written in Python are described as those in C++ are."""
+import json
+import os
+import shutil
+import subprocess
+
+import numpy
+from package import BUILD, SCRATCH, SOURCE, main, marrow, small_case
+from written_nodes import HEAD, Written, view
+
+EXAMPLE = SOURCE / "docs" / "example-plugin"
+
+
+def twin():
+    """The folder of the example-plugin in C++, built once."""
+    build = SCRATCH / "twin"
+    if not build.exists():
+        configure = ["cmake", "-S", EXAMPLE, "-B", build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
+        subprocess.run(configure, check=True, capture_output=True)
+        subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
+    return build
+
+
+class Declared(Written):
+    def with_twins(self):
+        os.environ["MARROW_PLUGIN_PATH"] = "%s:%s" % (self.plugins, twin())
+        shutil.copy(EXAMPLE / "steepest.py", self.plugins)
+        marrow.find_plugins_again()
+
+    def test_ports_and_options_are_those_of_the_twin_in_cpp(self):
+        self.with_twins()
+        described = [json.loads(self.program("inspect", name, "--json")) for name in self.NAMES]
+        for one in described:
+            for varying in ("name", "library", "build_id"):
+                one.pop(varying, None)
+        self.assertEqual(described[0], described[1])
+        self.assertIn("edges.steepest_python", self.program("list", "edges"))
+        checked = ("check", SOURCE / "pipelines" / "femur.yaml", "--set", "edges.uses=edges.steepest_python")
+        self.program(*checked)
+        self.assertIn("'lowest'", self.program(*checked, "--set", "edges.lowest=3", code=2))
+        self.assertIn("below the least allowed, 0", self.program(*checked, "--set", "edges.least=-3", code=2))
+
+    NAMES = ("edges.steepest", "edges.steepest_python")
+
+    def test_results_are_those_of_the_twin_in_cpp(self):
+        self.with_twins()
+        for seen in [view(1), *small_case()[1].views.values()]:
+            for least in (1, 300, 500.5, 1e9):
+                found = [marrow.node(name)(seen, least=least) for name in self.NAMES]
+                self.assertTrue(numpy.array_equal(found[0].pixels, found[1].pixels))
+                self.assertEqual(found[0].width_px, found[1].width_px)
+        self.assertGreater(len(marrow.edges.steepest_python(view(1))), 1000)
+
+    def test_conformance(self):
+        self.with_twins()
+        said = self.program("conformance", "edges.steepest_python", code=1)
+        failed = [line.split()[1] for line in said.splitlines() if "FAIL" in line]
+        self.assertEqual(failed, ["disc_spread", "bar_spread"], "as in C++: it does not thin its edges")
+        self.assertIn("23 passed, 0 do not apply, 2 failed", said)
+
+    def test_all_that_a_signature_may_say(self):
+        self.plugin(
+            """
+from pathlib import Path
+from typing import List, Literal
+
+class Found(NamedTuple):
+    first: Annotated[marrow.Mesh, "a surface"]
+    second: Annotated[Optional[marrow.Pose], "a pose"]
+    many: Annotated[marrow.Items[marrow.View], marrow.over("view"), "views"]
+
+@marrow.node("own.all", summary="all", random=True, relations=[marrow.not_above("low", "high_mm")])
+def all_of_it(
+    mesh: Annotated[marrow.Mesh, "mesh"],
+    views: Annotated[Optional[marrow.Items[marrow.View]], marrow.over("view"), "views"] = None,
+    from_: Annotated[Optional[marrow.Pose], "pose"] = None,
+    *,
+    context: marrow.Context,
+    low: Annotated[float, marrow.at_least(1), marrow.at_most(9), "low"] = 2,
+    high_mm: Annotated[int, "high"] = 3,
+    word: Annotated[Literal["a", "b"], "word"] = "b",
+    text: Annotated[str, "text"],
+    yes: Annotated[bool, "yes"] = True,
+    place: Annotated[Path, "place"] = Path("x"),
+    axis: Annotated[List[float], marrow.length(3), "axis"] = [0, 0, 1],
+    words: Annotated[List[str], "words"] = [],
+) -> Found: ...
+"""
+        )
+        info = marrow._core.node_info("own.all")
+        ports = [(port["name"], port["type"], port["optional"], port["axis"]) for port in info["inputs"]]
+        self.assertEqual(
+            ports, [("mesh", "mesh", False, ""), ("views", "view", True, "view"), ("from", "pose", True, "")]
+        )
+        ports = [(port["name"], port["type"], port["optional"], port["axis"]) for port in info["outputs"]]
+        self.assertEqual(
+            ports, [("first", "mesh", False, ""), ("second", "pose", True, ""), ("many", "view", True, "view")]
+        )
+        self.assertTrue(info["random"])
+        options = {option["name"]: option for option in info["options"]}
+        types = {name: option["type"] for name, option in options.items()}
+        self.assertEqual(
+            types,
+            dict(low="number", high_mm="integer", word="text", text="text", yes="boolean", place="path")
+            | dict(axis="numbers", words="texts"),
+        )
+        self.assertEqual((options["low"]["minimum"], options["low"]["maximum"]), (1, 9))
+        self.assertEqual((options["high_mm"]["unit"], options["low"]["unit"]), ("mm", ""))
+        self.assertEqual((options["word"]["choices"], options["word"]["default"]), (["a", "b"], "b"))
+        self.assertEqual([name for name, option in options.items() if option["required"]], ["text"])
+        self.assertEqual(options["axis"]["default"], [0, 0, 1])
+
+    def test_the_function_stays_a_function(self):
+        scope = {"__name__": "here"}
+        text = """
+@marrow.node("edges.own", summary="own")
+def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMap:
+    return low + 1
+"""
+        exec(HEAD + text, scope)
+        self.assertEqual(scope["own"](None, low=4), 5)
+
+    def refusal(self, text, name="mine.py"):
+        """What doctor says of a file."""
+        file = self.plugin(text, name)
+        said = self.program("doctor", code=1)
+        line = next(one for one in said.splitlines() if "REFUSED" in one)
+        self.assertIn(str(file), line)
+        return line.partition(str(file) + ": it ")[2]
+
+    def test_files_that_are_refused(self):
+        node = '@marrow.node("edges.own", summary="own")\n'
+        here = str(self.plugins / "mine.py")
+        for text, expected in (
+            (node + "def own(view: marrow.View -> 3\n", "cannot be used: %s, line 5: SyntaxError: " % here),
+            (
+                "import nosuch  # @marrow.node\n",
+                "cannot be used: %s, line 4, in <module>: ModuleNotFoundError: No module" % here,
+            ),
+            (
+                node + "def own(view: int) -> marrow.EdgeMap: ...\n",
+                "input 'view' of edges.own: expected one of marrow's",
+            ),
+            (node + "def own(view: marrow.View): ...\n", "the output of edges.own: expected one of marrow's values"),
+            (
+                node + "def own(view: marrow.View, *, low=3) -> marrow.EdgeMap: ...\n",
+                "option 'low' of edges.own: expected bool, int, float, str, pathlib.Path, Literal of texts, or List of "
+                "these, got nothing",
+            ),
+            (
+                node + "def own(view: marrow.View, *, low: float = 3) -> marrow.EdgeMap: ...\n",
+                "option 'low': has no line of help",
+            ),
+            (
+                node + 'def own(view: marrow.View, *, low: Annotated[float, marrow.at_least(5), "low"] = 3)'
+                " -> marrow.EdgeMap: ...\n",
+                "option 'low': its default is outside its own range",
+            ),
+            (
+                node + "def own(view: marrow.Items[marrow.View]) -> marrow.EdgeMap: ...\n",
+                'a list is written Annotated[marrow.Items[marrow.View], marrow.over("view")]',
+            ),
+            (node + "def own(view: marrow.Mesh) -> marrow.EdgeMap: ...\n", "the kind 'edges' has it as view, not mesh"),
+            (
+                node.replace("edges.own", "nokind.own") + "def own(view: marrow.View) -> marrow.EdgeMap: ...\n",
+                "nokind.own: the kind does not name the output; name it",
+            ),
+            ("# @marrow.node\n", "it declares no node; write @marrow.node before a function"),
+            ("import os  # @marrow.node\nos.kill(os.getpid(), 11)\n", "crashed while it was imported (Segmentation"),
+            ("import os  # @marrow.node\nos._exit(3)\n", "ended the process that imported it"),
+        ):
+            with self.subTest(expected):
+                self.assertIn(expected, self.refusal(text))
+
+    def test_a_file_that_others_may_write_is_refused(self):
+        file = self.plugin("# @marrow.node\n")
+        file.chmod(0o666)
+        self.assertIn("chmod go-w", self.program("doctor", code=1))
+
+    def test_an_interpreter_that_is_not_there(self):
+        self.plugin("# @marrow.node\n")
+        os.environ["MARROW_PYTHON"] = "/nowhere/python3"
+        try:
+            self.assertIn("there is no Python interpreter /nowhere/python3; install", self.program("doctor", code=1))
+        finally:
+            del os.environ["MARROW_PYTHON"]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What goes wrong in a node written in Python costs one call, and is said clearly."""
+import os
+import signal
+import subprocess
+import threading
+import time
+
+from package import BUILD, MARROW, main, marrow
+from written_nodes import Written, processes, view
+
+CALLS = """
+import os, signal, sys, time
+
+def figures():
+    return marrow.Metrics({"process": os.getpid()})
+
+@marrow.node("own.does", summary="does what it is told", seconds=3, memory_mb=500)
+def does(view: Annotated[marrow.View, "view"], *, what: Annotated[str, "what"] = "") -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    exec(what)
+    return figures()
+"""
+
+
+class Faults(Written):
+    def does(self, what):
+        return int(marrow.own.does(view(), what=what)["process"])
+
+    def failure(self, what):
+        with self.assertRaises(marrow.RunError) as caught:
+            self.does(what)
+        return str(caught.exception)
+
+    def test_a_crash_costs_one_call(self):
+        self.plugin(CALLS)
+        first = self.does("")
+        self.assertEqual(self.does(""), first)
+        self.assertIn(
+            "mine.py crashed its process (Killed); the next call starts a new one",
+            self.failure("os.kill(os.getpid(), signal.SIGKILL)"),
+        )
+        self.assertIn("crashed its process (Segmentation fault)", self.failure("os.kill(os.getpid(), 11)"))
+        self.assertIn("ended its process; a node must return or raise", self.failure("os._exit(0)"))
+        self.assertNotEqual(self.does(""), first)
+
+    def test_a_process_that_is_killed_between_two_calls_costs_nothing(self):
+        self.plugin(CALLS)
+        first = self.does("")
+        os.kill(first, signal.SIGKILL)
+        time.sleep(0.1)
+        self.assertNotEqual(self.does(""), first)
+
+    def test_of_two_calls_at_once_only_the_killed_one_fails(self):
+        file = self.plugin(CALLS)
+        ends = {}
+
+        def call(name, what):
+            try:
+                ends[name] = self.does(what)
+            except marrow.RunError as error:
+                ends[name] = str(error)
+
+        threads = [
+            threading.Thread(target=call, args=(name, "open(%r, 'w'); time.sleep(1.5)" % str(self.scratch / name)))
+            for name in ("a", "b")
+        ]
+        for thread in threads:
+            thread.start()
+        while not all((self.scratch / name).exists() for name in ("a", "b")):
+            time.sleep(0.02)
+        os.kill(processes(file)[0], signal.SIGKILL)
+        for thread in threads:
+            thread.join()
+        self.assertEqual(sorted(isinstance(end, int) for end in ends.values()), [False, True], ends)
+        self.assertIn("(Killed)", next(end for end in ends.values() if isinstance(end, str)))
+
+    def test_a_hang(self):
+        file = self.plugin(CALLS)
+        start = time.monotonic()
+        self.assertIn(
+            "mine.py took longer than 3 s, and its process was ended; if it needs more, give it more in "
+            "@marrow.node(..., seconds=...)",
+            self.failure("while True: pass"),
+        )
+        self.assertLess(time.monotonic() - start, 15)
+        self.assertEqual(processes(file), [])
+        self.does("")
+
+    def test_too_much_memory(self):
+        self.plugin(CALLS)
+        text = self.failure("kept = [bytearray(b'x' * 50_000_000) for i in range(100) if not time.sleep(0.05)]")
+        self.assertRegex(text, r"mine.py used more than 500(\.\d+)? MB of memory, and its process was ended")
+        self.assertIn("memory_mb=", text)
+        self.assertIn("out of memory", self.failure("raise MemoryError"))
+
+    def test_exceptions(self):
+        file = self.plugin(CALLS + "\ndef broken(number):\n    return 1 / number\n")
+        line = file.read_text().splitlines().index("    return 1 / number") + 1
+        self.assertIn(
+            "%s, line %d, in broken: ZeroDivisionError: division by zero (return 1 / number)" % (file, line),
+            self.failure("broken(0)"),
+        )
+        self.assertIn("in does: SystemExit: 3 (exec(what))", self.failure("sys.exit(3)"))
+        said = self.failure("raise marrow.Error('the view shows no bone; take another one')")
+        self.assertIn("the view shows no bone; take another one", said)
+        self.assertNotIn("line", said)
+        self.does("print('what a node prints is no answer'); sys.stdout.flush(); os.system('echo as little')")
+
+    def test_wrong_outputs(self):
+        self.plugin(
+            "class Two(NamedTuple):\n"
+            '    first: Annotated[marrow.Pose, "a"]\n    second: Annotated[marrow.Pose, "b"]\n'
+            + "".join(
+                '\n@marrow.node("own.%s", summary="wrong")\ndef %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n'
+                % (name, name, kind, value)
+                for name, kind, value in (
+                    ("none", 'Annotated[marrow.Pose, marrow.named("p")]', "None"),
+                    ("other", 'Annotated[marrow.Pose, marrow.named("p")]', "view"),
+                    ("number", 'Annotated[marrow.Pose, marrow.named("p")]', "7"),
+                    ("many", 'Annotated[marrow.Pose, marrow.named("p")]', "[marrow.Pose(numpy.eye(4))]"),
+                    ("three", "Two", "(1, 2, 3)"),
+                )
+            )
+        )
+        for name, text in (
+            ("none", "own.none returned nothing for the output 'p'"),
+            ("other", "output 'p': expected pose, got view"),
+            ("number", "output 'p': expected pose, got int"),
+            ("many", "output 'p': expected one pose, got a list"),
+            ("three", "own.three returned 3 values, expected 2"),
+        ):
+            with self.subTest(name), self.assertRaisesRegex(marrow.RunError, text):
+                marrow.node("own." + name)(view())
+
+    def test_ctrl_c_lets_the_node_clean_up(self):
+        file = self.plugin(
+            CALLS
+            + """
+@marrow.node("own.cleans", summary="cleans up")
+def cleans(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: Annotated[str, "mark"]) -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    open(mark + ".begun", "w")
+    try:
+        time.sleep(60)
+    finally:
+        open(mark, "w")
+    return figures()
+"""
+        )
+        mark = self.scratch / "cleaned"
+        pipeline = self.write(
+            "p.yaml", "marrow: 1\nnodes:\n  a: {uses: own.cleans, with: {mark: %s}}\noutputs: {a: a.figures}\n" % mark
+        )
+        file.write_text(file.read_text().replace("seconds=3", "seconds=90"))
+        run = subprocess.Popen([str(MARROW), "run", str(pipeline), "--out", str(self.scratch / "out")])
+        for _ in range(600):
+            if (self.scratch / "cleaned.begun").exists():
+                break
+            time.sleep(0.05)
+        run.send_signal(signal.SIGINT)
+        self.assertEqual(run.wait(30), 130)
+        self.assertTrue(mark.exists())
+        self.assertEqual(processes(file), [])
+
+    def test_a_killed_program_leaves_no_process(self):
+        file = self.plugin(CALLS)
+        script = (
+            "import sys; sys.path.insert(0, %r); import marrow, numpy\n"
+            "camera = marrow.Camera(9, 9, [[9, 0, 4], [0, 9, 4], [0, 0, 1]], numpy.eye(4))\n"
+            "marrow.own.does(marrow.View(numpy.ones((9, 9), 'uint8'), camera), what='while True: pass')\n"
+        ) % str(BUILD / "python")
+        run = subprocess.Popen(["/usr/bin/python3", "-c", script.replace("seconds=3", "seconds=90")])
+        while not processes(file):
+            time.sleep(0.02)
+        time.sleep(0.5)
+        run.kill()
+        run.wait()
+        for _ in range(40):
+            if not processes(file):
+                break
+            time.sleep(0.1)
+        self.assertEqual(processes(file), [])
+
+
+if __name__ == "__main__":
+    main()

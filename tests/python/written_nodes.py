@@ -1,0 +1,65 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What the tests of nodes written in Python share: a folder of plugins, and small views."""
+import os
+import pathlib
+import subprocess
+
+import numpy
+from package import MARROW, SCRATCH, TEST_PLUGINS, Case, marrow
+
+HEAD = """from typing import Annotated, NamedTuple, Optional
+import marrow
+import numpy
+"""
+
+
+def view(seed=1, width_px=60, height_px=40):
+    """A view of noise."""
+    pixels = numpy.random.default_rng(seed).integers(0, 60000, (height_px, width_px)).astype("uint16")
+    camera = marrow.Camera(width_px, height_px, [[1700, 0, 30], [0, 1700, 20], [0, 0, 1]], numpy.eye(4))
+    return marrow.View(pixels, camera, name="frontal")
+
+
+def processes(file):
+    """The numbers of the Python processes that hold the nodes of a file."""
+    found = []
+    for folder in pathlib.Path("/proc").iterdir():
+        try:
+            command = (folder / "cmdline").read_bytes().split(b"\0") if folder.name.isdigit() else []
+        except OSError:  # it has just ended
+            continue
+        if b"marrow.plugin" in command and os.fsencode(str(file)) in command:
+            found.append(int(folder.name))
+    return found
+
+
+class Written(Case):
+    """Each test has a folder of plugins and a cache of descriptions of its own."""
+
+    def setUp(self):
+        super().setUp()
+        self.plugins = self.scratch / "plugins"
+        self.plugins.mkdir()
+        os.environ["MARROW_PLUGIN_PATH"] = "%s:%s" % (self.plugins, TEST_PLUGINS)
+        os.environ["XDG_CACHE_HOME"] = str(self.scratch / "cache")
+        marrow.find_plugins_again()
+
+    def tearDown(self):
+        os.environ["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS)
+        marrow.find_plugins_again()
+
+    def plugin(self, text, name="mine.py"):
+        """Writes a Python file with nodes, which is then found."""
+        file = self.plugins / name
+        file.write_text(HEAD + text)
+        marrow.find_plugins_again()
+        return file
+
+    def program(self, *arguments, code=0):
+        """Runs marrow's program; returns what it printed."""
+        done = subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=self.scratch)
+        self.assertEqual(done.returncode, code, done.stdout + done.stderr)
+        return done.stdout + done.stderr
+
+
+__all__ = ["HEAD", "SCRATCH", "Written", "processes", "view"]
