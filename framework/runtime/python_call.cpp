@@ -7,32 +7,31 @@
 #include <algorithm>
 #include <chrono>
 #include <cstring>
-#include <mutex>
-#include <set>
 
 #include "apart.hpp"
 #include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/types.hpp"
 #include "python_file.hpp"
+#include "python_nodes.hpp"
 #include "python_process.hpp"
-#include "shared_inputs.hpp"
 #include "trust.hpp"
 
 namespace marrow {
+
+/// A process that holds the nodes of one Python file, and the memory through which it hands values over.
+struct PythonProcess {
+  SharedMemory made;
+  Worker worker;
+  nlohmann::json limits;  ///< of each node: {"seconds": ..., "memory_mb": ...}
+  explicit PythonProcess(const std::filesystem::path& file) : worker(python_process(file, made.descriptor())) {}
+};
+
 namespace {
 
 namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr double kLoadLimit_s = 20, kShareLimit_s = 600, kStopLimit_s = 2;
-
-/// A process that holds the nodes of one Python file, and the memory through which it hands values over.
-struct PythonProcess {
-  SharedMemory made;
-  Worker worker;
-  json limits;  ///< of each node: {"seconds": ..., "memory_mb": ...}
-  explicit PythonProcess(const fs::path& file) : worker(python_process(file, made.descriptor())) {}
-};
 
 /// The inputs as a request has them. `kept` keeps the memory that the request names until the call has ended.
 json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedInput>>& kept) {
@@ -106,103 +105,26 @@ std::string failure_of_call(const fs::path& file, const WorkerEnd& end, const Wo
   return end.failed;
 }
 
-/// The nodes of one file. A process does one call at a time, and waits for the next one when it has done so.
-class PythonNodes {
- public:
-  explicit PythonNodes(LibraryInfo described) : described_(std::move(described)) {}
+std::vector<Value> values_of(PythonProcess& process) {
+  try {
+    return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
+  } catch (const NoAccess&) {
+    process.worker.ask({{"do", "share"}});
+    const WorkerEnd end = process.worker.wait({kShareLimit_s}, nullptr, nullptr);
+    if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
+    return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
+  }
+}
 
-  std::vector<Value> call(const NodeInfo& node, const std::vector<Value>& inputs,
-                          const std::vector<OptionValue>& options, Context& context) {
-    std::unique_ptr<PythonProcess> process = take(context);
-    std::vector<std::shared_ptr<const SharedInput>> kept;
-    json request = {{"do", "call"}, {"node", node.name}, {"seed", context.seed()}};
-    request["inputs"] = request["options"] = json::array();
-    for (const Value& input : inputs) request["inputs"].push_back(json_of_input(input, kept));
-    for (const OptionValue& value : options) request["options"].push_back(json_of_option(value));
-    request["kept"] = SharedInputs::all().numbers();
-    WorkerLimits limits;
-    limits.seconds = process->limits.at(node.name).at("seconds");
-    limits.memory_mb = process->limits.at(node.name).at("memory_mb");
-    for (const auto& one : kept) limits.memory_mb += 2e-6 * double(one->bytes);
-    process->worker.ask(std::move(request));
-    const WorkerEnd end = wait_for(process->worker, limits, context);
-    if (!end.failed.empty()) {
-      if (!end.died) give_back(std::move(process));
-      throw Error(failure_of_call(described_.file, end, limits));
-    }
-    std::vector<Value> outputs = handed_over(*process);
-    learn(end.answer.at("files"));
-    give_back(std::move(process));
-    expect_outputs(outputs, node.outputs);
-    return outputs;
-  }
-
- private:
-  std::unique_ptr<PythonProcess> take(Context& context) {
-    {
-      const std::scoped_lock lock(mutex_);
-      while (!idle_.empty()) {
-        std::unique_ptr<PythonProcess> process = std::move(idle_.back());
-        idle_.pop_back();
-        process->worker.take(nullptr);  // notices that it has ended meanwhile
-        if (!process->worker.is_dead()) return process;
-      }
-    }
-    auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));
-    process->worker.ask({{"do", "load"}});
-    const WorkerEnd end = wait_for(process->worker, {kLoadLimit_s}, context);
-    if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
-    process->limits = end.answer;
-    if (digest_of_python(described_) != described_.digest) throw Error(changed());
-    for (const NodeInfo& node : described_.nodes)
-      if (!process->limits.contains(node.name)) throw Error(changed());
-    return process;
-  }
-  void give_back(std::unique_ptr<PythonProcess> process) {
-    const std::scoped_lock lock(mutex_);
-    idle_.push_back(std::move(process));
-  }
-  std::string changed() const {
-    return described_.file.string() +
-           " or a module that it imports was changed since this program began; start it again";
-  }
-  static std::vector<Value> handed_over(PythonProcess& process) {
-    try {
-      return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
-    } catch (const NoAccess&) {
-      process.worker.ask({{"do", "share"}});
-      const WorkerEnd end = process.worker.wait({kShareLimit_s}, nullptr, nullptr);
-      if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
-      return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
-    }
-  }
-  /// Takes note of files that the process has loaded during the call and that the description does not name.
-  void learn(const std::vector<std::string>& files) {
-    const std::scoped_lock lock(mutex_);
-    for (const std::string& file : files) {
-      const bool is_known = std::any_of(described_.linked.begin(), described_.linked.end(),
-                                        [&](const LinkedLibrary& one) { return one.path == file; });
-      if (!is_known) new_files_.insert(file);
-    }
-    if (new_files_.size() == learnt_) {
-      if (!files.empty() && digest_of_python(described_) != described_.digest) throw Error(changed());
-      return;
-    }
-    learnt_ = new_files_.size();
-    add_to_description(described_, {new_files_.begin(), new_files_.end()});
-  }
-
-  LibraryInfo described_;
-  std::mutex mutex_;
-  std::vector<std::unique_ptr<PythonProcess>> idle_;
-  std::set<std::string> new_files_;
-  std::size_t learnt_ = 0;
-};
+bool makes_cost(const NodeInfo& node) {
+  return node.outputs.size() == 1 && node.outputs[0].type == TypeInfo::of<Cost>();
+}
 
 /// The node with Contents for its types, which a description does not have.
 NodeInfo with_contents(NodeInfo node) {
   for (std::vector<PortInfo>* ports : {&node.inputs, &node.outputs})
     for (PortInfo& port : *ports) {
+      if (ports == &node.outputs && makes_cost(node)) continue;
       port.type.content = content_of_own(port.type);
       if (!port.type.content) throw Error("has a port of type '" + port.type.id + "', which Python does not know");
     }
@@ -210,6 +132,87 @@ NodeInfo with_contents(NodeInfo node) {
 }
 
 }  // namespace
+
+PythonArguments::PythonArguments(const std::vector<Value>& given, const std::vector<OptionValue>& values) {
+  for (const Value& input : given) inputs.push_back(json_of_input(input, memory));
+  for (const OptionValue& value : values) options.push_back(json_of_option(value));
+}
+
+PythonNodes::PythonNodes(LibraryInfo described) : described_(std::move(described)) {}
+PythonNodes::~PythonNodes() = default;
+
+json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments& arguments, Context& context,
+                      std::vector<Value>* outputs) {
+  std::unique_ptr<PythonProcess> process = take(context);
+  WorkerLimits limits;
+  limits.seconds = process->limits.at(node.name).at("seconds");
+  limits.memory_mb = process->limits.at(node.name).at("memory_mb");
+  std::vector<std::uint64_t> kept = SharedInputs::all().numbers();
+  for (const auto& one : arguments.memory) {
+    limits.memory_mb += 2e-6 * double(one->bytes);
+    kept.push_back(one->number);
+  }
+  request["node"] = node.name;
+  request["inputs"] = arguments.inputs;
+  request["options"] = arguments.options;
+  request["kept"] = kept;
+  process->worker.ask(std::move(request));
+  const WorkerEnd end = wait_for(process->worker, limits, context);
+  if (!end.failed.empty()) {
+    if (!end.died) give_back(std::move(process));
+    throw Error(failure_of_call(described_.file, end, limits));
+  }
+  if (outputs) *outputs = values_of(*process);
+  learn(end.answer.at("files"));
+  give_back(std::move(process));
+  return end.answer;
+}
+
+std::unique_ptr<PythonProcess> PythonNodes::take(Context& context) {
+  {
+    const std::scoped_lock lock(mutex_);
+    while (!idle_.empty()) {
+      std::unique_ptr<PythonProcess> process = std::move(idle_.back());
+      idle_.pop_back();
+      process->worker.take(nullptr);  // notices that it has ended meanwhile
+      if (!process->worker.is_dead()) return process;
+    }
+  }
+  auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));
+  process->worker.ask({{"do", "load"}});
+  const WorkerEnd end = wait_for(process->worker, {kLoadLimit_s}, context);
+  if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
+  process->limits = end.answer;
+  if (digest_of_python(described_) != described_.digest) throw Error(changed());
+  for (const NodeInfo& node : described_.nodes)
+    if (!process->limits.contains(node.name)) throw Error(changed());
+  return process;
+}
+
+void PythonNodes::give_back(std::unique_ptr<PythonProcess> process) {
+  const std::scoped_lock lock(mutex_);
+  idle_.push_back(std::move(process));
+}
+
+std::string PythonNodes::changed() const {
+  return described_.file.string() + " or a module that it imports was changed since this program began; start it again";
+}
+
+/// Takes note of files that a process has loaded during a call and that the description does not name.
+void PythonNodes::learn(const std::vector<std::string>& files) {
+  const std::scoped_lock lock(mutex_);
+  for (const std::string& file : files) {
+    const bool is_known = std::any_of(described_.linked.begin(), described_.linked.end(),
+                                      [&](const LinkedLibrary& one) { return one.path == file; });
+    if (!is_known) new_files_.insert(file);
+  }
+  if (new_files_.size() == learnt_) {
+    if (!files.empty() && digest_of_python(described_) != described_.digest) throw Error(changed());
+    return;
+  }
+  learnt_ = new_files_.size();
+  add_to_description(described_, {new_files_.begin(), new_files_.end()});
+}
 
 std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {
   auto plugin = std::make_unique<Plugin>();
@@ -227,7 +230,12 @@ std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {
         (*static_cast<std::vector<OptionValue>*>(options))[i] = value;
       });
     node.call = [nodes, info = node.info](const std::vector<Value>& inputs, const void* options, Context& context) {
-      return nodes->call(info, inputs, *static_cast<const std::vector<OptionValue>*>(options), context);
+      const auto& values = *static_cast<const std::vector<OptionValue>*>(options);
+      if (makes_cost(info)) return std::vector<Value>{python_cost(nodes, info, inputs, values)};
+      std::vector<Value> outputs;
+      nodes->ask(info, {{"do", "call"}, {"seed", context.seed()}}, PythonArguments(inputs, values), context, &outputs);
+      expect_outputs(outputs, info.outputs);
+      return outputs;
     };
   }
   return plugin;

@@ -28,6 +28,19 @@ LineSegment line_of(const py::handle& ends, const std::string& what) {
   return line;
 }
 
+ShaftLines shaft_lines_of(const py::object& left, const py::object& right, double width_mm, double width_deviation_mm,
+                          double log_likelihood, const py::iterable& rejected) {
+  ShaftLines lines{line_of(left, "left"), line_of(right, "right"), width_mm, width_deviation_mm, log_likelihood, {}};
+  for (const py::handle& pair : rejected) {
+    const auto parts = pair.cast<py::tuple>();
+    if (parts.size() != 3)
+      throw Error("rejected: expected triples (left, right, reason), got " + std::to_string(parts.size()) + " items");
+    lines.rejected.push_back({line_of(parts[0], "left of a rejected pair"),
+                              line_of(parts[1], "right of a rejected pair"), py::str(parts[2])});
+  }
+  return lines;
+}
+
 EdgeMap edge_map_of(const py::handle& pixels, int width_px, int height_px) {
   const std::vector<double> numbers = numbers_of(pixels, {-1, 5}, "pixels of the edge map");
   if (width_px < 1 || height_px < 1)
@@ -70,17 +83,10 @@ void bind_edges(py::module_& module) {
            [](const EdgeMap& self) { return "<marrow.EdgeMap of " + std::to_string(self.pixels.size()) + " pixels>"; });
   value_class<ShaftLines>(module, "ShaftLines", "The two outer borders of the shaft in one view.")
       .def(
-          py::init([](const py::object& left, const py::object& right, double width_mm, double width_deviation_mm) {
-            ShaftLines lines;
-            lines.left = line_of(left, "left");
-            lines.right = line_of(right, "right");
-            lines.width_mm = width_mm;
-            lines.width_deviation_mm = width_deviation_mm;
-            return lines;
-          }),
-          py::arg("left"), py::arg("right"), py::kw_only(), py::arg("width_mm"), py::arg("width_deviation_mm"),
+          py::init(&shaft_lines_of), py::arg("left"), py::arg("right"), py::kw_only(), py::arg("width_mm"),
+          py::arg("width_deviation_mm"), py::arg("log_likelihood") = 0.0, py::arg("rejected") = py::tuple(),
           "left, right: both ends ((u, v), (u, v)) of a border, in pixels. Both run in the same direction, and left is "
-          "on the left when looking along it.")
+          "on the left when looking along it. rejected: triples (left, right, reason), the best ones first.")
       .def_property_readonly(
           "left", [](const ShaftLines& self) { return ends_of(self.left); },
           "Both ends ((u, v), (u, v)) of the left border, in pixels.")
@@ -88,7 +94,17 @@ void bind_edges(py::module_& module) {
           "right", [](const ShaftLines& self) { return ends_of(self.right); },
           "Both ends ((u, v), (u, v)) of the right border, in pixels.")
       .def_readonly("width_mm", &ShaftLines::width_mm, "The outer diameter of the shaft.")
-      .def_readonly("width_deviation_mm", &ShaftLines::width_deviation_mm, "Its standard deviation.");
+      .def_readonly("width_deviation_mm", &ShaftLines::width_deviation_mm, "Its standard deviation.")
+      .def_readonly("log_likelihood", &ShaftLines::log_likelihood, "The score of the pair.")
+      .def_property_readonly(
+          "rejected",
+          [](const ShaftLines& self) {
+            py::list pairs;
+            for (const ShaftLines::Rejected& one : self.rejected)
+              pairs.append(py::make_tuple(ends_of(one.left), ends_of(one.right), one.reason));
+            return pairs;
+          },
+          "Pairs that were rejected, the best ones first: triples of both borders and the reason in words.");
 }
 
 void bind_judgements(py::module_& module) {

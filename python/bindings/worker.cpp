@@ -100,7 +100,7 @@ void end_with(long parent) {
 }
 
 py::object type_description(const std::string& id) {
-  const TypeInfo& type = conversion_of(id).type;
+  const TypeInfo type = id == TypeInfo::of<Cost>().id ? TypeInfo::of<Cost>() : conversion_of(id).type;
   py::dict made;
   made["id"] = type.id;
   made["version"] = type.version;

@@ -50,6 +50,7 @@ from .annotations import (
 )
 from .comparison import Comparison, compare
 from .context import Context
+from .declaration import cost
 from .errors import Error, Fault, PipelineError, RunError
 from .items import Items
 from .nodes import Kind, Node, node

@@ -37,6 +37,7 @@ from .annotations import unit as unit
 from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .context import Context as Context
+from .declaration import cost as cost
 from .errors import Error as Error
 from .errors import Fault as Fault
 from .errors import PipelineError as PipelineError

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-from typing import Any, Callable, Dict, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
 
 import numpy
 import numpy.typing
@@ -8,6 +8,7 @@ from .items import Items
 
 Array = numpy.ndarray[Any, Any]
 ArrayLike = numpy.typing.ArrayLike
+_Ends = Tuple[Tuple[float, float], Tuple[float, float]]
 Texts = Sequence[Tuple[str, str]]
 Faults = List[Dict[str, Any]]
 
@@ -164,12 +165,23 @@ class EdgeMap:
 class ShaftLines:
     type: str
     def __init__(
-        self, left: ArrayLike, right: ArrayLike, *, width_mm: float, width_deviation_mm: float
+        self,
+        left: ArrayLike,
+        right: ArrayLike,
+        *,
+        width_mm: float,
+        width_deviation_mm: float,
+        log_likelihood: float = 0.0,
+        rejected: Iterable[Tuple[ArrayLike, ArrayLike, str]] = ...,
     ) -> None: ...
     @property
-    def left(self) -> Tuple[Tuple[float, float], Tuple[float, float]]: ...
+    def log_likelihood(self) -> float: ...
     @property
-    def right(self) -> Tuple[Tuple[float, float], Tuple[float, float]]: ...
+    def rejected(self) -> List[Tuple[_Ends, _Ends, str]]: ...
+    @property
+    def left(self) -> _Ends: ...
+    @property
+    def right(self) -> _Ends: ...
     @property
     def width_mm(self) -> float: ...
     @property

@@ -2,6 +2,8 @@
 """What marrow gives a node besides its inputs and options."""
 from typing import Any, Callable, Dict, Optional
 
+from .errors import Error
+
 __all__ = ["Context"]
 
 
@@ -9,14 +11,21 @@ class Context:
     """A node takes it as a parameter `context: marrow.Context`. One that you make yourself, for tests, reports
     nothing."""
 
-    def __init__(self, seed: int = 1, say: Optional[Callable[[Dict[str, Any]], None]] = None) -> None:
-        self.seed = seed
-        """The only source of randomness: numpy.random.default_rng(context.seed). It is made from the run's seed and
-        everything that the node was given. A node that uses it is declared with random=True."""
+    def __init__(self, seed: Optional[int] = 1, say: Optional[Callable[[Dict[str, Any]], None]] = None) -> None:
+        self._seed = seed
         self.cancelled = False
         """Whether the call is to end. The main thread of the node then gets a KeyboardInterrupt anyway; threads of your
         own look here."""
         self._say = say or (lambda report: None)
+
+    @property
+    def seed(self) -> int:
+        """The only source of randomness: numpy.random.default_rng(context.seed). It is made from the run's seed and
+        everything that the node was given. Raises Error if the node was not declared with random=True: its kept result
+        would not depend on the seed."""
+        if self._seed is None:
+            raise Error("it draws from context.seed, so declare it with random=True")
+        return self._seed
 
     def progress(self, fraction: float, what: str = "") -> None:
         """Reports how far a long call is, from 0 to 1."""

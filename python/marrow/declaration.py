@@ -41,8 +41,9 @@ def declared(
     relations: Any = (),
     seconds: float = _SECONDS,
     memory_mb: float = _MEMORY_MB,
+    is_cost: bool = False,
 ) -> Decorator:
-    """The decorator of a node. The function stays as it is."""
+    """The decorator of a node, or of a cost if `is_cost`. The function stays as it is."""
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
         manifest = {"name": name, "summary": summary, "random": bool(random), "inputs": [], "outputs": []}
@@ -51,11 +52,30 @@ def declared(
         hints = typing.get_type_hints(function, include_extras=True)
         for parameter in inspect.signature(function).parameters.values():
             _add_parameter(made, parameter, hints.get(parameter.name))
-        _add_outputs(made, hints.get("return"))
+        if is_cost:
+            kind = _core.type_description("cost")
+            manifest["outputs"] = [{"name": "", "help": "", "type": kind, "optional": False, "axis": ""}]
+        else:
+            _add_outputs(made, hints.get("return"))
         setattr(function, "__marrow_node__", made)
         return function
 
     return declare
+
+
+def cost(
+    name: str,
+    *,
+    summary: str,
+    traits: Any = (),
+    relations: Any = (),
+    seconds: float = _SECONDS,
+    memory_mb: float = _MEMORY_MB
+) -> Decorator:
+    """Declares a function as a node that makes a cost: @marrow.cost("similarity.mine", summary="..."). The function
+    gets the node's inputs and options, and returns another one: from an array of poses [N, 4, 4] (world from model, mm)
+    to their N costs. Smaller is better, and each must be finite. `seconds` limits one batch of poses."""
+    return declared(name, summary, False, traits, relations, seconds, memory_mb, True)
 
 
 def nodes_of(module: Any) -> List[Declaration]:
@@ -195,4 +215,4 @@ def _add_outputs(made: Declaration, hint: Any) -> None:
         made.manifest["outputs"].append(_port(what, own, kind, True))
 
 
-__all__ = ["Context", "Declaration", "Note", "completed", "declared", "nodes_of"]
+__all__ = ["Context", "Declaration", "Note", "completed", "cost", "declared", "nodes_of"]

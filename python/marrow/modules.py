@@ -1,16 +1,51 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files that a node written in Python depends on."""
 import ast
+import importlib.machinery
 import importlib.metadata
+import importlib.util
 import os
 import pathlib
 import sys
 import sysconfig
+from types import CodeType, ModuleType
 from typing import Any, Dict, Iterator, List, Optional, Set
 
 from . import _core
 
 _STANDARD = [os.path.realpath(sysconfig.get_paths()[key]) for key in ("stdlib", "platstdlib")]
+
+
+class _FromSource(importlib.machinery.SourceFileLoader):
+    """Compiles the text that is there now. Bytecode that was kept may be of an older text: it is told apart by size and
+    second only."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        return self.source_to_code(self.get_data(self.path), self.path)
+
+
+def import_from_source(file: str, name: str) -> ModuleType:
+    """Imports a file as the module `name`. From now on, modules are looked for in its folder first."""
+    folder = str(pathlib.Path(file).parent)
+    loaders = [
+        (importlib.machinery.ExtensionFileLoader, importlib.machinery.EXTENSION_SUFFIXES),
+        (_FromSource, importlib.machinery.SOURCE_SUFFIXES),
+    ]
+
+    def finder(path: str) -> Any:
+        if (path + os.sep).startswith(folder + os.sep):
+            return importlib.machinery.FileFinder(path, *loaders)
+        raise ImportError
+
+    sys.path_hooks.insert(0, finder)
+    sys.path_importer_cache.clear()
+    sys.path.insert(0, folder)
+    spec = importlib.util.spec_from_loader(name, _FromSource(name, file))
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
 
 
 def loaded_files(file: str) -> List[str]:

@@ -5,7 +5,7 @@ python3 -m marrow.plugin FILE
 
 It reads requests and writes reports and answers as marrow/runtime/worker.hpp says.
 """
-import importlib.util
+import importlib
 import json
 import os
 import pathlib
@@ -16,15 +16,18 @@ import traceback
 from types import FrameType, ModuleType
 from typing import Any, Dict, List, Optional
 
+import numpy
+
 from . import _core
 from .context import Context
 from .declaration import Declaration, completed, nodes_of
 from .errors import Error
 from .items import Items
-from .modules import loaded_files
+from .modules import import_from_source, loaded_files
 
 _MADE = 3  # the descriptor through which values are handed over
 _MODULE = "marrow_python_nodes"
+_MOST_COSTS = 8  # that are kept; others are made again
 
 
 class Process:
@@ -32,6 +35,7 @@ class Process:
         self.file = file
         self.nodes: Optional[Dict[str, Declaration]] = None
         self.inputs: Dict[int, Any] = {}  # by the number of their memory
+        self.costs: Dict[int, Any] = {}  # by their own number
         self.made: Optional[Any] = None
         self.files: List[str] = []
         self.modules = 0
@@ -40,12 +44,7 @@ class Process:
     def load(self) -> Dict[str, Declaration]:
         """Imports the file, once."""
         if self.nodes is None:
-            sys.path.insert(0, str(pathlib.Path(self.file).parent))
-            spec = importlib.util.spec_from_file_location(_MODULE, self.file)
-            assert spec is not None and spec.loader is not None
-            module = importlib.util.module_from_spec(spec)
-            sys.modules[_MODULE] = module
-            spec.loader.exec_module(module)
+            module = import_from_source(self.file, _MODULE)
             self.nodes = {one.manifest["name"]: one for one in _checked(nodes_of(module))}
             self.files = loaded_files(self.file)
             self.modules = len(sys.modules)
@@ -65,12 +64,8 @@ class Process:
 
     def call(self, request: Dict[str, Any], say: Any) -> Any:
         node = self.load()[request["node"]]
-        self.inputs = {number: self.inputs[number] for number in request["kept"] if number in self.inputs}
-        values = [self._input(one) for one in request["inputs"]]
-        arguments = dict(zip(node.inputs, values))
-        for (name, kind), value in zip(node.options, request["options"]):
-            arguments[name] = _option(kind, value)
-        self.context = Context(request["seed"], say)
+        arguments = self._arguments(node, request)
+        self.context = Context(request["seed"] if node.manifest["random"] else None, say)
         if node.context is not None:
             arguments[node.context] = self.context
         try:
@@ -81,9 +76,36 @@ class Process:
         self.made.hand_over(_MADE, True)
         return {"files": self._new_files()}
 
+    def cost(self, request: Dict[str, Any]) -> Any:
+        """The costs of a batch of poses. The cost itself is made when it is first asked for."""
+        node, number = self.load()[request["node"]], request["cost"]
+        if number not in self.costs:
+            while len(self.costs) >= _MOST_COSTS:
+                self.costs.pop(next(iter(self.costs)))
+            self.costs[number] = node.function(**self._arguments(node, request))
+        poses = numpy.zeros((len(request["poses"]) // 12, 4, 4))
+        poses[:, :3] = numpy.reshape(request["poses"], (-1, 3, 4))
+        poses[:, 3, 3] = 1
+        values = numpy.asarray(self.costs[number](poses), float)
+        if values.shape != (len(poses),):
+            shape = " x ".join(map(str, values.shape)) or "one number"
+            raise Error("%s: expected %d costs, got %s" % (request["node"], len(poses), shape))
+        if not numpy.isfinite(values).all():
+            raise Error(
+                "%s: a cost is not finite; give the worst value where nothing can be compared" % request["node"]
+            )
+        return {"values": values.tolist(), "files": self._new_files()}
+
     def share(self, request: Dict[str, Any]) -> Any:
         assert self.made is not None
         return self.made.hand_over(_MADE, False)
+
+    def _arguments(self, node: Declaration, request: Dict[str, Any]) -> Dict[str, Any]:
+        self.inputs = {number: self.inputs[number] for number in request["kept"] if number in self.inputs}
+        arguments = dict(zip(node.inputs, [self._input(one) for one in request["inputs"]]))
+        for (name, kind), value in zip(node.options, request["options"]):
+            arguments[name] = _option(kind, value)
+        return arguments
 
     def _input(self, given: Any) -> Any:
         if given is None:
@@ -176,6 +198,7 @@ def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[
         if request["do"] == "call":
             return {"end": process.call(request, answers.send)}
         tasks = {"describe": process.describe, "load": process.limits, "share": process.share}
+        tasks["cost"] = process.cost
         return {"end": tasks[request["do"]](request)}
     except MemoryError:
         return {"failed": "out of memory", "out_of_memory": True}

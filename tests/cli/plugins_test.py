@@ -20,7 +20,9 @@ class Plugins(Case):
     def test_smallest_plugin_outside_the_tree(self):
         folder = self.scratch / "mine"
         shutil.copytree(SOURCE / "docs" / "example-plugin", folder)
-        self.assertLessEqual(sum(len(path.read_text().splitlines()) for path in folder.iterdir() if path.suffix != ".py"), 40)
+        self.assertLessEqual(
+            sum(len(path.read_text().splitlines()) for path in folder.iterdir() if path.suffix != ".py"), 40
+        )
         subprocess.run(
             ["cmake", "-S", folder, "-B", folder / "build", "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD],
             check=True,

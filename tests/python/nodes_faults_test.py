@@ -107,12 +107,25 @@ class Faults(Written):
         self.assertNotIn("line", said)
         self.does("print('what a node prints is no answer'); sys.stdout.flush(); os.system('echo as little')")
 
+    def test_a_seed_is_only_for_random_nodes(self):
+        self.plugin(
+            """
+@marrow.node("own.draws", summary="draws")
+def draws(view: Annotated[marrow.View, "view"], *, context: marrow.Context) -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    return marrow.Metrics({"seed": float(context.seed)})
+"""
+        )
+        with self.assertRaisesRegex(marrow.RunError, "it draws from context.seed, so declare it with random=True"):
+            marrow.own.draws(view())
+
     def test_wrong_outputs(self):
         self.plugin(
             "class Two(NamedTuple):\n"
             '    first: Annotated[marrow.Pose, "a"]\n    second: Annotated[marrow.Pose, "b"]\n'
             + "".join(
-                '\n@marrow.node("own.%s", summary="wrong")\ndef %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n'
+                '\n@marrow.node("own.%s", summary="wrong")\n'
+                'def %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n'
                 % (name, name, kind, value)
                 for name, kind, value in (
                     ("none", 'Annotated[marrow.Pose, marrow.named("p")]', "None"),

@@ -2,6 +2,7 @@
 """Results of nodes written in Python are kept, and made again when anything that decides them has changed."""
 import json
 import os
+import py_compile
 
 from package import main, marrow
 from written_nodes import Written, view
@@ -65,6 +66,16 @@ class Stale(Written):
         helper.write_text("VALUE = 2\n")
         self.assertEqual(self.found(), (2, True))
 
+    def test_bytecode_that_is_kept_is_not_trusted(self):
+        helper = self.plugins / "helper.py"
+        helper.write_text("VALUE = 1\n")
+        py_compile.compile(str(helper))
+        time = helper.stat().st_mtime_ns
+        helper.write_text("VALUE = 2\n")
+        os.utime(helper, ns=(time, time))  # as if both were written within one second
+        self.plugin("import helper\n" + NODE % 'return marrow.Metrics({"value": helper.VALUE})')
+        self.assertEqual(self.found(), (2, True))
+
     def test_a_file_that_changes_during_a_program(self):
         file = self.plugin(NODE % 'return marrow.Metrics({"value": 1})')
         node = marrow.own.value
@@ -73,6 +84,21 @@ class Stale(Written):
             marrow.RunError, "mine.py or a module that it imports was changed since this program"
         ):
             node(view())
+
+    def test_a_run_records_the_interpreter(self):
+        self.plugin(
+            """
+@marrow.node("own.value", summary="a value")
+def value(camera: Annotated[Optional[marrow.Camera], "none"] = None) -> Annotated[
+        marrow.Metrics, marrow.named("figures")]:
+    return marrow.Metrics({"value": 3})
+"""
+        )
+        pipeline = self.write("p.yaml", "marrow: 1\nnodes:\n  a: {uses: own.value}\noutputs: {a: a.figures}\n")
+        self.program("run", pipeline, "--out", self.scratch / "out")
+        record = json.loads((self.scratch / "out" / "run.json").read_text())
+        plugin = next(one for one in record["plugins"] if one["file"] == "mine.py")
+        self.assertEqual(plugin["interpreter"], os.path.realpath("/usr/bin/python3"))
 
     def test_what_a_node_depends_on(self):
         file = self.plugin("import json\n" + NODE % 'return marrow.Metrics({"value": 1})')

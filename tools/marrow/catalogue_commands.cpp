@@ -192,7 +192,7 @@ void add_describe(CLI::App& app, int& code) {
   const auto write = std::make_shared<bool>(false);
   CLI::App* command =
       app.add_subcommand("describe", "load one plugin library in a process of its own and print its manifest");
-  command->add_option("library", *library, "the .so file")->required();
+  command->add_option("library", *library, "the .so file, or a .py file with @marrow.node")->required();
   command->add_flag("--write", *write, "write the manifest beside the library instead");
   command->callback([library, write, &code] { code = describe(*library, *write); });
 }

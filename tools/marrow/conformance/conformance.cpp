@@ -182,7 +182,7 @@ void search_folders_of(const std::vector<std::string>& subjects) {
   for (const std::string& subject : subjects) {
     std::error_code error;
     const std::filesystem::path file(subject);
-    if (file.extension() != ".so" || !std::filesystem::exists(file, error)) continue;
+    if ((file.extension() != ".so" && file.extension() != ".py") || !std::filesystem::exists(file, error)) continue;
     const char* searched = std::getenv("MARROW_PLUGIN_PATH");
     const std::string folder = std::filesystem::absolute(file).parent_path().string();
     setenv("MARROW_PLUGIN_PATH", (searched && *searched ? folder + ":" + searched : folder).c_str(), 1);

@@ -61,7 +61,7 @@ FileStates states_of(const WatchedFiles& files) {
       add(path, states);
   for (const fs::path& folder : files.plugin_folders)
     for (fs::directory_iterator entry(folder, gone), end; !gone && entry != end; entry.increment(gone))
-      if (entry->path().extension() == ".so") add(entry->path(), states);
+      if (entry->path().extension() == ".so" || entry->path().extension() == ".py") add(entry->path(), states);
   return states;
 }
 

@@ -1,0 +1,57 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+// The processes that hold the nodes of one Python file.
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "marrow/runtime/context.hpp"
+#include "marrow/runtime/library.hpp"
+#include "shared_inputs.hpp"
+
+namespace marrow {
+
+struct PythonProcess;
+
+/// The inputs and options of a call as JSON, and the memory that the JSON names.
+struct PythonArguments {
+  nlohmann::json inputs = nlohmann::json::array(), options = nlohmann::json::array();
+  std::vector<std::shared_ptr<const SharedInput>> memory;
+
+  PythonArguments(const std::vector<Value>& inputs, const std::vector<OptionValue>& options);
+};
+
+/// A process does one request at a time, and waits for the next one when it has done so. Safe to use from several
+/// threads: each uses a process of its own.
+class PythonNodes {
+ public:
+  explicit PythonNodes(LibraryInfo described);
+  ~PythonNodes();
+
+  /// Has a process answer a request about a node, with these arguments. `outputs`, if it is not null, receives the
+  /// values that the process handed over. Throws Error if the process fails, crashes or exceeds the node's limits, and
+  /// Cancelled.
+  nlohmann::json ask(const NodeInfo& node, nlohmann::json request, const PythonArguments& arguments, Context& context,
+                     std::vector<Value>* outputs);
+
+ private:
+  std::unique_ptr<PythonProcess> take(Context& context);
+  void give_back(std::unique_ptr<PythonProcess> process);
+  void learn(const std::vector<std::string>& files);
+  std::string changed() const;
+
+  LibraryInfo described_;
+  std::mutex mutex_;
+  std::vector<std::unique_ptr<PythonProcess>> idle_;
+  std::set<std::string> new_files_;
+  std::size_t learnt_ = 0;
+};
+
+/// The cost that a node declared with @marrow.cost makes: each batch of poses is one request.
+Value python_cost(std::shared_ptr<PythonNodes> nodes, const NodeInfo& node, const std::vector<Value>& inputs,
+                  const std::vector<OptionValue>& options);
+
+}  // namespace marrow
