@@ -23,6 +23,10 @@ foreach(template ${templates})
   foreach(file template.yaml test.cpp)
     file(CREATE_LINK ${folder}/${file} ${share}/nodes/${kind}/${file} SYMBOLIC)
   endforeach()
+  if(IS_DIRECTORY ${folder}/python)  # for kinds whose values Python can make
+    file(CREATE_LINK ${folder}/python ${share}/nodes/${kind}/python SYMBOLIC)
+    install(DIRECTORY ${folder}/python DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} COMPONENT marrow-dev)
+  endif()
   install(FILES ${template} ${folder}/test.cpp DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind}
     COMPONENT marrow-dev)
   install(FILES ${kind_folder}/${source} DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/nodes/${kind} RENAME node.cpp

@@ -3,9 +3,10 @@
 import os
 import pathlib
 import subprocess
+import unittest
 
 import yaml
-from marrow_cli import BUILD, SOURCE, Case, main, marrow
+from marrow_cli import BUILD, MARROW, SOURCE, Case, main, marrow
 
 KINDS = sorted(path.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/template.yaml"))
 
@@ -74,6 +75,30 @@ class New(Case):
             self.scratch, program, "compare", "edges_mine/compare.yaml", "--out", "compared", MARROW_PLUGIN_PATH=plugins
         )
         self.assertRegex(row, r"\nmine +2 +0 ")
+
+    @unittest.skipUnless((BUILD / "python" / "marrow" / "nodes.pyi").exists(), "the Python package is not built")
+    def test_nodes_in_python_work_without_a_build(self):
+        in_python = [kind for kind in KINDS if (SOURCE / "plugins" / kind / "template" / "python").exists()]
+        self.assertEqual(in_python, ["camera", "edges", "mesh", "segment", "shaft"])
+        for kind in in_python:
+            with self.subTest(kind):
+                result = self.new("node", kind + ".mine", "--python")
+                self.assertIn("%s_mine/ci tests it, and compares it with marrow's own" % kind, result.stdout)
+                folder = self.scratch / (kind + "_mine")
+                paths = {"PYTHONPATH": str(BUILD / "python"), "MARROW_PLUGIN_PATH": str(folder)}
+                self.assertIn("OK", self.run_in(folder, "/usr/bin/python3", "test.py", **paths))
+                self.assertIn(", 0 failed", self.run_in(folder, MARROW, "conformance", kind + ".mine", **paths))
+                self.run_in(folder, MARROW, "check", "pipeline.yaml", **paths)
+                self.run_in(folder, MARROW, "compare", "compare.yaml", "--dry-run", **paths)
+                self.assertTrue(os.access(folder / "ci", os.X_OK))
+                self.assertIn("%s.mine" % kind, (folder / "ci").read_text())
+                self.assertFalse(any(path.suffix in (".cpp", ".txt") for path in folder.iterdir()))
+        self.assertEqual(
+            self.refused("node", "optimizer.mine", "--python"),
+            "nodes of the kind 'optimizer' make functions, for which there is no template in Python; there are some of "
+            "camera, edges, mesh, segment, shaft. Leave out --python to make it in C++; docs/python.md says how a cost "
+            "is written in Python",
+        )
 
     def test_a_pipeline_and_an_experiment_work_where_they_are_put(self):
         (self.scratch / "mine").mkdir()

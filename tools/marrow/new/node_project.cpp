@@ -65,38 +65,77 @@ std::string node_at(const std::string& pipeline, const std::string& place) {
   return pipeline.substr(begin, pipeline.find_first_of(",}\n", begin) - begin);
 }
 
+std::string without_python(const std::string& kind) {
+  std::string list;
+  for (const std::string& one : kinds_with_templates())
+    if (fs::exists(shared_files("nodes") / one / "python")) list += (list.empty() ? "" : ", ") + one;
+  return "nodes of the kind '" + kind +
+         "' make functions, for which there is no template in Python; there are some of " + list +
+         ". Leave out --python to make it in C++; docs/python.md says how a cost is written in Python";
+}
+
+/// A node that is to be made: its names, and what it replaces in the pipeline.
+struct NewNode {
+  std::string name, kind, own, file, origin, place, before, link;
+  fs::path from;  ///< the templates of its kind
+
+  NewNode(const std::string& wanted, bool in_python) : name(wanted) {
+    const std::size_t dot = name.find('.');
+    if (dot == std::string::npos) throw Error("new node '" + name + "': expected KIND.NAME, such as edges.mine");
+    kind = name.substr(0, dot), own = name.substr(dot + 1), file = kind + "_" + own;
+    expect_name(kind, "new node: the kind");
+    expect_name(own, "new node: the name");
+    const Catalogue catalogue;
+    if (catalogue.find(name)) throw Error("a node '" + name + "' exists already; choose another name");
+    expect_template(kind, catalogue);
+    from = shared_files("nodes") / kind;
+    if (in_python && !fs::exists(from / "python")) throw Error(without_python(kind));
+    const YAML::Node about = parse_yaml(read_text_file(from / "template.yaml", kMostSourceBytes));
+    origin = about["node"].as<std::string>(), place = about["place"].as<std::string>();
+    for (const YAML::Node& library : about["link"]) link += (link.empty() ? " LINK " : " ") + library.as<std::string>();
+    before = node_at(whole_pipeline(), place);
+  }
+
+  /// The files of a folder of templates, and a pipeline with the new node in it.
+  Files files_from(const fs::path& templates) const {
+    Files files = filled_templates(templates, {{"@node@", name},
+                                               {"@name@", own},
+                                               {"@kind@", kind},
+                                               {"@folder@", file},
+                                               {"@link@", link},
+                                               {"@place@", place},
+                                               {"@replaced@", before},
+                                               {"@origin@", origin}});
+    std::string pipeline = whole_pipeline();
+    const std::size_t at = pipeline.find("uses: " + before, line_of_node(pipeline, place));
+    files["pipeline.yaml"] = pipeline.replace(at, 6 + before.size(), "uses: " + name);
+    return files;
+  }
+};
+
 }  // namespace
 
 fs::path new_node(const std::string& name, const fs::path& folder) {
-  const std::size_t dot = name.find('.');
-  if (dot == std::string::npos) throw Error("new node '" + name + "': expected KIND.NAME, such as edges.mine");
-  const std::string kind = name.substr(0, dot), own = name.substr(dot + 1), file = kind + "_" + own;
-  expect_name(kind, "new node: the kind");
-  expect_name(own, "new node: the name");
-  const Catalogue catalogue;
-  if (catalogue.find(name)) throw Error("a node '" + name + "' exists already; choose another name");
-  expect_template(kind, catalogue);
-  const fs::path from = shared_files("nodes") / kind;
-  const YAML::Node about = parse_yaml(read_text_file(from / "template.yaml", kMostSourceBytes));
-  const std::string origin = about["node"].as<std::string>(), place = about["place"].as<std::string>();
-  std::string link;
-  for (const YAML::Node& library : about["link"]) link += (link.empty() ? " LINK " : " ") + library.as<std::string>();
-  std::string pipeline = whole_pipeline();
-  const std::string before = node_at(pipeline, place);
-  Files files = filled_templates(shared_files("templates/node"), {{"@node@", name},
-                                                                  {"@name@", own},
-                                                                  {"@kind@", kind},
-                                                                  {"@folder@", file},
-                                                                  {"@link@", link},
-                                                                  {"@place@", place},
-                                                                  {"@replaced@", before},
-                                                                  {"@origin@", origin}});
-  files[file + ".cpp"] = replaced(read_text_file(from / "node.cpp", kMostSourceBytes), {{origin, name}});
-  files["test.cpp"] = replaced(read_text_file(from / "test.cpp", kMostSourceBytes),
-                               {{kind + ".new_node", name}, {"NewNode", capitalised(own)}});
-  files["pipeline.yaml"] = pipeline.replace(pipeline.find("uses: " + before, line_of_node(pipeline, place)),
-                                            6 + before.size(), "uses: " + name);
-  const fs::path target = folder.empty() ? fs::path(file) : folder;
+  const NewNode node(name, false);
+  Files files = node.files_from(shared_files("templates/node"));
+  files[node.file + ".cpp"] = replaced(read_text_file(node.from / "node.cpp", kMostSourceBytes), {{node.origin, name}});
+  files["test.cpp"] = replaced(read_text_file(node.from / "test.cpp", kMostSourceBytes),
+                               {{node.kind + ".new_node", name}, {"NewNode", capitalised(node.own)}});
+  const fs::path target = folder.empty() ? fs::path(node.file) : folder;
+  write_project(target, files);
+  return target;
+}
+
+fs::path new_python_node(const std::string& name, const fs::path& folder) {
+  const NewNode node(name, true);
+  Files files = node.files_from(shared_files("templates/python-node"));
+  const Replacements names{{"new_node_file", node.file},  // the longest is replaced first
+                           {node.kind + ".new_node", name},
+                           {"new_node", node.file},
+                           {"NewNode", capitalised(node.own)}};
+  files[node.file + ".py"] = replaced(read_text_file(node.from / "python/node.py", kMostSourceBytes), names);
+  files["test.py"] = replaced(read_text_file(node.from / "python/test.py", kMostSourceBytes), names);
+  const fs::path target = folder.empty() ? fs::path(node.file) : folder;
   write_project(target, files);
   return target;
 }

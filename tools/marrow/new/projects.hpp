@@ -8,6 +8,8 @@ namespace marrow::cli {
 
 /// Makes a folder with a node KIND.NAME, its test and a comparison. Empty `folder`: KIND_NAME here. Returns the folder.
 std::filesystem::path new_node(const std::string& name, const std::filesystem::path& folder);
+/// The same with a node in Python, which needs no build. For kinds whose values Python can make.
+std::filesystem::path new_python_node(const std::string& name, const std::filesystem::path& folder);
 /// Makes a folder with a kind, its checks and a first node.
 std::filesystem::path new_kind(const std::string& name, const std::filesystem::path& folder);
 /// Makes a copy of a pipeline or an experiment, of marrow's own by its name or of any file, that works where it is put.
