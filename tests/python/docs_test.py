@@ -34,6 +34,7 @@ class Documents(Case):
         self.assertLess(names["r"]["errors"]["distal"]["final"]["mtre_mm"], 2)
         self.assertIn("edges hihg 'edges.adaptive_relaxation' has no option 'hihg'", said.getvalue())
         self.assertIn("Help on Node", said.getvalue())
+        self.assertEqual(len(names["bright"](names["view"])), 512 * 512, "the function of a node is a plain function")
         comparison = names["c"]
         self.assertEqual(len(comparison.cells), 4)
         self.assertEqual({row["variant"] for row in comparison.cells}, {"adaptive_relaxation", "canny"})
