@@ -38,7 +38,7 @@ bool is_newer(const std::string& file, const timespec& time) {
   struct stat status {};
   if (stat(file.c_str(), &status) != 0) return true;
   const auto seconds = [](const timespec& t) { return double(t.tv_sec) + 1e-9 * double(t.tv_nsec); };
-  return seconds(status.st_mtim) > seconds(time) - 0.02;
+  return seconds(status.st_ctim) > seconds(time) - 0.02;  // unlike st_mtim, it cannot be set
 }
 
 std::string why_refused(const WorkerEnd& end) {
@@ -55,9 +55,16 @@ std::string why_refused(const WorkerEnd& end) {
 LibraryInfo described_by_process(const fs::path& real, std::vector<std::string>& files) {
   LibraryInfo info;
   const SharedMemory made;
-  Worker worker(python_process(real, made.descriptor()));
+  WorkerSettings settings = python_process(real, made.descriptor());
+  settings.quiet = true;
+  Worker worker(settings);
   worker.ask({{"do", "describe"}});
   const WorkerEnd end = worker.wait({kPythonDescribeLimit_s, kPythonDescribeLimit_mb}, nullptr, nullptr);
+  if (end.died && !end.is_late && worker.at().empty())
+    throw Error(
+        "cannot be described: " + python_interpreter().string() + " cannot import marrow's package from " +
+        python_package_folder().string() +
+        "; it must have numpy and be of the version for which the package was built (MARROW_PYTHON names another)");
   if (!end.failed.empty()) {
     info.refused = why_refused(end);
     return info;

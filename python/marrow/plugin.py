@@ -14,7 +14,7 @@ import sys
 import threading
 import traceback
 from types import FrameType, ModuleType
-from typing import Any, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional
 
 import numpy
 
@@ -31,8 +31,9 @@ _MOST_COSTS = 8  # that are kept; others are made again
 
 
 class Process:
-    def __init__(self, file: str) -> None:
+    def __init__(self, file: str, say: Callable[[Dict[str, Any]], None]) -> None:
         self.file = file
+        self.say = say
         self.nodes: Optional[Dict[str, Declaration]] = None
         self.inputs: Dict[int, Any] = {}  # by the number of their memory
         self.costs: Dict[int, Any] = {}  # by their own number
@@ -44,6 +45,7 @@ class Process:
     def load(self) -> Dict[str, Declaration]:
         """Imports the file, once."""
         if self.nodes is None:
+            self.say({"say": "at", "place": self.file})  # what ends the process from here on is the file's fault
             module = import_from_source(self.file, _MODULE)
             self.nodes = {one.manifest["name"]: one for one in _checked(nodes_of(module))}
             self.files = loaded_files(self.file)
@@ -62,10 +64,10 @@ class Process:
     def limits(self, request: Dict[str, Any]) -> Any:
         return {name: one.limits for name, one in self.load().items()}
 
-    def call(self, request: Dict[str, Any], say: Any) -> Any:
+    def call(self, request: Dict[str, Any]) -> Any:
         node = self.load()[request["node"]]
         arguments = self._arguments(node, request)
-        self.context = Context(request["seed"] if node.manifest["random"] else None, say)
+        self.context = Context(request["seed"] if node.manifest["random"] else None, self.say)
         if node.context is not None:
             arguments[node.context] = self.context
         try:
@@ -82,7 +84,10 @@ class Process:
         if number not in self.costs:
             while len(self.costs) >= _MOST_COSTS:
                 self.costs.pop(next(iter(self.costs)))
-            self.costs[number] = node.function(**self._arguments(node, request))
+            arguments = self._arguments(node, request)
+            if node.context is not None:
+                arguments[node.context] = Context(None, self.say)
+            self.costs[number] = node.function(**arguments)
         poses = numpy.zeros((len(request["poses"]) // 12, 4, 4))
         poses[:, :3] = numpy.reshape(request["poses"], (-1, 3, 4))
         poses[:, 3, 3] = 1
@@ -195,17 +200,15 @@ class Answers:
 
 def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[str, Any]:
     try:
-        if request["do"] == "call":
-            return {"end": process.call(request, answers.send)}
-        tasks = {"describe": process.describe, "load": process.limits, "share": process.share}
-        tasks["cost"] = process.cost
+        tasks = {"describe": process.describe, "load": process.limits, "call": process.call}
+        tasks.update({"share": process.share, "cost": process.cost})
         return {"end": tasks[request["do"]](request)}
     except MemoryError:
         return {"failed": "out of memory", "out_of_memory": True}
     except KeyboardInterrupt:
         return {"failed": "stopped"}
     except BaseException as error:  # also SystemExit: the process serves the next call
-        if request["do"] == "call" and not isinstance(error, Error):
+        if request["do"] in ("call", "cost") and not isinstance(error, Error):
             answers.send({"say": "debug", "text": "".join(traceback.format_exception(type(error), error, None))})
         return {"failed": explained(error, process.file)}
 
@@ -214,7 +217,8 @@ def main(arguments: List[str]) -> int:
     if len(arguments) != 1:
         print(__doc__, file=sys.stderr)
         return 2
-    process, answers = Process(arguments[0]), Answers()
+    answers = Answers()
+    process = Process(arguments[0], answers.send)
     parent = int(os.environ.get("MARROW_PARENT", os.getppid()))
     _core.end_with(parent)
 

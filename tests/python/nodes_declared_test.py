@@ -4,6 +4,7 @@ import json
 import os
 import shutil
 import subprocess
+import time
 
 import numpy
 from package import BUILD, SCRATCH, SOURCE, main, marrow, small_case
@@ -185,6 +186,25 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
             self.assertIn("there is no Python interpreter /nowhere/python3; install", self.program("doctor", code=1))
         finally:
             del os.environ["MARROW_PYTHON"]
+
+    def test_an_interpreter_that_cannot_import_the_package(self):
+        self.plugin("# @marrow.node\n")
+        os.environ["MARROW_PYTHON"] = "/bin/false"
+        try:
+            self.assertRegex(
+                self.program("doctor", code=1),
+                "it cannot be described: /bin/false cannot import marrow's package from .*; it must have numpy and be of "
+                "the version for which the package was built",
+            )
+        finally:
+            del os.environ["MARROW_PYTHON"]
+
+    def test_a_file_that_never_ends_is_described_once(self):
+        self.plugin("# @marrow.node\nwhile True: pass\n")
+        for least_s, most_s in ((20, 60), (0, 10)):
+            start = time.monotonic()
+            self.assertIn("it did not say what it holds within 20 s of being imported", self.program("doctor", code=1))
+            self.assertTrue(least_s <= time.monotonic() - start <= most_s, time.monotonic() - start)
 
 
 if __name__ == "__main__":

@@ -125,8 +125,7 @@ def draws(view: Annotated[marrow.View, "view"], *, context: marrow.Context) -> A
             '    first: Annotated[marrow.Pose, "a"]\n    second: Annotated[marrow.Pose, "b"]\n'
             + "".join(
                 '\n@marrow.node("own.%s", summary="wrong")\n'
-                'def %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n'
-                % (name, name, kind, value)
+                'def %s(view: Annotated[marrow.View, "v"]) -> %s: return %s\n' % (name, name, kind, value)
                 for name, kind, value in (
                     ("none", 'Annotated[marrow.Pose, marrow.named("p")]', "None"),
                     ("other", 'Annotated[marrow.Pose, marrow.named("p")]', "view"),
