@@ -193,8 +193,8 @@ def own(view: marrow.View, *, low: Annotated[float, "low"] = 3) -> marrow.EdgeMa
         try:
             self.assertRegex(
                 self.program("doctor", code=1),
-                "it cannot be described: /bin/false cannot import marrow's package from .*; it must have numpy and be of "
-                "the version for which the package was built",
+                "it cannot be described: /bin/false cannot import marrow's package from .*; it must have numpy and be "
+                "of the version for which the package was built",
             )
         finally:
             del os.environ["MARROW_PYTHON"]

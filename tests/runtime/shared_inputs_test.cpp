@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "runtime/shared_inputs.hpp"
+#include "framework/runtime/shared_inputs.hpp"
 
 #include <gtest/gtest.h>
 #include <unistd.h>
