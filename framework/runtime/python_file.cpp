@@ -119,6 +119,7 @@ bool is_python_plugin(const fs::path& file) {
 Digest digest_of_python(const LibraryInfo& described) {
   Hasher digest;
   digest.add(digest_of(RegularFile(trusted_path(described.file))));
+  digest.add(python_interpreter().string());  // a virtual environment has the same program under another name
   for (const LinkedLibrary& one : described.linked) {
     digest.add(one.path);
     digest.add(identity_of(one));

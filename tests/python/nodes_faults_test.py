@@ -145,35 +145,41 @@ def draws(view: Annotated[marrow.View, "view"], *, context: marrow.Context) -> A
             with self.subTest(name), self.assertRaisesRegex(marrow.RunError, text):
                 marrow.node("own." + name)(view())
 
-    def test_ctrl_c_lets_the_node_clean_up(self):
+    def stop_by_ctrl_c(self, body):
+        """Stops a run in which a node runs this code for longer than anybody waits. Returns how long that takes."""
         file = self.plugin(
             CALLS
             + """
-@marrow.node("own.cleans", summary="cleans up")
-def cleans(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: Annotated[str, "mark"]) -> Annotated[
+@marrow.node("own.waits", summary="waits")
+def waits(camera: Annotated[Optional[marrow.Camera], "none"] = None, *, mark: Annotated[str, "mark"]) -> Annotated[
         marrow.Metrics, marrow.named("figures")]:
     open(mark + ".begun", "w")
-    try:
-        time.sleep(60)
-    finally:
-        open(mark, "w")
+%s
     return figures()
 """
+            % body
         )
-        mark = self.scratch / "cleaned"
-        pipeline = self.write(
-            "p.yaml", "marrow: 1\nnodes:\n  a: {uses: own.cleans, with: {mark: %s}}\noutputs: {a: a.figures}\n" % mark
-        )
-        file.write_text(file.read_text().replace("seconds=3", "seconds=90"))
+        mark = self.scratch / "ended"
+        text = "marrow: 1\nnodes:\n  a: {uses: own.waits, with: {mark: %s}}\noutputs: {a: a.figures}\n" % mark
+        pipeline = self.write("p.yaml", text)
         run = subprocess.Popen([str(MARROW), "run", str(pipeline), "--out", str(self.scratch / "out")])
         for _ in range(600):
-            if (self.scratch / "cleaned.begun").exists():
+            if (self.scratch / "ended.begun").exists():
                 break
             time.sleep(0.05)
         run.send_signal(signal.SIGINT)
+        start = time.monotonic()
         self.assertEqual(run.wait(30), 130)
-        self.assertTrue(mark.exists())
         self.assertEqual(processes(file), [])
+        return time.monotonic() - start
+
+    def test_ctrl_c_lets_the_node_clean_up(self):
+        self.stop_by_ctrl_c("    try:\n        time.sleep(60)\n    finally:\n        open(mark, 'w')")
+        self.assertTrue((self.scratch / "ended").exists())
+
+    def test_ctrl_c_ends_a_node_that_does_not_listen(self):
+        body = "    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})\n    time.sleep(60)"
+        self.assertLess(self.stop_by_ctrl_c(body), 15)
 
     def test_a_killed_program_leaves_no_process(self):
         file = self.plugin(CALLS)
