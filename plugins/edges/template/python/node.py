@@ -13,7 +13,7 @@ def new_node(
     sigma_px: Annotated[
         float, marrow.at_least(0.7), marrow.at_most(10), "deviation of the Gaussian that smooths"
     ] = 1.5,
-    least: Annotated[float, marrow.at_least(0), "least slope of an edge, in multiples of the slopes' noise"] = 6,
+    least: Annotated[float, marrow.at_least(0), "least slope of an edge, in multiples of the slopes' noise"] = 3,
 ) -> marrow.EdgeMap:
     grey = view.image.array.astype(float)
     if min(grey.shape) < 3 or not np.isfinite(grey).all():
