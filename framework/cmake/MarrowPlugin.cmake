@@ -43,7 +43,7 @@ function(marrow_add_plugin name)
   endif()
 endfunction()
 
-# marrow_test_plugin(NAME file.cpp ... NODES node ...)
+# marrow_test_plugin(NAME file.cpp ... NODES node or kind ...)
 #
 # Builds test_NAME, a GoogleTest program, and tells ctest of it and of the checks of each node's kind
 # (`marrow conformance NODE`). The tests call the plugins of this folder by the names of their nodes, see

@@ -2,12 +2,14 @@
 install(DIRECTORY pipelines schemas DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow)
 install(DIRECTORY tools/templates DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow COMPONENT marrow-dev
   USE_SOURCE_PERMISSIONS)
+install(FILES docs/example-kind/kind.cpp docs/example-kind/nodes.cpp
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/marrow/example-kind COMPONENT marrow-dev)
 
 # What `marrow new node` starts from, for each kind that has it: a node of marrow's own, and a test. The program looks
 # for all of this in share/marrow, in the build folder too.
 set(share ${PROJECT_BINARY_DIR}/share/marrow)
 file(MAKE_DIRECTORY ${share})
-foreach(folder pipelines schemas tools/templates)
+foreach(folder pipelines schemas tools/templates docs/example-kind)
   get_filename_component(name ${folder} NAME)
   file(CREATE_LINK ${PROJECT_SOURCE_DIR}/${folder} ${share}/${name} SYMBOLIC)
 endforeach()

@@ -61,13 +61,6 @@ json request_of(const Catalogue& catalogue, const PipelineNode& node, bool has_i
   return request;
 }
 
-void pass_on(const json& report, const Context::Hooks& hooks) {
-  const std::string what = report.value("say", ""), text = report.value("text", "");
-  if (what == "progress" && hooks.progress) hooks.progress(report.value("fraction", 0.0), text);
-  for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
-    if (what == level_name(level) && hooks.log) hooks.log(text, level);
-}
-
 /// The file that was being read: what the worker said last, else what the node's options name.
 std::string file_of(const PipelineNode& node, const Worker& worker) {
   if (!worker.at().empty()) return worker.at();
@@ -75,24 +68,14 @@ std::string file_of(const PipelineNode& node, const Worker& worker) {
   return paths.at(0) + (paths.size() > 1 ? " or another of its " + std::to_string(paths.size()) + " files" : "");
 }
 
-/// The values that the worker made. Large pieces are read from its memory. If this is not allowed, they are read from
-/// memory that both processes share.
-std::vector<Value> handed_over(const Catalogue& catalogue, const PipelineNode& node, Worker& worker,
-                               const SharedMemory& made) {
-  const auto content_of = [&](const TypeInfo& type) -> const Content* {
+/// Finds the Content of marrow's own types, and of the other types of a node's outputs.
+ContentOf content_of_outputs(const Catalogue& catalogue, const PipelineNode& node) {
+  return [&](const TypeInfo& type) -> const Content* {
     if (const Content* content = content_of_own(type)) return content;
     for (const PortInfo& port : catalogue.load(node.info.name).info.outputs)
       if (port.type == type) return port.type.content;
     return nullptr;
   };
-  try {
-    return read_values(made.descriptor(), worker.process(), content_of);
-  } catch (const NoAccess&) {
-    worker.ask({{"do", "share"}});
-    const WorkerEnd end = worker.wait({600, 1e9}, nullptr, nullptr);
-    if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
-    return read_values(made.descriptor(), worker.process(), content_of);
-  }
 }
 
 /// The processes that read files for this one. If the system does not start another one, start() waits until one of
@@ -186,6 +169,25 @@ json json_of_option(const OptionValue& value) {
   return list;
 }
 
+void pass_on(const json& report, const Context& context) {
+  const std::string what = report.value("say", ""), text = report.value("text", "");
+  if (what == "progress") context.progress(report.value("fraction", 0.0), text);
+  for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
+    if (what == level_name(level)) context.log(level, text);
+}
+
+std::vector<Value> handed_over(Worker& worker, const SharedMemory& made, const ContentOf& content_of) {
+  constexpr double kShareLimit_s = 600;
+  try {
+    return read_values(made.descriptor(), worker.process(), content_of);
+  } catch (const NoAccess&) {
+    worker.ask({{"do", "share"}});
+    const WorkerEnd end = worker.wait({kShareLimit_s}, nullptr, nullptr);
+    if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
+    return read_values(made.descriptor(), worker.process(), content_of);
+  }
+}
+
 void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo>& outputs) {
   if (values.size() != outputs.size())
     throw Error("the process that was started for it handed over " + std::to_string(values.size()) +
@@ -253,9 +255,9 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
   Worker& worker = reader.worker();
   worker.ask(request_of(catalogue, node, !inputs.empty(), hooks, limits));
   const WorkerEnd end = worker.wait({limits.seconds, 2 * limits.memory_mb}, hooks.cancelled,
-                                    [&](const json& report) { pass_on(report, hooks); });
+                                    [context = Context(hooks)](const json& report) { pass_on(report, context); });
   if (!end.failed.empty()) throw Error(failure_of(file_of(node, worker), end, limits));
-  std::vector<Value> outputs = handed_over(catalogue, node, worker, made);
+  std::vector<Value> outputs = handed_over(worker, made, content_of_outputs(catalogue, node));
   expect_outputs(outputs, node.info.outputs);
   return outputs;
 }

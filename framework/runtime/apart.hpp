@@ -6,9 +6,11 @@
 #include "marrow/runtime/catalogue.hpp"
 #include "marrow/runtime/context.hpp"
 #include "marrow/runtime/executor.hpp"
+#include "packed_values.hpp"
 
 namespace marrow {
 
+class Worker;
 class WorkerReports;
 struct WorkerEnd;
 
@@ -36,6 +38,13 @@ std::vector<Value> call_apart(const Catalogue& catalogue, const PipelineNode& no
 
 /// An option's value as JSON, for the request of a call.
 nlohmann::json json_of_option(const OptionValue& value);
+
+/// Passes a worker's report on: its progress, or a line of the log.
+void pass_on(const nlohmann::json& report, const Context& context);
+
+/// The values that a worker has made. Large pieces are read from its memory. If this is not allowed, they are read from
+/// memory that both processes share.
+std::vector<Value> handed_over(Worker& worker, const SharedMemory& made, const ContentOf& content_of);
 
 /// Throws Error unless the values have the types and axes of the outputs.
 void expect_outputs(const std::vector<Value>& values, const std::vector<PortInfo>& outputs);

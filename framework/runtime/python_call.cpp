@@ -31,7 +31,7 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::json;
 
-constexpr double kLoadLimit_s = 20, kShareLimit_s = 600, kStopLimit_s = 2;
+constexpr double kLoadLimit_s = 20, kStopLimit_s = 2;
 
 /// The inputs as a request has them. `kept` keeps the memory that the request names until the call has ended.
 json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedInput>>& kept) {
@@ -49,13 +49,6 @@ json json_of_input(const Value& value, std::vector<std::shared_ptr<const SharedI
           {"samples_bytes", shared->samples_bytes}};
 }
 
-void pass_on_to(Context& context, const json& report) {
-  const std::string what = report.value("say", ""), text = report.value("text", "");
-  if (what == "progress") context.progress(report.value("fraction", 0.0), text);
-  for (const LogLevel level : {LogLevel::debug, LogLevel::info, LogLevel::warning})
-    if (what == level_name(level)) context.log(level, text);
-}
-
 /// Asks the process to end, so that it can clean up, and ends it if it does not.
 void stop(Worker& worker) {
   kill(worker.process(), SIGTERM);
@@ -69,7 +62,7 @@ void stop(Worker& worker) {
 }
 
 WorkerEnd wait_for(Worker& worker, const WorkerLimits& limits, Context& context) {
-  const auto said = [&](const json& report) { pass_on_to(context, report); };
+  const auto said = [&](const json& report) { pass_on(report, context); };
   for (;;) {
     try {
       context.check_cancelled();
@@ -103,17 +96,6 @@ std::string failure_of_call(const fs::path& file, const WorkerEnd& end, const Wo
   if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
   if (end.died) return name + " ended its process; a node must return or raise an exception";
   return end.failed;
-}
-
-std::vector<Value> values_of(PythonProcess& process) {
-  try {
-    return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
-  } catch (const NoAccess&) {
-    process.worker.ask({{"do", "share"}});
-    const WorkerEnd end = process.worker.wait({kShareLimit_s}, nullptr, nullptr);
-    if (!end.failed.empty()) throw Error("the process that was started for it " + end.failed);
-    return read_values(process.made.descriptor(), process.worker.process(), content_of_own);
-  }
 }
 
 bool makes_cost(const NodeInfo& node) {
@@ -162,7 +144,7 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
     if (!end.died) give_back(std::move(process));
     throw Error(failure_of_call(described_.file, end, limits));
   }
-  if (outputs) *outputs = values_of(*process);
+  if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
   learn(end.answer.at("files"));
   give_back(std::move(process));
   return end.answer;

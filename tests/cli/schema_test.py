@@ -9,12 +9,23 @@ import yaml
 from marrow_cli import SOURCE, Case, main, marrow
 
 
-class Schema(Case):
+class SchemaCase(Case):
+    """Tests of one schema, whose text schema_text() gives."""
+
     @classmethod
     def setUpClass(cls):
-        cls.schema = json.loads(marrow("schema").stdout)
+        cls.schema = json.loads(cls.schema_text())
         jsonschema.Draft7Validator.check_schema(cls.schema)
         cls.validator = jsonschema.Draft7Validator(cls.schema)
+
+    def errors(self, text):
+        return [error.message for error in self.validator.iter_errors(yaml.safe_load(text))]
+
+
+class Schema(SchemaCase):
+    @staticmethod
+    def schema_text():
+        return marrow("schema").stdout
 
     def test_every_pipeline_is_valid(self):
         files = sorted((SOURCE / "pipelines").glob("*.yaml"))
@@ -110,15 +121,10 @@ WRONG = {
 }
 
 
-class ExperimentSchema(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.schema = json.loads((SOURCE / "schemas" / "experiment.schema.json").read_text())
-        jsonschema.Draft7Validator.check_schema(cls.schema)
-        cls.validator = jsonschema.Draft7Validator(cls.schema)
-
-    def errors(self, text):
-        return [error.message for error in self.validator.iter_errors(yaml.safe_load(text))]
+class ExperimentSchema(SchemaCase):
+    @staticmethod
+    def schema_text():
+        return (SOURCE / "schemas" / "experiment.schema.json").read_text()
 
     def program(self, text):
         (self.scratch / "cases" / "one").mkdir(parents=True, exist_ok=True)
@@ -219,12 +225,10 @@ WRONG_CASE = {
 }
 
 
-class CaseSchema(Case):
-    @classmethod
-    def setUpClass(cls):
-        cls.schema = json.loads((SOURCE / "schemas" / "case.schema.json").read_text())
-        jsonschema.Draft7Validator.check_schema(cls.schema)
-        cls.validator = jsonschema.Draft7Validator(cls.schema)
+class CaseSchema(SchemaCase):
+    @staticmethod
+    def schema_text():
+        return (SOURCE / "schemas" / "case.schema.json").read_text()
 
     def faults(self, text):
         """What the program says of the file itself: its other files are not there, which counts for nothing here."""
@@ -241,7 +245,7 @@ class CaseSchema(Case):
         return [line for line in said if "there is no '" not in line]
 
     def test_one_file_has_every_key(self):
-        self.assertEqual([error.message for error in self.validator.iter_errors(yaml.safe_load(CASE))], [])
+        self.assertEqual(self.errors(CASE), [])
         self.assertEqual(self.faults(CASE), [])
 
     def test_what_is_wrong_is_refused_by_schema_and_program(self):

@@ -7,17 +7,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import unittest
 
-SOURCE = pathlib.Path(sys.argv[1])
-BUILD = pathlib.Path(sys.argv[2])
-MARROW = BUILD / "bin" / "marrow"
-TEST_PLUGINS = BUILD / "tests" / "plugins"
+sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "cli"))
+from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main  # noqa: E402, F401
+
 FEMUR = SOURCE / "pipelines" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
 atexit.register(shutil.rmtree, SCRATCH, ignore_errors=True)
 tempfile.tempdir = str(SCRATCH)  # whatever is left there goes with it
-os.environ["MARROW_CACHE"] = str(SCRATCH / "cache")  # no test sees what another run left
 os.environ["MARROW_PLUGIN_PATH"] = str(TEST_PLUGINS)
 sys.path.insert(0, str(BUILD / "python"))
 SMALL = {"ct.spacing_mm": [1.2, 1.2, 1.5], "ct.range_mm": [0, 300]}  # runs in 2 seconds instead of 7
@@ -40,17 +37,3 @@ def program(*arguments, cwd=None):
     done = subprocess.run([str(MARROW), *map(str, arguments)], capture_output=True, text=True, cwd=cwd)
     assert done.returncode == 0, done.stderr
     return done.stdout
-
-
-class Case(unittest.TestCase):
-    def setUp(self):
-        self.scratch = pathlib.Path(tempfile.mkdtemp(dir=SCRATCH))
-
-    def write(self, name, text):
-        path = self.scratch / name
-        path.write_text(text)
-        return path
-
-
-def main():
-    unittest.main(argv=sys.argv[:1], verbosity=2)

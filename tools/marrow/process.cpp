@@ -76,6 +76,8 @@ const std::atomic<bool>& stop_on_signals() {
   return stopped;
 }
 
+std::filesystem::path this_program() { return std::filesystem::read_symlink("/proc/self/exe"); }
+
 std::string stopped_text() {
   if (stopped_by == SIGHUP) return "stopped, because its terminal was closed";
   if (stopped_by == SIGTERM) return "stopped, because it was asked to end (SIGTERM)";

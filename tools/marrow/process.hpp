@@ -2,6 +2,7 @@
 #pragma once
 // The process: its streams, its signals, and its last error messages.
 #include <atomic>
+#include <filesystem>
 #include <string>
 
 namespace marrow::cli {
@@ -18,6 +19,9 @@ int with_output_written(int code);
 /// From now on, SIGINT, SIGTERM and SIGHUP set the returned flag: the program should stop. A second signal ends the
 /// process at once.
 const std::atomic<bool>& stop_on_signals();
+
+/// The file of this program, to be started again or to find what is installed beside it.
+std::filesystem::path this_program();
 
 /// The reason for the stop, for example "stopped by Ctrl-C".
 std::string stopped_text();

@@ -65,13 +65,9 @@ PoolSettings pool_of(const CompareRequest& request, const fs::path& folder, int 
     std::fprintf(stderr, "  %s waits for another run that is making the same result\n",
                  where.empty() ? "a cell" : printable(where).c_str());
   };
-  pool.command = {fs::read_symlink("/proc/self/exe").string(),
-                  "worker",
-                  fs::absolute(request.file).string(),
-                  "--out",
-                  folder.string(),
-                  "--threads",
-                  std::to_string(threads)};
+  pool.command = {
+      this_program().string(), "worker", fs::absolute(request.file).string(), "--out", folder.string(), "--threads",
+      std::to_string(threads)};
   if (request.no_cache) pool.command.push_back("--no-cache");
   for (const auto& [name, value] :
        {std::pair("--file-memory", request.file_limits.memory_mb), {"--file-seconds", request.file_limits.seconds}})

@@ -128,8 +128,7 @@ class Checks {
  private:
   WorkerEnd ask(std::size_t number) {
     if (!worker_)
-      worker_ = std::make_unique<Worker>(
-          WorkerSettings{{std::filesystem::read_symlink("/proc/self/exe").string(), "check-worker", files_.path()}});
+      worker_ = std::make_unique<Worker>(WorkerSettings{{this_program().string(), "check-worker", files_.path()}});
     worker_->ask({{"do", "check"}, {"node", node_}, {"in", makers_}, {"check", number}});
     const WorkerEnd end = worker_->wait({double(time_limit_s()), kMemory_mb}, &stopped_, nullptr);
     if (stopped_.load()) throw Cancelled();  // Ctrl-C in a terminal ends the worker too

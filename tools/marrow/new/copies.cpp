@@ -32,9 +32,7 @@ fs::path file_named(const std::string& from, const fs::path& folder) {
 fs::path copy(const std::string& name, const fs::path& from, const fs::path& file) {
   expect_name(name, "the name");
   const fs::path target = file.empty() ? fs::path(name + ".yaml") : file;
-  if (fs::exists(fs::symlink_status(target)))
-    throw Error(printable(target.string()) +
-                ": it exists already, and nothing was written; name another place with --out");
+  expect_free(target);
   const fs::path folder = fs::absolute(target).parent_path();
   if (!fs::is_directory(folder)) throw Error(printable(folder.string()) + ": there is no such folder; make it first");
   write_text_file(target, moved_text(from, folder));
@@ -54,9 +52,7 @@ fs::path new_experiment(const std::string& name, const std::string& from, const 
 fs::path new_case(const std::string& name, const fs::path& folder) {
   if (name.empty() || name.find('/') != std::string::npos)
     throw Error("new case '" + printable(name) + "': expected the name of a folder; its place is given with --out");
-  const fs::path target = folder.empty() ? fs::path(name) : folder;
-  write_project(target, filled_templates(shared_files("templates/case"), {}));
-  return target;
+  return write_project(folder, name, filled_templates(shared_files("templates/case"), {}));
 }
 
 }  // namespace marrow::cli

@@ -121,9 +121,7 @@ fs::path new_node(const std::string& name, const fs::path& folder) {
   files[node.file + ".cpp"] = replaced(read_text_file(node.from / "node.cpp", kMostSourceBytes), {{node.origin, name}});
   files["test.cpp"] = replaced(read_text_file(node.from / "test.cpp", kMostSourceBytes),
                                {{node.kind + ".new_node", name}, {"NewNode", capitalised(node.own)}});
-  const fs::path target = folder.empty() ? fs::path(node.file) : folder;
-  write_project(target, files);
-  return target;
+  return write_project(folder, node.file, files);
 }
 
 fs::path new_python_node(const std::string& name, const fs::path& folder) {
@@ -135,9 +133,7 @@ fs::path new_python_node(const std::string& name, const fs::path& folder) {
                            {"NewNode", capitalised(node.own)}};
   files[node.file + ".py"] = replaced(read_text_file(node.from / "python/node.py", kMostSourceBytes), names);
   files["test.py"] = replaced(read_text_file(node.from / "python/test.py", kMostSourceBytes), names);
-  const fs::path target = folder.empty() ? fs::path(node.file) : folder;
-  write_project(target, files);
-  return target;
+  return write_project(folder, node.file, files);
 }
 
 fs::path new_kind(const std::string& name, const fs::path& folder) {
@@ -147,6 +143,9 @@ fs::path new_kind(const std::string& name, const fs::path& folder) {
     throw Error("a kind '" + name + "' exists already; a node of it: marrow new node " + name + ".mine");
   Files files = filled_templates(shared_files("templates/kind"),
                                  {{"@kind@", name}, {"new_kind", name}, {"NewKind", capitalised(name)}});
+  for (const char* source : {"kind.cpp", "nodes.cpp"})
+    files[source] =
+        replaced(read_text_file(shared_files("example-kind") / source, kMostSourceBytes), {{"denoise", name}});
   // The views go through the new node before their edges are looked for.
   std::string pipeline = whole_pipeline();
   const std::size_t edges = line_of_node(pipeline, "edges");
@@ -154,9 +153,7 @@ fs::path new_kind(const std::string& name, const fs::path& folder) {
   pipeline.replace(pipeline.find(wire, edges), wire.size(), "view: filtered");
   pipeline.insert(edges, "  filtered:  {uses: " + name + ".median, in: {view: case.views}}\n");
   files["pipeline.yaml"] = pipeline;
-  const fs::path target = folder.empty() ? fs::path(name) : folder;
-  write_project(target, files);
-  return target;
+  return write_project(folder, name, files);
 }
 
 }  // namespace marrow::cli

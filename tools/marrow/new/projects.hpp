@@ -10,7 +10,7 @@ namespace marrow::cli {
 std::filesystem::path new_node(const std::string& name, const std::filesystem::path& folder);
 /// The same with a node in Python, which needs no build. For kinds whose values Python can make.
 std::filesystem::path new_python_node(const std::string& name, const std::filesystem::path& folder);
-/// Makes a folder with a kind, its checks and a first node.
+/// Makes a folder with a kind, its checks and two nodes, as docs/example-kind has them.
 std::filesystem::path new_kind(const std::string& name, const std::filesystem::path& folder);
 /// Makes a copy of a pipeline or an experiment, of marrow's own by its name or of any file, that works where it is put.
 std::filesystem::path new_pipeline(const std::string& name, const std::string& from, const std::filesystem::path& file);

@@ -7,6 +7,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/toolbox/files/atomic_write.hpp"
+#include "process.hpp"
 #include "runtime/text_file.hpp"
 
 namespace fs = std::filesystem;
@@ -14,7 +15,7 @@ namespace fs = std::filesystem;
 namespace marrow::cli {
 
 fs::path shared_files(const fs::path& below) {
-  const fs::path folder = fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share/marrow" / below;
+  const fs::path folder = this_program().parent_path().parent_path() / "share/marrow" / below;
   if (!fs::exists(folder))
     throw Error(printable(folder.string()) +
                 ": it is not there, so this installation is not whole; install marrow again");
@@ -41,18 +42,23 @@ Files filled_templates(const fs::path& folder, const Replacements& replacements)
   return files;
 }
 
-void write_project(const fs::path& folder, const Files& files) {
-  if (fs::exists(fs::symlink_status(folder)))
-    throw Error(printable(folder.string()) +
+void expect_free(const fs::path& place) {
+  if (fs::exists(fs::symlink_status(place)))
+    throw Error(printable(place.string()) +
                 ": it exists already, and nothing was written; name another place with --out");
+}
+
+fs::path write_project(const fs::path& wanted, const std::string& otherwise, const Files& files) {
+  const fs::path folder = wanted.empty() ? fs::path(otherwise) : wanted;
+  expect_free(folder);
   files::write_atomically(fs::absolute(folder), [&](const fs::path& unfinished) {
     fs::create_directories(unfinished);
     for (const auto& [name, text] : files) {
       write_text_file(unfinished / name, text);
-      fs::permissions(unfinished / name, fs::perms(name == "ci" ? 0755 : 0644) & ~fs::perms::others_write,
-                      fs::perm_options::replace);
+      fs::permissions(unfinished / name, fs::perms(name == "ci" ? 0755 : 0644));
     }
   });
+  return folder;
 }
 
 std::string moved_text(const fs::path& from, const fs::path& folder) {

@@ -21,8 +21,13 @@ std::string replaced(std::string text, const Replacements& replacements);
 /// All files of a folder of templates, with replacements in their texts. `gitignore` becomes `.gitignore`.
 Files filled_templates(const std::filesystem::path& folder, const Replacements& replacements);
 
-/// Writes all files, or nothing. Throws Error if `folder` exists already, or cannot be written.
-void write_project(const std::filesystem::path& folder, const Files& files);
+/// Throws Error if there is anything at the place.
+void expect_free(const std::filesystem::path& place);
+
+/// Writes all files into a new folder, or nothing: the `wanted` one, or if that is empty, `otherwise`. Returns the
+/// folder. Throws Error if it exists already, or cannot be written.
+std::filesystem::path write_project(const std::filesystem::path& wanted, const std::string& otherwise,
+                                    const Files& files);
 
 /// The text of the file `from`, for a copy of it in `folder`: relative paths of files and folders that exist, such as
 /// `../femur.yaml`, are changed so that they lead there from the new place.

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // `marrow watch`: builds, runs and shows a pipeline again whenever something changes that its result depends on.
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -29,7 +30,7 @@ struct WatchRequest {
   fs::path folder;  ///< empty = runs/NAME-watch
 };
 
-/// The part of a colourless text that fits a page: without the lines of progress that a terminal would overwrite.
+/// What a program that failed printed, with what it was to do.
 std::string shown_fault(const std::string& what, const ChildEnd& end) {
   return what + " (exit code " + std::to_string(end.code) + ")\n\n" + printable_lines(end.said);
 }
@@ -139,13 +140,14 @@ class Watch {
     note_files();
     const fs::path run = folder_ / ("run-" + std::to_string(last_ + 1));
     tell("running " + printable(request_.pipeline.file.string()));
-    std::vector<std::string> command{program(), "run", request_.pipeline.file.string()};
+    std::vector<std::string> command{this_program().string(), "run", request_.pipeline.file.string()};
     command.insert(command.end(), request_.pipeline.inputs.begin(), request_.pipeline.inputs.end());
     for (const std::string& change : request_.pipeline.overrides) command.insert(command.end(), {"--set", change});
     command.insert(command.end(), {"--out", run.string()});
     ChildEnd end = run_child(command, [&] { return should_stop(); });
     const bool is_good = end.code == 0 || end.code == kWrongVerdict;
-    if (is_good && !end.stopped) end = run_child({program(), "show", run.string()}, [&] { return bool(stop_); });
+    if (is_good && !end.stopped)
+      end = run_child({this_program().string(), "show", run.string()}, [&] { return bool(stop_); });
     if (end.stopped || (end.code != 0 && end.code != kWrongVerdict)) {
       if (!end.stopped) state_.fault = shown_fault("the run failed", end);
       fs::remove_all(run);
@@ -157,8 +159,6 @@ class Watch {
     tell("");
     if (!before.empty()) fs::remove_all(before);
   }
-
-  static std::string program() { return fs::read_symlink("/proc/self/exe").string(); }
 
   const WatchRequest& request_;
   const std::atomic<bool>& stop_;
