@@ -12,11 +12,15 @@ using namespace marrow;
 using track::TrackState;
 using track::Trajectory;
 
-Trajectory trajectory(const List<TrackState>& states) {
+Trajectory trajectory(const List<TrackState>& states, const List<Verdict>* verdicts) {
+  if (verdicts && verdicts->names() != states.names())
+    throw Error("the verdicts are of other frames than the states: " + std::to_string(verdicts->size()) + " and " +
+                std::to_string(states.size()) + "; wire both to the same repetition");
   Trajectory result;
   for (std::size_t i = 0; i < states.size(); ++i) {
     result.frames.push_back(states.name(i));
     result.states.push_back(states[i]);
+    if (verdicts) result.verdicts.push_back((*verdicts)[i]);
   }
   return result;
 }
@@ -30,7 +34,7 @@ std::string quoted(const std::string& text) {
 constexpr const char* kAxes[] = {"frontal_deg", "lateral_deg", "axial_deg", "frontal_mm", "lateral_mm", "along_mm"};
 
 /// A row of world_from_model (row-major), then the motion from the first frame along the bone's six axes, then the
-/// deviations along them.
+/// deviations along them, then the verdict and its probability of a failure, which are empty where there is none.
 void write_csv(const Trajectory& trajectory, const std::string& path) {
   std::string text = "frame,name,time_s,found";
   for (int row = 1; row <= 3; ++row)
@@ -38,7 +42,7 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
       text += ",m" + std::to_string(row) + std::to_string(column) + (column == 4 ? "_mm" : "");
   for (const char* prefix : {",", ",deviation_"})
     for (const char* axis : kAxes) text += std::string(prefix) + axis;
-  text += ",note\n";
+  text += ",verdict,failure_probability,note\n";
   const auto add = [&](double value) {
     char number[40];
     std::snprintf(number, sizeof number, ",%.10g", value);
@@ -60,12 +64,18 @@ void write_csv(const Trajectory& trajectory, const std::string& path) {
     add_degrees_and_mm(
         motion_between(trajectory.states.front().now.world_from_model, pose, trajectory.states.front().fragment));
     add_degrees_and_mm(state.now.covariance.diagonal().head<6>().cwiseMax(0).cwiseSqrt());
+    if (trajectory.verdicts.empty()) {
+      text += ",,";
+    } else {
+      text += "," + std::string(name_of(trajectory.verdicts[i].judgement));
+      add(trajectory.verdicts[i].failure_probability);
+    }
     text += "," + quoted(state.note) + "\n";
   }
   files::write_text(path, text);
 }
 
-void write_state(const TrackState& state, const std::string& path) { write_csv({{""}, {state}}, path); }
+void write_state(const TrackState& state, const std::string& path) { write_csv({{""}, {state}, {}}, path); }
 
 }  // namespace
 
@@ -73,8 +83,11 @@ MARROW_PLUGIN(plugin) {
   plugin.node("track.trajectory", trajectory)
       .summary("The way of a bone through all frames, as one table")
       .in("states", "what is known after each frame", over("frame"))
+      .in("verdicts", "whether the pose of each frame can be relied on", over("frame"))
       .out("trajectory", "poses, deviations, and in which frames the bone was found");
   plugin.writer<TrackState>(".csv", write_state, "one frame: time, 3x4 matrix world_from_model, motion, deviations");
   plugin.writer<Trajectory>(
-      ".csv", write_csv, "a line a frame: time, 3x4 matrix world_from_model, motion from the first frame, deviations");
+      ".csv", write_csv,
+      "a line a frame: time, 3x4 matrix world_from_model, motion from the first frame, deviations, "
+      "verdict");
 }

@@ -29,8 +29,19 @@ std::vector<std::vector<std::string>> table_of(const Trajectory& trajectory) {
   return table;
 }
 
+List<marrow::Verdict> verdicts_of_frames(int count) {
+  List<marrow::Verdict> verdicts;
+  for (int i = 0; i < count; ++i) {
+    marrow::Verdict verdict;
+    verdict.judgement = i == 1 ? marrow::Judgement::doubtful : marrow::Judgement::trusted;
+    verdict.failure_probability = i == 1 ? 0.25 : 0;
+    verdicts.add("000" + std::to_string(i + 1), verdict);
+  }
+  return verdicts;
+}
+
 /// Three frames at 10 Hz: 2 degrees about and 3 mm along the long axis in each; the second one lost.
-Trajectory three_frames() {
+Trajectory three_frames(int verdicts = 3) {
   const TrackState begin = sequences::begin({{"frame_rate_hz", 10.0}});
   const auto poses = sequences::way(begin, sequences::six(0, 0, 20, 0, 0, 30), 3);
   List<TrackState> states;
@@ -44,7 +55,8 @@ Trajectory three_frames() {
     if (i == 1) state.note = "no edges";
     states.add("000" + std::to_string(i + 1), state);
   }
-  return shipped::call("track.trajectory", {{"states", shipped::list(states, "frame")}})
+  return shipped::call("track.trajectory", {{"states", shipped::list(states, "frame")},
+                                            {"verdicts", shipped::list(verdicts_of_frames(verdicts), "frame")}})
       .at("trajectory")
       .as<Trajectory>();
 }
@@ -68,6 +80,18 @@ TEST(Trajectory, TableOfTimeMotionAndDeviations) {
   EXPECT_NEAR(std::stod(cell(2, "deviation_axial_deg")), marrow::degrees(0.1), 1e-6);
   EXPECT_NEAR(std::stod(cell(2, "deviation_along_mm")), 0.1, 1e-9);
   EXPECT_NEAR(std::stod(cell(1, "m14_mm")), 10, 1e-9);
+  EXPECT_EQ(cell(1, "verdict") + " " + cell(2, "verdict"), "trusted doubtful");
+  EXPECT_NEAR(std::stod(cell(2, "failure_probability")), 0.25, 1e-9);
+}
+
+TEST(Trajectory, VerdictsOfOtherFramesAreRefused) {
+  try {
+    three_frames(2);
+    FAIL() << "no error";
+  } catch (const marrow::Error& error) {
+    EXPECT_STREQ(error.what(),
+                 "the verdicts are of other frames than the states: 2 and 3; wire both to the same repetition");
+  }
 }
 
 }  // namespace trajectory_test

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "marrow/domain/pose.hpp"
+#include "marrow/domain/verdict.hpp"
 #include "marrow/runtime/value.hpp"
 
 namespace marrow::track {
@@ -64,7 +65,8 @@ struct TrackState {
 struct Trajectory {
   std::vector<std::string> frames;  ///< their names
   std::vector<TrackState> states;   ///< as many
-  using fields = Fields<&Trajectory::frames, &Trajectory::states>;
+  std::vector<Verdict> verdicts;    ///< as many, or none
+  using fields = Fields<&Trajectory::frames, &Trajectory::states, &Trajectory::verdicts>;
 };
 
 /// A bone's poses in Autoscoper's format (.tra): world from bone, frame by frame; nothing where it was not tracked.
@@ -76,5 +78,5 @@ struct AutoscoperTrack {
 }  // namespace marrow::track
 
 MARROW_VALUE_TYPE(marrow::track::TrackState, "track_state", 1)
-MARROW_VALUE_TYPE(marrow::track::Trajectory, "trajectory", 1)
+MARROW_VALUE_TYPE(marrow::track::Trajectory, "trajectory", 2)
 MARROW_VALUE_TYPE(marrow::track::AutoscoperTrack, "autoscoper_track", 1)
