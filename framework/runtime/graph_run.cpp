@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <chrono>
 
+#include "known_keys.hpp"
 #include "no_process.hpp"
 #include "passes.hpp"
 #include "resident_memory.hpp"
@@ -83,7 +84,7 @@ std::vector<PlannedNode> GraphRun::plan() {
 /// Data made outside of a run has no key yet. Without keys, all such data would count as the same.
 void GraphRun::complete_key(Value& value) {
   for (Value& item : value.items) complete_key(item);
-  if (value.data && value.type.content && value.key == Digest{}) value.key = value.type.content->hash(value.data.get());
+  if (value.data && value.type.content && value.key == Digest{}) value.key = KnownKeys::all().key_of(value);
 }
 
 /// Makes the data of the pipeline's outputs while the nodes can still be called.
