@@ -181,7 +181,7 @@ class ExperimentSchema(SchemaCase):
             self.assertEqual(self.errors(EXPERIMENT.replace(*change)), [])
 
 
-# All that a case file can say, but for the two ways to write a transform and a camera.
+# All that a case file can say, but for a camera in a file of its own and the two ways to write a transform.
 CASE = """marrow-case: 1
 ct: {file: ct.mha, voxel_size_mm: [1, 1, 1], flip: [z], value_offset_hu: 0, series_uid: "1.2"}
 views:
@@ -195,6 +195,12 @@ views:
       intrinsics: [[1000, 0, 3.5], [0, 1000, 3.5], [0, 0, 1]]
       radial_distortion: [0, 0, 0]
       camera_from_world: {target: camera, source: world, rotation: ROTATION, translation_mm: [0, 0, 600]}
+  - name: oblique
+    image: oblique.png
+    camera:
+      width_px: 16
+      height_px: 16
+      c_arm: {alpha_deg: 5, beta_deg: 40, source_to_detector_mm: 1000, source_to_isocentre_mm: 600, pixel_mm: 0.5}
 fragments:
   distal:
     seeds: [[1, 2, 3]]
@@ -216,6 +222,9 @@ WRONG_CASE = {
     "[0, 0, 1]]\n      radial": "[0, 0]]\n      radial",
     "radial_distortion: [0, 0, 0]": "radial_distortion: [0, 0]",
     "{target: camera": "{target: world",
+    "alpha_deg: 5": "alpha_deg: 95",
+    "beta_deg: 40": "beta_degrees: 40",
+    "pixel_mm: 0.5": "pixel_mm: 0",
     "fragments:": "fragment:",
     "    seeds: [[1, 2, 3]]": "    seeds: [[1, 2]]",
     "register: true": "register: yes please",

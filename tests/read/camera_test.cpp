@@ -64,6 +64,40 @@ TEST(ReadCamera, RealBeadsReprojectWithinTheirMeasuredError) {
   RecordProperty("worst_px", std::to_string(worst));
 }
 
+const std::string kByAngles =
+    "marrow-camera: 1\nwidth_px: 512\nheight_px: 256\nc_arm:\n  alpha_deg: 0\n  beta_deg: 90\n"
+    "  source_to_detector_mm: 1000\n  source_to_isocentre_mm: 600\n  pixel_mm: 0.5\n";
+
+// From the patient's right to the left: u points to the front (-y), v to the feet, the detector lies at x > 0.
+TEST(ReadCamera, ByTheAnglesOfACArm) {
+  const TemporaryFolder folder;
+  put(folder / "cam.yaml", kByAngles);
+  const marrow::Camera camera = read(folder / "cam.yaml");
+  EXPECT_EQ(camera.intrinsics, (Eigen::Matrix3d() << 2000, 0, 255.5, 0, 2000, 127.5, 0, 0, 1).finished());
+  const Eigen::Matrix3d axes = (Eigen::Matrix3d() << 0, -1, 0, 0, 0, -1, 1, 0, 0).finished();
+  EXPECT_TRUE(camera.camera_from_world.rotation.isApprox(axes, 1e-12)) << camera.camera_from_world.rotation;
+  EXPECT_TRUE(camera.camera_from_world.translation_mm.isApprox(Eigen::Vector3d(0, 0, 600), 1e-12));
+}
+
+TEST(ReadCamera, AnglesAndDistancesThatCannotBe) {
+  const TemporaryFolder folder;
+  const auto expect = [&](const std::string& text, const std::string& said) {
+    put(folder / "cam.yaml", text);
+    EXPECT_SAYS(read(folder / "cam.yaml"), said);
+  };
+  expect(with(kByAngles, "beta_deg: 90", "beta_deg: 190"),
+         "cam.yaml:6:13: c_arm: beta_deg: expected -180 to 180, got 190");
+  expect(with(kByAngles, "pixel_mm: 0.5", "pixel_mm: 0"), "pixel_mm: expected 0.001 to 100, got 0");
+  expect(with(kByAngles, "isocentre_mm: 600", "isocentre_mm: 1000"),
+         "cam.yaml:8:27: c_arm: source_to_isocentre_mm: the isocentre lies between source and detector; expected less "
+         "than "
+         "source_to_detector_mm");
+  expect(with(kByAngles, "alpha_deg: 0", "alhpa_deg: 0"), "did you mean 'alpha_deg'?");
+  expect(with(kByAngles, "  alpha_deg: 0\n", ""), "alpha_deg");
+  expect(kByAngles + "intrinsics: [[1, 0, 0], [0, 1, 0], [0, 0, 1]]\n",
+         "cam.yaml:10:13: camera: intrinsics: 'c_arm' already gives it; keep one of the two");
+}
+
 TEST(ReadCamera, DiagnosesXmalabFaultsAtTheirLine) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {

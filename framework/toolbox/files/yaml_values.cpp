@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "marrow/domain/c_arm.hpp"
 #include "marrow/domain/error.hpp"
 #include "marrow/toolbox/files/yaml_text.hpp"
 
@@ -69,19 +70,62 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
   return transform;
 }
 
-std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
-  const YamlMap map(file, node, "camera",
-                    {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world"});
-  if (map.has("marrow-camera")) check_version(map, "marrow-camera");
-  const auto width = map.integer("width_px");
-  const auto height = map.integer("height_px");
+namespace {
+
+/// A number within limits, which the fault names.
+std::optional<double> number_within(const YamlMap& map, const std::string& key, double least, double most) {
+  const auto value = map.number(key);
+  if (!value || (*value >= least && *value <= most)) return value;
+  map.fault(key, key + ": expected " + number(least) + " to " + number(most) + ", got " + number(*value));
+  return std::nullopt;
+}
+
+/// The camera of an isocentric C-arm from its angles and distances. The isocentre is the origin of the world.
+std::optional<Camera> camera_by_c_arm(const YAML::Node& node, int width_px, int height_px, YamlFile& file) {
+  const YamlMap map(file, node, "c_arm",
+                    {"alpha_deg", "beta_deg", "source_to_detector_mm", "source_to_isocentre_mm", "pixel_mm"});
+  const auto alpha_deg = number_within(map, "alpha_deg", -90, 90), beta_deg = number_within(map, "beta_deg", -180, 180),
+             detector_mm = number_within(map, "source_to_detector_mm", 1, 10000),
+             isocentre_mm = number_within(map, "source_to_isocentre_mm", 1, 10000),
+             pixel_mm = number_within(map, "pixel_mm", 0.001, 100);
+  if (!alpha_deg || !beta_deg || !detector_mm || !isocentre_mm || !pixel_mm) return std::nullopt;
+  if (*isocentre_mm >= *detector_mm) {
+    map.fault("source_to_isocentre_mm",
+              "source_to_isocentre_mm: the isocentre lies between source and detector; expected less than "
+              "source_to_detector_mm");
+    return std::nullopt;
+  }
+  const CArm arm{width_px,     height_px,     Eigen::Vector2d::Constant(*pixel_mm),
+                 *detector_mm, *isocentre_mm, Eigen::Vector3d::Zero()};
+  return carm_camera(arm, world_from_camera_rotation(radians(*alpha_deg), radians(*beta_deg)));
+}
+
+/// The camera from its matrices.
+std::optional<Camera> camera_by_matrices(const YamlMap& map, int width_px, int height_px, YamlFile& file) {
   const auto intrinsics = map.matrix("intrinsics", 3, 3);
   const auto transform_node = map.required("camera_from_world");
   if (!transform_node) return std::nullopt;
   const YamlMap transform_map(file, *transform_node, "camera_from_world", transform_keys());
   const auto transform = transform_from(transform_map, Camera{}.camera_from_world);
-  if (!width || !height || !intrinsics || !transform) return std::nullopt;
-  DistortedCamera result{{*width, *height, *intrinsics, *transform}, {}};
+  if (!intrinsics || !transform) return std::nullopt;
+  return Camera{width_px, height_px, *intrinsics, *transform};
+}
+
+}  // namespace
+
+std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file) {
+  const YamlMap map(
+      file, node, "camera",
+      {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world", "c_arm"});
+  if (map.has("marrow-camera")) check_version(map, "marrow-camera");
+  const int width_px = map.integer("width_px").value_or(0), height_px = map.integer("height_px").value_or(0);
+  if (map.has("c_arm"))
+    for (const char* key : {"intrinsics", "camera_from_world"})
+      if (map.has(key)) map.fault(key, std::string(key) + ": 'c_arm' already gives it; keep one of the two");
+  const std::optional<Camera> camera = map.has("c_arm") ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
+                                                        : camera_by_matrices(map, width_px, height_px, file);
+  if (!camera || !map.has("width_px") || !map.has("height_px")) return std::nullopt;
+  DistortedCamera result{*camera, {}};
   if (map.has("radial_distortion")) {
     const auto terms = map.vector3("radial_distortion");
     if (!terms) return std::nullopt;
@@ -89,7 +133,7 @@ std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& fil
   }
   try {
     check_camera(result.camera, "camera");
-    check_distortion(*intrinsics, result.distortion, *width, *height, "camera");
+    check_distortion(camera->intrinsics, result.distortion, width_px, height_px, "camera");
   } catch (const Error& error) {
     file.fault(node.Mark(), error.what());
     return std::nullopt;

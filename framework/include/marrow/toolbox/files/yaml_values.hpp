@@ -17,8 +17,8 @@ std::optional<RigidTransform> transform_from(const YamlMap& map, const RigidTran
 /// The keys that transform_from() reads.
 const std::vector<std::string>& transform_keys();
 
-/// A camera from the keys width_px, height_px, intrinsics, camera_from_world and, for distorted images,
-/// radial_distortion. Faults are noted in `file`.
+/// A camera from the keys width_px, height_px, then either intrinsics and camera_from_world or c_arm and, for distorted
+/// images, radial_distortion. Faults are noted in `file`.
 std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& file);
 
 /// Seeds of one fragment from the map's keys `seeds` and `register`.
