@@ -213,7 +213,7 @@ std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {
       });
     node.call = [nodes, info = node.info](const std::vector<Value>& inputs, const void* options, Context& context) {
       const auto& values = *static_cast<const std::vector<OptionValue>*>(options);
-      if (makes_cost(info)) return std::vector<Value>{python_cost(nodes, info, inputs, values)};
+      if (makes_cost(info)) return std::vector<Value>{python_cost(nodes, info, inputs, values, context)};
       std::vector<Value> outputs;
       nodes->ask(info, {{"do", "call"}, {"seed", context.seed()}}, PythonArguments(inputs, values), context, &outputs);
       expect_outputs(outputs, info.outputs);

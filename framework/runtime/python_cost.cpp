@@ -19,6 +19,9 @@ class PythonCost : public Cost {
     number_ = ++made;
   }
 
+  /// Has a process make the cost, so that what is wrong with its inputs is said at once.
+  void make(Context& context) const { ask(json::array(), context); }
+
   double value(const RigidTransform& world_from_model) const override { return values({world_from_model}).at(0); }
   std::vector<double> values(const std::vector<RigidTransform>& world_from_model) const override {
     if (world_from_model.empty()) return {};
@@ -29,9 +32,7 @@ class PythonCost : public Cost {
         poses.push_back(pose.translation_mm[row]);
       }
     Context context;
-    const json answer =
-        nodes_->ask(node_, {{"do", "cost"}, {"cost", number_}, {"poses", poses}}, arguments_, context, nullptr);
-    auto values = answer.at("values").get<std::vector<double>>();
+    auto values = ask(poses, context).at("values").get<std::vector<double>>();
     if (values.size() != world_from_model.size())
       throw Error(node_.name + " gave " + std::to_string(values.size()) + " costs for " +
                   std::to_string(world_from_model.size()) + " poses");
@@ -41,6 +42,10 @@ class PythonCost : public Cost {
   std::shared_ptr<const Cost> at_level(const CostLevel&) const override { return std::make_shared<PythonCost>(*this); }
 
  private:
+  json ask(const json& poses, Context& context) const {
+    return nodes_->ask(node_, {{"do", "cost"}, {"cost", number_}, {"poses", poses}}, arguments_, context, nullptr);
+  }
+
   std::shared_ptr<PythonNodes> nodes_;
   NodeInfo node_;
   std::vector<Value> inputs_;
@@ -51,8 +56,10 @@ class PythonCost : public Cost {
 }  // namespace
 
 Value python_cost(std::shared_ptr<PythonNodes> nodes, const NodeInfo& node, const std::vector<Value>& inputs,
-                  const std::vector<OptionValue>& options) {
-  return Value::of<Cost>(std::make_shared<const PythonCost>(std::move(nodes), node, inputs, options));
+                  const std::vector<OptionValue>& options, Context& context) {
+  const auto cost = std::make_shared<const PythonCost>(std::move(nodes), node, inputs, options);
+  cost->make(context);
+  return Value::of<Cost>(std::shared_ptr<const Cost>(cost));
 }
 
 }  // namespace marrow

@@ -50,8 +50,9 @@ class PythonNodes {
   std::size_t learnt_ = 0;
 };
 
-/// The cost that a node declared with @marrow.cost makes: each batch of poses is one request.
+/// The cost that a node declared with @marrow.cost makes: each batch of poses is one request. Throws as ask() does if
+/// it cannot be made.
 Value python_cost(std::shared_ptr<PythonNodes> nodes, const NodeInfo& node, const std::vector<Value>& inputs,
-                  const std::vector<OptionValue>& options);
+                  const std::vector<OptionValue>& options, Context& context);
 
 }  // namespace marrow

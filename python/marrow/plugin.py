@@ -88,6 +88,8 @@ class Process:
             if node.context is not None:
                 arguments[node.context] = Context(None, self.say)
             self.costs[number] = node.function(**arguments)
+        if not request["poses"]:
+            return {"values": [], "files": self._new_files()}
         poses = numpy.zeros((len(request["poses"]) // 12, 4, 4))
         poses[:, :3] = numpy.reshape(request["poses"], (-1, 3, 4))
         poses[:, 3, 3] = 1

@@ -79,7 +79,7 @@ class New(Case):
     @unittest.skipUnless((BUILD / "python" / "marrow" / "nodes.pyi").exists(), "the Python package is not built")
     def test_nodes_in_python_work_without_a_build(self):
         in_python = [kind for kind in KINDS if (SOURCE / "plugins" / kind / "template" / "python").exists()]
-        self.assertEqual(in_python, ["camera", "edges", "mesh", "segment", "shaft"])
+        self.assertEqual(in_python, ["camera", "edges", "mesh", "segment", "shaft", "similarity"])
         for kind in in_python:
             with self.subTest(kind):
                 result = self.new("node", kind + ".mine", "--python")
@@ -97,8 +97,7 @@ class New(Case):
         self.assertEqual(
             self.refused("node", "optimizer.mine", "--python"),
             "nodes of the kind 'optimizer' make functions, for which there is no template in Python; there are some of "
-            "camera, edges, mesh, segment, shaft. Leave out --python to make it in C++; docs/python.md says how a cost "
-            "is written in Python",
+            "camera, edges, mesh, segment, shaft, similarity. Leave out --python to make it in C++",
         )
 
     def test_a_pipeline_and_an_experiment_work_where_they_are_put(self):

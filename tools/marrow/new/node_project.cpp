@@ -71,7 +71,7 @@ std::string without_python(const std::string& kind) {
     if (fs::exists(shared_files("nodes") / one / "python")) list += (list.empty() ? "" : ", ") + one;
   return "nodes of the kind '" + kind +
          "' make functions, for which there is no template in Python; there are some of " + list +
-         ". Leave out --python to make it in C++; docs/python.md says how a cost is written in Python";
+         ". Leave out --python to make it in C++";
 }
 
 /// A node that is to be made: its names, and what it replaces in the pipeline.
