@@ -31,6 +31,10 @@ _VALUES = {
     "scene": "Scene",
     "landscape": "Landscape",
     "case": "Case",
+    "cost": "Cost",
+    "optimizer": "Optimizer",
+    "outline_projector": "OutlineProjector",
+    "radiograph_projector": "RadiographProjector",
 }
 _OPTIONS = {
     "boolean": "bool",
