@@ -43,6 +43,7 @@ from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .context import Context as Context
 from .declaration import cost as cost
+from .declaration import projector as projector
 from .errors import Error as Error
 from .errors import Fault as Fault
 from .errors import PipelineError as PipelineError
@@ -51,6 +52,8 @@ from .items import Items as Items
 from .nodes import *
 from .pages import show as show
 from .pipeline import Pipeline as Pipeline
+from .problem import BudgetSpent as BudgetSpent
+from .problem import Problem as Problem
 from .result import NodeReport as NodeReport
 from .result import Result as Result
 from .tables import Table as Table
