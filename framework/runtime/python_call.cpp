@@ -100,16 +100,24 @@ std::string short_text(double number) {
   return text;
 }
 
+/// How the node is declared in its file.
+std::string decorator_of(const NodeInfo& node) {
+  const TypeInfo type = makes_function(node) ? node.outputs[0].type : TypeInfo{};
+  return type == TypeInfo::of<Cost>()                  ? "@marrow.cost"
+         : type == TypeInfo::of<Optimizer>()           ? "@marrow.optimizer"
+         : type == TypeInfo::of<RadiographProjector>() ? "@marrow.projector"
+                                                       : "@marrow.node";
+}
+
 /// Why a call failed, in one sentence.
-std::string failure_of_call(const fs::path& file, const WorkerEnd& end, const WorkerLimits& limits) {
-  const std::string name = file.filename().string();
+std::string failure_of_call(const fs::path& file, const NodeInfo& node, const WorkerEnd& end,
+                            const WorkerLimits& limits) {
+  const std::string name = file.filename().string(),
+                    ended = " and its process was ended; if it needs more, give it more in " + decorator_of(node);
   if (end.is_late)
-    return name + " took longer than " + short_text(limits.seconds) +
-           " s, and its process was ended; if it needs more, give it more in @marrow.node(..., seconds=...)";
+    return name + " took longer than " + short_text(limits.seconds) + " s," + ended + "(..., seconds=...)";
   if (end.is_out_of_memory && end.died)
-    return name + " used more than " + short_text(limits.memory_mb) +
-           " MB of memory, and its process was ended; if it needs more, give it more in @marrow.node(..., "
-           "memory_mb=...)";
+    return name + " used more than " + short_text(limits.memory_mb) + " MB of memory," + ended + "(..., memory_mb=...)";
   if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
   if (end.died) return name + " ended its process; a node must return or raise an exception";
   return end.failed;
@@ -155,7 +163,7 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
   const WorkerEnd end = wait_for(*process, limits, context, reply);
   if (!end.failed.empty()) {
     if (!end.died) give_back(std::move(process));
-    throw Error(failure_of_call(described_.file, end, limits));
+    throw Error(failure_of_call(described_.file, node, end, limits));
   }
   if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
   learn(end.answer.at("files"));
