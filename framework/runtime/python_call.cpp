@@ -12,7 +12,7 @@
 #include "marrow/runtime/run_log.hpp"
 #include "marrow/runtime/types.hpp"
 #include "python_file.hpp"
-#include "python_nodes.hpp"
+#include "python_functions.hpp"
 #include "python_process.hpp"
 #include "trust.hpp"
 
@@ -21,9 +21,13 @@ namespace marrow {
 /// A process that holds the nodes of one Python file, and the memory through which it hands values over.
 struct PythonProcess {
   SharedMemory made;
+  ReplyPipe replies;
   Worker worker;
   nlohmann::json limits;  ///< of each node: {"seconds": ..., "memory_mb": ...}
-  explicit PythonProcess(const std::filesystem::path& file) : worker(python_process(file, made.descriptor())) {}
+  explicit PythonProcess(const std::filesystem::path& file)
+      : worker(python_process(file, made.descriptor(), replies.read_end())) {
+    replies.close_read_end();
+  }
 };
 
 namespace {
@@ -61,18 +65,31 @@ void stop(Worker& worker) {
   worker.close();
 }
 
-WorkerEnd wait_for(Worker& worker, const WorkerLimits& limits, Context& context) {
-  const auto said = [&](const json& report) { pass_on(report, context); };
+/// Waits for the end of the job, and replies to what the process asks meanwhile.
+WorkerEnd wait_for(PythonProcess& process, const WorkerLimits& limits, Context& context,
+                   const PythonNodes::Reply& reply) {
+  Worker& worker = process.worker;
+  std::exception_ptr fault;
+  const auto said = [&](const json& report) {
+    if (report.value("say", json()) != "ask" || !reply) return pass_on(report, context);
+    try {
+      process.replies.send(reply(report));
+    } catch (...) {
+      fault = std::current_exception();
+    }
+  };
   for (;;) {
     try {
       context.check_cancelled();
-    } catch (const Cancelled&) {
+      if (fault) std::rethrow_exception(fault);
+    } catch (...) {
       stop(worker);
       throw;
     }
     pollfd polled{worker.descriptor(), POLLIN, 0};
     poll(&polled, 1, 20);
     if (auto end = worker.take(said)) return *end;
+    if (fault) continue;
     if (auto end = worker.check(limits)) return *end;
   }
 }
@@ -83,30 +100,34 @@ std::string short_text(double number) {
   return text;
 }
 
+/// How the node is declared in its file.
+std::string decorator_of(const NodeInfo& node) {
+  const TypeInfo type = makes_function(node) ? node.outputs[0].type : TypeInfo{};
+  return type == TypeInfo::of<Cost>()                  ? "@marrow.cost"
+         : type == TypeInfo::of<Optimizer>()           ? "@marrow.optimizer"
+         : type == TypeInfo::of<RadiographProjector>() ? "@marrow.projector"
+                                                       : "@marrow.node";
+}
+
 /// Why a call failed, in one sentence.
-std::string failure_of_call(const fs::path& file, const WorkerEnd& end, const WorkerLimits& limits) {
-  const std::string name = file.filename().string();
+std::string failure_of_call(const fs::path& file, const NodeInfo& node, const WorkerEnd& end,
+                            const WorkerLimits& limits) {
+  const std::string name = file.filename().string(),
+                    ended = " and its process was ended; if it needs more, give it more in " + decorator_of(node);
   if (end.is_late)
-    return name + " took longer than " + short_text(limits.seconds) +
-           " s, and its process was ended; if it needs more, give it more in @marrow.node(..., seconds=...)";
+    return name + " took longer than " + short_text(limits.seconds) + " s," + ended + "(..., seconds=...)";
   if (end.is_out_of_memory && end.died)
-    return name + " used more than " + short_text(limits.memory_mb) +
-           " MB of memory, and its process was ended; if it needs more, give it more in @marrow.node(..., "
-           "memory_mb=...)";
+    return name + " used more than " + short_text(limits.memory_mb) + " MB of memory," + ended + "(..., memory_mb=...)";
   if (end.signal) return name + " crashed its process (" + strsignal(end.signal) + "); the next call starts a new one";
   if (end.died) return name + " ended its process; a node must return or raise an exception";
   return end.failed;
-}
-
-bool makes_cost(const NodeInfo& node) {
-  return node.outputs.size() == 1 && node.outputs[0].type == TypeInfo::of<Cost>();
 }
 
 /// The node with Contents for its types, which a description does not have.
 NodeInfo with_contents(NodeInfo node) {
   for (std::vector<PortInfo>* ports : {&node.inputs, &node.outputs})
     for (PortInfo& port : *ports) {
-      if (ports == &node.outputs && makes_cost(node)) continue;
+      if (ports == &node.outputs && makes_function(node)) continue;
       port.type.content = content_of_own(port.type);
       if (!port.type.content) throw Error("has a port of type '" + port.type.id + "', which Python does not know");
     }
@@ -124,7 +145,7 @@ PythonNodes::PythonNodes(LibraryInfo described) : described_(std::move(described
 PythonNodes::~PythonNodes() = default;
 
 json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments& arguments, Context& context,
-                      std::vector<Value>* outputs) {
+                      std::vector<Value>* outputs, const Reply& reply) {
   std::unique_ptr<PythonProcess> process = take(context);
   WorkerLimits limits;
   limits.seconds = process->limits.at(node.name).at("seconds");
@@ -139,10 +160,10 @@ json PythonNodes::ask(const NodeInfo& node, json request, const PythonArguments&
   request["options"] = arguments.options;
   request["kept"] = kept;
   process->worker.ask(std::move(request));
-  const WorkerEnd end = wait_for(process->worker, limits, context);
+  const WorkerEnd end = wait_for(*process, limits, context, reply);
   if (!end.failed.empty()) {
     if (!end.died) give_back(std::move(process));
-    throw Error(failure_of_call(described_.file, end, limits));
+    throw Error(failure_of_call(described_.file, node, end, limits));
   }
   if (outputs) *outputs = handed_over(process->worker, process->made, content_of_own);
   learn(end.answer.at("files"));
@@ -162,7 +183,7 @@ std::unique_ptr<PythonProcess> PythonNodes::take(Context& context) {
   }
   auto process = std::make_unique<PythonProcess>(trusted_path(described_.file));
   process->worker.ask({{"do", "load"}});
-  const WorkerEnd end = wait_for(process->worker, {kLoadLimit_s}, context);
+  const WorkerEnd end = wait_for(*process, {kLoadLimit_s}, context, nullptr);
   if (!end.failed.empty()) throw Error(described_.file.string() + " cannot be loaded: " + end.failed);
   process->limits = end.answer;
   if (digest_of_python(described_) != described_.digest) throw Error(changed());
@@ -213,7 +234,8 @@ std::unique_ptr<Plugin> load_python_file(const LibraryInfo& described) {
       });
     node.call = [nodes, info = node.info](const std::vector<Value>& inputs, const void* options, Context& context) {
       const auto& values = *static_cast<const std::vector<OptionValue>*>(options);
-      if (makes_cost(info)) return std::vector<Value>{python_cost(nodes, info, inputs, values)};
+      if (makes_function(info))
+        return std::vector<Value>{value_of_function(info, PythonFunction(nodes, info, inputs, values), context)};
       std::vector<Value> outputs;
       nodes->ask(info, {{"do", "call"}, {"seed", context.seed()}}, PythonArguments(inputs, values), context, &outputs);
       expect_outputs(outputs, info.outputs);

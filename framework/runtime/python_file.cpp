@@ -110,10 +110,11 @@ bool is_python_plugin(const fs::path& file) {
   if (file.extension() != ".py" || std::getenv("MARROW_WITHOUT_PYTHON_NODES")) return false;
   try {
     const std::string text = read_text(RegularFile(file), kMostSource_bytes);
-    return text.find("@marrow.node") != std::string::npos || text.find("@marrow.cost") != std::string::npos;
-  } catch (const Error&) {
-    return false;
+    for (const char* decorator : {"@marrow.node", "@marrow.cost", "@marrow.optimizer", "@marrow.projector"})
+      if (text.find(decorator) != std::string::npos) return true;
+  } catch (const Error&) {  // it cannot be read
   }
+  return false;
 }
 
 Digest digest_of_python(const LibraryInfo& described) {

@@ -8,8 +8,8 @@
 
 namespace marrow {
 
-/// Whether the file's name ends in .py and it holds @marrow.node or @marrow.cost. False in a process of a Python node,
-/// which would otherwise start another one, and so on.
+/// Whether the file's name ends in .py and it holds a decorator of nodes, such as @marrow.node. False in a process of a
+/// Python node, which would otherwise start another one, and so on.
 bool is_python_plugin(const std::filesystem::path& file);
 
 /// Describes a file by a Python process with limits of time and memory. `linked` has the interpreter, the modules that

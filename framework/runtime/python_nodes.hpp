@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 // The processes that hold the nodes of one Python file.
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
@@ -28,14 +29,17 @@ struct PythonArguments {
 /// threads: each uses a process of its own.
 class PythonNodes {
  public:
+  /// Answers what a process asks back during a request: {"say": "ask", ...}. What it throws ends the request.
+  using Reply = std::function<nlohmann::json(const nlohmann::json& question)>;
+
   explicit PythonNodes(LibraryInfo described);
   ~PythonNodes();
 
   /// Has a process answer a request about a node, with these arguments. `outputs`, if it is not null, receives the
-  /// values that the process handed over. Throws Error if the process fails, crashes or exceeds the node's limits, and
-  /// Cancelled.
+  /// values that the process handed over. Throws Error if the process fails, crashes or exceeds the node's limits,
+  /// Cancelled, and what `reply` throws.
   nlohmann::json ask(const NodeInfo& node, nlohmann::json request, const PythonArguments& arguments, Context& context,
-                     std::vector<Value>* outputs);
+                     std::vector<Value>* outputs, const Reply& reply = nullptr);
 
  private:
   std::unique_ptr<PythonProcess> take(Context& context);
@@ -49,9 +53,5 @@ class PythonNodes {
   std::set<std::string> new_files_;
   std::size_t learnt_ = 0;
 };
-
-/// The cost that a node declared with @marrow.cost makes: each batch of poses is one request.
-Value python_cost(std::shared_ptr<PythonNodes> nodes, const NodeInfo& node, const std::vector<Value>& inputs,
-                  const std::vector<OptionValue>& options);
 
 }  // namespace marrow

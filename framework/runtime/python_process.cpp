@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "python_process.hpp"
 
+#include <fcntl.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <cstdlib>
+#include <cstring>
+#include <utility>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/runtime/library.hpp"
@@ -32,14 +36,41 @@ fs::path python_package_folder() {
   throw Error("cannot be described: marrow's Python package is not there; install python3-marrow");
 }
 
-WorkerSettings python_process(const fs::path& file, int made) {
+WorkerSettings python_process(const fs::path& file, int made, int replies) {
   const char* before = std::getenv("PYTHONPATH");
   std::string path = python_package_folder().string();
   if (before && *before) path += std::string(":") + before;
+  std::vector<int> shared{made};
+  if (replies >= 0) shared.push_back(replies);
   return {{"/usr/bin/env", "PYTHONPATH=" + path, "PYTHONHASHSEED=0", "PYTHONSAFEPATH=1", "PYTHONDONTWRITEBYTECODE=1",
            "OMP_NUM_THREADS=1", "OPENBLAS_NUM_THREADS=1", "MKL_NUM_THREADS=1", "OPENCV_FOR_THREADS_NUM=1",
            "MARROW_WITHOUT_PYTHON_NODES=1", python_interpreter().string(), "-m", "marrow.plugin", file.string()},
-          {made}};
+          shared};
+}
+
+ReplyPipe::ReplyPipe() {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) throw Error(std::string("cannot start a process: ") + std::strerror(errno));
+  read_end_ = ends[0];
+  write_end_ = ends[1];
+}
+
+ReplyPipe::~ReplyPipe() {
+  close_read_end();
+  close(write_end_);
+}
+
+void ReplyPipe::close_read_end() {
+  if (read_end_ >= 0) close(std::exchange(read_end_, -1));
+}
+
+void ReplyPipe::send(const nlohmann::json& reply) {
+  const std::string line = reply.dump() + "\n";
+  for (std::size_t done = 0; done < line.size();) {
+    const ssize_t count = write(write_end_, line.data() + done, line.size() - done);
+    if (count < 0 && errno != EINTR) return;
+    if (count > 0) done += std::size_t(count);
+  }
 }
 
 }  // namespace marrow

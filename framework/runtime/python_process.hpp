@@ -14,9 +14,30 @@ std::filesystem::path python_interpreter();
 /// The folder that holds marrow's Python package. Throws Error, with a text that begins with a verb, if there is none.
 std::filesystem::path python_package_folder();
 
-/// A process that holds the nodes of `file`. It answers "describe", "load", "call" and "share"
-/// (python/marrow/plugin.py). Its descriptor 3 is the open file `made`, through which it hands values over. Hashes of
-/// texts have no random seed there, and numerical libraries use one thread.
-WorkerSettings python_process(const std::filesystem::path& file, int made);
+/// A process that holds the nodes of `file` (python/marrow/plugin.py). Its descriptor 3 is the open file `made`,
+/// through which it hands values over. From descriptor 4, `replies`, it reads the replies to its questions; a process
+/// that asks none needs no such file, -1. Hashes of texts have no random seed there, and numerical libraries use one
+/// thread.
+WorkerSettings python_process(const std::filesystem::path& file, int made, int replies = -1);
+
+/// The way back to a process that asks something during a job: {"job": 7, "say": "ask", ...}. A reply is one line, a
+/// JSON document.
+class ReplyPipe {
+ public:
+  /// Throws Error if no more files can be opened.
+  ReplyPipe();
+  ~ReplyPipe();
+  ReplyPipe(const ReplyPipe&) = delete;
+  ReplyPipe& operator=(const ReplyPipe&) = delete;
+
+  int read_end() const { return read_end_; }
+  /// To be called when the process has been started: only it reads.
+  void close_read_end();
+  /// Does nothing if the process has ended.
+  void send(const nlohmann::json& reply);
+
+ private:
+  int read_end_ = -1, write_end_ = -1;
+};
 
 }  // namespace marrow

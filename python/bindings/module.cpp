@@ -23,6 +23,7 @@ PYBIND11_MODULE(_core, module) {
   python::bind_geometry(module);
   python::bind_findings(module);
   python::bind_values(module);
+  python::bind_functions(module);
   python::bind_catalogue(module);
   python::bind_pipelines(module);
   python::bind_runs(module);

@@ -62,6 +62,11 @@ std::vector<Conversion>& conversions() {
   return all;
 }
 
+std::vector<FunctionClass>& function_classes() {
+  static std::vector<FunctionClass> all;
+  return all;
+}
+
 py::object python_of(const Value& value) {
   if (value.is_list()) {
     py::list items;
@@ -71,6 +76,8 @@ py::object python_of(const Value& value) {
   if (value.is_absent() || !value.data) return py::none();
   for (const Conversion& one : conversions())
     if (one.type == value.type) return one.to_python(value.data);
+  for (const FunctionClass& one : function_classes())
+    if (one.type == value.type) return one.to_python(value);
   return py::cast(OtherValue{value});
 }
 
@@ -104,8 +111,8 @@ Value value_of(const py::handle& object, const TypeInfo& type, const std::string
 
 void bind_values(py::module_& module) {
   py::class_<OtherValue>(module, "OtherValue",
-                         "A value without a class of its own in Python: a function, such as a cost, or a type of a "
-                         "plugin. It can be given to another node.")
+                         "A value without a class of its own in Python, of a type of a plugin. It can be given to "
+                         "another node.")
       .def_property_readonly(
           "type", [](const OtherValue& other) { return other.value.type.id; },
           "The name of the type, as messages show it.")

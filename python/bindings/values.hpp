@@ -26,6 +26,13 @@ struct Conversion {
 };
 std::vector<Conversion>& conversions();
 
+/// The Python class of functions of one type. It is derived from OtherValue.
+struct FunctionClass {
+  TypeInfo type;
+  py::object (*to_python)(const Value& value);
+};
+std::vector<FunctionClass>& function_classes();
+
 /// Declares the Python class of a value type.
 template <class T, class... Extra>
 py::class_<T, std::shared_ptr<T>> value_class(py::module_& module, const char* name, const Extra&... extra) {
@@ -56,8 +63,10 @@ void bind_images(py::module_& module);
 void bind_geometry(py::module_& module);
 /// What nodes find: edges, shaft lines, figures, verdicts, landscapes.
 void bind_findings(py::module_& module);
-/// Items and OtherValue; to be called last.
+/// OtherValue.
 void bind_values(py::module_& module);
+/// Cost, Optimizer, OutlineProjector, RadiographProjector; after bind_values().
+void bind_functions(py::module_& module);
 /// What processes of nodes written in Python need.
 void bind_worker(py::module_& module);
 

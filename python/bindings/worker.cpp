@@ -99,8 +99,14 @@ void end_with(long parent) {
   }).detach();
 }
 
+TypeInfo type_named(const std::string& id) {
+  for (const FunctionClass& one : function_classes())
+    if (one.type.id == id) return one.type;
+  return conversion_of(id).type;
+}
+
 py::object type_description(const std::string& id) {
-  const TypeInfo type = id == TypeInfo::of<Cost>().id ? TypeInfo::of<Cost>() : conversion_of(id).type;
+  const TypeInfo type = type_named(id);
   py::dict made;
   made["id"] = type.id;
   made["version"] = type.version;

@@ -12,16 +12,21 @@ from . import nodes as _nodes
 from ._core import (
     Camera,
     Case,
+    Cost,
     EdgeMap,
     Image,
     Landmarks,
     Landscape,
     Mesh,
     Metrics,
+    Minimum,
+    Optimizer,
     OtherValue,
+    OutlineProjector,
     Picture,
     Pose,
     Profile,
+    RadiographProjector,
     Scene,
     Seeds,
     ShaftLines,
@@ -50,12 +55,13 @@ from .annotations import (
 )
 from .comparison import Comparison, compare
 from .context import Context
-from .declaration import cost
+from .declaration import cost, projector
 from .errors import Error, Fault, PipelineError, RunError
 from .items import Items
 from .nodes import Kind, Node, node
 from .pages import show
 from .pipeline import Pipeline
+from .problem import BudgetSpent, Problem
 from .result import NodeReport, Result
 from .tables import Table
 

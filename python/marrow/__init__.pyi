@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
 from ._core import Camera as Camera
 from ._core import Case as Case
+from ._core import Cost as Cost
 from ._core import EdgeMap as EdgeMap
 from ._core import Image as Image
 from ._core import Landmarks as Landmarks
 from ._core import Landscape as Landscape
 from ._core import Mesh as Mesh
 from ._core import Metrics as Metrics
+from ._core import Minimum as Minimum
+from ._core import Optimizer as Optimizer
 from ._core import OtherValue as OtherValue
+from ._core import OutlineProjector as OutlineProjector
 from ._core import Picture as Picture
 from ._core import Pose as Pose
 from ._core import Profile as Profile
+from ._core import RadiographProjector as RadiographProjector
 from ._core import Scene as Scene
 from ._core import Seeds as Seeds
 from ._core import ShaftLines as ShaftLines
@@ -38,6 +43,7 @@ from .comparison import Comparison as Comparison
 from .comparison import compare as compare
 from .context import Context as Context
 from .declaration import cost as cost
+from .declaration import projector as projector
 from .errors import Error as Error
 from .errors import Fault as Fault
 from .errors import PipelineError as PipelineError
@@ -46,6 +52,8 @@ from .items import Items as Items
 from .nodes import *
 from .pages import show as show
 from .pipeline import Pipeline as Pipeline
+from .problem import BudgetSpent as BudgetSpent
+from .problem import Problem as Problem
 from .result import NodeReport as NodeReport
 from .result import Result as Result
 from .tables import Table as Table

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-from typing import Any, Callable, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union, overload
 
 import numpy
 import numpy.typing
@@ -251,6 +251,43 @@ class Case:
 class OtherValue:
     @property
     def type(self) -> str: ...
+
+_Pose = Union[Pose, ArrayLike]
+
+class Cost(OtherValue):
+    @overload
+    def __call__(self, poses: Pose) -> float: ...
+    @overload
+    def __call__(self, poses: Union[ArrayLike, Sequence[_Pose], Mapping[str, _Pose]]) -> Any: ...
+
+class RadiographProjector(OtherValue):
+    def __call__(self, camera: Union[Camera, View], pose: _Pose, *, step_px: float = 1) -> Array: ...
+
+class OutlineProjector(OtherValue):
+    def __call__(self, camera: Union[Camera, View], pose: _Pose, *, spacing_px: float = 1) -> Array: ...
+
+class Minimum:
+    @property
+    def x(self) -> Array: ...
+    @property
+    def value(self) -> float: ...
+    @property
+    def evaluations(self) -> int: ...
+    @property
+    def stopped_because(self) -> str: ...
+
+class Optimizer(OtherValue):
+    def minimise(
+        self,
+        function: Callable[[Array], float],
+        start: ArrayLike,
+        initial_step: ArrayLike,
+        *,
+        lower: Optional[ArrayLike] = None,
+        upper: Optional[ArrayLike] = None,
+        max_evaluations: int = 1000,
+        step_tolerance: float = 1e-4,
+    ) -> Minimum: ...
 
 class ReadPipeline:
     @property

@@ -10,6 +10,7 @@ from .annotations import Note
 from .context import Context
 from .errors import Error
 from .items import Items
+from .problem import Problem
 
 _UNITS = {"mm": "mm", "deg": "deg", "rad": "rad", "px": "px", "s": "s", "hu": "HU", "kev": "keV", "percent": "%"}
 _OPTIONS = {bool: "boolean", int: "integer", float: "number", str: "text", pathlib.Path: "path"}
@@ -30,6 +31,8 @@ class Declaration:
         self.inputs: List[str] = []  # names of the function's parameters, in the order of the ports
         self.options: List[Tuple[str, type]] = []  # and of its options
         self.context: Optional[str] = None
+        self.problem: Optional[str] = None  # the parameter of an optimizer that gets the problem
+        self.makes = ""  # the type of the function that it makes; empty if it makes data
         self.of_one: bool = True  # whether what the function returns is the only output
 
 
@@ -41,19 +44,23 @@ def declared(
     relations: Any = (),
     seconds: float = _SECONDS,
     memory_mb: float = _MEMORY_MB,
-    is_cost: bool = False,
+    makes: str = "",
 ) -> Decorator:
-    """The decorator of a node, or of a cost if `is_cost`. The function stays as it is."""
+    """The decorator of a node; `makes` is the type of the function that it makes, if any. The function stays as it
+    is."""
 
     def declare(function: Callable[..., Any]) -> Callable[..., Any]:
         manifest = {"name": name, "summary": summary, "random": bool(random), "inputs": [], "outputs": []}
         manifest.update(options=[], relations=list(relations), traits=list(traits))
         made = Declaration(function, manifest, {"seconds": float(seconds), "memory_mb": float(memory_mb)})
+        made.makes = makes
         hints = typing.get_type_hints(function, include_extras=True)
         for parameter in inspect.signature(function).parameters.values():
             _add_parameter(made, parameter, hints.get(parameter.name))
-        if is_cost:
-            kind = _core.type_description("cost")
+        if (makes == "optimizer") != (made.problem is not None):
+            raise Error("%s: an optimizer, and nothing else, has a parameter 'problem: marrow.Problem'" % name)
+        if makes:
+            kind = _core.type_description(makes)
             manifest["outputs"] = [{"name": "", "help": "", "type": kind, "optional": False, "axis": ""}]
         else:
             _add_outputs(made, hints.get("return"))
@@ -75,7 +82,40 @@ def cost(
     """Declares a function as a node that makes a cost: @marrow.cost("similarity.mine", summary="..."). The function
     gets the node's inputs and options, and returns another one: from an array of poses [N, 4, 4] (world from model, mm)
     to their N costs. Smaller is better, and each must be finite. `seconds` limits one batch of poses."""
-    return declared(name, summary, False, traits, relations, seconds, memory_mb, True)
+    return declared(name, summary, False, traits, relations, seconds, memory_mb, "cost")
+
+
+def optimizer(
+    name: str,
+    *,
+    summary: str,
+    traits: Any = (),
+    relations: Any = (),
+    seconds: float = _SECONDS,
+    memory_mb: float = _MEMORY_MB
+) -> Decorator:
+    """Declares a function as a node that makes an optimizer: @marrow.optimizer("optimizer.mine", summary="..."). The
+    function itself minimises: it gets `problem: marrow.Problem` and the node's options, asks for values by
+    problem(points), and returns in words why it ended. The result is the best point that it asked for. `seconds` limits
+    one minimisation, without the time that the values take."""
+    return declared(name, summary, False, traits, relations, seconds, memory_mb, "optimizer")
+
+
+def projector(
+    name: str,
+    *,
+    summary: str,
+    traits: Any = (),
+    relations: Any = (),
+    seconds: float = _SECONDS,
+    memory_mb: float = _MEMORY_MB
+) -> Decorator:
+    """Declares a function as a node that makes a projector of radiographs: @marrow.projector("project.mine",
+    summary="..."). The function gets the node's inputs and options, and returns two things: a function
+    draw(camera, pose, pixels) from a marrow.Camera, a 4 x 4 pose (world from model, mm) and pixels [N, 2] (u, v) to N
+    line integrals in mm of water; and the corners [N, 3] of a box that holds the whole model, in its frame, in mm.
+    `seconds` limits one radiograph."""
+    return declared(name, summary, False, traits, relations, seconds, memory_mb, "radiograph_projector")
 
 
 def nodes_of(module: Any) -> List[Declaration]:
@@ -151,6 +191,9 @@ def _add_parameter(made: Declaration, parameter: inspect.Parameter, hint: Any) -
     if _split(hint)[0] is Context:
         made.context = parameter.name
         return
+    if _split(hint)[0] is Problem:
+        made.problem = parameter.name
+        return
     name = parameter.name[:-1] if parameter.name.endswith("_") else parameter.name  # from_ is the port "from"
     if parameter.kind is inspect.Parameter.KEYWORD_ONLY:
         option, kind = _option("option '%s' of %s" % (name, made.manifest["name"]), name, parameter.default, hint)
@@ -215,4 +258,4 @@ def _add_outputs(made: Declaration, hint: Any) -> None:
         made.manifest["outputs"].append(_port(what, own, kind, True))
 
 
-__all__ = ["Context", "Declaration", "Note", "completed", "cost", "declared", "nodes_of"]
+__all__ = ["Context", "Declaration", "Note", "completed", "cost", "declared", "nodes_of", "optimizer", "projector"]

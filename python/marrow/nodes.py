@@ -6,7 +6,7 @@ import keyword
 import os
 from typing import Any, Dict, List, Optional, Tuple
 
-from . import _core, texts
+from . import _core, declaration, texts
 from .declaration import declared
 from .errors import Error, Fault, PipelineError
 from .pipeline import checked_pipeline, natural
@@ -101,6 +101,13 @@ class Kind:
         return "<marrow kind %s: %s>" % (self._name, ", ".join(self.__dir__()))
 
 
+class Optimizers(Kind):
+    """The nodes of the kind `optimizer`, and the decorator of a new one: @marrow.optimizer("optimizer.mine", ...)."""
+
+    def __call__(self, name: str, **arguments: Any) -> Any:
+        return declaration.optimizer(name, **arguments)
+
+
 def node(name: str, *, summary: Optional[str] = None, **declaration: Any) -> Any:
     """The node of this name, as "edges.canny". Raises marrow.Error if no plugin has it.
 
@@ -116,6 +123,8 @@ def node(name: str, *, summary: Optional[str] = None, **declaration: Any) -> Any
 
 
 def __getattr__(name: str) -> Kind:
+    if name == "optimizer":
+        return Optimizers(name)
     if name.startswith("__") or name not in _core.kind_names():  # an import asks for __path__
         hint = "" if name.startswith("_") else "; " + _core.suggestion(name, _core.kind_names())
         raise AttributeError("marrow has no attribute or kind of nodes '%s'%s" % (name, hint))

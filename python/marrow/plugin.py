@@ -14,11 +14,11 @@ import sys
 import threading
 import traceback
 from types import FrameType, ModuleType
-from typing import Any, Callable, Dict, List, Optional
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import numpy
 
-from . import _core
+from . import _core, functions
 from .context import Context
 from .declaration import Declaration, completed, nodes_of
 from .errors import Error
@@ -26,8 +26,8 @@ from .items import Items
 from .modules import import_from_source, loaded_files
 
 _MADE = 3  # the descriptor through which values are handed over
+_REPLIES = 4  # the descriptor from which the replies to questions are read
 _MODULE = "marrow_python_nodes"
-_MOST_COSTS = 8  # that are kept; others are made again
 
 
 class Process:
@@ -36,7 +36,8 @@ class Process:
         self.say = say
         self.nodes: Optional[Dict[str, Declaration]] = None
         self.inputs: Dict[int, Any] = {}  # by the number of their memory
-        self.costs: Dict[int, Any] = {}  # by their own number
+        self.functions = functions.Functions()
+        self.replies: Any = None
         self.made: Optional[Any] = None
         self.files: List[str] = []
         self.modules = 0
@@ -78,32 +79,59 @@ class Process:
         self.made.hand_over(_MADE, True)
         return {"files": self._new_files()}
 
+    def make(self, request: Dict[str, Any]) -> Any:
+        """Makes a function, so that what is wrong with its inputs is said before it is needed."""
+        node, made = self._function(request)
+        return dict(functions.said_of(node, made), files=self._new_files())
+
     def cost(self, request: Dict[str, Any]) -> Any:
-        """The costs of a batch of poses. The cost itself is made when it is first asked for."""
-        node, number = self.load()[request["node"]], request["cost"]
-        if number not in self.costs:
-            while len(self.costs) >= _MOST_COSTS:
-                self.costs.pop(next(iter(self.costs)))
-            arguments = self._arguments(node, request)
-            if node.context is not None:
-                arguments[node.context] = Context(None, self.say)
-            self.costs[number] = node.function(**arguments)
-        poses = numpy.zeros((len(request["poses"]) // 12, 4, 4))
-        poses[:, :3] = numpy.reshape(request["poses"], (-1, 3, 4))
-        poses[:, 3, 3] = 1
-        values = numpy.asarray(self.costs[number](poses), float)
-        if values.shape != (len(poses),):
-            shape = " x ".join(map(str, values.shape)) or "one number"
-            raise Error("%s: expected %d costs, got %s" % (request["node"], len(poses), shape))
-        if not numpy.isfinite(values).all():
-            raise Error(
-                "%s: a cost is not finite; give the worst value where nothing can be compared" % request["node"]
-            )
-        return {"values": values.tolist(), "files": self._new_files()}
+        values = functions.costs(*self._function(request), request)
+        return {"values": values, "files": self._new_files()}
+
+    def radiograph(self, request: Dict[str, Any]) -> Any:
+        image = functions.radiograph(*self._function(request), request)
+        self.made = _core.Made([(image, "radiograph", "image", "")])
+        self.made.hand_over(_MADE, True)
+        return {"files": self._new_files()}
+
+    def minimise(self, request: Dict[str, Any]) -> Any:
+        node = self.load()[request["node"]]
+        self.context = Context(None, self.say)
+        try:
+            reason = functions.minimum(node, self._all_arguments(node, request), request, self._ask_back)
+        finally:
+            self.context = None
+        return {"stopped_because": reason, "files": self._new_files()}
 
     def share(self, request: Dict[str, Any]) -> Any:
         assert self.made is not None
         return self.made.hand_over(_MADE, False)
+
+    def _function(self, request: Dict[str, Any]) -> Tuple[Declaration, Any]:
+        """The node and the function that it makes. It is made when it is first asked for."""
+        node = self.load()[request["node"]]
+        made = self.functions.get(
+            request["function"], node, lambda: node.function(**self._all_arguments(node, request))
+        )
+        return node, made
+
+    def _all_arguments(self, node: Declaration, request: Dict[str, Any]) -> Dict[str, Any]:
+        arguments = self._arguments(node, request)
+        if node.context is not None:
+            arguments[node.context] = self.context or Context(None, self.say)
+        return arguments
+
+    def _ask_back(self, points: Any) -> Any:
+        """The values of a function of the process that gave the job. The time that they take does not count."""
+        self.say({"say": "waiting"})
+        self.say({"say": "ask", "points": points.ravel().tolist()})
+        if self.replies is None:
+            self.replies = open(_REPLIES, "rb", closefd=False)
+        line = self.replies.readline()
+        if not line:
+            os._exit(1)  # nobody waits any more
+        self.say({"say": "goes on"})
+        return numpy.array(json.loads(line), float)  # null, for what is not finite, becomes NaN
 
     def _arguments(self, node: Declaration, request: Dict[str, Any]) -> Dict[str, Any]:
         self.inputs = {number: self.inputs[number] for number in request["kept"] if number in self.inputs}
@@ -201,14 +229,15 @@ class Answers:
 def answer(process: Process, request: Dict[str, Any], answers: Answers) -> Dict[str, Any]:
     try:
         tasks = {"describe": process.describe, "load": process.limits, "call": process.call}
-        tasks.update({"share": process.share, "cost": process.cost})
+        tasks.update({"share": process.share, "make": process.make, "cost": process.cost})
+        tasks.update({"radiograph": process.radiograph, "minimise": process.minimise})
         return {"end": tasks[request["do"]](request)}
     except MemoryError:
         return {"failed": "out of memory", "out_of_memory": True}
     except KeyboardInterrupt:
         return {"failed": "stopped"}
     except BaseException as error:  # also SystemExit: the process serves the next call
-        if request["do"] in ("call", "cost") and not isinstance(error, Error):
+        if request["do"] not in ("describe", "load", "share") and not isinstance(error, Error):
             answers.send({"say": "debug", "text": "".join(traceback.format_exception(type(error), error, None))})
         return {"failed": explained(error, process.file)}
 

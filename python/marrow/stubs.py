@@ -31,6 +31,10 @@ _VALUES = {
     "scene": "Scene",
     "landscape": "Landscape",
     "case": "Case",
+    "cost": "Cost",
+    "optimizer": "Optimizer",
+    "outline_projector": "OutlineProjector",
+    "radiograph_projector": "RadiographProjector",
 }
 _OPTIONS = {
     "boolean": "bool",
@@ -67,6 +71,21 @@ class Kind:
 
     def __getattr__(self, name: str) -> Node: ...
 
+class Optimizers(Kind):
+    """The nodes of the kind `optimizer`, and the decorator of a new one."""
+
+    def __call__(
+        self,
+        name: str,
+        *,
+        summary: str,
+        traits: Sequence[str] = ...,
+        relations: Sequence[Any] = ...,
+        seconds: float = ...,
+        memory_mb: float = ...,
+    ) -> Callable[[_T], _T]:
+        """Declares a function as a new optimizer."""
+
 @overload
 def node(name: str) -> Node:
     """The node of this name, as "edges.canny"."""
@@ -98,7 +117,8 @@ def stub() -> str:
     for kind, names in kinds.items():
         text += "".join(_node(_core.node_info(name)) for name in names)
         members = "".join("    %s: %s\n" % (name.split(".", 1)[1], _class_name(name)) for name in names)
-        text += "\nclass _%s(Kind):\n%s\n%s: _%s\n" % (_capitals(kind), members, kind, _capitals(kind))
+        base = "Optimizers" if kind == "optimizer" else "Kind"
+        text += "\nclass _%s(%s):\n%s\n%s: _%s\n" % (_capitals(kind), base, members, kind, _capitals(kind))
     return text
 
 

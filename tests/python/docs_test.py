@@ -8,6 +8,7 @@ import json
 import os
 import re
 
+import numpy
 from package import BUILD, SOURCE, Case, main, marrow, small_case
 
 HAS_PANDAS = importlib.util.find_spec("pandas") is not None
@@ -35,6 +36,14 @@ class Documents(Case):
         self.assertIn("edges hihg 'edges.adaptive_relaxation' has no option 'hihg'", said.getvalue())
         self.assertIn("Help on Node", said.getvalue())
         self.assertEqual(len(names["bright"](names["view"])), 512 * 512, "the function of a node is a plain function")
+        problem = marrow.Problem(lambda points: (points**2).sum(axis=1), [3, -2], [1, 1])
+        self.assertEqual(names["crosses"](problem), "the steps are short")
+        self.assertLess(problem.least, 1e-6)
+        away = numpy.eye(4)
+        away[2, 3] = 600
+        camera = marrow.Camera(64, 64, [[1000, 0, 31.5], [0, 1000, 31.5], [0, 0, 1]], away)
+        self.assertAlmostEqual(names["ball"]()[0](camera, numpy.eye(4), numpy.array([[31.5, 31.5]]))[0], 40, delta=1e-6)
+        self.assertEqual(names["ball"]()[1].shape, (8, 3))
         comparison = names["c"]
         self.assertEqual(len(comparison.cells), 4)
         self.assertEqual({row["variant"] for row in comparison.cells}, {"adaptive_relaxation", "canny"})

@@ -17,6 +17,8 @@ def near(
 ):
     made.append(1)
     assert list(views) == ["frontal"]
+    if answer == "refuse":
+        raise marrow.Error("the views show no bone; take others")
 
     def costs(poses):
         assert poses.shape[1:] == (4, 4) and (poses[:, 3] == [0, 0, 0, 1]).all()
@@ -60,6 +62,11 @@ class Costs(Written):
         for _ in range(3):
             profiles = marrow.evaluate.landscape(cost, marrow.Pose(numpy.eye(4))).profiles
             self.assertLess(max(profile.costs.max() for profile in profiles), 1e4, "1e6 for each further one")
+
+    def test_what_is_wrong_with_its_inputs_is_said_when_it_is_made(self):
+        self.plugin(COST)
+        with self.assertRaisesRegex(marrow.RunError, "the views show no bone; take others"):
+            marrow.similarity.near([view()], answer="refuse")
 
     def test_an_optimizer_finds_the_least(self):
         self.plugin(COST)

@@ -14,6 +14,12 @@ USE = """import marrow
 edges = marrow.edges.canny(marrow.View([[1]], marrow.Camera(1, 1, [[1]], [[1]])), high=5)
 marrow.edges.canny.using(threads=2)
 print(marrow.Pipeline("a.yaml", case="b").run(only=["pose"])["pose"], edges)
+print(marrow.optimizer.nelder_mead().minimise(lambda x: float(x @ x), [1], [1]).x)
+
+@marrow.optimizer("optimizer.mine", summary="mine")
+def mine(problem: marrow.Problem, *, factor: float = 0.5) -> str:
+    problem(problem.start)
+    return "no reason"
 """
 MISTAKES = """import marrow
 marrow.edges.canny(5)

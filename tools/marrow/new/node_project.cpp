@@ -65,21 +65,12 @@ std::string node_at(const std::string& pipeline, const std::string& place) {
   return pipeline.substr(begin, pipeline.find_first_of(",}\n", begin) - begin);
 }
 
-std::string without_python(const std::string& kind) {
-  std::string list;
-  for (const std::string& one : kinds_with_templates())
-    if (fs::exists(shared_files("nodes") / one / "python")) list += (list.empty() ? "" : ", ") + one;
-  return "nodes of the kind '" + kind +
-         "' make functions, for which there is no template in Python; there are some of " + list +
-         ". Leave out --python to make it in C++; docs/python.md says how a cost is written in Python";
-}
-
 /// A node that is to be made: its names, and what it replaces in the pipeline.
 struct NewNode {
   std::string name, kind, own, file, origin, place, before, link;
   fs::path from;  ///< the templates of its kind
 
-  NewNode(const std::string& wanted, bool in_python) : name(wanted) {
+  explicit NewNode(const std::string& wanted) : name(wanted) {
     const std::size_t dot = name.find('.');
     if (dot == std::string::npos) throw Error("new node '" + name + "': expected KIND.NAME, such as edges.mine");
     kind = name.substr(0, dot), own = name.substr(dot + 1), file = kind + "_" + own;
@@ -89,7 +80,6 @@ struct NewNode {
     if (catalogue.find(name)) throw Error("a node '" + name + "' exists already; choose another name");
     expect_template(kind, catalogue);
     from = shared_files("nodes") / kind;
-    if (in_python && !fs::exists(from / "python")) throw Error(without_python(kind));
     const YAML::Node about = parse_yaml(read_text_file(from / "template.yaml", kMostSourceBytes));
     origin = about["node"].as<std::string>(), place = about["place"].as<std::string>();
     for (const YAML::Node& library : about["link"]) link += (link.empty() ? " LINK " : " ") + library.as<std::string>();
@@ -116,7 +106,7 @@ struct NewNode {
 }  // namespace
 
 fs::path new_node(const std::string& name, const fs::path& folder) {
-  const NewNode node(name, false);
+  const NewNode node(name);
   Files files = node.files_from(shared_files("templates/node"));
   files[node.file + ".cpp"] = replaced(read_text_file(node.from / "node.cpp", kMostSourceBytes), {{node.origin, name}});
   files["test.cpp"] = replaced(read_text_file(node.from / "test.cpp", kMostSourceBytes),
@@ -125,7 +115,7 @@ fs::path new_node(const std::string& name, const fs::path& folder) {
 }
 
 fs::path new_python_node(const std::string& name, const fs::path& folder) {
-  const NewNode node(name, true);
+  const NewNode node(name);
   Files files = node.files_from(shared_files("templates/python-node"));
   const Replacements names{{"new_node_file", node.file},  // the longest is replaced first
                            {node.kind + ".new_node", name},

@@ -1,0 +1,215 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Optimizers written in Python: they run in a process, and ask back for the values of the function."""
+import os
+import signal
+import threading
+import time
+
+import numpy
+from package import main, marrow
+from written_nodes import Written, processes
+
+STEPS = """import time
+
+@marrow.optimizer("optimizer.steps", summary="steps along each axis", traits=["needs_start"], seconds=2)
+def steps(problem: marrow.Problem, *, does: Annotated[str, "what it does"] = "steps") -> str:
+    if does == "nothing":
+        return "it is of no use"
+    if does == "silent":
+        problem(problem.start)
+        return None
+    if does == "raise":
+        problem(problem.start)
+        raise ValueError("no way down")
+    if does == "nan":
+        problem(problem.start * numpy.nan)
+    if does == "other size":
+        problem([1.0])
+    if does == "hang":
+        problem(problem.start)
+        time.sleep(60)
+    if does == "crash":
+        problem(problem.start)
+        import os
+        os.abort()
+    if does == "swallow":
+        while True:
+            try:
+                problem(problem.start)
+            except Exception:
+                pass
+    step = problem.initial_step
+    problem(problem.start)
+    while (step > problem.step_tolerance * problem.initial_step).any():
+        around = numpy.vstack([problem.best + numpy.diag(step), problem.best - numpy.diag(step)])
+        before = problem.least
+        problem(around)
+        if problem.least >= before:
+            step = step / 2
+    return "the steps are short"
+"""
+
+
+def bowl(x):
+    return float((x[0] - 1) ** 2 + 2 * (x[1] + 2) ** 2 + 3)
+
+
+class Optimizers(Written):
+    def setUp(self):
+        super().setUp()
+        self.file = self.plugin(STEPS)
+
+    def minimise(self, function=bowl, does="steps", **limits):
+        return marrow.optimizer.steps(does=does).minimise(function, [0, 0], [0.5, 0.5], **limits)
+
+    def test_it_is_described_as_an_optimizer(self):
+        info = marrow._core.node_info("optimizer.steps")
+        self.assertEqual([(port["name"], port["type"]) for port in info["outputs"]], [("optimizer", "optimizer")])
+        self.assertEqual([option["name"] for option in info["options"]], ["does"])
+        self.assertEqual(info["inputs"], [])
+
+    def test_it_finds_the_least(self):
+        asked = []
+
+        def noted(x):
+            asked.append(tuple(x))
+            return bowl(x)
+
+        found = self.minimise(noted)
+        self.assertLess(numpy.abs(found.x - [1, -2]).max(), 1e-3)
+        self.assertEqual(found.value, bowl(found.x))
+        self.assertEqual((found.evaluations, found.stopped_because), (len(asked), "the steps are short"))
+        self.assertIn(tuple(found.x), asked, "a number is the same on both sides")
+        self.assertEqual(asked[:3], [(0, 0), (0.5, 0), (0, 0.5)])
+
+    def test_the_budget_ends_it(self):
+        found = self.minimise(max_evaluations=7)
+        self.assertEqual((found.evaluations, found.stopped_because), (7, "the budget of 7 evaluations is spent"))
+
+    def test_bounds(self):
+        asked = []
+        found = self.minimise(lambda x: asked.append(x) or bowl(x), lower=[-5, -1], upper=[0.25, 5])
+        self.assertLess(numpy.abs(found.x - [0.25, -1]).max(), 1e-3)
+        self.assertGreaterEqual(numpy.array(asked)[:, 1].min(), -1)
+        self.assertLessEqual(numpy.array(asked)[:, 0].max(), 0.25)
+
+    def test_values_that_are_not_finite_are_the_worst(self):
+        found = self.minimise(lambda x: numpy.nan if x[0] > 0.7 else bowl(x))
+        self.assertLess(numpy.abs(found.x - [0.7, -2]).max(), 1e-3)
+
+    def test_it_registers_with_a_cost(self):
+        self.plugin(
+            """
+@marrow.cost("similarity.near", summary="how far the model is from a place")
+def near():
+    return lambda poses: numpy.square(poses[:, :3, 3] - 3).sum(axis=1) + 1000 * numpy.square(
+        poses[:, :3, :3] - numpy.eye(3)).sum(axis=(1, 2))
+""",
+            "costs.py",
+        )
+        found = marrow.register.multiresolution(
+            cost=marrow.similarity.near(), optimizer=marrow.optimizer.steps(), initial=marrow.Pose(numpy.eye(4))
+        )
+        self.assertLess(numpy.abs(found.pose.matrix[:3, 3] - 3).max(), 0.1)
+
+    def test_what_the_function_raises_is_raised_and_the_next_call_works(self):
+        def broken(x):
+            if x[0] > 0:
+                raise ValueError("no value here")
+            return bowl(x)
+
+        with self.assertRaisesRegex(ValueError, "no value here"):
+            self.minimise(broken)
+        self.assertEqual(self.minimise().stopped_because, "the steps are short")
+
+    def test_an_optimizer_that_swallows_all_exceptions_is_ended(self):
+        def broken(x):
+            raise ValueError("no value here")
+
+        begun = time.monotonic()
+        with self.assertRaisesRegex(ValueError, "no value here"):
+            self.minimise(broken, does="swallow")
+        self.assertLess(time.monotonic() - begun, 10)
+        self.assertEqual(processes(self.file), [])
+
+    def test_what_it_may_not_do(self):
+        for does, text in (
+            ("nothing", r"optimizer.steps: it asked for no value of the function; call problem\(points\)"),
+            ("silent", "optimizer.steps: it returned None; return in words why it ended"),
+            ("raise", "mine.py, line [0-9]+, in steps: ValueError: no way down"),
+            ("nan", "the optimizer asked for the value of a point that is not finite"),
+            ("other size", r"expected points of 2 numbers, \[N, 2\] or \[2\], got 1"),
+            ("hang", r"took longer than 2 s, and .* give it more in @marrow.optimizer\(..., seconds=...\)"),
+            ("crash", r"mine.py crashed its process \(Aborted\)"),
+        ):
+            with self.subTest(does), self.assertRaisesRegex(marrow.Error, text):
+                self.minimise(does=does)
+        with self.assertRaisesRegex(marrow.Error, "one positive initial step per coordinate"):
+            marrow.optimizer.steps().minimise(bowl, [0, 0], [1])
+
+    def test_the_time_of_the_function_does_not_count(self):
+        asked = []
+
+        def slow(x):
+            asked.append(x)
+            time.sleep(3 if len(asked) == 1 else 0)  # longer than the optimizer may take
+            return bowl(x)
+
+        self.assertEqual(self.minimise(slow).stopped_because, "the steps are short")
+
+    def test_ctrl_c(self):
+        threading.Timer(0.5, os.kill, (os.getpid(), signal.SIGINT)).start()
+        begun = time.monotonic()
+        with self.assertRaises(KeyboardInterrupt):
+            self.minimise(lambda x: time.sleep(0.1) or numpy.random.default_rng().random())
+        self.assertLess(time.monotonic() - begun, 10)
+
+    def test_threads_have_processes_of_their_own(self):
+        optimizer = marrow.optimizer.steps()
+        found = [None] * 3
+
+        def work(i):
+            found[i] = optimizer.minimise(bowl, [0, 0], [0.5, 0.5]).x.tolist()
+
+        threads = [threading.Thread(target=work, args=(i,)) for i in range(3)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        self.assertEqual(found, [self.minimise().x.tolist()] * 3)
+
+    def test_a_declaration_without_a_problem(self):
+        self.plugin('@marrow.optimizer("optimizer.none", summary="none")\ndef none() -> str: ...\n', "none.py")
+        self.assertIn(
+            "optimizer.none: an optimizer, and nothing else, has a parameter 'problem: marrow.Problem'",
+            self.program("doctor", code=1).replace("\n", " "),
+        )
+
+
+class Problems(Written):
+    def test_it_can_be_made_for_tests(self):
+        problem = marrow.Problem(lambda points: (points**2).sum(axis=1), [1, 2], [1, 1], max_evaluations=4)
+        self.assertEqual(problem([1, 0]), 1)
+        self.assertEqual(problem([[1, 1], [0, 2]]).tolist(), [2, 4])
+        self.assertEqual((problem.best.tolist(), problem.least, problem.left), ([1, 0], 1, 1))
+        self.assertEqual((problem.lower.tolist(), problem.upper.tolist()), ([-numpy.inf] * 2, [numpy.inf] * 2))
+        with self.assertRaisesRegex(marrow.BudgetSpent, "the budget of 4 evaluations is spent"):
+            problem([[0, 0], [3, 3]])
+        self.assertEqual((problem.best.tolist(), problem.evaluations), ([0, 0], 4))
+
+    def test_what_it_refuses(self):
+        for arguments, limits, text in (
+            (([1], [0]), {}, "one positive initial step per coordinate"),
+            (([numpy.nan], [1]), {}, "one positive initial step per coordinate"),
+            (([1], [1]), {"lower": [1, 2]}, "bounds for 2 of 1 coordinates"),
+            (([1], [1]), {"upper": [0]}, "the optimizer's start lies outside the bounds"),
+            (([1], [1]), {"max_evaluations": 0}, "at least one evaluation, got max_evaluations = 0"),
+        ):
+            with self.subTest(text), self.assertRaisesRegex(marrow.Error, text):
+                marrow.Problem(lambda points: points[:, 0], *arguments, **limits)
+        with self.assertRaisesRegex(marrow.Error, "the function gave 2 x 1 for 2 points"):
+            marrow.Problem(lambda points: points, [0], [1])([[0], [1]])
+
+
+if __name__ == "__main__":
+    main()
