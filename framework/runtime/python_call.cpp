@@ -88,7 +88,10 @@ WorkerEnd wait_for(PythonProcess& process, const WorkerLimits& limits, Context& 
     }
     pollfd polled{worker.descriptor(), POLLIN, 0};
     poll(&polled, 1, 20);
-    if (auto end = worker.take(said)) return *end;
+    if (auto end = worker.take(said)) {
+      if (fault) std::rethrow_exception(fault);  // the process has ended, too
+      return *end;
+    }
     if (fault) continue;
     if (auto end = worker.check(limits)) return *end;
   }
