@@ -18,4 +18,21 @@ Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, co
   return motion;
 }
 
+Matrix6d change_of_frame(const FragmentFrame& from, const FragmentFrame& to) {
+  const Eigen::Vector3d arm = to.origin_mm - from.origin_mm;
+  Matrix6d change = Matrix6d::Zero();
+  change.topLeftCorner<3, 3>() = change.bottomRightCorner<3, 3>() = to.axes.transpose() * from.axes;
+  for (int i = 0; i < 3; ++i) change.block<3, 1>(3, i) = to.axes.transpose() * from.axes.col(i).cross(arm);
+  return change;
+}
+
+Pose in_frame(Pose pose, const FragmentFrame& frame) {
+  if (pose.covariance) {
+    const Matrix6d change = change_of_frame(pose.frame, frame);
+    pose.covariance = change * *pose.covariance * change.transpose();
+  }
+  pose.frame = frame;
+  return pose;
+}
+
 }  // namespace marrow

@@ -16,20 +16,6 @@ struct Options {
   int points = 500;
 };
 
-/// Converts the covariance of a small motion (r, t) to another origin and other axes: r becomes to^T (from r), and t
-/// becomes to^T (from t + (from r) x (to's origin - from's origin)).
-marrow::Matrix6d in_frame(const marrow::Matrix6d& covariance, const marrow::FragmentFrame& from,
-                          const marrow::FragmentFrame& to) {
-  const Eigen::Vector3d arm = to.origin_mm - from.origin_mm;
-  Eigen::Matrix3d cross;  // cross * v = v x arm
-  cross << 0, arm.z(), -arm.y(), -arm.z(), 0, arm.x(), arm.y(), -arm.x(), 0;
-  marrow::Matrix6d change = marrow::Matrix6d::Zero();
-  change.topLeftCorner<3, 3>() = to.axes.transpose() * from.axes;
-  change.bottomRightCorner<3, 3>() = change.topLeftCorner<3, 3>();
-  change.bottomLeftCorner<3, 3>() = to.axes.transpose() * cross * from.axes;
-  return change * covariance * change.transpose();
-}
-
 /// Standard deviation in the worst direction.
 double largest_deviation(const Eigen::Matrix3d& covariance) {
   return std::sqrt(std::max(0.0, marrow::eigen_of_symmetric(covariance).values[2]));
@@ -38,7 +24,7 @@ double largest_deviation(const Eigen::Matrix3d& covariance) {
 void add_predictions(const marrow::Pose& pose, const marrow::FragmentFrame& frame, marrow::Metrics& metrics) {
   // If the images do not determine a direction at all, its deviation is infinite. Then no prediction is given.
   if (!pose.covariance || !pose.covariance->allFinite()) return;
-  const marrow::Matrix6d covariance = in_frame(*pose.covariance, pose.frame, frame);
+  const marrow::Matrix6d covariance = *marrow::in_frame(pose, frame).covariance;
   const auto deviation = [&](int i) { return std::sqrt(std::max(0.0, covariance(i, i))); };
   metrics.items.push_back({"predicted_frontal_deg", degrees(deviation(0)), "deg"});
   metrics.items.push_back({"predicted_lateral_deg", degrees(deviation(1)), "deg"});

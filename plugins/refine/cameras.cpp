@@ -135,15 +135,11 @@ class Refinement {
   Matrix6d covariance_of_pose(std::size_t bone) const { return covariance_.block<6, 6>(at_pose(bone), at_pose(bone)); }
   /// Of the bone's small motion relative to the first bone: what both are off by in common does not count.
   Matrix6d covariance_beside_first(std::size_t bone) const {
-    const auto axes_of = [&](std::size_t f) -> Eigen::Matrix3d {
-      return state_.poses[f].rotation * poses_[f].frame.axes;
+    const auto frame_of = [&](std::size_t f) -> FragmentFrame {
+      return {state_.poses[f] * poses_[f].frame.origin_mm, state_.poses[f].rotation * poses_[f].frame.axes};
     };
-    const Eigen::Matrix3d to_bone = axes_of(bone).transpose(), axes = axes_of(0);
-    const Eigen::Vector3d arm =
-        state_.poses[bone] * poses_[bone].frame.origin_mm - state_.poses[0] * poses_[0].frame.origin_mm;
-    Matrix6d change = Matrix6d::Zero();  // the first bone's motion, as one of this bone
-    change.topLeftCorner<3, 3>() = change.bottomRightCorner<3, 3>() = to_bone * axes;
-    for (int i = 0; i < 3; ++i) change.block<3, 1>(3, i) = to_bone * axes.col(i).cross(arm) * radians(1);
+    Matrix6d change = change_of_frame(frame_of(0), frame_of(bone));  // the first bone's motion, as one of this bone
+    change.bottomLeftCorner<3, 3>() *= radians(1);                   // rotations are in degrees here
     const Matrix6d both = covariance_.block<6, 6>(at_pose(bone), at_pose(0)) * change.transpose();
     return covariance_of_pose(bone) - both - both.transpose() + change * covariance_of_pose(0) * change.transpose();
   }

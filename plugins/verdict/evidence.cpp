@@ -34,6 +34,10 @@ constexpr const char* kThirdView = "a third view, from a direction between the o
 constexpr const char* kAxial = "a third view, or a landmark off the long axis";
 constexpr const char* kLook = "a look at the overlay of each view: is this the bone, the side and the camera?";
 constexpr const char* kStart = "a start nearer to the bone, by hand or by landmarks";
+constexpr const char* kGiven =
+    "a check of what was given: the bone, the side, which image belongs to which camera, the signs of its angles";
+constexpr const char* kKnownCameras =
+    "cameras that are known better, by a calibration; then give refine.cameras smaller rotation_deg and shift_mm";
 constexpr const char* kCameras = "a check of the cameras' calibration (camera.check), or refine.cameras";
 constexpr Words kWords[] = {
     {"decoys_scatter", "the cost of random poses scatters by %.2f of what they lie above this pose", kStart},
@@ -79,10 +83,23 @@ void add_predicted(const Pose& pose, const Mesh& mesh, Evidence& evidence) {
 }
 
 /// The share of the errors that the pose's own covariance stands for, and that are off.
-double predicted_failure(const Pose& pose, const Mesh& mesh) {
+double predicted_failure(const Pose& pose, const verdicts::Spread& spread) {
   if (!pose.covariance) return 0;
   if (!pose.covariance->allFinite()) return 1;
-  return double(verdicts::spread_of(pose, mesh).off) / verdicts::Spread::kDraws;
+  return double(spread.off) / verdicts::Spread::kDraws;
+}
+
+/// What the pose's own covariance leaves open. After refine.cameras it counts with the cameras, too.
+void explain_predicted(const verdicts::Spread& spread, double predicted, bool is_refined, Verdict& verdict) {
+  if (is_refined) {
+    verdict.reasons.push_back("with what is not known about the cameras, the bone's surface is known to " +
+                              filled("%.1f mm, and the rotation about the long axis to ", spread.mtre_mm) +
+                              filled("%.1f degrees", spread.axial_deg));
+    verdict.remedies.emplace_back(kKnownCameras);
+  } else {
+    verdict.reasons.push_back(filled("the predicted deviations allow a failure with a probability of %.2f", predicted));
+    verdict.remedies.emplace_back(kCameras);
+  }
 }
 
 Evidence gather(const Judged& judged, const Pose* contour_pose, const Pose& searched, const Cost& cost,
@@ -174,7 +191,9 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     return verdict;
   }
   const auto contributions = model.contributions(verdict.figures);
-  const double predicted = predicted_failure(pose, mesh);
+  const bool is_determined = pose.covariance && pose.covariance->allFinite();
+  const verdicts::Spread spread = is_determined ? verdicts::spread_of(pose, mesh) : verdicts::Spread();
+  const double predicted = predicted_failure(pose, spread);
   verdict.failure_probability = 1 - (1 - model.probability(contributions)) * (1 - predicted);
   verdict.judgement = verdict.failure_probability > model.wrong_above      ? Judgement::wrong
                       : verdict.failure_probability > model.doubtful_above ? Judgement::doubtful
@@ -183,10 +202,8 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     verdict.judgement = Judgement::doubtful;
     verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
   }
-  if (predicted > model.doubtful_above) {
-    verdict.reasons.push_back(filled("the predicted deviations allow a failure with a probability of %.2f", predicted));
-    verdict.remedies.emplace_back(kCameras);
-  }
+  if (verdict.judgement == Judgement::wrong) verdict.remedies.emplace_back(kGiven);
+  if (predicted > model.doubtful_above) explain_predicted(spread, predicted, &searched != &pose, verdict);
   explain(contributions, verdict);
   return verdict;
 }

@@ -180,7 +180,7 @@ class New(Case):
         )
         self.assertEqual(result.returncode, 2)
         self.assertIn(
-            "share/marrow/templates/case: it is not there, so this installation is not whole; install marrow " "again",
+            "share/marrow/templates/case: it is not there; install the package marrow-dev, or marrow as a whole",
             result.stderr,
         )
 

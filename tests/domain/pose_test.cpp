@@ -59,4 +59,31 @@ TEST(MotionBetween, RefusesPosesInDifferentFrames) {
             "points in 'table'");
 }
 
+// Rotated by r about the z axis through the origin, the point (10, 0, 0) moves by 10 r along y.
+TEST(Pose, ACovarianceInAnotherFrame) {
+  marrow::Pose pose;
+  pose.covariance.emplace(marrow::Matrix6d::Zero());
+  (*pose.covariance)(2, 2) = 1e-4;
+  (*pose.covariance)(4, 4) = 0.04;
+  Eigen::Matrix3d axes;  // the new frame's axes: y, -x, z
+  axes << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  const marrow::Pose other = marrow::in_frame(pose, {{10, 0, 0}, axes});
+  EXPECT_NEAR((*other.covariance)(2, 2), 1e-4, 1e-15);
+  EXPECT_NEAR((*other.covariance)(3, 3), 0.04 + 0.01, 1e-12);
+  EXPECT_NEAR((*other.covariance)(2, 3), 1e-3, 1e-12);
+  EXPECT_NEAR((*other.covariance)(4, 4), 0, 1e-15);
+  const marrow::Pose back = marrow::in_frame(other, pose.frame);
+  EXPECT_TRUE(back.covariance->isApprox(*pose.covariance, 1e-12));
+}
+
+TEST(Pose, ASmallMotionInAnotherFrame) {
+  const marrow::FragmentFrame from{{1, 2, 3}, marrow::rotation_from_vector({0.3, -0.2, 0.5})};
+  const marrow::FragmentFrame to{{-20, 40, 7}, marrow::rotation_from_vector({-0.7, 0.1, 0.4})};
+  marrow::Vector6d motion;
+  motion << 1e-6, -2e-6, 3e-6, 4e-5, -5e-5, 6e-5;
+  const marrow::RigidTransform start{"ct", "ct"};
+  const marrow::Vector6d expected = marrow::motion_between(start, marrow::moved(start, from, motion), to);
+  EXPECT_TRUE((marrow::change_of_frame(from, to) * motion).isApprox(expected, 1e-4));
+}
+
 }  // namespace pose_test

@@ -263,7 +263,9 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
     EXPECT_EQ(verdict.judgement, judgement);
     ASSERT_EQ(verdict.reasons.size(), 1u);
     EXPECT_EQ(verdict.reasons[0], "the registration gave 3 warnings");
-    EXPECT_EQ(verdict.remedies.size(), judgement == Judgement::trusted ? 0u : 1u);
+    EXPECT_EQ(verdict.remedies.size(), judgement == Judgement::trusted    ? 0u
+                                       : judgement == Judgement::doubtful ? 1u
+                                                                          : 2u);
   }
 }
 

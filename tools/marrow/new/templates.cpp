@@ -17,8 +17,7 @@ namespace marrow::cli {
 fs::path shared_files(const fs::path& below) {
   const fs::path folder = this_program().parent_path().parent_path() / "share/marrow" / below;
   if (!fs::exists(folder))
-    throw Error(printable(folder.string()) +
-                ": it is not there, so this installation is not whole; install marrow again");
+    throw Error(printable(folder.string()) + ": it is not there; install the package marrow-dev, or marrow as a whole");
   return folder;
 }
 

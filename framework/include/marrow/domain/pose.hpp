@@ -41,6 +41,13 @@ RigidTransform moved(const RigidTransform& world_from_model, const FragmentFrame
 /// The motion that leads from one pose to another. It is the inverse of moved(): to = moved(from, frame, motion).
 Vector6d motion_between(const RigidTransform& from, const RigidTransform& to, const FragmentFrame& frame);
 
+/// The matrix M that turns a small motion (r, t) in one frame into one in another: r' = to^T (from r), t' = to^T (from
+/// t + (from r) x (to's origin - from's origin)). A covariance C becomes M C M^T.
+Matrix6d change_of_frame(const FragmentFrame& from, const FragmentFrame& to);
+
+/// The same pose, with its covariance in another frame.
+Pose in_frame(Pose pose, const FragmentFrame& frame);
+
 /// The exact pose of a fragment, known for simulated data. It has its own type so that a pipeline can give it only to
 /// nodes of kinds that may see the truth, such as `evaluate` and `render`.
 struct Truth {

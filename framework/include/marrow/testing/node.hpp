@@ -32,6 +32,8 @@ marrow::Value list(const marrow::List<T>& items, const std::string& axis) {
 
 inline const marrow::NodeDefinition& definition_of(const std::string& node) {
   static const marrow::Catalogue catalogue;
+  if (!catalogue.find(node))
+    throw marrow::Error("there is no node '" + node + "'; is it built, and its folder in MARROW_PLUGIN_PATH?");
   return catalogue.load(node);
 }
 
