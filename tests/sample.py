@@ -11,8 +11,8 @@ SEED = os.environ.get("MARROW_TEST_SEED") or datetime.date.today().isoformat()
 def sample(trials, count, key=None):
     """At least `count` of the trials, in their order; all of them if MARROW_TEST_ALL is 1.
 
-    With `key`, at least one trial of each key is among them. The draw depends on MARROW_TEST_SEED, which is today's date
-    if it is not set, and on nothing else. It is printed, so that it can be repeated.
+    With `key`, at least one trial of each key is among them. The draw depends only on MARROW_TEST_SEED, by default
+    today's date, and is printed, so that it can be repeated.
     """
     trials = list(trials)
     if ALL or count >= len(trials):
