@@ -1,8 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A part of many trials that are alike, another part each day, for tests that would take minutes to try them all."""
+"""A part of many trials that are alike, another part each day, for tests that would take minutes to try them all.
+
+    sample.py COUNT TRIAL ...    prints the sample, one a line
+"""
 import datetime
 import os
 import random
+import sys
 
 ALL = os.environ.get("MARROW_TEST_ALL") == "1"
 SEED = os.environ.get("MARROW_TEST_SEED") or datetime.date.today().isoformat()
@@ -24,5 +28,9 @@ def sample(trials, count, key=None):
             met.add(key(trials[index]))
             chosen.append(index)
     chosen += [index for index in order if index not in set(chosen)][: max(0, count - len(chosen))]
-    print("a sample of %d of %d: MARROW_TEST_SEED=%s repeats it" % (len(chosen), len(trials), SEED), flush=True)
+    print("a sample of %d of %d: MARROW_TEST_SEED=%s repeats it" % (len(chosen), len(trials), SEED), file=sys.stderr)
     return [trials[index] for index in sorted(chosen)]
+
+
+if __name__ == "__main__":
+    print(*sample(sys.argv[2:], int(sys.argv[1])), sep="\n")
