@@ -17,6 +17,7 @@ SOURCE = pathlib.Path(sys.argv[1])
 BUILD = pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
 TEST_PLUGINS = BUILD / "tests" / "plugins"
+SHARED_CACHE = BUILD / "tests" / "store"  # of simulated cases, which are the same in many tests
 # A sanitizer makes everything several times slower and larger.
 IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left
