@@ -6,8 +6,11 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <deque>
 #include <stdexcept>
 #include <thread>
+
+#include "manifest.hpp"
 
 namespace marrow::conformance {
 namespace {
@@ -29,6 +32,60 @@ std::string keys_of(std::vector<Value>& values) {
   };
   for (Value& value : values) add(value);
   return text;
+}
+
+/// A value for each input of a node. Throws NotApplicable if there is none for a required one.
+std::vector<Value> values_for(const NodeInfo& node, const Inputs& inputs, const Inputs& further) {
+  std::vector<Value> values;
+  for (const PortInfo& port : node.inputs) {
+    const Value* found = inputs.find(port);
+    if (!found) found = further.find(port);
+    if (!found && !port.optional) throw NotApplicable("it needs the input '" + port.name + "'");
+    values.push_back(found ? *found : Value{});
+    values.back().type = port.type;
+  }
+  return values;
+}
+
+bool has_function(const Value& value) {
+  return value.type.is_function || std::any_of(value.items.begin(), value.items.end(), has_function);
+}
+
+/// What a call of a node depends on, as text. Empty if that cannot be told, because it takes or gives functions.
+std::string text_of_call(const NodeInfo& node, const std::map<std::string, OptionValue>& options,
+                         std::vector<Value>& inputs) {
+  const auto gives_function = [](const PortInfo& output) { return output.type.is_function; };
+  if (std::any_of(inputs.begin(), inputs.end(), has_function) ||
+      std::any_of(node.outputs.begin(), node.outputs.end(), gives_function))
+    return "";
+  std::string text = node.name + " " + keys_of(inputs);
+  for (const auto& [name, value] : options) text += name + ": " + json_of(value).dump() + " ";
+  return text;
+}
+
+/// The outputs of the last calls. Most checks of accuracy measure one figure of an output that other checks measure,
+/// too, and the call takes nearly all of the time. Checks run one after the other.
+class LastOutputs {
+ public:
+  const std::vector<Value>* find(const std::string& call) const {
+    for (const auto& [known, outputs] : last_)
+      if (known == call) return &outputs;
+    return nullptr;
+  }
+  const std::vector<Value>& keep(const std::string& call, std::vector<Value> outputs) {
+    constexpr std::size_t kMost = 4;
+    if (last_.size() == kMost) last_.pop_front();
+    last_.emplace_back(call, std::move(outputs));
+    return last_.back().second;
+  }
+
+ private:
+  std::deque<std::pair<std::string, std::vector<Value>>> last_;
+};
+
+LastOutputs& last_outputs() {
+  static LastOutputs outputs;
+  return outputs;
 }
 
 using Kept = std::shared_ptr<const Suite>;
@@ -142,14 +199,7 @@ bool Subject::has_trait(const std::string& name) const {
 }
 
 Result Subject::call(const Inputs& inputs, int threads) const {
-  std::vector<Value> values;
-  for (const PortInfo& port : node_.info.inputs) {
-    const Value* found = inputs.find(port);
-    if (!found) found = further_.find(port);
-    if (!found && !port.optional) throw NotApplicable("it needs the input '" + port.name + "'");
-    values.push_back(found ? *found : Value{});
-    values.back().type = port.type;
-  }
+  std::vector<Value> values = values_for(node_.info, inputs, further_);
   const std::shared_ptr<void> options = node_.make_options();
   for (std::size_t i = 0; i < node_.info.options.size(); ++i) {
     const OptionInfo& option = node_.info.options[i];
@@ -179,12 +229,19 @@ Subject Subject::with(const std::string& option, OptionValue value) const {
 }
 
 Value Subject::output(const Inputs& inputs, const std::string& port) const {
-  const Result result = call(inputs);
-  if (result.refusal) throw Failure("it refuses: " + *result.refusal);
+  std::vector<Value> values = values_for(node_.info, inputs, further_);
+  const std::string of_call = text_of_call(node_.info, options_, values);
+  const std::vector<Value>* outputs = of_call.empty() ? nullptr : last_outputs().find(of_call);
+  Result result;
+  if (!outputs) {
+    result = call(inputs);
+    if (result.refusal) throw Failure("it refuses: " + *result.refusal);
+    outputs = of_call.empty() ? &result.outputs : &last_outputs().keep(of_call, result.outputs);
+  }
   for (std::size_t i = 0; i < node_.info.outputs.size(); ++i)
     if (node_.info.outputs[i].name == port) {
-      expect(!result.outputs.at(i).is_absent(), "it gives no output '" + port + "'");
-      return result.outputs[i];
+      expect(!outputs->at(i).is_absent(), "it gives no output '" + port + "'");
+      return (*outputs)[i];
     }
   throw Failure("it has no output '" + port + "'");
 }

@@ -168,8 +168,8 @@ LibraryInfo library_info(const fs::path& file, const Digest& framework) {
   Hasher build_id;
   build_id.add(digest);
   build_id.add(framework);
-  for (const std::vector<LinkedLibrary>* libraries : {&framework_libraries(), &std::as_const(info.linked)})
-    for (const LinkedLibrary& library : *libraries) build_id.add(identity_of(library));
+  for (const Digest& identity : framework_identities()) build_id.add(identity);
+  for (const LinkedLibrary& library : std::as_const(info.linked)) build_id.add(identity_of(library));
   info.build_id = build_id.digest();
   return info;
 }

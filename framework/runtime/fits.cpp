@@ -6,6 +6,7 @@
 #include "contract.hpp"
 #include "marrow/domain/printable.hpp"
 #include "marrow/runtime/run_folder.hpp"
+#include "pipeline_trial.hpp"
 
 namespace marrow {
 namespace {
@@ -35,7 +36,7 @@ Fit fit_of(const std::string& name, const std::string& id, const std::filesystem
   PipelineArguments changed = arguments;
   changed.overrides.push_back({id + ".uses", name});
   Diagnostics faults;
-  const Pipeline pipeline = read_pipeline(file, changed, catalogue, faults, false);
+  const Pipeline pipeline = try_pipeline(file, changed, catalogue, faults);
   check_writers(pipeline, catalogue, faults);
   Fit fit{name, {}, {}};
   for (const PipelineNode& node : pipeline.nodes)

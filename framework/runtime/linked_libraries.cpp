@@ -176,6 +176,15 @@ Digest identity_of(const LinkedLibrary& library) {
   return identity;
 }
 
+const std::vector<Digest>& framework_identities() {
+  static const std::vector<Digest> identities = [] {
+    std::vector<Digest> found;
+    for (const LinkedLibrary& library : framework_libraries()) found.push_back(identity_of(library));
+    return found;
+  }();
+  return identities;
+}
+
 std::string found_before(const LinkedLibrary& library) {
   struct Found {
     std::string search_path;

@@ -18,6 +18,9 @@ const std::vector<LinkedLibrary>& framework_libraries();
 /// people build themselves, it includes the content. Throws Error if the file cannot be read.
 Digest identity_of(const LinkedLibrary& library);
 
+/// The identities of framework_libraries(). They are found out once: what this process has loaded stays as it is.
+const std::vector<Digest>& framework_identities();
+
 /// Another file in LD_LIBRARY_PATH that has the same name up to the version; empty if there is none. The loader may
 /// prefer that file.
 std::string found_before(const LinkedLibrary& library);

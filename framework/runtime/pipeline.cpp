@@ -19,6 +19,7 @@
 #include "pipeline_references.hpp"
 #include "pipeline_repetition.hpp"
 #include "pipeline_text.hpp"
+#include "pipeline_trial.hpp"
 
 namespace marrow {
 namespace {
@@ -314,14 +315,22 @@ class Resolver {
   std::vector<fs::path> files_;
 };
 
+Pipeline resolved(const WrittenPipeline& written, const Catalogue& catalogue, Diagnostics& diagnostics, bool is_trial) {
+  if (written.nodes.empty()) return {};
+  std::error_code ignored;
+  return Resolver(written, catalogue, diagnostics, is_trial).resolve({fs::weakly_canonical(written.file, ignored)});
+}
+
 }  // namespace
 
 Pipeline read_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
                        Diagnostics& diagnostics, bool inputs_required) {
-  const WrittenPipeline written = read_written_pipeline(file, arguments, diagnostics, inputs_required);
-  if (written.nodes.empty()) return {};
-  std::error_code ignored;
-  return Resolver(written, catalogue, diagnostics).resolve({fs::weakly_canonical(file, ignored)});
+  return resolved(read_written_pipeline(file, arguments, diagnostics, inputs_required), catalogue, diagnostics, false);
+}
+
+Pipeline try_pipeline(const fs::path& file, const PipelineArguments& arguments, const Catalogue& catalogue,
+                      Diagnostics& diagnostics) {
+  return resolved(read_written_pipeline(file, arguments, diagnostics, false), catalogue, diagnostics, true);
 }
 
 }  // namespace marrow

@@ -162,7 +162,7 @@ LibraryInfo python_file_info(const fs::path& file, const Digest& framework) {
   Hasher build_id;
   build_id.add(info.digest);
   build_id.add(framework);
-  for (const LinkedLibrary& library : framework_libraries()) build_id.add(identity_of(library));
+  for (const Digest& identity : framework_identities()) build_id.add(identity);
   info.build_id = build_id.digest();
   return info;
 }

@@ -28,7 +28,7 @@ class Changes(Case):
         self.write("p.yaml", PIPELINE)
         self.write("other.txt", "one")
         self.add_case("1")
-        self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}}\n")
+        self.file = self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 0.7}}\n")
         self.environment = dict(
             os.environ, MARROW_PLUGIN_PATH=str(TEST_PLUGINS), MARROW_CACHE=str(self.scratch / "cache")
         )
@@ -106,7 +106,7 @@ class Changes(Case):
     def test_pictures_of_another_state_do_not_stay(self):
         head = HEAD.replace("timed_cells: 0", "timed_cells: 1")
         self.write("p.yaml", PIPELINE.replace("work: s}", "work: s, picture: r}"))
-        self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 1.5}}\n")
+        self.write("e.yaml", head + "pictures: [picture]\nvariants: {a: {s.value: 0.7}}\n")
         self.compare("out")
         key = self.scratch / "out" / "pictures" / "a" / "1" / "0" / "key.txt"
         self.assertTrue(key.exists())
@@ -195,7 +195,7 @@ class Changes(Case):
                 "  m: {uses: test.misbehave, in: {a: s}}\noutputs: {number: r, work: m}",
             ),
         )
-        self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 1.5}, crash: {m.how: crash}}\n")
+        self.write("e.yaml", HEAD + "variants: {a: {}, b: {s.value: 0.7}, crash: {m.how: crash}}\n")
 
     def test_a_case_that_comes_meanwhile(self):
         self.with_a_crash()

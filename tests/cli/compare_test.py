@@ -131,7 +131,7 @@ class Compare(Case):
             },
             cases=2,
         )
-        limit = 40 if IS_SANITIZED else 15  # far more than a good cell takes on a busy machine
+        limit = 40 if IS_SANITIZED else 6  # far more than a good cell takes on a busy machine
         result = self.compare(path, "--out", self.scratch / "out", "--time-limit", limit, "--memory-limit", 1000)
         self.assertEqual(result.returncode, 0, result.stderr)
         rows = self.rows("out")

@@ -10,10 +10,14 @@ import tempfile
 import time
 import unittest
 
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent))
+from sample import sample  # noqa: E402, F401
+
 SOURCE = pathlib.Path(sys.argv[1])
 BUILD = pathlib.Path(sys.argv[2])
 MARROW = BUILD / "bin" / "marrow"
 TEST_PLUGINS = BUILD / "tests" / "plugins"
+SHARED_CACHE = BUILD / "tests" / "store"  # of simulated cases, which are the same in many tests
 # A sanitizer makes everything several times slower and larger.
 IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))
 CACHE = pathlib.Path(tempfile.mkdtemp(prefix="marrow-cache-"))  # no test sees what another run left

@@ -6,7 +6,7 @@ import subprocess
 import unittest
 
 import yaml
-from marrow_cli import BUILD, MARROW, SOURCE, Case, main, marrow
+from marrow_cli import BUILD, MARROW, SOURCE, Case, main, marrow, sample
 
 KINDS = sorted(path.parent.parent.name for path in (SOURCE / "plugins").glob("*/template/template.yaml"))
 
@@ -34,11 +34,21 @@ class New(Case):
         self.assertEqual(result.returncode, 0, result.stdout)
         return result.stdout
 
+    def with_one_coarse_case(self, folder):
+        """Makes the comparison of a new node shorter."""
+        for name, old, new in (
+            ("compare.yaml", "seeds: 1..2", "seeds: [1]"),
+            ("pipeline.yaml", "spacing_mm: [1, 1, 1.2]", "spacing_mm: [1.5, 1.5, 1.5]"),
+        ):
+            text = (folder / name).read_text()
+            self.assertEqual(text.count(old), 1, old)
+            (folder / name).write_text(text.replace(old, new))
+
     def test_every_kind_with_a_suite_has_a_template(self):
         with_suite = sorted(path.parent.name for path in (SOURCE / "plugins").glob("*/suite.cpp"))
         self.assertEqual(KINDS, with_suite)
 
-    def test_nodes_of_all_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):
+    def test_nodes_of_kinds_and_a_kind_are_built_against_an_installation_and_tested(self):
         prefix = self.scratch / "installed"
         self.run_in(self.scratch, "cmake", "--install", BUILD, "--prefix", prefix)
         program = prefix / "bin" / "marrow"
@@ -46,7 +56,8 @@ class New(Case):
             said = self.run_in(self.scratch, program, "new", "node", kind + ".mine")
             self.assertIn("%s_mine/ci builds it, tests it" % kind, said)
         self.run_in(self.scratch, program, "new", "kind", "denoised")
-        projects = [kind + "_mine" for kind in KINDS] + ["denoised"]
+        kinds = sample(KINDS, 2)
+        projects = [kind + "_mine" for kind in kinds] + ["denoised"]
         # One project for all, so that the packages are looked for once.
         lines = ["cmake_minimum_required(VERSION 3.25)", "project(all CXX)", "enable_testing()"]
         lines += ["add_subdirectory(%s)" % project for project in projects]
@@ -71,13 +82,14 @@ class New(Case):
             about = yaml.safe_load(pipeline.with_name("plugin.yaml").read_text())
             self.assertEqual(about["name"], project)
             self.assertTrue(os.access(pipeline.with_name("ci"), os.X_OK))
-        row = self.run_in(
-            self.scratch, program, "compare", "edges_mine/compare.yaml", "--out", "compared", MARROW_PLUGIN_PATH=plugins
-        )
-        self.assertRegex(row, r"\nmine +2 +0 ")
+        self.with_one_coarse_case(self.scratch / projects[0])
+        experiment = "%s/compare.yaml" % projects[0]
+        row = self.run_in(self.scratch, program, "compare", experiment, "--out", "compared", MARROW_PLUGIN_PATH=plugins)
+        self.assertRegex(row, r"\nmine +1 +0 ")
 
     @unittest.skipUnless((BUILD / "python" / "marrow" / "nodes.pyi").exists(), "the Python package is not built")
     def test_nodes_in_python_work_without_a_build(self):
+        compared = sample(KINDS, 2)
         for kind in KINDS:
             with self.subTest(kind):
                 result = self.new("node", kind + ".mine", "--python")
@@ -87,8 +99,10 @@ class New(Case):
                 self.assertIn("OK", self.run_in(folder, "/usr/bin/python3", "test.py", **paths))
                 self.assertIn(", 0 failed", self.run_in(folder, MARROW, "conformance", kind + ".mine", **paths))
                 self.run_in(folder, MARROW, "check", "pipeline.yaml", **paths)
-                row = self.run_in(folder, MARROW, "compare", "compare.yaml", **paths)
-                self.assertRegex(row, r"\nmine +2 +0 +100.0 %", "it takes its place in a whole registration")
+                if kind in compared:
+                    self.with_one_coarse_case(folder)
+                    row = self.run_in(folder, MARROW, "compare", "compare.yaml", **paths)
+                    self.assertRegex(row, r"\nmine +1 +0 +100.0 %", "it takes its place in a whole registration")
                 self.assertTrue(os.access(folder / "ci", os.X_OK))
                 self.assertIn("%s.mine" % kind, (folder / "ci").read_text())
                 self.assertFalse(any(path.suffix in (".cpp", ".txt") for path in folder.iterdir()))

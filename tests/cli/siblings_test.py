@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""One pipeline file for one view, three views and two fragments, with every node replaced by each of its siblings."""
+"""One pipeline file for one view, three views and two fragments, with every node replaced by its siblings."""
 import json
 import pathlib
 import shutil
@@ -19,9 +19,15 @@ from cases import (
     times,
     transposed,
 )
-from marrow_cli import Case, main, marrow
+from marrow_cli import Case, main, marrow, sample
 
 
+# Coarser images than usual, so that each run takes less time.
+COARSE_IMAGES = [
+    *["--set", "cameras.width_px=256"],
+    *["--set", "cameras.height_px=256"],
+    *["--set", "cameras.pixel_mm=1.172"],
+]
 # It runs, but at this case's coarse voxels it takes part of the other fragment, as the chapter says: the shaft of that
 # model is not where the images show it, and the start is refused.
 WRONG_HERE = {"segment.region_growing"}
@@ -37,7 +43,7 @@ class Siblings(Case):
     @classmethod
     def setUpClass(cls):
         cls.shared = pathlib.Path(tempfile.mkdtemp(prefix="marrow-siblings-"))
-        cls.case = simulate(cls.shared / "simulated", *SMALL)
+        cls.case = simulate(cls.shared / "simulated", *SMALL, *COARSE_IMAGES)
 
     @classmethod
     def tearDownClass(cls):
@@ -83,12 +89,10 @@ class Siblings(Case):
         case = simulate(
             self.scratch / "simulated",
             *SMALL,
-            "--set",
-            "cameras.names=[a, b, c]",
-            "--set",
-            "cameras.alpha_deg=[0, 0, 0]",
-            "--set",
-            "cameras.beta_deg=[0, 60, 120]"
+            *COARSE_IMAGES,
+            *["--set", "cameras.names=[a, b, c]"],
+            *["--set", "cameras.alpha_deg=[0, 0, 0]"],
+            *["--set", "cameras.beta_deg=[0, 60, 120]"],
         )
         self.check_errors(self.run_femur(case), "distal", "three views")
 
@@ -98,10 +102,9 @@ class Siblings(Case):
             self.scratch / "simulated",
             "level=0.35",
             "isocentre_from_distal_end_mm=200",
-            "--set",
-            "cameras.height_px=1024",
-            "--set",
-            "case.register=[distal, proximal]",
+            *["--set", "cameras.height_px=1024"],
+            *["--set", "case.register=[distal, proximal]"],
+            *["--set", "ct.spacing_mm=[1.2, 1.2, 1.5]"],
         )
         out = self.run_femur(case)
         for fragment in ("distal", "proximal"):
@@ -113,18 +116,8 @@ class Siblings(Case):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.check_errors(out, "distal", "by intensity")
 
-    def test_every_node_replaced_by_each_sibling(self):
-        replaced = set()
-        for name in yaml.safe_load(FEMUR.read_text())["nodes"]:
-            for other in fitting(FEMUR, name):
-                if other in WRONG_HERE:
-                    continue
-                setting = "%s.uses=%s" % (name, other)
-                with self.subTest(setting):
-                    out = self.run_femur(self.case, "--set", setting, out=setting)
-                    if other not in NOT_AS_EXACT:
-                        self.check_errors(out, "distal", setting)
-                replaced.add(other)
+    def test_every_node_replaced_by_its_siblings(self):
+        trials = [(name, other) for name in nodes_of(FEMUR) for other in fitting(FEMUR, name)]
         self.assertLessEqual(
             {
                 "segment.threshold",
@@ -140,8 +133,15 @@ class Siblings(Case):
                 "project.silhouette",
                 "optimizer.bobyqa",
             },
-            replaced,
+            {other for _, other in trials},
         )
+        right = [trial for trial in trials if trial[1] not in WRONG_HERE]
+        for name, other in sample(right, 16, key=lambda trial: trial[0]):
+            setting = "%s.uses=%s" % (name, other)
+            with self.subTest(setting):
+                out = self.run_femur(self.case, "--set", setting, out=setting)
+                if other not in NOT_AS_EXACT:
+                    self.check_errors(out, "distal", setting)
 
     def test_the_truth_changes_no_byte_of_a_pose(self):
         without = copy_case(
@@ -153,6 +153,10 @@ class Siblings(Case):
         poses = contents(one / "outputs" / "pose")
         self.assertEqual(list(poses), ["distal.yaml"])
         self.assertEqual(poses, contents(other / "outputs" / "pose"))
+
+
+def nodes_of(pipeline):
+    return list(yaml.safe_load(pipeline.read_text())["nodes"])
 
 
 def fitting(pipeline, node):

@@ -35,7 +35,7 @@ outputs: {number: total}
 """
 WORK = """marrow: 1
 nodes:
-  w: {uses: test.work, with: {value: 10, path: data}}
+  w: {uses: test.work, with: {value: 3, path: data}}
   n: {uses: test.add, in: {a: w}}
 outputs: {number: n}
 """
@@ -96,7 +96,7 @@ class Workers(Case):
                 "--out",
                 "out",
                 "--time-limit",
-                "8",
+                "5",
             ]
             comparison = subprocess.Popen(
                 [*command, "--jobs", "1"],
@@ -111,7 +111,7 @@ class Workers(Case):
             lambda: comparison.poll() is not None or "waits for another run" in said.read_text(),
             "it does not say that it waits",
         )
-        time.sleep(9)  # longer than a cell may take
+        time.sleep(6)  # longer than a cell may take
         self.assertIsNone(comparison.poll(), "it did not wait")
         other.send_signal(signal.SIGCONT)
         text = comparison.communicate(timeout=120)[0]

@@ -10,9 +10,10 @@ import tempfile
 import unittest
 
 SOURCE, BUILD = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2])
-sys.path.insert(0, str(SOURCE / "tools" / "site"))
+sys.path[:0] = [str(SOURCE / "tools" / "site"), str(SOURCE / "tests")]
 import blocks  # noqa: E402
 import document_pages  # noqa: E402
+from sample import ALL  # noqa: E402, F401
 
 MARROW = BUILD / "bin" / "marrow"
 IS_SANITIZED = any(name in MARROW.read_bytes() for name in (b"libasan.so", b"libtsan.so"))

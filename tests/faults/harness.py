@@ -4,6 +4,7 @@ import argparse
 import contextlib
 import os
 import pathlib
+import random
 import shutil
 import subprocess
 import sys
@@ -12,6 +13,9 @@ import tempfile
 from subjects import Program
 
 SOURCE = pathlib.Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(SOURCE / "tests"))
+from sample import ALL, SEED, sample  # noqa: E402, F401
+
 SKIPPED = 77  # ctest's SKIP_RETURN_CODE
 
 
@@ -21,7 +25,12 @@ def arguments_parser(description):
         "--build", type=pathlib.Path, default=SOURCE / "build", help="the build folder (default: build)"
     )
     parser.add_argument("--all", action="store_true", help="the whole, not a sample")
-    parser.add_argument("--seed", type=int, default=1, help="of what is drawn by chance (default: 1)")
+    parser.add_argument(
+        "--seed",
+        type=int,
+        default=random.Random(SEED).randrange(10**6),
+        help="of what is drawn by chance (default: another each day)",
+    )
     parser.add_argument("--jobs", type=int, default=2, help="how many at once (default: 2)")
     return parser
 
@@ -37,6 +46,7 @@ def program_of(options):
     if is_sanitized(options.build / "bin" / "marrow"):
         print("skipped: the program is built with a sanitizer")
         sys.exit(SKIPPED)
+    print("drawn with --seed %d" % options.seed, flush=True)
     os.umask(0o022)
     scratch = pathlib.Path(tempfile.mkdtemp(prefix="marrow-faults-"))
     try:

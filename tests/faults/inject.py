@@ -12,7 +12,7 @@ import struct
 import subprocess
 import sys
 
-from harness import arguments_parser, conclude, program_of
+from harness import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
 CALLS = [
@@ -151,7 +151,12 @@ def chosen_faults(injector, options):
 
 def main():
     parser = arguments_parser(__doc__)
-    parser.add_argument("--trials", type=int, default=70, help="faults of a sample, each of another kind (default: 70)")
+    parser.add_argument(
+        "--trials",
+        type=int,
+        default=70 if ALL else 25,
+        help="faults of a sample, each of another kind (default: 25; 70 with MARROW_TEST_ALL=1)",
+    )
     parser.add_argument(
         "--most",
         type=int,

@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 
-from harness import arguments_parser, conclude, program_of
+from harness import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Collect, Compare, Run
 
 Pair = collections.namedtuple("Pair", "number kind gap_s")
@@ -168,13 +168,13 @@ class Pairs:
 
 def main():
     parser = arguments_parser(__doc__)
-    parser.add_argument("--trials", type=int, help="how many pairs (default: 30, with --all 1000)")
+    parser.add_argument("--trials", type=int, help="how many pairs (default: 10, with --all 1000)")
     parser.add_argument("--only", help="only pairs of this kind")
     options = parser.parse_args()
     failures, counts = [], collections.Counter()
     with program_of(options) as program:
         pairs = Pairs(program, options.seed)
-        chosen = list(pairs.pairs(options.trials or (1000 if options.all else 30)))
+        chosen = list(pairs.pairs(options.trials or (1000 if options.all else 30 if ALL else 10)))
         chosen = [pair for pair in chosen if options.only in (None, pair.kind)]
         with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
             for pair, complaints in zip(chosen, pool.map(pairs.try_pair, chosen)):

@@ -16,7 +16,7 @@ import sys
 import time
 import uuid
 
-from harness import arguments_parser, conclude, program_of
+from harness import ALL, arguments_parser, conclude, program_of
 from subjects import SENTENCE, Compare, Run
 
 STOPPING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -162,7 +162,7 @@ class Signals:
 
 def main():
     parser = arguments_parser(__doc__)
-    parser.add_argument("--trials", type=int, help="how many signals (default: 40, with --all 1000)")
+    parser.add_argument("--trials", type=int, help="how many signals (default: 15, with --all 1000)")
     parser.add_argument("--only", type=int, help="only the trial of this number")
     options = parser.parse_args()
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
@@ -171,7 +171,7 @@ def main():
     failures, ends = [], collections.Counter()
     with program_of(options) as program:
         signals = Signals(program, options.seed)
-        trials = list(signals.trials(options.trials or (1000 if options.all else 40)))
+        trials = list(signals.trials(options.trials or (1000 if options.all else 40 if ALL else 15)))
         trials = [trial for trial in trials if options.only in (None, trial.number)]
         with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
             for trial, (code, complaints, errors) in zip(trials, pool.map(signals.try_signal, trials)):

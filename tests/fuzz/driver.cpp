@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // Runs a fuzz target without libFuzzer, so that the ordinary tests need no clang: the seeds, then what a seeded mutator
-// makes of them, until the time is over. It sees crashes, foreign exceptions, too much memory and too much time; leaks
-// and errors of memory that do no harm at once need the sanitizers of tools/fuzz.
-//   fuzz_NAME --seconds 10 --seeds FOLDER --dictionary FILE        fuzz_NAME FILE...
+// makes of them, until the time is over: 2 s, or 10 s if MARROW_TEST_ALL is 1. Each day the mutator makes others: its
+// seed is the day, unless MARROW_TEST_SEED or --seed gives one. This driver sees crashes, foreign exceptions, too much
+// memory and too much time; leaks and errors of memory that do no harm at once need the sanitizers of tools/fuzz.
+//   fuzz_NAME --seeds FOLDER --dictionary FILE [--seconds 10] [--seed 1]        fuzz_NAME FILE...
 #include <fcntl.h>
 #include <sys/time.h>
 #include <unistd.h>
@@ -100,9 +101,21 @@ std::vector<std::string> read_seeds(const fs::path& folder) {
   return seeds;
 }
 
+std::string variable(const char* name) {
+  const char* text = std::getenv(name);
+  return text ? text : "";
+}
+
+std::uint64_t seed_of_today() {
+  const std::string given = variable("MARROW_TEST_SEED");
+  if (!given.empty()) return std::hash<std::string>()(given);
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::uint64_t(std::chrono::floor<std::chrono::days>(now).count());
+}
+
 struct Settings {
-  double seconds = 10;
-  std::uint64_t seed = 1;
+  double seconds = variable("MARROW_TEST_ALL") == "1" ? 10 : 2;
+  std::uint64_t seed = seed_of_today();
   fs::path seeds, dictionary;
   std::vector<fs::path> inputs;
 };
@@ -164,8 +177,8 @@ int main(int count, char** words) try {
   }
   std::size_t largest_heap = 0;
   const std::size_t executions = fuzz(settings, largest_heap);
-  std::printf("%s: %zu executions without a finding, at most %zu kB of memory\n", name.c_str(), executions,
-              largest_heap / 1000);
+  std::printf("%s: %zu executions without a finding, at most %zu kB of memory, seed %llu\n", name.c_str(), executions,
+              largest_heap / 1000, static_cast<unsigned long long>(settings.seed));
   return 0;
 } catch (const std::exception& error) {
   std::fprintf(stderr, "%s\n", error.what());

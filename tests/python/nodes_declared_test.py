@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes written in Python are described as those in C++ are."""
+import functools
 import json
 import os
 import shutil
@@ -7,19 +8,19 @@ import subprocess
 import time
 
 import numpy
-from package import BUILD, SCRATCH, SOURCE, main, marrow, small_case
+from package import BUILD, SOURCE, main, marrow, small_case
 from written_nodes import HEAD, Written, view
 
 EXAMPLE = SOURCE / "docs" / "example-plugin"
 
 
+@functools.cache
 def twin():
-    """The folder of the example-plugin in C++, built once."""
-    build = SCRATCH / "twin"
-    if not build.exists():
-        configure = ["cmake", "-S", EXAMPLE, "-B", build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
-        subprocess.run(configure, check=True, capture_output=True)
-        subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
+    """The folder of the example-plugin in C++. It stays in marrow's build folder, and is built again if it must be."""
+    build = BUILD / "tests" / "twin"
+    configure = ["cmake", "-S", EXAMPLE, "-B", build, "-G", "Ninja", "-Dmarrow_DIR=%s" % BUILD]
+    subprocess.run(configure, check=True, capture_output=True)
+    subprocess.run(["cmake", "--build", build], check=True, capture_output=True)
     return build
 
 

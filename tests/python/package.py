@@ -9,7 +9,7 @@ import sys
 import tempfile
 
 sys.path.insert(0, str(pathlib.Path(sys.argv[1]) / "tests" / "cli"))
-from marrow_cli import BUILD, MARROW, SOURCE, TEST_PLUGINS, Case, main  # noqa: E402, F401
+from marrow_cli import BUILD, MARROW, SHARED_CACHE, SOURCE, TEST_PLUGINS, Case, main  # noqa: E402, F401
 
 FEMUR = SOURCE / "pipelines" / "femur.yaml"
 SCRATCH = pathlib.Path(tempfile.mkdtemp(prefix="marrow-python-"))
@@ -25,9 +25,15 @@ _made = {}
 
 
 def small_case():
-    """A simulated case, made once: its folder, and the case itself."""
+    """A simulated case, made once for all tests: its folder, and the case itself."""
     if not _made:
-        result = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml").set(SMALL).run(folder=SCRATCH / "simulated")
+        own = os.environ["MARROW_CACHE"]
+        os.environ["MARROW_CACHE"] = str(SHARED_CACHE)
+        try:
+            pipeline = marrow.Pipeline(SOURCE / "pipelines" / "simulate.yaml").set(SMALL)
+            result = pipeline.run(folder=SCRATCH / "simulated")
+        finally:
+            os.environ["MARROW_CACHE"] = own
         _made["case"] = (SCRATCH / "simulated" / "outputs" / "case", result["case"])
     return _made["case"]
 
