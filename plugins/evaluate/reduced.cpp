@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/fracture.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/geometry/targets.hpp"
 
@@ -20,16 +19,13 @@ const RigidTransform& place_of(const List<Truth>& truths, const std::string& nam
 Metrics reduced(const List<Truth>& truths, const List<Mesh>& models, const geometry::FragmentPair& options) {
   const RigidTransform &moved = place_of(truths, options.moved), &reference = place_of(truths, options.reference);
   geometry::check_poses(moved, reference, "pose of '" + options.reference + "'");
-  const Mesh *model = models.find(options.moved), *other = models.find(options.reference);
-  for (const auto& [surface, name] : {std::pair(model, options.moved), std::pair(other, options.reference)})
-    if (!surface) throw Error("there is no surface of the fragment '" + name + "'");
-  const FragmentFrame own = fragment_frame(*model);
-  const Vector6d motion = motion_between(reference, moved, {geometry::fracture_centre_mm(*model, *other), own.axes});
+  const Mesh* model = models.find(options.moved);
+  if (!model) throw Error("there is no surface of the fragment '" + options.moved + "'");
+  const Vector6d motion = motion_between(reference, moved, fragment_frame(*model));
   return {{{"rotation_deg", degrees(geodesic_angle_rad(moved.rotation, reference.rotation)), "deg"},
            {"axial_deg", degrees(motion[2]), "deg"},
            {"translation_mm", motion.tail<3>().norm(), "mm"},
-           {"along_mm", motion[5], "mm"},
-           {"centroid_mm", motion_between(reference, moved, own).tail<3>().norm(), "mm"}}};
+           {"along_mm", motion[5], "mm"}}};
 }
 
 }  // namespace
@@ -38,10 +34,10 @@ MARROW_PLUGIN(plugin) {
   plugin.node("evaluate.reduced", reduced)
       .summary("How far a fragment is from its place in the restored bone, by the exact poses")
       .in("truths", "exact poses of both fragments", over("fragment"))
-      .in("models", "surfaces of both fragments; the moved one gives the axes", over("fragment"))
+      .in("models", "surfaces of both fragments; the moved one gives the axes and the centroid", over("fragment"))
       .out("metrics",
-           "rotation angle (geodesic), signed rotation about the long axis, shift of the fracture's middle, its signed "
-           "part along the long axis, and shift of the fragment's centroid")
+           "rotation angle (geodesic), signed rotation about the long axis, shift of the centroid and its signed part "
+           "along the long axis")
       .option("moved", &geometry::FragmentPair::moved, "fragment that is moved")
       .option("reference", &geometry::FragmentPair::reference, "fragment that stays");
 }

@@ -6,7 +6,6 @@
 #include <cstdio>
 #include <marrow/plugin.hpp>
 
-#include "marrow/toolbox/geometry/fracture.hpp"
 #include "marrow/toolbox/geometry/fragments.hpp"
 #include "marrow/toolbox/robot/approach.hpp"
 #include "marrow/toolbox/robot/guide_state.hpp"
@@ -130,19 +129,16 @@ void learn(GuideState& state, const RigidTransform& seen, const Eigen::Vector3d&
   state.seen = seen;
 }
 
-/// The poses of the next pair: as wide as the motion and what is known of the robot's place say. `fracture`: the frame
-/// of the step.
-List<Pose> predicted(const List<Pose>& poses, const FragmentFrame& fracture, const RigidTransform& motion,
-                     const Vector6d& step, const Matrix6d& hand_eye, const Options& options) {
+/// The poses of the next pair: as wide as the motion and what is known of the robot's place say.
+List<Pose> predicted(const List<Pose>& poses, const RigidTransform& motion, const Vector6d& step,
+                     const Matrix6d& hand_eye, const Options& options) {
   constexpr double kLeast_deg = 0.5, kLeast_mm = 1;
   List<Pose> result;
   const Pose& reference = geometry::pose_of(poses, options.reference);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     Pose pose = poses[i];
     double turn = radians(kLeast_deg), shift = kLeast_mm;
-    const FragmentFrame own = pose.frame;
     if (poses.name(i) == options.moved) {
-      pose.frame = fracture;
       RigidTransform in_ct = motion;
       in_ct.target = in_ct.source = reference.world_from_model.source;
       pose.world_from_model =
@@ -155,7 +151,7 @@ List<Pose> predicted(const List<Pose>& poses, const FragmentFrame& fracture, con
                           .finished()
                           .asDiagonal();
     pose.convergence.clear();
-    result.add(poses.name(i), in_frame(pose, own));
+    result.add(poses.name(i), pose);
   }
   return result;
 }
@@ -170,7 +166,7 @@ struct Command {
 /// A step is shortened so that what is not known of the robot's place leads the fracture no farther astray than the
 /// bones are apart, or than `astray_mm`.
 Vector6d careful(const Vector6d& step, const Matrix6d& hand_eye, double distance_mm, double astray_mm) {
-  constexpr double kArm_mm = 20;  // from the fracture's middle to its rim
+  constexpr double kArm_mm = 150;  // from the fragment's middle to the fracture
   const double turn = step.head<3>().norm(), unknown_rad = std::min(1.5, robot::rotation_deviation_rad(hand_eye)),
                unknown_mm = std::min(60.0, robot::shift_deviation_mm(hand_eye)),
                astray = unknown_rad * (step.tail<3>().norm() + kArm_mm * turn) + unknown_mm * turn;
@@ -207,19 +203,13 @@ Command command_for(const GuideState& state, const RobotReport& report, const Le
 Result closed_loop(const List<Pose>& poses, const GuideState& before, const RobotReport& report,
                    const List<SignedField>& fields, const List<Mesh>& models, const List<Verdict>* verdicts,
                    const List<View>* views, const Options& options, Context& context) {
-  const Pose& reference = geometry::pose_of(poses, options.reference);
+  const Pose &moved = geometry::pose_of(poses, options.moved), &reference = geometry::pose_of(poses, options.reference);
   const auto part_of = [](const auto& list, const std::string& name, const std::string& what) -> const auto& {
     if (const auto* item = list.find(name)) return *item;
     throw Error("there is no " + what + " of the fragment '" + name + "'; give those of both fragments");
   };
   const robot::Gap gap(part_of(models, options.moved, "surface"), part_of(fields, options.moved, "field"),
                        part_of(models, options.reference, "surface"), part_of(fields, options.reference, "field"));
-  // What counts is how the fracture's surfaces meet. An error of a rotation moves the fragment's far end, too.
-  const FragmentFrame own = geometry::pose_of(poses, options.moved).frame;
-  const Pose moved = in_frame(geometry::pose_of(poses, options.moved),
-                              {geometry::fracture_centre_mm(part_of(models, options.moved, "surface"),
-                                                            part_of(models, options.reference, "surface")),
-                               own.axes});
   const RelativePose relative = robot::relative_pose(moved, reference);
   const RigidTransform& seen = relative.reference_from_fragment;
   const Eigen::Vector3d centre_mm = moved.frame.origin_mm, middle_mm = seen * centre_mm;
@@ -249,7 +239,7 @@ Result closed_loop(const List<Pose>& poses, const GuideState& before, const Robo
     result.stop.reason = leg.stage + ": " + result.stop.reason;
   }
   result.motion.world_from_model = command.told;
-  result.predicted = predicted(poses, moved.frame, command.expected, command.step, command.hand_eye, options);
+  result.predicted = predicted(poses, command.expected, command.step, command.hand_eye, options);
   context.info("pair " + std::to_string(state.pairs) + ": " + result.stop.reason);
   result.figures.items = {
       {"pairs", double(state.pairs), ""},

@@ -144,10 +144,10 @@ TEST(ClosedLoop, NoStepIsLargerThanItsLimits) {
 }
 
 /// How far a step leads the fracture astray at most, if nothing is known of the robot's place. Its direction counts as
-/// known to 1.5 rad then, its place to 60 mm, and the fracture's rim lies 20 mm from its middle.
+/// known to 1.5 rad then, its place to 60 mm, and the fracture lies 150 mm from the fragment's middle.
 double astray_mm(const Value& figures) {
   const double turn = radians(shipped::figure(figures, "step_deg"));
-  return 1.5 * (shipped::figure(figures, "step_mm") + 20 * turn) + 60 * turn;
+  return 1.5 * (shipped::figure(figures, "step_mm") + 150 * turn) + 60 * turn;
 }
 
 TEST(ClosedLoop, TheFirstStepIsShortIfTheRobotMayStandAnywhere) {
@@ -218,7 +218,7 @@ TEST(ClosedLoop, EndsWhereTheImagesShowNoMore) {
   };
   EXPECT_TRUE(
       reason(0.4, 0.2).starts_with("the fragment is in its place as far as the images show: 0.40 degrees and "
-                                   "0.20 mm remain, known to 0.42 degrees and 0.36 mm"))
+                                   "0.20 mm remain, known to 0.42 degrees and 0.43 mm"))
       << reason(0.4, 0.2);
   EXPECT_TRUE(reason(0.5, 0.2).starts_with("release: ")) << reason(0.5, 0.2);
   EXPECT_TRUE(reason(0.4, 0.5).starts_with("release: ")) << reason(0.4, 0.5);
