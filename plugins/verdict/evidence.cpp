@@ -203,7 +203,8 @@ Verdict judge(const Pose& pose, const Pose* contour_pose, const List<Pose>* stag
     verdict.reasons.push_back(filled("the bone reaches %.1f mm into another bone", inside_mm));
   }
   if (verdict.judgement == Judgement::wrong) verdict.remedies.emplace_back(kGiven);
-  if (predicted > model.doubtful_above) explain_predicted(spread, predicted, &searched != &pose, verdict);
+  if (predicted > model.doubtful_above)
+    explain_predicted(spread, predicted, is_determined && &searched != &pose, verdict);
   explain(contributions, verdict);
   return verdict;
 }

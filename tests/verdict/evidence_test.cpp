@@ -269,6 +269,38 @@ TEST(VerdictEvidence, TheModelGivesTheProbability) {
   }
 }
 
+// 5 mm along each axis: most errors of such a pose are above 2 mm. Only the cameras leave it open, not the search.
+TEST(VerdictEvidence, SaysWhatThePredictedDeviationsLeaveOpen) {
+  const ModelFile model(model_of(-9, "  - {figure: warnings, scale: 1, weight: 1, absent: 0}\n"));
+  Trial trial;
+  const auto verdict_with = [&](double deviation_mm, bool is_refined) {
+    Pose pose = trial.pose;
+    pose.covariance.emplace(marrow::Matrix6d::Zero());
+    pose.covariance->diagonal().tail<3>().setConstant(deviation_mm * deviation_mm);
+    trial.inputs["pose"] = shipped::item(pose);
+    marrow::List<Pose> stages;
+    stages.add("last", trial.pose);
+    if (is_refined) trial.inputs["stages"] = shipped::list(stages, "stage");
+    return trial.verdict(model.options());
+  };
+  const double unknown = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(verdict_with(5, false).reasons.at(0).starts_with(
+      "the predicted deviations allow a failure with a probability of 0.9"));
+  EXPECT_EQ(verdict_with(unknown, false).reasons.at(0),
+            "the predicted deviations allow a failure with a probability of 1.00");
+  const Verdict refined = verdict_with(5, true);
+  EXPECT_TRUE(
+      refined.reasons.at(0).starts_with("with what is not known about the cameras, the bone's surface is known to "))
+      << refined.reasons[0];
+  EXPECT_EQ(refined.remedies,
+            (std::vector<std::string>{"a check of what was given: the bone, the side, which image belongs to which "
+                                      "camera, the signs of its angles",
+                                      "cameras that are known better, by a calibration; then give refine.cameras "
+                                      "smaller rotation_deg and shift_mm"}));
+  EXPECT_EQ(verdict_with(unknown, true).reasons.at(0),
+            "the predicted deviations allow a failure with a probability of 1.00");
+}
+
 TEST(VerdictEvidence, APoseInAnotherBoneIsDoubtful) {
   Trial trial;
   Pose other = trial.pose;

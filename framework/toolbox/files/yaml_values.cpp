@@ -118,13 +118,14 @@ std::optional<DistortedCamera> camera_from(const YAML::Node& node, YamlFile& fil
       file, node, "camera",
       {"marrow-camera", "width_px", "height_px", "intrinsics", "radial_distortion", "camera_from_world", "c_arm"});
   if (map.has("marrow-camera")) check_version(map, "marrow-camera");
-  const int width_px = map.integer("width_px").value_or(0), height_px = map.integer("height_px").value_or(0);
+  const auto width = map.integer("width_px"), height = map.integer("height_px");
+  const int width_px = width.value_or(0), height_px = height.value_or(0);
   if (map.has("c_arm"))
     for (const char* key : {"intrinsics", "camera_from_world"})
       if (map.has(key)) map.fault(key, std::string(key) + ": 'c_arm' already gives it; keep one of the two");
   const std::optional<Camera> camera = map.has("c_arm") ? camera_by_c_arm(map.node("c_arm"), width_px, height_px, file)
                                                         : camera_by_matrices(map, width_px, height_px, file);
-  if (!camera || !map.has("width_px") || !map.has("height_px")) return std::nullopt;
+  if (!camera || !width || !height) return std::nullopt;
   DistortedCamera result{*camera, {}};
   if (map.has("radial_distortion")) {
     const auto terms = map.vector3("radial_distortion");
