@@ -58,8 +58,8 @@ class Subject {
   /// any other exception passes through. Throws NotApplicable if the node needs an input or an option that this check
   /// does not have.
   Result call(const Inputs& inputs, int threads = 0) const;
-  /// Calls the node and returns its output of that name. Throws Failure if the node refuses or does not give this
-  /// output.
+  /// Calls the node and returns its output of that name. If one of the last calls was the same and took and gave only
+  /// data, returns what that call gave. Throws Failure if the node refuses or does not give this output.
   Value output(const Inputs& inputs, const std::string& port) const;
 
   /// The same node with another value of an option.
