@@ -14,20 +14,18 @@
 
 #include <marrow/domain/decompositions.hpp>
 #include "bone_in_view.hpp"
+#include "marrow/toolbox/search/search.hpp"
+#include "sight.hpp"
 
 namespace {
 
 using namespace marrow;
-using refine::from_units, refine::BoneInView, refine::Model;
+using refine::from_units, refine::BoneInView, refine::Model, refine::Sight;
 
-struct Options {
-  double rotation_deg = 0.5;
-  double shift_mm = 1;
-  double focal_percent = 1;
-  double centre_px = 5;
+struct Options : refine::ExpectedErrors {
   double contour_spacing_px = 2;
   double reach_px = 6;
-  int pixel_step = 2;
+  std::vector<double> pixel_step{2};
   int max_rounds = 15;
 };
 
@@ -38,45 +36,6 @@ struct Result {
   List<Metrics> motions;
 };
 
-/// A camera's motion: rotations [deg] about the axes u, v and depth of its image, through `centre_mm`, and shifts [mm]
-/// along them.
-struct Sight {
-  Eigen::Vector3d centre_mm;
-  Eigen::Matrix3d axes;  ///< u, v and depth in columns, in the world
-  Vector6d deviation;    ///< expected of the six numbers
-
-  RigidTransform motion(const Vector6d& deg_and_mm) const {
-    const Vector6d motion = from_units(deg_and_mm);
-    RigidTransform moved{"world", "world"};
-    moved.rotation = rotation_from_vector(axes * motion.head<3>());
-    moved.translation_mm = centre_mm - moved.rotation * centre_mm + axes * motion.tail<3>();
-    return moved;
-  }
-  /// How a bone's pose moves along its own axes, for small motions of the camera; both in degrees and mm.
-  Matrix6d of_bone(const RigidTransform& world_from_model, const FragmentFrame& frame) const {
-    const Eigen::Matrix3d to_bone = (world_from_model.rotation * frame.axes).transpose();
-    const Eigen::Vector3d arm = world_from_model * frame.origin_mm - centre_mm;
-    Matrix6d change = Matrix6d::Zero();
-    change.topLeftCorner<3, 3>() = change.bottomRightCorner<3, 3>() = to_bone * axes;
-    for (int i = 0; i < 3; ++i) change.block<3, 1>(3, i) = to_bone * axes.col(i).cross(arm) * radians(1);
-    return change;
-  }
-};
-
-Sight sight_of(const View& view, const Eigen::Vector3d& centre_mm, const Options& options) {
-  const double depth_mm = (view.camera.camera_from_world * centre_mm).z();
-  if (!(depth_mm > 0))
-    throw Error("view '" + view.name + "': the bones do not lie in front of its camera; look at the overlays first");
-  const double each = 1 / std::sqrt(3.0), each_of_two = 1 / std::sqrt(2.0);
-  const double shift = each * options.shift_mm,
-               centre = each_of_two * options.centre_px * pixel_size_at_mm(view.camera, centre_mm),
-               depth = options.focal_percent / 100 * depth_mm, turn = each * options.rotation_deg;
-  Sight sight{centre_mm, view.camera.camera_from_world.rotation.transpose(), Vector6d()};
-  const double across = std::hypot(shift, centre);
-  sight.deviation << turn, turn, turn, across, across, std::hypot(shift, depth);
-  return sight;
-}
-
 /// What is sought: a pose for each bone, and a motion in degrees and mm for each view.
 struct State {
   std::vector<RigidTransform> poses;
@@ -86,38 +45,23 @@ struct State {
 class Refinement {
  public:
   Refinement(const List<Cost>& costs, const List<Pose>& poses, const List<View>& views, const Options& options)
-      : poses_(poses), views_(views) {
+      : costs_(costs), poses_(poses), views_(views), options_(options) {
     Eigen::Vector3d centre = Eigen::Vector3d::Zero();
     for (const Pose& pose : poses) centre += pose.world_from_model * pose.frame.origin_mm / double(poses.size());
     for (const View& view : views) sights_.push_back(sight_of(view, centre, options));
-    for (std::size_t f = 0; f < poses.size(); ++f) {
-      levels_.push_back(costs[f].at_level({options.contour_spacing_px, options.reach_px, options.pixel_step}));
-      for (std::size_t v = 0; v < views.size(); ++v) in_views_.emplace_back(*levels_[f], poses[f].frame, v, views);
-      state_.poses.push_back(poses[f].world_from_model);
-    }
+    for (const Pose& pose : poses) state_.poses.push_back(pose.world_from_model);
     state_.motions.assign(views.size(), Vector6d::Zero());
-    noise_.assign(poses.size(), 0.0);
-    models_.resize(in_views_.size());
   }
 
-  /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
-  /// with the largest marginal likelihood. So cameras that are right stay as they are.
-  void run(int max_rounds, Context& context) {
-    const State given = state_;
-    Found best;
-    for (const double scale : {1.0, 0.1, 0.01}) {
-      scale_ = scale;
-      if (scale < 1) state_ = given;
-      const bool converged = descend(max_rounds, context);
-      expand(scale == 1);
-      const Found found{scale, converged, evidence(), state_, models_};
-      char text[96];
-      std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
-                    found.evidence);
-      context.debug(text);
-      if (scale == 1 || found.evidence > best.evidence) best = found;
+  /// Chooses the scale with the first pixel step, and goes on with the others, as from an approximate state.
+  void run(Context& context) {
+    compare_each(options_.pixel_step.front());
+    choose_scale(context);
+    for (std::size_t i = 1; i < options_.pixel_step.size(); ++i) {
+      compare_each(options_.pixel_step[i]);
+      converged_ = descend(true, context);
+      expand(true);
     }
-    scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
     covariance_ = inverse_of(equations().first);
   }
 
@@ -156,6 +100,38 @@ class Refinement {
     State state;
     std::vector<Model> models;
   };
+
+  /// Compares every n-th pixel from now on.
+  void compare_each(double pixel_step) {
+    in_views_.clear();
+    levels_.clear();
+    for (std::size_t f = 0; f < poses_.size(); ++f) {
+      levels_.push_back(costs_[f].at_level({options_.contour_spacing_px, options_.reach_px, int(pixel_step)}));
+      for (std::size_t v = 0; v < views_.size(); ++v) in_views_.emplace_back(*levels_[f], poses_[f].frame, v, views_);
+    }
+    noise_.assign(poses_.size(), 0.0);
+    models_.assign(in_views_.size(), Model());
+  }
+
+  /// Finds the most probable state if the cameras are off as expected, a tenth and a hundredth of it, and keeps the one
+  /// with the largest marginal likelihood. So cameras that are right stay as they are.
+  void choose_scale(Context& context) {
+    const State given = state_;
+    Found best;
+    for (const double scale : {1.0, 0.1, 0.01}) {
+      scale_ = scale;
+      if (scale < 1) state_ = given;
+      const bool converged = descend(scale == 1, context);
+      expand(scale == 1);
+      const Found found{scale, converged, evidence(), state_, models_};
+      char text[96];
+      std::snprintf(text, sizeof text, "cameras off by %g times what is expected: log evidence %.4g", scale,
+                    found.evidence);
+      context.debug(text);
+      if (scale == 1 || found.evidence > best.evidence) best = found;
+    }
+    scale_ = best.scale, converged_ = best.converged, state_ = best.state, models_ = best.models;
+  }
 
   static Eigen::Index at_pose(std::size_t bone) { return 6 * Eigen::Index(bone); }
   Eigen::Index at_motion(std::size_t view) const { return 6 * Eigen::Index(poses_.size() + view); }
@@ -222,12 +198,13 @@ class Refinement {
     return {a, b};
   }
 
-  /// Goes on until a step makes the state hardly more probable. The noise is measured at the first scale only.
-  bool descend(int max_rounds, Context& context) {
-    for (int round = 0; round < max_rounds; ++round) {
+  /// Goes on until a step makes the state hardly more probable. The noise is measured in the first two rounds, if
+  /// wanted.
+  bool descend(bool with_noise, Context& context) {
+    for (int round = 0; round < options_.max_rounds; ++round) {
       context.check_cancelled();
-      context.progress(double(round) / max_rounds, "rounds");
-      expand(scale_ == 1 && round < 2);
+      context.progress(double(round) / options_.max_rounds, "rounds");
+      expand(with_noise && round < 2);
       if (step() < 0.05) return true;
     }
     return false;
@@ -277,8 +254,10 @@ class Refinement {
     return inverse;
   }
 
+  const List<Cost>& costs_;
   const List<Pose>& poses_;
   const List<View>& views_;
+  const Options& options_;
   std::vector<Sight> sights_;
   std::vector<std::shared_ptr<const Cost>> levels_;
   std::vector<BoneInView> in_views_;  ///< of the first bone in each view, then of the next
@@ -333,9 +312,10 @@ void warn_of_large(const std::string& view, const Vector6d& in_deviations, Conte
 
 Result refined(const List<View>& views, const List<Cost>& costs, const List<Pose>& poses, const Options& options,
                Context& context) {
+  search::check_level_list(options.pixel_step, "pixel_step");
   check_inputs(views, costs, poses);
   Refinement refinement(costs, poses, views, options);
-  refinement.run(options.max_rounds, context);
+  refinement.run(context);
   if (!refinement.converged())
     context.warn("the cameras still moved after " + std::to_string(options.max_rounds) + " rounds; raise max_rounds");
   char text[96];
@@ -400,7 +380,10 @@ MARROW_PLUGIN(plugin) {
               "for costs of contours: distance between two points of the outline", at_least(0.1))
       .option("reach_px", &Options::reach_px,
               "for costs of contours: a point with no edge within this distance counts as unmatched", at_least(0.1))
-      .option("pixel_step", &Options::pixel_step, "for costs of grey values: only every n-th pixel is compared",
-              at_least(1))
+      .option(
+          "pixel_step", &Options::pixel_step,
+          "for costs of grey values: only every n-th pixel is compared; how far the cameras are off is judged with the "
+          "first number, and a smaller one after it makes the poses more exact",
+          at_least(1))
       .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1));
 }
