@@ -156,6 +156,53 @@ TEST(RefineCameras, TwoBonesShareTheCameras) {
   EXPECT_LT((wanted.translation_mm - is.translation_mm).norm(), 0.03) << "the reduction does not feel the cameras";
 }
 
+TEST(RefineCameras, WhatBothBonesAreOffByInCommonDoesNotCountBetweenThem) {
+  // v of both images is y of the world, so nothing tells how high both bones and cameras are together.
+  const RigidTransform none = motion({0, 0, 0}, {0, 0, 0}), high = motion({0, 0, 0}, {0, 2, 0});
+  const auto outputs = shipped::call("refine.cameras", inputs({Bone({none, high}, 1e6), Bone({none, high}, 1e6, -60)}));
+  const auto poses = outputs.at("poses").as_list<marrow::Pose>(),
+             relative = outputs.at("relative").as_list<marrow::Pose>();
+  const auto along_y = [](const marrow::Pose& pose) {
+    const Vector3d y = (pose.world_from_model.rotation * pose.frame.axes).transpose() * Vector3d::UnitY();
+    return std::sqrt(y.dot(pose.covariance->bottomRightCorner<3, 3>() * y));
+  };
+  EXPECT_LT(relative[0].covariance->norm(), 1e-9) << "the first bone relative to itself";
+  EXPECT_EQ(relative[1].world_from_model.translation_mm, poses[1].world_from_model.translation_mm);
+  EXPECT_GT(along_y(poses[1]), 0.2);
+  EXPECT_LT(along_y(relative[1]), 0.1 * along_y(poses[1]));
+}
+
+/// At a coarse level, each view likes a pose that is 0.6 mm away.
+class Levels : public Split {
+ public:
+  Levels(const Bone& bone, const RigidTransform& best, double away_mm)
+      : Split(std::vector(2, motion({0, 0, 0}, {0, away_mm, 0}) * best), bone.pose.frame, 1e4),
+        bone_(bone),
+        best_(best) {}
+  std::shared_ptr<const marrow::Cost> at_level(const marrow::CostLevel& level) const override {
+    return std::make_shared<Levels>(bone_, best_, level.pixel_step > 1 ? 0.6 : 0);
+  }
+
+ private:
+  const Bone& bone_;
+  RigidTransform best_;
+};
+
+TEST(RefineCameras, TheLastPixelStepDecidesThePoses) {
+  const Bone bone({});
+  Bone levels = bone;
+  levels.cost = std::make_shared<Levels>(bone, bone.pose.world_from_model, 0);
+  const auto off_mm = [&](std::vector<double> steps) {
+    const auto poses =
+        shipped::call("refine.cameras", inputs({levels}), {{"pixel_step", steps}}).at("poses").as_list<marrow::Pose>();
+    return (poses[0].world_from_model.translation_mm - bone.pose.world_from_model.translation_mm).norm();
+  };
+  EXPECT_NEAR(off_mm({3}), 0.6, 0.02);
+  EXPECT_NEAR(off_mm({3, 1}), 0, 0.02);
+  EXPECT_EQ(shipped::refusal("refine.cameras", inputs({bone}), {{"pixel_step", std::vector<double>{}}}),
+            "pixel_step: there is no level; give a number for one at least");
+}
+
 TEST(RefineCameras, TheViewsKeepTheirImagesAndNames) {
   const RigidTransform none = motion({0, 0, 0}, {0, 0, 0});
   const auto after = shipped::call("refine.cameras", inputs({Bone({none, none})})).at("views").as_list<marrow::View>();
