@@ -380,10 +380,9 @@ MARROW_PLUGIN(plugin) {
               "for costs of contours: distance between two points of the outline", at_least(0.1))
       .option("reach_px", &Options::reach_px,
               "for costs of contours: a point with no edge within this distance counts as unmatched", at_least(0.1))
-      .option(
-          "pixel_step", &Options::pixel_step,
-          "for costs of grey values: only every n-th pixel is compared; how far the cameras are off is judged with the "
-          "first number, and a smaller one after it makes the poses more exact",
-          at_least(1))
+      .option("pixel_step", &Options::pixel_step,
+              "per level, for costs of grey values: only every n-th pixel is compared; the first level tells how far "
+              "the cameras are off, and the last one decides the poses",
+              at_least(1))
       .option("max_rounds", &Options::max_rounds, "largest number of steps", at_least(1));
 }
