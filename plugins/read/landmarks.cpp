@@ -2,6 +2,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/domain/names.hpp"
+#include "marrow/toolbox/exchange/marked_values.hpp"
 #include "marrow/toolbox/files/yaml_values.hpp"
 
 namespace {
@@ -11,6 +12,7 @@ using files::FreeKeys, files::YamlFile, files::YamlMap;
 
 struct Options {
   std::filesystem::path path;
+  std::string fragment = "bone";
 };
 
 /// Notes a fault if the points in the CT have none with the name of a seen or tracked point.
@@ -54,10 +56,15 @@ Landmarks landmarks_of(const YamlMap& fragment, YamlFile& file) {
 }
 
 List<Landmarks> landmarks(const Options& options) {
+  List<Landmarks> landmarks;
+  if (exchange::is_markups_file(options.path)) {
+    check_item_name("fragment", options.fragment);
+    landmarks.add(options.fragment, exchange::read_marked_landmarks(options.path));
+    return landmarks;
+  }
   YamlFile file(options.path);
   const YamlMap map(file, file.root(), "landmarks", {"marrow-landmarks", "fragments"});
   files::check_version(map, "marrow-landmarks");
-  List<Landmarks> landmarks;
   if (const auto fragments = map.required("fragments")) {
     const YamlMap by_name(file, *fragments, "fragments", FreeKeys{});
     if (by_name.valid() && by_name.keys().empty())
@@ -77,8 +84,11 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.landmarks", landmarks)
       .summary(
           "Reads landmarks or markers of each fragment from marrow's YAML: their positions in the CT, in the images, "
-          "and in the world as measured by a tracking system")
+          "and in the world as measured by a tracking system; or their positions in the CT from 3D Slicer's points")
       .out("landmarks", "points in CT coordinates (mm), in pixels of views, and in world coordinates (mm)",
            over("fragment"))
-      .option("path", &Options::path, "file with landmarks", required());
+      .option("path", &Options::path,
+              "file with landmarks; .mrk.json, .json or .fcsv: 3D Slicer's points, any other: marrow's YAML",
+              required())
+      .option("fragment", &Options::fragment, "only for 3D Slicer's files: the fragment of the points");
 }
