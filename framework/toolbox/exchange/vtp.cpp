@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // Surfaces of VTK (.vtp), read and written by VTK itself. 3D Slicer marks the coordinate system by a text "SPACE".
 #include <vtkCellArray.h>
-#include <vtkCommand.h>
-#include <vtkExecutive.h>
 #include <vtkFieldData.h>
+#include <vtkLogger.h>
 #include <vtkNew.h>
+#include <vtkOutputWindow.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
+#include <vtkSmartPointer.h>
 #include <vtkStringArray.h>
 #include <vtkXMLPolyDataReader.h>
 #include <vtkXMLPolyDataWriter.h>
@@ -23,23 +24,48 @@
 namespace marrow::exchange {
 namespace {
 
-/// Keeps VTK's first complaint, which it would else print.
-class Complaints : public vtkCommand {
+/// Keeps the first complaint of any part of VTK, which it would else print.
+class Complaints : public vtkOutputWindow {
  public:
   static Complaints* New() { return new Complaints; }
-  void Execute(vtkObject*, unsigned long event, void* text) override {
-    if (first.empty() && text && (event == vtkCommand::ErrorEvent || event == vtkCommand::WarningEvent))
-      first = static_cast<const char*>(text);
-  }
+  void DisplayText(const char* text) override { keep(text); }
+  void DisplayErrorText(const char* text) override { keep(text); }
+  void DisplayWarningText(const char* text) override { keep(text); }
+  void DisplayGenericWarningText(const char* text) override { keep(text); }
+  bool are_none() const { return first_.empty(); }
   /// Its last line, which says what is wrong; the others name VTK's source.
   std::string shown() const {
-    std::string text = first;
+    std::string text = first_;
     while (!text.empty() && (text.back() == '\n' || text.back() == ' ')) text.pop_back();
     text = text.substr(text.rfind('\n') + 1);
     if (const std::size_t at = text.find("): "); at != std::string::npos) text = text.substr(at + 3);
     return printable(text.substr(0, 120));
   }
-  std::string first;
+
+ private:
+  void keep(const char* text) {
+    if (first_.empty() && text) first_ = text;
+  }
+  std::string first_;
+};
+
+/// Takes VTK's complaints while it lives.
+class Listening {
+ public:
+  explicit Listening(Complaints* complaints) : before_(vtkOutputWindow::GetInstance()) {
+    vtkOutputWindow::SetInstance(complaints);
+    vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
+  }
+  ~Listening() {
+    vtkOutputWindow::SetInstance(before_);
+    vtkLogger::SetStderrVerbosity(verbosity_);
+  }
+  Listening(const Listening&) = delete;
+  Listening& operator=(const Listening&) = delete;
+
+ private:
+  vtkSmartPointer<vtkOutputWindow> before_;
+  vtkLogger::Verbosity verbosity_ = vtkLogger::GetCurrentVerbosityCutoff();
 };
 
 /// The number behind `name="` in the text before `end`, for each time that it occurs, added up.
@@ -105,18 +131,13 @@ FilePolygons read_vtp(const std::filesystem::path& path) {
   const std::string what = path.string(), bytes = files::read_bytes(path, kMostSurfaceBytes);
   check_is_vtp(bytes, what);
   check_claims(bytes, what);
-  vtkNew<vtkXMLPolyDataReader> reader;
   vtkNew<Complaints> complaints;
-  for (vtkObject* const source : {static_cast<vtkObject*>(reader), static_cast<vtkObject*>(reader->GetExecutive())}) {
-    source->AddObserver(vtkCommand::ErrorEvent, complaints);
-    source->AddObserver(vtkCommand::WarningEvent, complaints);
-  }
-  reader->SetReaderErrorObserver(complaints);
-  reader->SetParserErrorObserver(complaints);
+  const Listening listening(complaints);
+  vtkNew<vtkXMLPolyDataReader> reader;
   reader->ReadFromInputStringOn();
   reader->SetInputString(bytes);
   reader->Update();
-  if (!complaints->first.empty())
+  if (!complaints->are_none())
     throw Error(what + ": VTK cannot read it (" + complaints->shown() + "); it is cut off or damaged: export it again");
   return polygons_of(*reader->GetOutput(), what);
 }

@@ -21,6 +21,9 @@ using FcsvFile = FileOf<struct Fcsv>;
 using ItkTransformFile = FileOf<struct ItkTransform>;
 using ObjFile = FileOf<struct Obj>;
 using VtpFile = FileOf<struct Vtp>;
+using PlastimatchFile = FileOf<struct Plastimatch>;
+using RtkFile = FileOf<struct Rtk>;
+using XregFile = FileOf<struct Xreg>;
 
 /// The writer of such a type.
 template <class Format>
@@ -35,3 +38,6 @@ MARROW_VALUE_TYPE(marrow::exchange::FcsvFile, "fcsv_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::ItkTransformFile, "itk_transform_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::ObjFile, "obj_file", 1)
 MARROW_VALUE_TYPE(marrow::exchange::VtpFile, "vtp_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::PlastimatchFile, "plastimatch_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::RtkFile, "rtk_file", 1)
+MARROW_VALUE_TYPE(marrow::exchange::XregFile, "xreg_file", 1)
