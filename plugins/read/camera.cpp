@@ -3,8 +3,7 @@
 #include <marrow/plugin.hpp>
 
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"
-#include "marrow/toolbox/exchange/rtk_geometry.hpp"
-#include "marrow/toolbox/exchange/xreg_file.hpp"
+#include "marrow/toolbox/exchange/projections.hpp"
 #include "marrow/toolbox/files/camera_file.hpp"
 
 namespace {
@@ -24,8 +23,9 @@ Format format_of(const std::filesystem::path& path) {
   std::string end = path.extension().string();
   for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
   if (end == ".yaml" || end == ".yml") return Format::own;
-  if (end == ".xml") return Format::rtk;
-  if (end == ".h5" || end == ".hdf5") return Format::xreg;
+  const exchange::Projections projections = exchange::projections_in(path);
+  if (projections == exchange::Projections::rtk) return Format::rtk;
+  if (projections == exchange::Projections::xreg) return Format::xreg;
   return exchange::is_plastimatch_camera(path) ? Format::plastimatch : Format::own;
 }
 
@@ -53,25 +53,14 @@ Camera own_camera(const std::filesystem::path& path, Context& context) {
   return file.camera;
 }
 
-Camera xreg_camera(const Options& options) {
-  const std::string what = options.path.string();
-  const std::vector<exchange::XregProjection> all = exchange::read_xreg(options.path);
-  if (std::size_t(options.projection) >= all.size())
-    throw Error(what + ": has " + std::to_string(all.size()) + " projections, counted from 0; there is no projection " +
-                std::to_string(options.projection));
-  return exchange::camera_of(all[std::size_t(options.projection)], exchange::mirror_of(options.mirror),
-                             what + ": projection " + std::to_string(options.projection));
-}
-
 Camera camera(const Image* image, const Options& options, Context& context) {
   const Format format = format_of(options.path);
   check_needed(options, image != nullptr, format);
   if (format == Format::own) return own_camera(options.path, context);
-  if (format == Format::xreg) return xreg_camera(options);
   exchange::ImageSize size{options.size_px, options.pixel_mm, options.corner_mm};
   if (image) size.size_px = {double(image->width()), double(image->height())};
   if (format == Format::plastimatch) return exchange::read_plastimatch_camera(options.path, size);
-  return exchange::read_rtk_camera(options.path, options.projection, size, exchange::mirror_of(options.mirror));
+  return exchange::read_projections(options.path, {options.projection}, size, exchange::mirror_of(options.mirror))[0];
 }
 
 }  // namespace

@@ -161,6 +161,8 @@ TEST(Markups, DiagnosesFaultsOfJson) {
   expect(with(kJson, "[4e1, -5, 6]", "[4e1, -5]"), "controlPoints[1].position: expected 3 coordinates, got 2");
   expect(with(kJson, "4e1", "4e9"),
          "markups[0].controlPoints[1].position[0]: expected a coordinate in mm of at most 1 km");
+  expect(with(kJson, "4e1", "4e999"),
+         "holds a number too large to be one; it is damaged: save the markups again in 3D");
   expect(with(kJson, "4e1", "null"), "controlPoints[1].position[0]: expected a number, got 'null'");
   expect(with(kJson, "4e1", "NaN"), "a.mrk.json:19: is no JSON from here on");
   expect(with(kJson, "\"position\": [4e1", "\"place\": [4e1"),

@@ -168,12 +168,12 @@ TEST(Rtk, DiagnosesWhatTheImageLacks) {
       "g.xml: projection 0: its images are seen from the detector, or have their rows from below; turn them over "
       "by mirror: left_right or upside_down of read.view or read.image, and give the same mirror here");
   EXPECT_SAYS(read(folder / "g.xml", {{"size_px", std::vector<double>{}}}),
-              "g.xml: does not say how many pixels the image has; wire the image, or give size_px");
+              "g.xml: projection 0: does not say how many pixels the image has; wire the image, or give size_px");
   EXPECT_SAYS(read(folder / "g.xml", {{"pixel_mm", std::vector<double>{}}}),
-              "g.xml: needs the size of a pixel on the detector; give pixel_mm: [width, height]");
-  EXPECT_SAYS(
-      read(folder / "g.xml", {{"corner_mm", std::vector<double>{1}}}),
-      "g.xml: corner_mm: expected [u, v], the place of the first pixel's centre on the detector, got 1 numbers");
+              "g.xml: projection 0: needs the size of a pixel on the detector; give pixel_mm: [width, height]");
+  EXPECT_SAYS(read(folder / "g.xml", {{"corner_mm", std::vector<double>{1}}}),
+              "g.xml: projection 0: corner_mm: expected [u, v], the place of the first pixel's centre on the detector, "
+              "got 1 numbers");
 }
 
 TEST(Rtk, DiagnosesCamerasThatItCannotHold) {

@@ -41,6 +41,39 @@ TEST(Xreg, PointsByHandInAllFrames) {
   EXPECT_SAYS(read(kFile, 3, "none"), "has 3 projections, counted from 0; there is no projection 3");
 }
 
+marrow::List<marrow::Camera> cameras_at(const std::filesystem::path& path, shipped::Options options) {
+  options["path"] = path.string();
+  return shipped::call("read.cameras", {}, options).at("cameras").as_list<marrow::Camera>();
+}
+
+TEST(Xreg, SeveralProjectionsAtOnce) {
+  const shipped::Options both{{"names", std::vector<std::string>{"ap", "lateral"}},
+                              {"projections", std::vector<double>{2, 1}},
+                              {"mirror", "left_right"}};
+  const auto cameras = cameras_at(kFile, both);
+  EXPECT_EQ(cameras.names(), (std::vector<std::string>{"ap", "lateral"}));
+  EXPECT_EQ(marrow::hash_of(cameras[0]), marrow::hash_of(read(kFile, 2, "left_right")));
+  EXPECT_EQ(marrow::hash_of(cameras[1]), marrow::hash_of(read(kFile, 1, "left_right")));
+  const auto first = cameras_at(kFile, {{"names", std::vector<std::string>{"ap"}}});
+  EXPECT_EQ(marrow::hash_of(first[0]), marrow::hash_of(read(kFile, 0, "none")));
+  const auto refusal = [&](const std::string& option, const shipped::Options::mapped_type& value) {
+    shipped::Options options = both;
+    options[option] = value;
+    options["path"] = kFile.string();
+    return shipped::refusal("read.cameras", {}, options);
+  };
+  EXPECT_NE(refusal("projections", std::vector<double>{2, 3}).find("there is no projection 3"), std::string::npos);
+  EXPECT_NE(refusal("projections", std::vector<double>{2, 0.5})
+                .find("projections: expected whole numbers from 0, got 0.500000"),
+            std::string::npos);
+  EXPECT_NE(
+      refusal("size_px", std::vector<double>{2, 3}).find("says itself how large its images are; leave out size_px"),
+      std::string::npos);
+  EXPECT_NE(shipped::refusal("read.cameras", {}, {{"path", "a.txt"}, {"names", std::vector<std::string>{"a"}}})
+                .find("a.txt: expected RTK's geometry (.xml) or xReg's projection data (.h5)"),
+            std::string::npos);
+}
+
 marrow::Landmarks landmarks_at(const std::filesystem::path& points, shipped::Options options) {
   options["path"] = points.string();
   return shipped::call("read.landmarks", {}, options).at("landmarks").as_list<marrow::Landmarks>()[0];

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // 3D Slicer's markups: JSON with the lists of points under "markups", each with its coordinate system.
+#include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
 
@@ -34,6 +35,8 @@ json parsed(const std::string& text, const std::string& file) {
     const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(end), '\n');
     throw Error(file + ":" + std::to_string(line) +
                 ": is no JSON from here on; it is cut off or damaged: save the markups again in 3D Slicer");
+  } catch (const json::out_of_range&) {
+    throw Error(file + ": holds a number too large to be one; it is damaged: save the markups again in 3D Slicer");
   }
 }
 

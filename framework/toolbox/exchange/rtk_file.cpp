@@ -157,7 +157,7 @@ class RtkReader {
 
 }  // namespace
 
-std::vector<RtkProjection> read_rtk_file(const std::filesystem::path& path) {
+std::vector<RtkProjection> read_rtk(const std::filesystem::path& path) {
   return RtkReader(path).read(files::read_bytes(path, kMostBytes));
 }
 

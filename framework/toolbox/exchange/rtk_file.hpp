@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
+// The names in RTK's file, for its reader and its writer.
 #include <array>
 #include <utility>
 
@@ -19,8 +20,5 @@ inline constexpr std::array<std::pair<const char*, double RtkProjection::*>, 9> 
     {"ProjectionOffsetX", &RtkProjection::projection_x_mm},
     {"ProjectionOffsetY", &RtkProjection::projection_y_mm},
 }};
-
-/// The projections of a file of RTK, version 2 or 3, in its order. Throws Error with the line of what is wrong.
-std::vector<RtkProjection> read_rtk_file(const std::filesystem::path& path);
 
 }  // namespace marrow::exchange

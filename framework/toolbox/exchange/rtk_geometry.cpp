@@ -73,12 +73,7 @@ Matrix34 rtk_matrix(const RtkProjection& p) {
   return to_detector * magnification * to_source * rotation;
 }
 
-Camera read_rtk_camera(const std::filesystem::path& path, int projection, const ImageSize& size, Mirror mirror) {
-  const std::string what = path.string();
-  const std::vector<RtkProjection> all = read_rtk_file(path);
-  if (projection < 0 || std::size_t(projection) >= all.size())
-    throw Error(what + ": has " + std::to_string(all.size()) + " projections, counted from 0; there is no projection " +
-                std::to_string(projection));
+Camera camera_of(const RtkProjection& projection, const ImageSize& size, Mirror mirror, const std::string& what) {
   const Eigen::Vector2i pixels = size_px(size, what);
   const Eigen::Vector2d spacing = pixel_mm(size.pixel_mm, what), corner = corner_mm(size, what);
   Eigen::Matrix3d pixel_from_mm = Eigen::Matrix3d::Identity();
@@ -86,8 +81,7 @@ Camera read_rtk_camera(const std::filesystem::path& path, int projection, const 
     pixel_from_mm(i, i) = 1 / spacing[i];
     pixel_from_mm(i, 2) = -corner[i] / spacing[i];
   }
-  return camera_of(-pixel_from_mm * rtk_matrix(all[std::size_t(projection)]), pixels, mirror,
-                   what + ": projection " + std::to_string(projection));
+  return camera_of(Matrix34(-pixel_from_mm * rtk_matrix(projection)), pixels, mirror, what);
 }
 
 std::string rtk_geometry(const std::vector<Camera>& cameras, const Eigen::Vector2d& pixel_mm) {
