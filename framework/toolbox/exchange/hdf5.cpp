@@ -11,17 +11,16 @@
 namespace marrow::exchange {
 namespace {
 
-constexpr std::uint64_t kMostBytes = std::uint64_t(8) << 30;  // the images are in the file
 constexpr std::size_t kLongestText = 4096;
 constexpr std::size_t kMostNames = 10000;
 
-/// Opens bytes as a file, without a copy on the disk. HDF5 prints its errors unless it is told not to.
-hid_t open_bytes(const std::string& bytes) {
+/// Opens a regular file without locking it. HDF5 prints its errors unless it is told not to.
+hid_t open_file(const std::filesystem::path& path) {
+  const files::InputFile checked(path);
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   const Hdf5Id access(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-  H5Pset_fapl_core(access, 1 << 16, false);
-  H5Pset_file_image(access, const_cast<char*>(bytes.data()), bytes.size());
-  return H5Fopen("marrow-in-memory", H5F_ACC_RDONLY, access);
+  H5Pset_file_locking(access, false, true);
+  return H5Fopen(path.c_str(), H5F_ACC_RDONLY, access);
 }
 
 hid_t create_in_memory() {
@@ -37,8 +36,7 @@ void check(bool good) {
 
 }  // namespace
 
-Hdf5Reader::Hdf5Reader(const std::filesystem::path& path)
-    : path_(path.string()), bytes_(files::read_bytes(path, kMostBytes)), file_(open_bytes(bytes_), H5Fclose) {
+Hdf5Reader::Hdf5Reader(const std::filesystem::path& path) : path_(path.string()), file_(open_file(path), H5Fclose) {
   if (!file_.is_open())
     throw Error(path_ +
                 ": is no HDF5 file that can be opened; it is cut off, damaged or of another kind: write it again");

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
-// A file of HDF5 in memory: numbers, texts and groups by their keys. Only small values are read, so a damaged file
-// cannot make it reserve much.
+// Files of HDF5: numbers, texts and groups by their keys. Only small values are read, so neither images in the file nor
+// a damaged file take much memory. What is written is made in memory.
 #include <hdf5.h>
 
 #include <filesystem>
@@ -44,7 +44,6 @@ class Hdf5Reader {
 
  private:
   std::string path_;
-  std::string bytes_;  ///< before file_, which uses it
   Hdf5Id file_;
 };
 
