@@ -89,6 +89,8 @@ List<Landmarks> marked_landmarks(const Options& options) {
 }
 
 List<Landmarks> landmarks(const Options& options) {
+  if (options.seen.empty() && (!options.views.empty() || options.mirror != "none"))
+    throw Error(options.path.string() + ": views and mirror are about the file of seen; give it, or leave them out");
   if (exchange::is_markups_file(options.path)) return marked_landmarks(options);
   if (!options.seen.empty())
     throw Error(options.path.string() +
@@ -120,8 +122,7 @@ MARROW_PLUGIN(plugin) {
       .out("landmarks", "points in CT coordinates (mm), in pixels of views, and in world coordinates (mm)",
            over("fragment"))
       .option("path", &Options::path,
-              "file with landmarks; .mrk.json, .json or .fcsv: 3D Slicer's points, any other: marrow's YAML",
-              required())
+              "file with landmarks; .mrk.json or .fcsv: 3D Slicer's points, any other: marrow's YAML", required())
       .option("fragment", &Options::fragment, "only for 3D Slicer's files: the fragment of the points")
       .option(
           "seen", &Options::seen,

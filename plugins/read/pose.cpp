@@ -15,7 +15,13 @@ struct Options {
 };
 
 marrow::Pose pose(const Options& options) {
-  if (!marrow::exchange::is_itk_transform_file(options.path)) return marrow::files::read_pose_file(options.path);
+  if (!marrow::exchange::is_itk_transform_file(options.path)) {
+    if (options.maps != "world_to_ct")
+      throw marrow::Error(options.path.string() +
+                          ": says itself what it maps; maps is only for transforms of ITK (.tfm "
+                          "or .txt), so leave it out");
+    return marrow::files::read_pose_file(options.path);
+  }
   marrow::Pose pose;
   pose.world_from_model = options.maps == "ct_to_world"
                               ? marrow::exchange::read_itk_transform(options.path, "world", "ct")

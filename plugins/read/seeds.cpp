@@ -26,8 +26,8 @@ MARROW_PLUGIN(plugin) {
   plugin.node("read.seeds", seeds)
       .summary("Reads points inside each bone fragment from marrow's YAML or from 3D Slicer's points")
       .out("seeds", "points per fragment in CT coordinates", marrow::over("fragment"))
-      .option("path", &Options::path,
-              "file with seeds; .mrk.json, .json or .fcsv: 3D Slicer's, any other: marrow's YAML", marrow::required())
+      .option("path", &Options::path, "file with seeds; .mrk.json or .fcsv: 3D Slicer's, any other: marrow's YAML",
+              marrow::required())
       .option(
           "fragment", &Options::fragment,
           "only for 3D Slicer's files: the fragment of all points; if empty, each point's label names it, without a "

@@ -161,6 +161,34 @@ class Xreg(Formats):
             self.assertEqual(file["proj-000/landmarks/head"][()].tolist(), [[7], [8.5]])
             self.assertNotIn("landmarks", file["proj-001"])
 
+    # Only the file that is named counts in a node's key, so nothing is read from elsewhere.
+    def test_what_lies_in_another_file_is_refused(self):
+        source = SOURCE / "tests/exchange/data/xreg-by-h5py.h5"
+        for name, change, said in (
+            ("soft", h5py.SoftLink("/proj-001/cam"), "proj-000/cam: is a link to another place, which is not followed"),
+            ("other", h5py.ExternalLink(source, "/proj-001/cam"), "proj-000/cam: is a link to another place"),
+            ("raw", None, "proj-000/cam/row-spacing: its values lie in another file, which is not read; copy them"),
+        ):
+            with self.subTest(name):
+                path = self.scratch / (name + ".h5")
+                shutil.copy(source, path)
+                with h5py.File(path, "a") as file:
+                    if change:
+                        del file["proj-000/cam"]
+                        file["proj-000/cam"] = change
+                    else:
+                        del file["proj-000/cam/row-spacing"]
+                        (self.scratch / "raw").write_bytes(bytes(8))
+                        file["proj-000/cam"].create_dataset(
+                            "row-spacing", (1,), "f8", external=[(str(self.scratch / "raw"), 0, 8)]
+                        )
+                pipeline = self.write(
+                    "p.yaml", "marrow: 1\nnodes:\n  c: {uses: read.camera, with: {path: %s}}\noutputs: {c: c}\n" % path
+                )
+                result = marrow("run", pipeline, "--out", self.scratch / ("out-" + name), "--quiet")
+                self.assertEqual(result.returncode, 1)
+                self.assertIn(said, result.stderr)
+
 
 if __name__ == "__main__":
     main()

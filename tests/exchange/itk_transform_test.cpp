@@ -98,6 +98,9 @@ TEST(ItkTransform, TheBytesThatAreWritten) {
 
 TEST(ItkTransform, DiagnosesFaults) {
   const TemporaryFolder folder;
+  put(folder / "p.yaml", "marrow-pose: 1\n");
+  EXPECT_SAYS(read(folder / "p.yaml", "ct_to_world"),
+              "p.yaml: says itself what it maps; maps is only for transforms of ITK (.tfm or .txt), so leave it out");
   const auto expect = [&](const std::string& text, const std::string& said) {
     put(folder / "a.tfm", text);
     EXPECT_REFUSED(read(folder / "a.tfm"), "a.tfm", said);

@@ -102,6 +102,8 @@ TEST(Xreg, LandmarksAsImagesShowThem) {
   put(folder / "p.fcsv", with(kPoints, "FH-r", "GSN-r"));
   EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"seen", kFile.string()}, {"views", views}}),
               "xreg-by-h5py.h5: projection 0 shows 'FH-r', which ");
+  EXPECT_SAYS(landmarks_at(folder / "p.fcsv", {{"views", views}}),
+              "p.fcsv: views and mirror are about the file of seen; give it, or leave them out");
   put(folder / "l.yaml", "marrow-landmarks: 1\nfragments: {a: {points: {b: [1, 2, 3]}}}\n");
   EXPECT_SAYS(
       landmarks_at(folder / "l.yaml", {{"seen", kFile.string()}}),

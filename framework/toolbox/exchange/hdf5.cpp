@@ -47,11 +47,21 @@ void Hdf5Reader::refuse(const std::string& key, const std::string& what) const {
 }
 
 bool Hdf5Reader::has(const std::string& key) const {
-  // Each group on the way must be there, or HDF5 takes the question for an error.
+  // Each group on the way must be there, or HDF5 takes the question for an error. A link may lead to another file.
   for (std::size_t at = key.find('/', 1);; at = key.find('/', at + 1)) {
-    if (H5Lexists(file_, key.substr(0, at).c_str(), H5P_DEFAULT) <= 0) return false;
+    const std::string part = key.substr(0, at);
+    if (H5Lexists(file_, part.c_str(), H5P_DEFAULT) <= 0) return false;
+    H5L_info_t info{};
+    if (H5Lget_info(file_, part.c_str(), &info, H5P_DEFAULT) < 0 || info.type != H5L_TYPE_HARD)
+      refuse(part, "is a link to another place, which is not followed; copy what it leads to into the file");
     if (at == std::string::npos) return true;
   }
+}
+
+void Hdf5Reader::check_is_inside(hid_t data, const std::string& key) const {
+  const Hdf5Id how(H5Dget_create_plist(data), H5Pclose);
+  if (!how.is_open() || H5Pget_external_count(how) != 0 || H5Pget_layout(how) == H5D_VIRTUAL)
+    refuse(key, "its values lie in another file, which is not read; copy them into the file");
 }
 
 std::vector<std::string> Hdf5Reader::names_in(const std::string& key) const {
@@ -78,6 +88,7 @@ std::vector<double> Hdf5Reader::numbers(const std::string& key, std::size_t coun
   const Hdf5Id space(data.is_open() ? H5Dget_space(data) : -1, H5Sclose),
       type(data.is_open() ? H5Dget_type(data) : -1, H5Tclose);
   if (!space.is_open() || !type.is_open()) refuse(key, "expected numbers; the file is damaged");
+  check_is_inside(data, key);
   const H5T_class_t kind = H5Tget_class(type);
   if (kind != H5T_FLOAT && kind != H5T_INTEGER) refuse(key, "expected numbers, got another type");
   const hssize_t found = H5Sget_simple_extent_npoints(space);
@@ -100,6 +111,7 @@ std::string Hdf5Reader::text(const std::string& key) const {
   if (!space.is_open() || !type.is_open() || H5Tget_class(type) != H5T_STRING ||
       H5Sget_simple_extent_npoints(space) != 1)
     refuse(key, "expected a text, got another type");
+  check_is_inside(data, key);
   if (H5Tis_variable_str(type) > 0) {
     char* found = nullptr;
     const Hdf5Id memory(H5Tcopy(H5T_C_S1), H5Tclose);

@@ -32,6 +32,7 @@ class Hdf5Reader {
   /// Throws Error if the file cannot be read, or is no HDF5.
   explicit Hdf5Reader(const std::filesystem::path& path);
 
+  /// Throws Error if a part of the key is a link, which could lead to a file that nobody named.
   bool has(const std::string& key) const;
   /// The names in a group, in their order; empty if there is no such group.
   std::vector<std::string> names_in(const std::string& key) const;
@@ -43,6 +44,7 @@ class Hdf5Reader {
   [[noreturn]] void refuse(const std::string& key, const std::string& what) const;
 
  private:
+  void check_is_inside(hid_t data, const std::string& key) const;
   std::string path_;
   Hdf5Id file_;
 };

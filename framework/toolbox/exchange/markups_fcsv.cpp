@@ -97,6 +97,13 @@ struct Header {
   }
 };
 
+/// In small or capital letters.
+bool ends_with(const std::filesystem::path& path, const std::string& end) {
+  std::string name = path.filename().string();
+  for (char& c : name) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return name.size() > end.size() && name.compare(name.size() - end.size(), end.size(), end) == 0;
+}
+
 std::string quoted(const std::string& text) {
   std::string clean;
   for (const char c : text) {
@@ -148,14 +155,11 @@ std::string markups_fcsv(const std::vector<MarkedPoint>& points) {
 }
 
 bool is_markups_file(const std::filesystem::path& path) {
-  std::string end = path.extension().string();
-  for (char& c : end) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return end == ".json" || end == ".fcsv";
+  return ends_with(path, ".mrk.json") || ends_with(path, ".fcsv");
 }
 
 std::vector<MarkedPoint> read_markups(const std::filesystem::path& path) {
-  const std::string end = path.extension().string();
-  return end.size() == 5 && (end[1] == 'j' || end[1] == 'J') ? read_markups_json(path) : read_markups_fcsv(path);
+  return ends_with(path, ".fcsv") ? read_markups_fcsv(path) : read_markups_json(path);
 }
 
 }  // namespace marrow::exchange

@@ -13,6 +13,7 @@
 #include <vtkXMLPolyDataWriter.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 
 #include "marrow/domain/error.hpp"
@@ -68,12 +69,12 @@ class Listening {
   vtkLogger::Verbosity verbosity_ = vtkLogger::GetCurrentVerbosityCutoff();
 };
 
-/// The number behind `name="` in the text before `end`, for each time that it occurs, added up.
+/// The numbers that follow `name` (as in name="4") in the text before `end`, added up.
 double claimed(const std::string& bytes, std::size_t end, const std::string& name) {
   double sum = 0;
-  for (std::size_t at = 0; (at = bytes.find(name + "=\"", at)) < end;) {
-    at += name.size() + 2;
-    sum += std::strtod(bytes.substr(at, 24).c_str(), nullptr);
+  for (std::size_t at = 0; (at = bytes.find(name, at)) < end;) {
+    at = std::min(bytes.find_first_not_of(" \t\r\n='\"", at + name.size()), bytes.size());
+    sum += std::abs(std::strtod(bytes.substr(at, 24).c_str(), nullptr));
   }
   return sum;
 }
@@ -85,7 +86,7 @@ void check_claims(const std::string& bytes, const std::string& what) {
   for (const char* name :
        {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys", "NumberOfTuples"}) {
     const double count = claimed(bytes, end, name);
-    if (!(count >= 0 && count <= kMostPerByte * double(bytes.size()) && count < 4e9))
+    if (!(count <= kMostPerByte * double(bytes.size()) && count < 4e9))
       throw Error(what + ": its " + name + " is more than a file of " + std::to_string(bytes.size()) +
                   " bytes can hold; it is damaged: export it again");
   }

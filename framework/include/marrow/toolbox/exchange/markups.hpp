@@ -14,7 +14,7 @@ struct MarkedPoint {
   Eigen::Vector3d at_mm = Eigen::Vector3d::Zero();
 };
 
-/// Whether the name ends as those of 3D Slicer's points do: .json or .fcsv, in small or capital letters.
+/// Whether the name ends as those of 3D Slicer's points do: .mrk.json or .fcsv, in small or capital letters.
 bool is_markups_file(const std::filesystem::path& path);
 
 /// The points of a file of 3D Slicer, in the file's order. The file says whether its coordinates are LPS or RAS; the
