@@ -161,33 +161,76 @@ class Xreg(Formats):
             self.assertEqual(file["proj-000/landmarks/head"][()].tolist(), [[7], [8.5]])
             self.assertNotIn("landmarks", file["proj-001"])
 
+    def refused(self, name, change):
+        """What is said of a copy of the file that was changed."""
+        path = self.scratch / (name + ".h5")
+        shutil.copy(SOURCE / "tests/exchange/data/xreg-by-h5py.h5", path)
+        with h5py.File(path, "a") as file:
+            change(file)
+        pipeline = self.write(
+            "p.yaml", "marrow: 1\nnodes:\n  c: {uses: read.camera, with: {path: %s}}\noutputs: {c: c}\n" % path
+        )
+        result = marrow("run", pipeline, "--out", self.scratch / ("out-" + name), "--quiet")
+        self.assertEqual(result.returncode, 1, result.stdout + result.stderr)
+        return result.stderr
+
     # Only the file that is named counts in a node's key, so nothing is read from elsewhere.
     def test_what_lies_in_another_file_is_refused(self):
         source = SOURCE / "tests/exchange/data/xreg-by-h5py.h5"
+
+        def raw(file):
+            del file["proj-000/cam/row-spacing"]
+            (self.scratch / "raw").write_bytes(bytes(8))
+            outside = [(str(self.scratch / "raw"), 0, 8)]
+            file["proj-000/cam"].create_dataset("row-spacing", (1,), "f8", external=outside)
+
+        link = "proj-000/cam: is a link to another place, which is not followed; copy what it leads to into the file"
         for name, change, said in (
-            ("soft", h5py.SoftLink("/proj-001/cam"), "proj-000/cam: is a link to another place, which is not followed"),
-            ("other", h5py.ExternalLink(source, "/proj-001/cam"), "proj-000/cam: is a link to another place"),
-            ("raw", None, "proj-000/cam/row-spacing: its values lie in another file, which is not read; copy them"),
+            ("soft", replaced("proj-000/cam", h5py.SoftLink("/proj-001/cam")), link),
+            ("other", replaced("proj-000/cam", h5py.ExternalLink(source, "/proj-001/cam")), link),
+            ("raw", raw, "proj-000/cam/row-spacing: its values lie in another file, which is not read; copy them"),
         ):
             with self.subTest(name):
-                path = self.scratch / (name + ".h5")
-                shutil.copy(source, path)
-                with h5py.File(path, "a") as file:
-                    if change:
-                        del file["proj-000/cam"]
-                        file["proj-000/cam"] = change
-                    else:
-                        del file["proj-000/cam/row-spacing"]
-                        (self.scratch / "raw").write_bytes(bytes(8))
-                        file["proj-000/cam"].create_dataset(
-                            "row-spacing", (1,), "f8", external=[(str(self.scratch / "raw"), 0, 8)]
-                        )
-                pipeline = self.write(
-                    "p.yaml", "marrow: 1\nnodes:\n  c: {uses: read.camera, with: {path: %s}}\noutputs: {c: c}\n" % path
-                )
-                result = marrow("run", pipeline, "--out", self.scratch / ("out-" + name), "--quiet")
-                self.assertEqual(result.returncode, 1)
-                self.assertIn(said, result.stderr)
+                self.assertIn(said, self.refused(name, change))
+
+    def test_values_of_another_kind_are_refused_by_their_keys(self):
+        cam, mark = "proj-000/cam/", "proj-000/landmarks/"
+        for name, key, value, said in (
+            ("missing", cam + "num-rows", None, "is missing; the file is cut off, or not of xReg: write it again"),
+            ("text", cam + "num-rows", "many", "expected numbers, got another type"),
+            ("group", cam + "num-rows", {}, "expected numbers; the file is damaged"),
+            ("shape", cam + "intrinsic", numpy.eye(4), "expected 9 numbers, got 16"),
+            ("large", cam + "intrinsic", numpy.zeros((3000, 3000)), "expected 9 numbers, got 9000000"),
+            ("number", cam + "cam-coord-frame-type", 1, "expected a text, got another type"),
+            ("long", cam + "cam-coord-frame-type", numpy.bytes_(b"x" * 5000), "expected a short text; the file is"),
+            ("flat", "proj-000/landmarks", 3.0, "expected a group; the file is damaged"),
+            ("mark", mark + "FH-l", [1.0, 2.0, 3.0], "expected 2 numbers, got 3"),
+            ("letters", mark + "a\nb", [1.0, 2.0], "its name "),
+            ("named", mark + "a" * 300, [1.0, 2.0], "has a name that is damaged or too long"),
+        ):
+            with self.subTest(name):
+                self.assertIn(said, self.refused(name, replaced(key, value)))
+
+    def test_more_landmarks_than_anybody_marks_are_refused(self):
+        def many(file):
+            for i in range(10001):
+                file["proj-000/landmarks/%d" % i] = [1.0, 2.0]
+
+        self.assertIn("landmarks: has 10003 items; at most 10000 are read", self.refused("many", many))
+
+
+def replaced(key, value):
+    """A change of a file: another value under a key, a group for {}, or nothing for None."""
+
+    def change(file):
+        if key in file:
+            del file[key]
+        if isinstance(value, dict):
+            file.create_group(key)
+        elif value is not None:
+            file[key] = value
+
+    return change
 
 
 if __name__ == "__main__":

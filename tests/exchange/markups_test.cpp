@@ -138,6 +138,11 @@ TEST(Markups, WhatIsWrittenIsReadBackExactly) {
   EXPECT_TRUE(shipped::declares("write.markups", marrow::exactly_one({"in.landmarks", "in.seeds"})));
 }
 
+TEST(Markups, DiagnosesThatThereIsNothingToWrite) {
+  for (const char* node : {"write.markups", "write.fcsv"})
+    EXPECT_EQ(shipped::refusal(node, {}), "the node that is wired to 'landmarks' or 'seeds' gave none");
+}
+
 TEST(Markups, DiagnosesFaultsOfJson) {
   const TemporaryFolder folder;
   const auto expect = [&](const std::string& text, const std::string& said) {
@@ -151,6 +156,8 @@ TEST(Markups, DiagnosesFaultsOfJson) {
   expect(R"({"markups": 3})", "markups: expected a list, got '3'");
   expect(R"({"markups": []})", "markups: there is no point in it; place the points in 3D Slicer, and save");
   expect(R"({"markups": [7]})", "markups[0]: expected an object, got '7'");
+  expect(R"({"markups": [{"controlPoints": [5]}]})", "markups[0].controlPoints[0]: expected an object, got '5'");
+  expect(R"({"markups": [{"controlPoints": {}}]})", "markups[0].controlPoints: expected a list, got '{}'");
   expect(with(kJson, "schema-v1.0.3", "schema-v2.0.0"),
          "@schema: expected a version 1 of 3D Slicer's markups, got 'http");
   expect(with(kJson, "\"LPS\"", "\"IJK\""), "markups[0].coordinateSystem: expected LPS or RAS, got 'IJK'");

@@ -175,6 +175,39 @@ TEST(Plastimatch, DiagnosesFaults) {
 }
 
 // A matrix whose factors agree with it, but are no camera's.
+// What a format does not need would be ignored.
+TEST(Plastimatch, DiagnosesOptionsThatAFormatDoesNotNeed) {
+  const TemporaryFolder folder;
+  put(folder / "c.yaml", "marrow-camera: 1\n");
+  put(folder / "c.xml", "<a/>");
+  put(folder / "c.h5", "a");
+  const auto expect = [&](const std::string& name, const shipped::Options::value_type& option,
+                          const std::string& said) {
+    shipped::Options options{option};
+    options["path"] = (folder / name).string();
+    EXPECT_EQ(shipped::refusal("read.camera", {}, options),
+              (folder / name).string() + ": " + said + " is not for this format of cameras; leave it out");
+  };
+  expect("c.yaml", {"size_px", std::vector<double>{3, 4}}, "size_px");
+  expect("c.h5", {"size_px", std::vector<double>{3, 4}}, "size_px");
+  expect("c.h5", {"pixel_mm", std::vector<double>{1}}, "pixel_mm");
+  expect("c.h5", {"corner_mm", std::vector<double>{0, 0}}, "corner_mm");
+  expect("c.yaml", {"mirror", "upside_down"}, "mirror");
+  marrow::Image image;
+  image.pixels = cv::Mat(4, 4, CV_8U, cv::Scalar(0));
+  EXPECT_NE(shipped::refusal("read.camera", {{"image", shipped::item(image)}}, {{"path", (folder / "c.h5").string()}})
+                .find("the input image is not for this format of cameras; leave it out"),
+            std::string::npos);
+}
+
+TEST(Plastimatch, DiagnosesThatThereIsNothingToWrite) {
+  const shipped::Options options{{"pixel_mm", std::vector<double>{1}}};
+  EXPECT_EQ(shipped::refusal("write.plastimatch", {}, options),
+            "the node that is wired to 'camera' or 'view' gave none");
+  for (const char* node : {"write.rtk", "write.xreg"})
+    EXPECT_EQ(shipped::refusal(node, {}, options), "the node that is wired to 'cameras' or 'views' gave none");
+}
+
 TEST(Plastimatch, DiagnosesFactorsThatAreNoCamera) {
   const TemporaryFolder folder;
   const auto text = [](const char* matrix, const char* extrinsic, const char* intrinsic) {

@@ -133,6 +133,10 @@ TEST(Surface, DiagnosesFaultsOfVtp) {
   expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4000000000\""),
          "its NumberOfPolys is more than a file of ");
   expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4\""), "a.vtp: ");
+  expect(with(with(kVtp, "NumberOfStrips=\"0\"", "NumberOfStrips=\"1\""), "<Polys>",
+              "<Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
+              "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray></Strips><Polys>"),
+         "has strips of triangles, which are not read; save it with polygons (VTK: vtkTriangleFilter)");
   expect(kVtp.substr(0, 500), "VTK cannot read it (");
   expect(with(kVtp, "0 2 1 0", "0 9 1 0"), "a face names point 9; there are 4, counted from 0");
   expect(with(kVtp, "0 2 1 0", "0 -2 1 0"), "a face names point -2; there are 4, counted from 0");
