@@ -22,7 +22,8 @@
       } catch (error) {
         outcome.replaceChildren(
             el('p', {}, 'Not saved:'),
-            el('ul', {class: 'faults'}, error.message.split('\n').filter(Boolean).map((line) => el('li', {}, line))));
+            el('ul', {class: 'faults'},
+               error.message.split('\n').map((line) => line.trim()).filter(Boolean).map((line) => el('li', {}, line))));
       }
       button.disabled = false;
     }

@@ -101,7 +101,8 @@ void put_landmarks(YAML::Emitter& out, const std::vector<json>& landmarks) {
   for (const json& landmark : landmarks) {
     put_name(out, name(landmark));
     put(out, landmark.at("model_mm"));
-    for (const auto& [view, pixel] : landmark.value("pixels", json::object()).items())
+    const json pixels = landmark.value("pixels", json::object());
+    for (const auto& [view, pixel] : pixels.items())
       if (pixel.is_array()) by_view[view].push_back(&landmark);
     is_tracked = is_tracked || landmark.contains("tracked_mm");
   }

@@ -46,31 +46,58 @@ bool is_same_file(const fs::path& a, const fs::path& b) {
   return one.eof() && two.eof();
 }
 
+[[noreturn]] void fail() { throw fs::filesystem_error("", std::error_code(errno, std::generic_category())); }
+
+/// An open file that is closed in any case.
+struct Descriptor {
+  const int number;
+  explicit Descriptor(int opened) : number(opened) {
+    if (number < 0) fail();
+  }
+  ~Descriptor() { close(number); }
+};
+
 /// Has a file or a folder's list of names on the disk, so that it outlives a loss of power.
-void settle(const fs::path& place) {
-  const int descriptor = open(place.c_str(), O_RDONLY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  const bool is_good = fsync(descriptor) == 0 || errno == EINVAL;  // some file systems cannot
-  const std::string why = std::strerror(errno);
-  close(descriptor);
-  if (!is_good) throw Error(why);
+void settle(const Descriptor& place) {
+  if (fsync(place.number) != 0 && errno != EINVAL) fail();  // some file systems cannot
+}
+void settle(const fs::path& folder) { settle(Descriptor(open(folder.c_str(), O_RDONLY | O_CLOEXEC))); }
+
+void write_all(const Descriptor& file, const char* bytes, std::size_t count) {
+  while (count > 0) {
+    const ssize_t written = write(file.number, bytes, count);
+    if (written < 0 && errno == EINTR) continue;
+    if (written < 0) fail();
+    bytes += written;
+    count -= std::size_t(written);
+  }
 }
 
-void copy_file(const fs::path& from, const fs::path& to) {
-  fs::copy_file(from, to);
-  settle(to);
+constexpr int kNewFile = O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC;
+
+/// As fs::copy_file(), which calls a full disk an input/output error.
+void copy_whole(const fs::path& from, const fs::path& to) {
+  const Descriptor source(open(from.c_str(), O_RDONLY | O_CLOEXEC)), copy(open(to.c_str(), kNewFile, 0644));
+  std::vector<char> bytes(1 << 20);
+  for (;;) {
+    const ssize_t count = read(source.number, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) fail();
+    if (count == 0) return settle(copy);
+    write_all(copy, bytes.data(), std::size_t(count));
+  }
 }
 
 /// The same file under another name, or a copy where the file system has no links.
 void link_file(const fs::path& from, const fs::path& to) {
   std::error_code error;
   fs::create_hard_link(fs::canonical(from), to, error);
-  if (error) fs::copy_file(from, to);
+  if (error) copy_whole(from, to);
 }
 
 void bring(const PlannedCase::File& file, const fs::path& staging) {
   const fs::path to = staging / file.name;
-  const auto bring_one = file.is_new ? copy_file : link_file;
+  const auto bring_one = file.is_new ? copy_whole : link_file;
   fs::create_directories(to.parent_path());
   if (!fs::is_directory(file.from)) {
     if (!fs::exists(to)) bring_one(file.from, to);
@@ -81,11 +108,9 @@ void bring(const PlannedCase::File& file, const fs::path& staging) {
     if (!fs::exists(to / name)) bring_one(file.from / name, to / name);
 }
 
-void write_text(const fs::path& file, const std::string& text) {
-  std::ofstream stream(file, std::ios::binary);
-  stream << text;
-  stream.close();
-  if (!stream) throw Error(std::strerror(errno));
+void write_text(const fs::path& to, const std::string& text) {
+  const Descriptor file(open(to.c_str(), kNewFile, 0644));
+  write_all(file, text.data(), text.size());
   settle(file);
 }
 

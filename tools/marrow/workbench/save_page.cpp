@@ -67,7 +67,7 @@ json save(const std::string& case_path, int revision, Workbench& workbench, Job&
   return {{"draft", workbench.drafts.mark_saved(case_path, revision)},
           {"copied", copied},
           {"folder", place.string()},
-          {"pipelines", workbench_pipeline("x").parent_path().parent_path().string()}};
+          {"pipelines", workbench_pipeline("case").parent_path().parent_path().string()}};
 }
 
 }  // namespace
