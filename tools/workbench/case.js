@@ -5,7 +5,13 @@
 const CasePage = (() => {
   const {el} = Dom;
   const panels = [];
+  const more_keys = [];
   let draft = null, open = [];
+
+  // Lists keys that the elements of a panel handle themselves: [[key, what it does]].
+  function tellKeys(keys) {
+    more_keys.push(...keys);
+  }
 
   // Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
   // draft. Panels with a smaller `order` come first.
@@ -50,8 +56,10 @@ const CasePage = (() => {
       open.forEach((one) => one.dispose && one.dispose());
       open = [];
     },
-    keys: [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()]]
+    get keys() {
+      return [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()], ...more_keys];
+    }
   });
 
-  return {panel};
+  return {panel, tellKeys};
 })();

@@ -5,6 +5,7 @@
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
 #include "runtime/text_file.hpp"
+#include "workbench/case_text.hpp"
 #include "workbench/drafts.hpp"
 
 namespace fs = std::filesystem;
@@ -82,6 +83,13 @@ json document_of_case(const OpenedFolder& folder, const std::string& case_path) 
     }
   }
   document["landmarks"] = json::array();
+  const fs::path landmarks = folder.inside(case_path) / "landmarks.yaml";
+  if (!fs::exists(landmarks)) return document;
+  try {
+    document["landmarks"] = landmarks_of_file(landmarks);
+  } catch (const std::exception& error) {
+    throw Error(printable(landmarks.string()) + ": these landmarks cannot be read here: " + printable(error.what()));
+  }
   return document;
 }
 
