@@ -4,7 +4,8 @@
 'use strict';
 
 const Geometry = (() => {
-  const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
+  // A row of a motion has a fourth number, which belongs to the shift.
+  const dot = (a, b) => b.reduce((sum, value, i) => sum + value * a[i], 0);
   const plus = (a, b) => a.map((value, i) => value + b[i]);
   const minus = (a, b) => a.map((value, i) => value - b[i]);
   const times = (a, factor) => a.map((value) => value * factor);
