@@ -63,9 +63,11 @@ PipelineEdit edit_of(const Request& request, const Catalogue& catalogue) {
 void expect_no_new_fault(const std::string& file, const PipelineEdit& edit, const Workbench& workbench) {
   if (!edit.value) return;
   const Place place{workbench.folder.inside(file).string(), 1, 1};  // paths in the value start at the file's folder
-  const auto after = faults_of(file, {{edit.key(), *edit.value, place}}, workbench);
-  if (after.first == 0 || after.first <= faults_of(file, {}, workbench).first) return;
-  throw Error(edit.in_words() + " is not written, because it would be a fault:\n" + after.second);
+  const std::vector<std::string> before = faults_of(file, {}, workbench);
+  std::string added;
+  for (const std::string& fault : faults_of(file, {{edit.key(), *edit.value, place}}, workbench))
+    if (std::find(before.begin(), before.end(), fault) == before.end()) added += (added.empty() ? "" : "\n") + fault;
+  if (!added.empty()) throw Error(edit.in_words() + " is not written: " + added);
 }
 
 void add_file_requests(Server& server, const Page& page) {

@@ -142,17 +142,20 @@ std::string command_of_form(const std::string& command, const std::string& file,
   if (inputs.is_object())
     for (const auto& [name, value] : inputs.items())
       if (value.is_string() && !value.get<std::string>().empty())
-        text += " " + cli::shell_word(name + "=" + value.get<std::string>());
+        text += " " + cli::shell_word(name) + "=" + cli::shell_word(value.get<std::string>());
   return text;
 }
 
-std::pair<std::size_t, std::string> faults_of(const std::string& file, const std::vector<Override>& overrides,
-                                              const Workbench& workbench) {
+std::vector<std::string> faults_of(const std::string& file, const std::vector<Override>& overrides,
+                                   const Workbench& workbench) {
   Diagnostics diagnostics;
   const Pipeline pipeline =
       read_pipeline(workbench.folder.inside(file), {{}, overrides}, workbench.catalogue, diagnostics, false);
   if (diagnostics.empty()) check_writers(pipeline, workbench.catalogue, diagnostics);
-  return {diagnostics.size(), diagnostics.text()};
+  std::vector<std::string> faults;
+  for (const Diagnostic& one : diagnostics.sorted())
+    faults.push_back(one.message + (one.hint.empty() ? "" : "; " + one.hint));
+  return faults;
 }
 
 }  // namespace marrow::workbench

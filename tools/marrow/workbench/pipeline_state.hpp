@@ -23,8 +23,8 @@ Pipeline pipeline_of_form(const std::string& file, const nlohmann::json& inputs,
 std::string command_of_form(const std::string& command, const std::string& file, const nlohmann::json& inputs,
                             const Workbench& workbench);
 
-/// How many faults the file has with these overrides, and their text.
-std::pair<std::size_t, std::string> faults_of(const std::string& file, const std::vector<Override>& overrides,
-                                              const Workbench& workbench);
+/// The faults that the file has with these overrides, each with what to do.
+std::vector<std::string> faults_of(const std::string& file, const std::vector<Override>& overrides,
+                                   const Workbench& workbench);
 
 }  // namespace marrow::workbench
