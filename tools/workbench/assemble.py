@@ -13,14 +13,15 @@ FOLDER = pathlib.Path(__file__).resolve().parent
 REPORT = FOLDER.parent / "report"
 THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's libjs-three
 # In this order. Scripts of pages come before main.js, which starts them.
-SCRIPTS = [
-    *(REPORT / name for name in ("dom.js", "orbit.js", "graph.js")),
-    *(FOLDER / name for name in ("server.js", "geometry.js", "shell.js", "home.js", "draft.js", "case.js")),
-    *(FOLDER / name for name in ("slice_geometry.js", "ct_state.js", "slice_input.js", "slice_view.js", "ct_panel.js")),
-    *(FOLDER / name for name in ("point_list.js", "fragments_panel.js", "surface_view.js", "segmentation_panel.js")),
-    *(FOLDER / name for name in ("ct_landmarks.js", "save_panel.js")),
-    FOLDER / "main.js",
-]
+FILES = """
+    server geometry shell home draft case
+    slice_geometry ct_state slice_input slice_view ct_panel point_list fragments_panel
+    surface_view segmentation_panel ct_landmarks save_panel
+    pipeline_text pipeline_node pipeline_runs node_output pipeline results
+    main
+"""
+SCRIPTS = [REPORT / (name + ".js") for name in ("dom", "orbit", "graph")]
+SCRIPTS += [FOLDER / (name + ".js") for name in FILES.split()]
 STYLES = [REPORT / "report.css", FOLDER / "workbench.css"]
 
 

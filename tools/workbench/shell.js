@@ -163,6 +163,7 @@ const Shell = (() => {
       return;
     }
     if (types && !event.ctrlKey && !event.metaKey) return;
+    if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
     if (name === '?') return void showKeys();
     const found =
         ((current && current.keys) || []).find(([key, , action]) => action && key.split(' or ').includes(name));

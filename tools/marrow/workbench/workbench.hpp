@@ -47,5 +47,7 @@ nlohmann::json json_of(const RunEvent& event);
 void add_shell(Server& server, Workbench& workbench);
 void add_case_page(Server& server, Workbench& workbench);
 void add_ct_page(Server& server, Workbench& workbench);
+void add_pipeline_page(Server& server, Workbench& workbench);
+void add_results_page(Server& server, Workbench& workbench);
 
 }  // namespace marrow::workbench
