@@ -128,11 +128,16 @@ TEST(Surface, DiagnosesFaultsOfVtp) {
   expect("solid\n", "expected a surface of VTK in XML, with <VTKFile at its beginning; export it again as .vtp");
   expect(with(kVtp, "\"PolyData\"", "\"ImageData\""), "its type is not PolyData, so it is no surface; export the");
   expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints=\"4000000000\""),
-         "its NumberOfPoints is more than a file of 544 bytes can hold; it is damaged: export it again");
-  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints = '4000000000'"), "its NumberOfPoints is more than a file");
+         "its NumberOfPoints is negative, or more than a file of 544 bytes can hold; it is damaged: export it again");
+  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints = '4000000000'"),
+         "its NumberOfPoints is negative, or more than a file");
   expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4000000000\""),
-         "its NumberOfPolys is more than a file of ");
-  expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4\""), "a.vtp: ");
+         "its NumberOfPolys is negative, or more than a file of ");
+  expect(with(kVtp, "NumberOfPolys=\"4\"", "NumberOfPolys=\"-4\""),
+         "its NumberOfPolys is negative, or more than a file of ");
+  expect(with(kVtp, "NumberOfComponents=\"3\"", "NumberOfComponents=\"-2147483648\""),
+         "its NumberOfComponents is negative, or more than a file of ");
+  expect(with(kVtp, "NumberOfPoints=\"4\"", "NumberOfPoints=\"-1\""), "its NumberOfPoints is negative, or more");
   expect(with(with(kVtp, "NumberOfStrips=\"0\"", "NumberOfStrips=\"1\""), "<Polys>",
               "<Strips><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">0 1 2 3</DataArray>"
               "<DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">4</DataArray></Strips><Polys>"),

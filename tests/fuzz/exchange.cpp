@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// Formats of other programs: points, transforms, surfaces and cameras. HDF5 and VTK read two of them themselves, in the
-// nodes' own processes; their own faults would hide ours, so those two are not tried here.
+// Formats of other programs: points, transforms, surfaces and cameras. HDF5 and VTK read .h5 and .vtp themselves, and
+// reserve what a damaged file claims to hold, which the limits of the nodes' own process stop. So those two are not
+// tried here.
 #include "marrow/toolbox/exchange/itk_transform.hpp"
 #include "marrow/toolbox/exchange/marked_values.hpp"
 #include "marrow/toolbox/exchange/plastimatch_camera.hpp"

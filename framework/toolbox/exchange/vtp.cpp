@@ -13,8 +13,9 @@
 #include <vtkXMLPolyDataWriter.h>
 
 #include <algorithm>
-#include <cmath>
 #include <cstdlib>
+#include <limits>
+#include <stdexcept>
 
 #include "marrow/domain/error.hpp"
 #include "marrow/domain/printable.hpp"
@@ -69,12 +70,13 @@ class Listening {
   vtkLogger::Verbosity verbosity_ = vtkLogger::GetCurrentVerbosityCutoff();
 };
 
-/// The numbers that follow `name` (as in name="4") in the text before `end`, added up.
+/// The numbers that follow `name` (as in name="4") in the text before `end`, added up; infinite if one is negative.
 double claimed(const std::string& bytes, std::size_t end, const std::string& name) {
   double sum = 0;
   for (std::size_t at = 0; (at = bytes.find(name, at)) < end;) {
     at = std::min(bytes.find_first_not_of(" \t\r\n='\"", at + name.size()), bytes.size());
-    sum += std::abs(std::strtod(bytes.substr(at, 24).c_str(), nullptr));
+    const double count = std::strtod(bytes.substr(at, 24).c_str(), nullptr);
+    sum += count >= 0 ? count : std::numeric_limits<double>::infinity();
   }
   return sum;
 }
@@ -83,11 +85,11 @@ double claimed(const std::string& bytes, std::size_t end, const std::string& nam
 void check_claims(const std::string& bytes, const std::string& what) {
   const std::size_t end = std::min(bytes.find("<AppendedData"), bytes.size());
   constexpr double kMostPerByte = 1100;  // zlib packs at most 1032 bytes into one
-  for (const char* name :
-       {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys", "NumberOfTuples"}) {
+  for (const char* name : {"NumberOfPoints", "NumberOfVerts", "NumberOfLines", "NumberOfStrips", "NumberOfPolys",
+                           "NumberOfTuples", "NumberOfComponents"}) {
     const double count = claimed(bytes, end, name);
     if (!(count <= kMostPerByte * double(bytes.size()) && count < 4e9))
-      throw Error(what + ": its " + name + " is more than a file of " + std::to_string(bytes.size()) +
+      throw Error(what + ": its " + name + " is negative, or more than a file of " + std::to_string(bytes.size()) +
                   " bytes can hold; it is damaged: export it again");
   }
 }
@@ -137,7 +139,11 @@ FilePolygons read_vtp(const std::filesystem::path& path) {
   vtkNew<vtkXMLPolyDataReader> reader;
   reader->ReadFromInputStringOn();
   reader->SetInputString(bytes);
-  reader->Update();
+  try {
+    reader->Update();
+  } catch (const std::logic_error&) {  // a length that VTK takes from the file, and asks a vector for
+    throw Error(what + ": VTK cannot read it; it is damaged: export it again");
+  }
   if (!complaints->are_none())
     throw Error(what + ": VTK cannot read it (" + complaints->shown() + "); it is cut off or damaged: export it again");
   return polygons_of(*reader->GetOutput(), what);
