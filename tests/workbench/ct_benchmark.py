@@ -49,7 +49,12 @@ class Benchmark(PageTest):
         server.json(
             "POST",
             "/api/draft/change",
-            {"case": "c", "revision": 0, "what": "ct", "document": {"ct": {"file": name}, "fragments": {}, "views": []}},
+            {
+                "case": "c",
+                "revision": 0,
+                "what": "ct",
+                "document": {"ct": {"file": name}, "fragments": {}, "views": []},
+            },
         )
         self.show(self.open(), "case=c")  # the address of a server works in one browser
         self.browser.wait(

@@ -57,11 +57,11 @@
   async function choose(draft) {
     const file = await Shell.choose(
         'Choose a CT: a file, or the folder of a DICOM series',
-        {folders: true, accepts: (name) => VOLUME.test(name), at: await startOf(draft)});
+        {folders: true, accepts: (name) => VOLUME.test(name), at: startOf(draft)});
     if (file !== undefined) draft.change('choose the CT ' + file, (document) => (document.ct = {file}));
   }
-  // The chooser begins in the case's folder, if there is one.
-  const startOf = (draft) => Ask.json('api/listing', {path: draft.path}).then(() => draft.path, () => '');
+  // The chooser begins beside the present CT.
+  const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
   function windowBar(state) {
     const presets = PRESETS.map(

@@ -36,7 +36,7 @@
                  [el('p', {class: 'note'}, words),
                   Dom.command(
                       'marrow run ' + Dom.shellPath(pipelines + '/' + name + '.yaml') + ' ' +
-                      Dom.shellWord('case=' + folder))])];
+                      'case=' + Dom.shellWord(folder))])];
 
     return {
       element: el(

@@ -94,7 +94,8 @@
         command.replaceChildren(
             command.firstChild,
             Dom.command(
-                'marrow run ' + Dom.shellPath(pipeline) + ' ' + Dom.shellWord('case=' + (draft.path || '.')) +
+                'marrow run ' + Dom.shellPath(pipeline) + ' ' +
+                'case=' + Dom.shellWord(draft.path || '.') +
                 (method === 'bone' ? ' threshold_hu=' + asked.threshold_hu : '')));
         await Shell.follow('Segmenting', job, (event) => {
           if (event.event === 'grown') take(event);
