@@ -15,7 +15,10 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's lib
 # In this order. Scripts of pages come before main.js, which starts them.
 SCRIPTS = [
     *(REPORT / name for name in ("dom.js", "orbit.js", "graph.js")),
-    *(FOLDER / name for name in ("server.js", "geometry.js", "shell.js", "home.js", "draft.js", "case.js", "main.js")),
+    *(FOLDER / name for name in ("server.js", "geometry.js", "shell.js", "home.js", "draft.js", "case.js")),
+    *(FOLDER / name for name in ("viewport.js", "sight.js", "xray_images.js", "xray_frame.js", "xray_landmarks.js")),
+    *(FOLDER / name for name in ("xray_table.js", "xray_masks.js", "xray_exchange.js", "xrays.js", "xray_add.js")),
+    *(FOLDER / name for name in ("xray_views.js", "main.js")),
 ]
 STYLES = [REPORT / "report.css", FOLDER / "workbench.css"]
 
