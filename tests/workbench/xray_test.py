@@ -77,13 +77,13 @@ def read_png(path):
 
 
 def shadow(view):
-    """Grey values from 20000 (air) down, of an ellipsoid with half axes 40, 30 and 45 mm."""
+    """Grey values from 20000 (air) down, of an ellipsoid with half axes 40, 30 and 400 mm, as of a limb."""
     intrinsics, rotation, shift = camera_matrices(*ANGLES[view])
     u, v = numpy.meshgrid(numpy.arange(WIDTH), numpy.arange(HEIGHT))
     rays = numpy.stack([u, v, numpy.ones_like(u)], -1) @ numpy.linalg.inv(intrinsics).T @ rotation
     rays /= numpy.linalg.norm(rays, axis=-1, keepdims=True)
     source = -rotation.T @ shift
-    half = numpy.array([40.0, 30, 45])
+    half = numpy.array([40.0, 30, 400])
     a = ((rays / half) ** 2).sum(-1)
     b = (rays / half * (source / half)).sum(-1)
     inside = numpy.maximum(0, b * b - a * (((source / half) ** 2).sum() - 1))
@@ -267,7 +267,7 @@ class ViewsTest(XrayTest):
         self.begin({"views": views})
         self.wait_text('[data-fault-of="small"]', "160 x 120")
         self.wait_text('[data-fault-of="small"]', "320 x 240")
-        self.wait_text('[data-fault-of="inverted"]', "Is bone bright here?")
+        self.wait_text('[data-fault-of="inverted"]', "is bone bright here?")
         self.wait_text('[data-fault-of="broken"]', "broken.png")
         self.wait_text("[data-warning]", "views 'twice' and 'twin' look along nearly the same line")
         self.assertEqual(self.driver.find_elements(By.CSS_SELECTOR, '[data-fault-of="twice"]'), [])

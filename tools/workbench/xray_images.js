@@ -41,10 +41,9 @@ const XrayImages = (() => {
     const sorted = Uint16Array.from(picked, (index) => numbers[index]).sort();
     return [0.01, 0.5, 0.99].map((share) => sorted[Math.min(sorted.length - 1, Math.floor(share * sorted.length))]);
   }
-  function every(count, step, accepts = () => true) {
+  function every(count, step) {
     const picked = [];
-    for (let index = 0; index < count; index += step)
-      if (accepts(index)) picked.push(index);
+    for (let index = 0; index < count; index += step) picked.push(index);
     return picked;
   }
 
@@ -54,37 +53,20 @@ const XrayImages = (() => {
     return high > low ? [low, high] : [low, low + 1];
   }
 
-  // Whether the middle is much brighter than the border. Air is bright, and it is seen at the border rather than in the
-  // middle. A collimator makes the border dark, too, but its edge is a step, and that of a limb is not.
-  function looksInverted(entry) {
-    const {numbers, width_px, height_px, range: [low, high]} = entry;
-    const step = Math.max(1, Math.floor(numbers.length / 60000));
-    const isInside = (index, share) => {
-      const u = index % width_px, v = Math.floor(index / width_px);
-      return u >= share * width_px && u < (1 - share) * width_px && v >= share * height_px &&
-          v < (1 - share) * height_px;
+  // Whether a limb is bright on a dark ground. It leaves the image at one side at least, and the ground is seen at two
+  // sides that face each other. A round field or a collimator is dark at all four sides, or only in the corners.
+  function looksInverted({numbers, width_px, height_px, range: [low, high]}) {
+    const median = (left, top, right, bottom) => {
+      const picked = [], step = Math.max(1, Math.floor(Math.sqrt((right - left) * (bottom - top) * width_px * height_px / 2000)));
+      for (let v = Math.floor(top * height_px); v < bottom * height_px; v += step)
+        for (let u = Math.floor(left * width_px); u < right * width_px; u += step) picked.push(v * width_px + u);
+      return (quantiles(numbers, picked)[1] - low) / (high - low);
     };
-    const border = every(numbers.length, step, (index) => !isInside(index, 0.05));
-    const middle = every(numbers.length, step, (index) => isInside(index, 0.3));
-    if (border.length < 20 || middle.length < 20) return false;
-    const is_brighter = quantiles(numbers, middle)[1] - quantiles(numbers, border)[1] > 0.25 * (high - low);
-    return is_brighter && !isCollimated(entry);
-  }
-
-  // Rows are followed from both sides to where they leave the dark. Behind a step they do not rise much further.
-  function isCollimated({numbers, width_px, height_px, range: [low, high]}) {
-    const near = Math.max(3, Math.round(0.01 * width_px)), far = Math.max(12, Math.round(0.08 * width_px));
-    const shares = [];
-    for (let row = 0; row < height_px; row += Math.max(1, Math.floor(height_px / 200)))
-      for (const by of [1, -1]) {
-        const begin = row * width_px + (by > 0 ? 0 : width_px - 1);
-        let at = 0;
-        while (at < width_px / 2 && numbers[begin + by * at] <= low + 0.03 * (high - low)) ++at;
-        if (at === 0 || at + far >= width_px) continue;
-        const [soon, late] = [near, far].map((further) => numbers[begin + by * (at + further)] - low);
-        if (late > 0) shares.push(soon / late);
-      }
-    return shares.length > 10 && shares.sort((a, b) => a - b)[Math.floor(shares.length / 2)] > 0.75;
+    const DARK = 0.15, BRIGHT = 0.4;
+    const across = [median(0, 0.4, 0.05, 0.6), median(0.95, 0.4, 1, 0.6)];
+    const along = [median(0.4, 0, 0.6, 0.05), median(0.4, 0.95, 0.6, 1)];
+    const leaves = (ground, limb) => ground.every((one) => one < DARK) && limb.some((one) => one > BRIGHT);
+    return median(0.4, 0.4, 0.6, 0.6) > BRIGHT && (leaves(across, along) || leaves(along, across));
   }
 
   // The grey value at a pixel, or null outside the image.

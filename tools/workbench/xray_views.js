@@ -20,8 +20,8 @@ const XrayViews = (() => {
     if (entry.fault) faults.push(entry.fault);
     if (entry.is_inverted)
       faults.push(
-          'the middle is brighter than the border. Is bone bright here? In marrow’s images air is bright and bone is ' +
-          'dark; invert the image file');
+          'a bright limb on a dark ground: is bone bright here? In marrow’s images air is bright and bone is dark; ' +
+          'invert the image file');
     return [...faults, ...(entry.warnings || [])];
   }
 
