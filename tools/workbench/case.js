@@ -5,19 +5,15 @@
 const CasePage = (() => {
   const {el} = Dom;
   const panels = [];
-  const more_keys = [];
+  const keys = [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()]];
   let draft = null, open = [];
 
-  // Lists keys that the elements of a panel handle themselves: [[key, what it does]].
-  function tellKeys(keys) {
-    more_keys.push(...keys);
-  }
-
   // Adds a panel. make(draft) returns {element, update(), dispose()}; update() is called after each change of the
-  // draft. Panels with a smaller `order` come first.
-  function panel(title, order, make) {
+  // draft. Panels with a smaller `order` come first. `more_keys` are as in Shell.page().
+  function panel(title, order, make, more_keys = []) {
     panels.push({title, order, make});
     panels.sort((a, b) => a.order - b.order);
+    keys.push(...more_keys);
   }
 
   function bar() {
@@ -56,10 +52,8 @@ const CasePage = (() => {
       open.forEach((one) => one.dispose && one.dispose());
       open = [];
     },
-    get keys() {
-      return [['Ctrl+z', 'undo', () => draft.undo()], ['Ctrl+y or Ctrl+Z', 'redo', () => draft.redo()], ...more_keys];
-    }
+    keys
   });
 
-  return {panel, tellKeys};
+  return {panel};
 })();

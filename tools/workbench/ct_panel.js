@@ -191,6 +191,5 @@
     };
   }
 
-  CasePage.panel('CT', 10, make);
-  CasePage.tellKeys(SliceInput.KEYS);
+  CasePage.panel('CT', 10, make, SliceInput.KEYS);
 })();

@@ -112,6 +112,5 @@
     };
   }
 
-  CasePage.panel('Fragments', 20, make);
-  CasePage.tellKeys([['Esc', 'end putting points']]);
+  CasePage.panel('Fragments', 20, make, [['Esc', 'end putting points']]);
 })();

@@ -83,8 +83,8 @@ int open(const OpenRequest& request) {
   workbench::Workbench bench(target.folder);
   using namespace workbench;
   for (const auto add : {
-           add_shell, add_case_page, add_ct_page,  //
-           add_pipeline_page, add_results_page,    //
+           add_shell, add_case_page, add_ct_page, add_xray_page,  //
+           add_place_page, add_pipeline_page, add_results_page,   //
        })
     add(server, bench);
   server.listen(request.port);

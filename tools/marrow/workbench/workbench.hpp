@@ -49,5 +49,6 @@ void add_case_page(Server& server, Workbench& workbench);
 void add_ct_page(Server& server, Workbench& workbench);
 void add_pipeline_page(Server& server, Workbench& workbench);
 void add_results_page(Server& server, Workbench& workbench);
+void add_xray_page(Server& server, Workbench& workbench);
 
 }  // namespace marrow::workbench
