@@ -81,7 +81,7 @@ int open(const OpenRequest& request) {
   const Target target = target_of(request.place);
   workbench::Server server;
   workbench::Workbench bench(target.folder);
-  for (const auto add : {workbench::add_shell, workbench::add_case_page}) add(server, bench);
+  for (const auto add : {workbench::add_shell, workbench::add_case_page, workbench::add_place_page}) add(server, bench);
   server.listen(request.port);
   const std::string address = server.access().address(target.page);
   std::printf("%s is open at\n\n  %s\n\nThe address works once, in one browser. Ctrl-C ends.\n",

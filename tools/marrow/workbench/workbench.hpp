@@ -46,5 +46,6 @@ nlohmann::json json_of(const RunEvent& event);
 /// Each adds the requests of one page to the server.
 void add_shell(Server& server, Workbench& workbench);
 void add_case_page(Server& server, Workbench& workbench);
+void add_place_page(Server& server, Workbench& workbench);
 
 }  // namespace marrow::workbench
