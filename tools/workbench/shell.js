@@ -162,6 +162,8 @@ const Shell = (() => {
       event.preventDefault();
       return;
     }
+    if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
+      return;  // they move the slider
     if (types && !event.ctrlKey && !event.metaKey) return;
     if (name === '?') return void showKeys();
     const found =
