@@ -162,6 +162,8 @@ const Shell = (() => {
       event.preventDefault();
       return;
     }
+    if (event.target.matches && event.target.matches('input[type="range"]') && /^(Arrow|Page|Home|End)/.test(event.key))
+      return;  // they move the slider
     if (types && !event.ctrlKey && !event.metaKey) return;
     if (types && !event.target.matches('select') && /^Ctrl\+[zyZ]$/.test(name)) return;  // the field's own undo
     if (name === '?') return void showKeys();

@@ -50,5 +50,6 @@ void add_ct_page(Server& server, Workbench& workbench);
 void add_pipeline_page(Server& server, Workbench& workbench);
 void add_results_page(Server& server, Workbench& workbench);
 void add_xray_page(Server& server, Workbench& workbench);
+void add_place_page(Server& server, Workbench& workbench);
 
 }  // namespace marrow::workbench
