@@ -6,6 +6,7 @@ import json
 import math
 import random
 import re
+import socket
 
 import bench
 import ct_cases
@@ -136,6 +137,17 @@ class CtServerTest(BenchTest):
         (self.folder / "ct.mha").unlink()
         self.assertEqual(server.ask("GET", "/api/ct/slice?ct=%s&axis=0&index=3" % name)[0], 200)
         self.assertIn("there is no such file or folder", self.opened(server, file="ct.mha")["error"])
+
+    def test_a_browser_that_goes_away_harms_nothing(self):
+        self.write("ct.mha")
+        server = self.enter()
+        job = server.json("POST", "/api/ct/open", {"ct": {"file": "ct.mha"}})["job"]
+        request = "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nCookie: %s\r\n\r\n"
+        for path in ["/api/job?job=%s&since=0" % job] + 20 * ["/api/ct/slice?ct=ct-1&axis=0&index=1"]:
+            with socket.create_connection(("127.0.0.1", server.port)) as connection:
+                connection.sendall((request % (path, server.port, server.cookie)).encode())
+        name = server.finish(job)["result"]["name"]
+        self.assertEqual(server.ask("GET", "/api/ct/slice?ct=%s&axis=0&index=3" % name)[0], 200)
 
     def test_the_shown_command_reads_the_same(self):
         self.write("ct.mha")

@@ -127,6 +127,7 @@
     return {
       element,
       views,
+      values,
       reset: () => views.forEach((view) => view.reset()),
       update() {
         views.forEach((view) => view.show());
@@ -171,6 +172,7 @@
     const viewed = () => state.ct && shown.update();
     state.addEventListener('ct', tell);
     state.addEventListener('view', viewed);
+    state.addEventListener('slice', shown.values.update);
     options.fill(draft.document.ct);
     tell();
     let filled = JSON.stringify(draft.document.ct);
@@ -186,6 +188,7 @@
       dispose() {
         state.removeEventListener('ct', tell);
         state.removeEventListener('view', viewed);
+        state.removeEventListener('slice', shown.values.update);
         shown.dispose();
       }
     };
