@@ -143,6 +143,16 @@ class CasePageTest(PageTest):
         volume_ml = float(re.search(r"distal ([\d.]+) ml", text).group(1))
         self.assertAlmostEqual(volume_ml, 4 / 3 * 3.1416 * 8**3 / 1000, delta=0.35)
         self.wait("Number(document.querySelector('canvas.surface').dataset.triangles) > 100")
+        self.wait(
+            """(() => {  // its outline is in the slice, in the fragment's colour
+              const canvas = document.querySelector('[data-slice="axial"]'), {width, height} = canvas;
+              const {data} = canvas.getContext('2d').getImageData(0, 0, width, height);
+              let count = 0;
+              for (let i = 0; i < data.length; i += 4)
+                count += Math.hypot(data[i] - 0x56, data[i + 1] - 0xb4, data[i + 2] - 0xe9) < 40;
+              return count > 300;
+            })()"""
+        )
 
         self.click('[data-do="save"]')
         self.wait("!!document.querySelector('[data-saved] .command')")
@@ -228,11 +238,20 @@ class CasePageTest(PageTest):
         self.assertEqual(document["landmarks"], [{"name": "tip", "pixels": pixels}])
 
     def test_a_ct_that_cannot_be_read_is_said_on_the_page(self):
-        (self.folder / "scan" / "slice007.dcm").write_bytes(b"damaged")
+        (self.folder / "scan" / "slice7-007.dcm").write_bytes(b"damaged")
         self.begin(ct={"file": "scan"})
         self.wait("!!document.querySelector('.ct-panel .fault')")
-        self.assertIn("slice007.dcm", self.css(".ct-panel .fault").text)
+        self.assertIn("slice7-007.dcm", self.css(".ct-panel .fault").text)
         self.assertEqual(self.browser.js("return document.querySelector('.ct-options').open"), True)
+
+    def test_of_several_series_one_is_chosen(self):
+        ct_cases.dicom_series(self.folder / "scan", (20, 20, 20), 8000 * [-1000], series="8")
+        self.begin(ct={"file": "scan"})
+        self.wait("document.querySelectorAll('[data-series]').length === 2")
+        self.click('[data-series="1.2.826.0.1.3680043.2.1143.8.2"]')
+        self.wait_for_slices()
+        self.assertIn("20 × 20 × 20 voxels", self.css(".ct-panel").text)
+        self.assertEqual(self.document()["ct"]["series_uid"], "1.2.826.0.1.3680043.2.1143.8.2")
 
     def test_faults_of_saving_are_listed(self):
         self.begin()

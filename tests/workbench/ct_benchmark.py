@@ -1,6 +1,7 @@
 #!/usr/bin/python3
 # SPDX-License-Identifier: Apache-2.0
-"""How long a CT of 512 x 512 x 400 voxels takes to open, and its slices to follow the wheel. Prints figures, tests nothing.
+"""How long a CT of 512 x 512 x 400 voxels takes to open and to segment, and its slices to follow the wheel. It
+prints figures and tests nothing.
 
     tests/workbench/ct_benchmark.py SOURCE BUILD
 """
@@ -84,15 +85,42 @@ class Benchmark(PageTest):
         print("  load %.1f" % os.getloadavg()[0])
 
     def test_one_file(self):
-        self.wheel(self.measure("large.mha", self.write_mha), "large.mha")
+        server = self.measure("large.mha", self.write_mha)
+        for method in ("bone", "femur"):
+            self.segment(server, method)
+        self.wheel(server, "large.mha")
 
     def test_series(self):
         self.measure("series", self.write_series)
 
     def slices(self):
-        first = array.array("h", [(x * y) % 2500 - 1000 for y in range(SIZE[1]) for x in range(SIZE[0])])
+        """Uneven soft tissue with a straight bone."""
+        tissue = array.array("h", [(x * y) % 150 - 50 for y in range(SIZE[1]) for x in range(SIZE[0])])
         for z in range(SIZE[2]):
-            yield first[1000 * z :] + first[: 1000 * z]
+            one = tissue[1000 * z :] + tissue[: 1000 * z]
+            if 20 <= z < SIZE[2] - 20:
+                for y in range(216, 297):
+                    half = int((40**2 - (y - 256) ** 2) ** 0.5)
+                    row = y * SIZE[0] + 256 - half
+                    one[row : row + 2 * half] = array.array("h", [900]) * (2 * half)
+            one[0] = -1000
+            yield one
+
+    def segment(self, server, method):
+        ct = server.finish(server.json("POST", "/api/ct/open", {"ct": {"file": "large.mha"}})["job"])["result"]["name"]
+        begin = time.monotonic()
+        fragments = {"shaft": {"seeds": [[179, 179, 200], [179, 179, 100], [179, 179, 300]]}}
+        asked = {"ct": ct, "fragments": fragments, "method": method}
+        job, since = server.json("POST", "/api/segment", asked)["job"], 0
+        while True:
+            state = server.json("GET", "/api/job?job=%s&since=%d" % (job, since))
+            since = state["next"]
+            for event in state["events"]:
+                if event["event"] == "grown":
+                    print("  %s: %s after %.1f s" % (method, event["stage"], time.monotonic() - begin), flush=True)
+            if state["state"] != "running":
+                print("  %s: %s %s, load %.1f" % (method, state["state"], state["error"], os.getloadavg()[0]))
+                return
 
     def write_mha(self, path):
         with open(path, "wb") as file:

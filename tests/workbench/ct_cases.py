@@ -66,7 +66,7 @@ def two_balls(size, first, second, radius):
     ]
 
 
-def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1):
+def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1, series="7"):
     """A CT series in explicit little endian with cubic voxels; its first voxel is the origin."""
 
     def element(group, tag, kind, value):
@@ -80,8 +80,8 @@ def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1):
     def short(tag, value):
         return element(0x28, tag, b"US", struct.pack("<H", value))
 
-    storage, series = "1.2.840.10008.5.1.4.1.1.2", "1.2.826.0.1.3680043.2.1143.7"
-    folder.mkdir(parents=True)
+    storage, series = "1.2.840.10008.5.1.4.1.1.2", "1.2.826.0.1.3680043.2.1143." + series
+    folder.mkdir(parents=True, exist_ok=True)
     plane = size[0] * size[1]
     for number in range(size[2]):
         name = "%s.%d" % (series, number)
@@ -93,7 +93,7 @@ def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1):
             + element(2, 18, b"UI", series)
         )
         part = values[number * plane : (number + 1) * plane]
-        (folder / ("slice%03d.dcm" % number)).write_bytes(
+        (folder / ("slice%s-%03d.dcm" % (series, number))).write_bytes(
             b"\0" * 128
             + b"DICM"
             + element(2, 0, b"UL", struct.pack("<I", len(meta)))

@@ -4,8 +4,13 @@
 import array
 import json
 import math
+import os
 import random
 import re
+import socket
+import subprocess
+
+import yaml
 
 import bench
 import ct_cases
@@ -137,11 +142,28 @@ class CtServerTest(BenchTest):
         self.assertEqual(server.ask("GET", "/api/ct/slice?ct=%s&axis=0&index=3" % name)[0], 200)
         self.assertIn("there is no such file or folder", self.opened(server, file="ct.mha")["error"])
 
+    def test_a_browser_that_goes_away_harms_nothing(self):
+        self.write("ct.mha")
+        server = self.enter()
+        job = server.json("POST", "/api/ct/open", {"ct": {"file": "ct.mha"}})["job"]
+        request = "GET %s HTTP/1.1\r\nHost: 127.0.0.1:%d\r\nCookie: %s\r\n\r\n"
+        for path in ["/api/job?job=%s&since=0" % job] + 20 * ["/api/ct/slice?ct=ct-1&axis=0&index=1"]:
+            with socket.create_connection(("127.0.0.1", server.port)) as connection:
+                connection.sendall((request % (path, server.port, server.cookie)).encode())
+        name = server.finish(job)["result"]["name"]
+        self.assertEqual(server.ask("GET", "/api/ct/slice?ct=%s&axis=0&index=3" % name)[0], 200)
+
     def test_the_shown_command_reads_the_same(self):
         self.write("ct.mha")
-        command = self.enter().json("POST", "/api/ct/open", {"ct": {"file": "ct.mha", "flip": ["z"]}})["command"]
-        self.assertTrue(command.startswith("marrow run '"), command)
-        self.assertTrue(command.endswith("volume.yaml' ct='ct.mha' --set 'ct.flip=[\"z\"]'"), command)
+        name = "it's $HOME.mha"
+        self.write(name)
+        command = self.enter().json("POST", "/api/ct/open", {"ct": {"file": name, "flip": ["z"]}})["command"]
+        environment = {**os.environ, "PATH": "%s:%s" % (bench.MARROW.parent, os.environ["PATH"])}
+        environment["MARROW_CACHE"] = str(self.scratch / "store")
+        ended = subprocess.run(command, shell=True, cwd=self.folder, env=environment, capture_output=True, text=True)
+        self.assertEqual(ended.returncode, 0, ended.stderr)
+        resolved = yaml.safe_load((self.folder / "runs" / "volume" / "pipeline.yaml").read_text())
+        self.assertEqual(resolved["nodes"]["ct"]["with"]["flip"], ["z"])
 
 
 def random_geometry(chance):
@@ -228,6 +250,8 @@ class CtPageTest(PageTest):
 
     def test_the_pixels_lie_where_the_page_says(self):
         """One bright voxel in a flipped grid of long voxels: the middle of what is bright is its place."""
+        from selenium.webdriver.common.keys import Keys
+
         grid = {
             "size": [33, 25, 20],
             "spacing_mm": [1.0, 1.5, 2.0],
@@ -247,6 +271,26 @@ class CtPageTest(PageTest):
             scale = self.browser.js("return document.querySelector('[data-slice=\"%s\"]').clientWidth" % name) / 50
             self.assertLess(math.dist(point_mm, wanted), 1.2 / scale + 0.1, name)
             self.assertEqual(value_hu, 2000)
+        for keys in ("+++", "-", "++"):  # closer, with another part of the slice in the middle
+            for name in ("axial", "coronal", "sagittal"):
+                canvas = self.browser.driver.find_element("css selector", '[data-slice="%s"]' % name)
+                self.browser.js("arguments[0].focus()", canvas)
+                canvas.send_keys(keys, Keys.SHIFT + Keys.ARROW_LEFT, Keys.SHIFT + Keys.ARROW_DOWN)
+                self.click_at(name, *self.middle_of_bright(name))
+                self.assertLess(math.dist(self.crosshair()[0], wanted), 0.25, name)
+
+    def test_dragging_with_the_right_button_changes_the_window(self):
+        from selenium.webdriver.common.actions.action_builder import ActionBuilder
+
+        self.open_case(ct_cases.straight((20, 20, 20)), 8000 * [-1000])
+        canvas = self.browser.driver.find_element("css selector", '[data-slice="axial"]')
+        self.browser.js("arguments[0].scrollIntoView({block: 'center'})", canvas)
+        for dx, dy, changed in ((60, 0, ("400", "2580")), (0, 40, ("480", "2580"))):
+            builder = ActionBuilder(self.browser.driver, duration=0)
+            builder.pointer_action.move_to(canvas).pointer_down(2).move_by(dx, dy).pointer_up(2)
+            builder.perform()
+            boxes = "[...document.querySelectorAll('.ct-panel input.short')].slice(-2).map((one) => one.value)"
+            self.browser.wait("return %s.join() === '%s'" % (boxes, ",".join(changed)), 10)
 
     def go_to_slice(self, name, number):
         self.browser.js(

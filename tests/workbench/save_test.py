@@ -3,7 +3,9 @@
 """Saving a draft as a case: it is read back, nothing that was there is lost, and each fault is said."""
 import json
 import os
+import shutil
 import subprocess
+import time
 import unittest
 
 import yaml
@@ -64,6 +66,7 @@ class SaveTest(BenchTest):
     def reads(self, case, *only):
         """What `marrow run` says of the case."""
         arguments = ["run", SOURCE / "pipelines/workbench/case.yaml", "case=%s" % case, "--out", self.scratch / "out"]
+        shutil.rmtree(self.scratch / "out", ignore_errors=True)
         for name in only or ("seeds", "views", "ct"):
             arguments += ["--only", name]
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}
@@ -206,6 +209,28 @@ class SaveTest(BenchTest):
         self.change(server, self.document())
         state = server.finish(server.json("POST", "/api/case/save", {"case": "cases/7", "revision": old})["job"])
         self.assertEqual(state["error"], "this case was changed in another tab; look at it, and save again")
+
+    def test_when_it_is_killed_the_old_case_or_the_new_one_is_there(self):
+        server = self.enter()
+        self.assertEqual(self.save(server, self.document())["state"], "done")
+        case = self.folder / "cases" / "7"
+        old = (case / "case.yaml").read_bytes()
+        for delay_s in (0, 0.01, 0.03, 0.06, 0.1, 0.2, 0.4):
+            document = self.document(landmarks=[{"name": "tip", "model_mm": [1, 2, delay_s], "fragment": "distal"}])
+            document["fragments"]["distal"]["seeds"] = [[20, 15, 10 + delay_s]]
+            revision = self.change(server, document)
+            server.json("POST", "/api/case/save", {"case": "cases/7", "revision": revision})
+            time.sleep(delay_s)
+            server.process.kill()
+            server.process.wait()
+            now = (case / "case.yaml").read_bytes()
+            seeds = yaml.safe_load(now)["fragments"]["distal"]["seeds"]
+            self.assertTrue(now == old or seeds == [[20, 15, 10 + delay_s]])
+            old = now
+            self.reads(case, "seeds", "ct")
+            server = self.enter()
+        self.assertEqual(self.save(server, self.document())["state"], "done")
+        self.assertEqual(list(case.glob(".saving*")), [])
 
     @unittest.skipUnless(os.geteuid() == 0, "only root can mount a small disk")
     def test_a_full_disk_loses_nothing(self):

@@ -128,6 +128,27 @@ class SegmentTest(BenchTest):
         state = server.finish(self.segment(server, ct, seed, threshold_hu=5000))
         self.assertIn("no voxel reaches the threshold of 5000 HU", state["error"])
 
+    def test_too_many_fragments_for_the_memory(self):
+        size, bone = (512, 512, 400), b"\x84\x03" * (512 * 512)  # 900 HU
+        with open(self.folder / "ct.mha", "wb") as file:
+            file.write(ct_cases.mha(ct_cases.straight(size), []))
+            begin = file.tell()
+            for z in range(100, 130):
+                file.seek(begin + 2 * 512 * 512 * z)
+                file.write(bone)
+            file.truncate(begin + 2 * 512 * 512 * 400)
+        server = self.open()
+        server.enter()
+        ct = server.finish(server.json("POST", "/api/ct/open", {"ct": {"file": "ct.mha"}})["job"])["result"]["name"]
+        fragments = {"part %d" % i: {"seeds": [[30 + 60 * i, 250, 115]]} for i in range(8)}
+        state = server.finish(self.segment(server, ct, fragments))
+        self.assertRegex(
+            state["error"],
+            r"^on the grid of the CT, 8 fragments would take 3\.4 GB of memory, and at most \d\.\d GB are used here; the "
+            r"result on the coarse grid stays\. Register fewer fragments, or cut the CT to the bone$",
+        )
+        self.assertEqual([event["stage"] for event in state["events"] if event["event"] == "grown"], ["coarse"])
+
 
 if __name__ == "__main__":
     import sys

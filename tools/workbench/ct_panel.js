@@ -63,6 +63,13 @@
   // The chooser begins beside the present CT.
   const startOf = ({document: {ct}}) => (ct ? ct.file.split('/').slice(0, -1).join('/') : '');
 
+  // If the fault lists the series of a folder, a button for each.
+  const seriesIn = (draft, fault) => [...fault.matchAll(/^ +(\d+(?:\.\d+)+) \((.*)\)$/gm)].map(
+      ([, uid, words]) =>
+          el('p', {}, Dom.button('Read the series of ' + words, () => draft.change('choose a series', (document) => {
+            document.ct.series_uid = uid;
+          }), {'data-series': uid})));
+
   function windowBar(state) {
     const presets = PRESETS.map(
         ([key, text, level, width]) => Dom.button(text, () => state.setWindow(level, width), {'data-window': key}));
@@ -127,6 +134,7 @@
     return {
       element,
       views,
+      values,
       reset: () => views.forEach((view) => view.reset()),
       update() {
         views.forEach((view) => view.show());
@@ -159,7 +167,8 @@
               ct.spacing_mm.map((size) => Number(size.toPrecision(4))).join(' × ') + ' mm' :
                '';
       says.replaceChildren(
-          ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault)] : []),
+          ...(state.fault ? [el('p', {class: 'fault', role: 'alert'}, state.fault), ...seriesIn(draft, state.fault)] :
+                            []),
           ...(ct ? ct.doubts : []).map((doubt) => el('p', {class: 'fault doubt', role: 'status'}, doubt)));
       options.element.hidden = command.hidden = !chosen;
       if (state.fault) options.element.open = true;
@@ -171,6 +180,7 @@
     const viewed = () => state.ct && shown.update();
     state.addEventListener('ct', tell);
     state.addEventListener('view', viewed);
+    state.addEventListener('slice', shown.values.update);
     options.fill(draft.document.ct);
     tell();
     let filled = JSON.stringify(draft.document.ct);
@@ -186,6 +196,7 @@
       dispose() {
         state.removeEventListener('ct', tell);
         state.removeEventListener('view', viewed);
+        state.removeEventListener('slice', shown.values.update);
         shown.dispose();
       }
     };

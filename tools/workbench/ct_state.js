@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The CT of the case that is open, and what its panels share: the crosshair, the window, what a click does, and what is
-// drawn over the slices. Events: 'ct' (another CT, or a fault), 'view' (anything else).
+// drawn over the slices. Events: 'ct' (another CT, or a fault), 'slice' (values of a slice have come), 'view' (anything
+// else).
 'use strict';
 
 class CtState extends EventTarget {

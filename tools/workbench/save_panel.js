@@ -42,8 +42,8 @@
       element: el(
           'div', {},
           el('p', {class: 'note'},
-             'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, and ' +
-                 'reads the case back before anything is replaced.'),
+             'Writes case.yaml and landmarks.yaml into the case\'s folder, copies files that lie elsewhere into it, ' +
+                 'and reads the case back before anything is replaced.'),
           el('div', {class: 'toolbar'}, button), outcome),
       update() {
         button.textContent = draft.is_saved ? 'Save again' : 'Save the case';

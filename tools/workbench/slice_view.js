@@ -78,7 +78,10 @@ class SliceView {
         if (!values || !this.state.ct || this.state.ct.name !== name) break;
         this.slices.set(index, values);
         if (this.slices.size > 64) this.slices.delete(this.slices.keys().next().value);
-        if (index === this.wanted) this.draw();
+        if (index === this.wanted) {
+          this.draw();
+          this.state.tell('slice');
+        }
       }
     } catch (error) {
       if (error.status !== 0 || !this.isTold) Shell.notice(error.message, 'fault');

@@ -101,7 +101,9 @@ PlannedCase plan_case(const OpenedFolder& folder, const std::string& case_path, 
   if (!views.is_array() || views.empty()) planner.miss("there is no X-ray view; add at least one");
   int number = 0;
   for (json& view : views) {
-    const std::string name = view.value("name", ""), what = "view " + in_quotes(printable(name));
+    const json given = view.value("name", json());
+    const std::string name = given.is_string() ? given.get<std::string>() : given.dump(),
+                      what = "view " + in_quotes(printable(name));
     const std::string stem = plain(name, "view-" + std::to_string(++number));
     planner.take(view["image"], what + ", its image", stem);
     if (view.contains("mask") && !view["mask"].is_null())

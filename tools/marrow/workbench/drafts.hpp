@@ -14,7 +14,7 @@ namespace marrow::workbench {
 
 /// A draft's document has the keys of case.yaml (docs/case.md), with these differences: paths are relative to the
 /// opened folder; `ct` is always a map or null; the poses `start` are 4 x 4 matrices; and there are `landmarks: [{name,
-/// model_mm, pixels: {view: [u, v]}}]`, whose two places may be missing.
+/// fragment, model_mm, pixels: {view: [u, v]}, tracked_mm}]`, of which only the name must be there.
 class Drafts {
  public:
   explicit Drafts(const OpenedFolder& folder) : folder_(folder) {}

@@ -9,6 +9,7 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cstdio>
 #include <cstring>
 #include <fstream>
 #include <vector>
@@ -106,6 +107,7 @@ void bring(const PlannedCase::File& file, const fs::path& staging) {
   fs::create_directories(to);
   for (const fs::path& name : files_in(file.from))
     if (!fs::exists(to / name)) bring_one(file.from / name, to / name);
+  settle(to);
 }
 
 void write_text(const fs::path& to, const std::string& text) {
@@ -125,21 +127,37 @@ void remove_left_over(const fs::path& place) {
   }
 }
 
+/// Throws if something of that name has come there in the meantime.
+void move_new(const fs::path& from, const fs::path& to) {
+  if (renameat2(AT_FDCWD, from.c_str(), AT_FDCWD, to.c_str(), RENAME_NOREPLACE) == 0) return;
+  if (errno != EINVAL || fs::exists(fs::symlink_status(to))) fail();
+  fs::rename(from, to);  // a file system that does not know the flag
+}
+
 /// Moves what is new to its place. What it has moved is taken back if it cannot go on.
 void move_in(const fs::path& staging, const fs::path& place, const PlannedCase& plan, bool has_landmarks) {
+  const fs::path old_landmarks = staging / "landmarks.before";
+  std::error_code none;
   std::vector<fs::path> moved;
+  if (fs::exists(place / "landmarks.yaml")) link_file(place / "landmarks.yaml", old_landmarks);
   try {
     for (const PlannedCase::File& file : plan.files)
       if (file.is_new) {
-        fs::rename(staging / file.name, place / file.name);
+        move_new(staging / file.name, place / file.name);
         moved.push_back(place / file.name);
       }
     settle(place);
-    if (has_landmarks) fs::rename(staging / "landmarks.yaml", place / "landmarks.yaml");
+    if (has_landmarks)
+      fs::rename(staging / "landmarks.yaml", place / "landmarks.yaml");
+    else
+      fs::remove(place / "landmarks.yaml");  // the last of them was removed
     fs::rename(staging / "case.yaml", place / "case.yaml");
   } catch (...) {
-    std::error_code error;
-    for (const fs::path& file : moved) fs::remove_all(file, error);
+    for (const fs::path& file : moved) fs::remove_all(file, none);
+    if (fs::exists(old_landmarks, none))
+      fs::rename(old_landmarks, place / "landmarks.yaml", none);
+    else
+      fs::remove(place / "landmarks.yaml", none);
     throw;
   }
   settle(place);
@@ -185,7 +203,6 @@ void write_case_files(const fs::path& place, const PlannedCase& plan, const std:
     if (!landmarks_text.empty()) write_text(staging / "landmarks.yaml", landmarks_text);
     check(staging);
     move_in(staging, place, plan, !landmarks_text.empty());
-    if (landmarks_text.empty()) fs::remove(place / "landmarks.yaml", none);  // the last of them was removed
     fs::remove_all(staging, none);
   } catch (const fs::filesystem_error& error) {
     clean();

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The requests of the page "Case" about segmenting: a job that segments, first on a coarse grid, then on that of the
 // CT; the outlines in the slices; the surfaces.
-#include <cstring>
+#include <cstdio>
 #include <deque>
 
 #include "marrow/domain/case.hpp"
@@ -36,7 +36,7 @@ class Segmentations {
     const std::lock_guard lock(mutex_);
     std::erase_if(kept_, [&](const auto& one) { return one.first == name; });
     kept_.emplace_back(name, std::move(segmentation));
-    if (kept_.size() > kMostKept) kept_.pop_front();
+    while (kept_.size() > 1 && (kept_.size() > kMostKept || bytes() > most_ct_bytes())) kept_.pop_front();
   }
   std::shared_ptr<const Segmentation> find(const std::string& name) {
     const std::lock_guard lock(mutex_);
@@ -46,6 +46,13 @@ class Segmentations {
   }
 
  private:
+  std::uintmax_t bytes() const {
+    std::uintmax_t sum = 0;
+    for (const auto& [name, segmentation] : kept_)
+      for (const SignedField& field : segmentation->fields) sum += field.values_mm.size() * sizeof(float);
+    return sum;
+  }
+
   std::mutex mutex_;
   std::deque<std::pair<std::string, std::shared_ptr<const Segmentation>>> kept_;
   int count_ = 0;
@@ -92,6 +99,20 @@ json grown(const std::string& name, const std::string& stage, const Segmentation
   return {{"event", "grown"}, {"segmentation", name}, {"stage", stage}, {"volumes_ml", volumes}};
 }
 
+/// Throws Error if the fields on the CT's grid would take too much memory.
+void check_memory(const Order& order, const Grid& grid) {
+  std::uintmax_t fields = 0;
+  for (const Seeds& seeds : order.seeds) fields += seeds.wanted;
+  const std::uintmax_t bytes = fields * grid.count() * sizeof(float);
+  if (bytes <= most_ct_bytes()) return;
+  char text[300];
+  std::snprintf(text, sizeof text,
+                "on the grid of the CT, %d fragments would take %.1f GB of memory, and at most %.1f GB are used here; "
+                "the result on the coarse grid stays. Register fewer fragments, or cut the CT to the bone",
+                int(fields), double(bytes) / 1e9, double(most_ct_bytes()) / 1e9);
+  throw Error(text);
+}
+
 json segment(const Order& order, const std::shared_ptr<const OpenCt>& ct, Segmentations& kept, Workbench& workbench,
              Job& job) {
   const std::string name = kept.new_name();
@@ -107,6 +128,7 @@ json segment(const Order& order, const std::shared_ptr<const OpenCt>& ct, Segmen
       job.tell({{"event", "message"}, {"text", "on a coarse grid: " + printable(error.what())}});
     }
   }
+  check_memory(order, ct->volume().grid);
   const auto fine = std::make_shared<const Segmentation>(segmented(order, ct, ct->value, workbench, job));
   kept.keep(name, fine);
   const json result = grown(name, "full", *fine);
