@@ -4,7 +4,7 @@
 
 (() => {
   const {el} = Dom;
-  const place_of = (folder) => folder || '(this folder)';
+  const place_of = (folder) => (folder && folder !== '.' ? folder : '(this folder)');
   const when = (text) => text.replace('T', ' ').replace(/(\.\d+)?Z$/, ' UTC');
   const reportAddress = (folder, more) => 'results/report.html?' + new URLSearchParams({folder, ...more});
 
@@ -57,7 +57,7 @@
            one.kind === 'run' && !one.fault && el('input', {
              type: 'checkbox',
              'aria-label': 'Compare ' + place_of(one.folder),
-             onchange: (event) => toggle(one.folder, event.target.checked)
+             onchange: (event) => toggle(one.folder || '.', event.target.checked)
            }) ||
                ''),
         el('th', {scope: 'row'}, el('a', {href: Shell.addressOf('results', one.folder || '.')}, place_of(one.folder)),
@@ -88,10 +88,8 @@
               el('a', {href: '#results='}, 'All results'))),
         el('iframe',
            {class: 'report', title: 'Report of ' + folder, sandbox: 'allow-scripts', src: reportAddress(folder)}),
-        el('h2', {}, 'The same on the command line'), Dom.command(command));
+        command ? el('h2', {}, 'The same on the command line') : '', command ? Dom.command(command) : '');
   }
-
-  const change = (one) => el('li', {}, el('code', {}, one.node || ''), ' ', one.text);
 
   function differing(outputs) {
     const rows = [];
