@@ -174,6 +174,22 @@ class ResultsPageTest(PageTest, ResultsBench):
         self.assertIn("marrow diff runs/first runs/second", self.js("return document.body.textContent"))
         self.assertEqual(self.browser.logs()[0], [])
 
+    def test_figures_are_put_side_by_side(self):
+        for name, mtre in (("first", 1.5), ("second", 0.25)):
+            run = self.folder / "runs" / name
+            figures = [{"name": "mtre", "unit": "mm", "value": mtre}, {"name": "size", "unit": "px", "value": 3}]
+            (run / "outputs" / "errors.json").write_text(json.dumps({"metrics": figures}))
+            record = json.loads((run / "run.json").read_text())
+            record["outputs"].append({"name": "errors", "files": ["outputs/errors.json"]})
+            (run / "run.json").write_text(json.dumps(record))
+        self.show_results("=runs/first&with=runs/second")
+        cells = self.js("return [...document.querySelectorAll('[data-figure=mtre] td')].map((one) => one.textContent)")
+        self.assertEqual(cells, ["1.50\u00a0mm", "0.250\u00a0mm", "\u22121.25"])
+        self.assertEqual(
+            self.js("return document.querySelector('[data-do=same-figures] summary').textContent"),
+            "The same in both, as rounded here: 1",
+        )
+
     def test_a_report_is_shown_in_the_page_and_its_script_runs(self):
         self.show_results("=runs/first")
         driver = self.browser.driver
