@@ -6,7 +6,11 @@ const NodeOutput = (() => {
   const {el} = Dom;
   let open = [];  // what must be given back when other outputs are shown
 
-  const bytes = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  function bytes(text) {
+    const raw = atob(text), all = new Uint8Array(raw.length);
+    for (let i = 0; i < raw.length; ++i) all[i] = raw.charCodeAt(i);
+    return all;
+  }
 
   function slices(part) {
     const words = ['from the side', 'from the front', 'from above'];

@@ -23,6 +23,7 @@ const PipelinePage = (() => {
       this.run = button('Run what is stale', () => this.start(), 'run');
       this.graphBox = el('div', {});
       this.picker = el('div', {class: 'toolbar'});
+      this.inputTitle = el('summary', {}, 'Inputs');
       this.inputBox = el('div', {class: 'form'});
       this.formBox = el('div', {class: 'form'});
       this.outputBox = el('div', {class: 'outputs', 'aria-live': 'polite'});
@@ -33,11 +34,10 @@ const PipelinePage = (() => {
       place.append(
           el('div', {class: 'page-head'}, el('h1', {}, this.file),
              el('div', {class: 'toolbar'}, this.run, this.undo, this.redo, this.status)),
-          this.result,
+          el('details', {class: 'pipeline-inputs', open: true}, this.inputTitle, this.inputBox), this.result,
           el('div', {class: 'pipeline-grid'}, panel('Graph', 'graph', this.picker, this.graphBox),
              panel('Text', 'text', this.text.element), panel('Node', 'node', this.formBox),
-             panel('What the node makes', 'output', this.outputBox), panel('Inputs', 'inputs', this.inputBox),
-             panel('Commands', 'commands', this.commands)));
+             panel('What the node makes', 'output', this.outputBox), panel('Commands', 'commands', this.commands)));
     }
 
     async load() {
@@ -124,12 +124,28 @@ const PipelinePage = (() => {
         if (again) again.focus({preventScroll: true});
         return;
       }
-      const outer = this.chosen && this.state.nodes[this.chosen.split('/')[0]];
-      this.formBox.replaceChildren(
-          el('p', {class: 'note'},
-             outer ? 'This node is in the body of ' + this.chosen.split('/')[0] +
-                     (outer.body ? ', the pipeline ' + outer.body : '') + '. Change it there.' :
-                     'Choose a node in the graph or in the list above it.'));
+      this.showNoForm();
+    }
+
+    // Nothing is chosen, or a node of a body, which is changed in the body's own file.
+    showNoForm() {
+      const [id] = (this.chosen || '').split('/'), outer = this.state.nodes[id];
+      if (!outer)
+        return this.formBox.replaceChildren(
+            el('p', {class: 'note'}, 'Choose a node in the graph or in the list above it.'));
+      const folder = this.file.split('/').slice(0, -1), name = outer.body.endsWith('.yaml') && outer.body;
+      return this.formBox.replaceChildren(
+          el('p', {}, this.chosen + ' is a node of the body of ' + id + '. ',
+             name ? el('a', {href: Shell.addressOf('pipeline', [...folder, name].join('/'))}, 'Open ' + name) :
+                    'Change it in the text.'));
+    }
+
+    // How many are given is said beside the heading, for when they are folded away.
+    countInputs() {
+      const count = this.state.inputs.length;
+      const given =
+          this.state.inputs.filter((one) => this.inputs[one.name]).map((one) => one.name + '=' + this.inputs[one.name]);
+      this.inputTitle.textContent = !count ? 'Inputs: none' : 'Inputs' + (given.length ? ': ' + given.join(', ') : '');
     }
 
     showInputs() {
@@ -138,8 +154,10 @@ const PipelinePage = (() => {
         if (value === '') delete this.inputs[name];
         const more = Object.fromEntries(Object.entries(this.inputs).map(([key, text]) => ['in.' + key, text]));
         history.replaceState(null, '', Shell.addressOf('pipeline', this.file, more));
-        this.refreshPlan();
+        this.countInputs();
+        this.refreshPlan().then(() => this.look());
       };
+      this.countInputs();
       this.inputBox.replaceChildren(
           ...(this.state.inputs.length ?
                   this.state.inputs.map((one) => PipelineRuns.inputField(one, this.inputs[one.name] || '', changed)) :

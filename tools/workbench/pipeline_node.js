@@ -134,7 +134,8 @@ const PipelineNode = (() => {
     return el(
         'div', {}, head, el('p', {}, info.summary), el('h3', {}, 'Options'),
         info.options.length ? '' : el('p', {class: 'note'}, 'It has no options.'), fields(given), fields(others),
-        info.relations.map((text) => el('p', {class: 'note'}, 'So that ' + text + '.')),
+        info.relations.length ? el('ul', {class: 'note relations'}, info.relations.map((text) => el('li', {}, text))) :
+                                '',
         Dom.checkbox(
             'may fail without ending the run', node.may_fail,
             (value) => own({what: 'may_fail', value: value ? 'true' : null})),

@@ -4,7 +4,7 @@
 
 (() => {
   const {el} = Dom;
-  const place_of = (folder) => folder || '(this folder)';
+  const place_of = (folder) => (folder && folder !== '.' ? folder : '(this folder)');
   const when = (text) => text.replace('T', ' ').replace(/(\.\d+)?Z$/, ' UTC');
   const reportAddress = (folder, more) => 'results/report.html?' + new URLSearchParams({folder, ...more});
 
@@ -19,17 +19,17 @@
                one.item ? ' ' + one.item : ''));
   }
 
-  // The figures of a run, a few of them in its row.
+  // The figures of a run, a few of them in its row: of several columns, such as the stages of a registration, the last.
   function figuresCell(row) {
     const lines = (row.sentences || []).map((text) => el('div', {}, text));
     for (const table of row.figures || [])
-      for (const one of table.rows)
-        one.values.forEach((value, i) => {
-          if (Number.isFinite(value))
-            lines.push(
-                el('div', {},
-                   [table.columns[i], one.name].filter(Boolean).join(' ') + ' ' + Dom.withUnit(value, one.unit)));
-        });
+      for (const one of table.rows) {
+        const last = one.values.findLastIndex((value) => Number.isFinite(value));
+        if (last < 0) continue;
+        const column = table.columns.length > 1 ? table.columns[last] : '';
+        lines.push(el(
+            'div', {}, [column, one.name].filter(Boolean).join(' ') + ' ' + Dom.withUnit(one.values[last], one.unit)));
+      }
     const shown = lines.slice(0, 3), more = lines.slice(3);
     return more.length ? [...shown, el('details', {}, el('summary', {}, more.length + ' more'), more)] : shown;
   }
@@ -57,7 +57,7 @@
            one.kind === 'run' && !one.fault && el('input', {
              type: 'checkbox',
              'aria-label': 'Compare ' + place_of(one.folder),
-             onchange: (event) => toggle(one.folder, event.target.checked)
+             onchange: (event) => toggle(one.folder || '.', event.target.checked)
            }) ||
                ''),
         el('th', {scope: 'row'}, el('a', {href: Shell.addressOf('results', one.folder || '.')}, place_of(one.folder)),
@@ -88,10 +88,14 @@
               el('a', {href: '#results='}, 'All results'))),
         el('iframe',
            {class: 'report', title: 'Report of ' + folder, sandbox: 'allow-scripts', src: reportAddress(folder)}),
-        el('h2', {}, 'The same on the command line'), Dom.command(command));
+        command ? el('h2', {}, 'The same on the command line') : '', command ? Dom.command(command) : '');
   }
 
-  const change = (one) => el('li', {}, el('code', {}, one.node || ''), ' ', one.text);
+  // A few lines; the others are folded away.
+  function folded(lines) {
+    const some = lines.map((line) => el('div', {}, line)), rest = some.splice(4);
+    return rest.length ? [...some, el('details', {}, el('summary', {}, rest.length + ' more'), rest)] : some;
+  }
 
   function differing(outputs) {
     const rows = [];
@@ -102,10 +106,15 @@
     return rows;
   }
 
-  const table = (caption, head, rows) => rows.length ?
+  // The last columns, as many as `numbers` says, hold numbers.
+  const table = (caption, head, rows, numbers = 0) => rows.length ?
       el('div', {class: 'scroll', tabindex: 0, role: 'region', 'aria-label': caption},
          el('table', {}, el('caption', {}, caption),
-            el('thead', {}, el('tr', {}, head.map((text) => el('th', {scope: 'col'}, text)))), el('tbody', {}, rows))) :
+            el('thead', {},
+               el('tr', {},
+                  head.map(
+                      (text, i) => el('th', {scope: 'col', class: i >= head.length - numbers && 'number'}, text)))),
+            el('tbody', {}, rows))) :
       '';
 
   function changesTable(findings) {
@@ -121,7 +130,7 @@
   }
 
   function figuresTable(figures) {
-    const rows = figures.map((one) => {
+    const row = (one) => {
       const both = Number.isFinite(one.before) && Number.isFinite(one.now);
       return el(
           'tr', {'data-figure': one.name},
@@ -130,8 +139,17 @@
           el('td', {class: 'number'}, Dom.withUnit(one.now, one.unit)),
           el('td', {class: 'number'},
              both ? (one.now > one.before ? '+' : '') + Dom.number(one.now - one.before) : '–'));
-    });
-    return table('Figures of merit', ['Figure', 'First run', 'Second run', 'Difference'], rows);
+    };
+    const head = ['Figure', 'First run', 'Second run', 'Difference'];
+    const known = figures.filter((one) => Number.isFinite(one.before) || Number.isFinite(one.now));
+    const same = known.filter((one) => Dom.number(one.before) === Dom.number(one.now));
+    const others = known.filter((one) => !same.includes(one));
+    return el(
+        'div', {}, table('Figures of merit that differ', head, others.map(row), 3),
+        same.length ? el('details', {'data-do': 'same-figures'},
+                         el('summary', {}, 'The same in both, as rounded here: ' + same.length),
+                         table('Figures of merit that are the same', head, same.map(row), 3)) :
+                      '');
   }
 
   function sideBySide(pictures, first, second) {
@@ -143,7 +161,8 @@
         (folder) =>
             el('figure', {}, el('img', {src: address(folder, name), alt: short(name) + ' of ' + folder}),
                el('figcaption', {}, folder))));
-    const start = pictures.find((name) => /result|overlay/.test(name)) || pictures[0];
+    const start = pictures.find((name) => name.includes('result')) ||
+        pictures.find((name) => name.includes('overlay')) || pictures[0];
     show(start);
     return el(
         'section', {'aria-label': 'Pictures side by side'}, el('h2', {}, 'Pictures side by side'),
@@ -155,9 +174,8 @@
     const {findings, figures, pictures, command} = await Ask.json('api/results/diff', {first, second});
     const rows = differing(findings.outputs)
                      .map(
-                         ([name, lines]) =>
-                             el('tr', {'data-output': name}, el('th', {scope: 'row'}, name),
-                                el('td', {}, lines.map((line) => el('div', {}, line)))));
+                         ([name, lines]) => el(
+                             'tr', {'data-output': name}, el('th', {scope: 'row'}, name), el('td', {}, folded(lines))));
     const same = findings.outputs.filter((one) => one.identical && one.same_items).map((one) => one.name);
     const root = findings.first;
     place.append(

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Shows what a node made: the writers of its types write files into a temporary folder, and the files become pictures,
-// slices, surfaces and texts.
+// Shows what a node made. Surfaces and volumes are shown as they are in memory. For other types their writers write
+// files into a temporary folder, and the files become pictures, surfaces and texts.
 #include <cstdlib>
 
 #include "marrow/domain/base64.hpp"
 #include "marrow/domain/error.hpp"
+#include "marrow/runtime/types.hpp"
 #include "marrow/toolbox/files/mesh_file.hpp"
-#include "marrow/toolbox/files/volume_file.hpp"
 #include "report/report.hpp"
 #include "runtime/text_file.hpp"
 #include "workbench/pipeline_run.hpp"
@@ -47,8 +47,7 @@ std::string bytes_text(const std::vector<Item>& items) {
   return base64({reinterpret_cast<const char*>(items.data()), items.size() * sizeof(Item)});
 }
 
-json mesh_json(const fs::path& file) {
-  const Mesh mesh = files::read_mesh_file(file, 1);
+json mesh_json(const Mesh& mesh) {
   const std::size_t count = mesh.triangles.size();
   if (count > kMostTriangles)
     return {{"kind", "text"},
@@ -67,9 +66,8 @@ json mesh_json(const fs::path& file) {
 }
 
 /// The three slices through the middle, from the least to the largest value in them.
-json slices_json(const fs::path& file) {
-  const Volume volume = files::read_volume_file(file, {});
-  const auto size = volume.grid.size;
+json slices_json(const Grid& grid, const std::vector<float>& voxels) {
+  const auto size = grid.size;
   json slices = json::array();
   double least = std::numeric_limits<double>::infinity(), most = -least;
   std::vector<std::vector<float>> values(3);
@@ -80,7 +78,7 @@ json slices_json(const fs::path& file) {
     for (int row = size[up] - 1; row >= 0; --row)
       for (int column = 0; column < size[across]; ++column) {
         at[std::size_t(up)] = row, at[std::size_t(across)] = column;
-        const float value = float(volume.at(at[0], at[1], at[2]));
+        const float value = voxels[grid.offset(at[0], at[1], at[2])];
         values[std::size_t(axis)].push_back(value);
         least = std::min(least, double(value)), most = std::max(most, double(value));
       }
@@ -92,7 +90,7 @@ json slices_json(const fs::path& file) {
       grey.push_back(std::uint8_t(most > least ? 255 * (value - least) / (most - least) : 0));
     slices.push_back({{"width", size[across]},
                       {"height", size[up]},
-                      {"stretch", volume.grid.spacing_mm[up] / volume.grid.spacing_mm[across]},
+                      {"stretch", grid.spacing_mm[up] / grid.spacing_mm[across]},
                       {"grey", bytes_text(grey)}});
   }
   return {{"kind", "slices"}, {"slices", slices}, {"least", least}, {"most", most}};
@@ -101,11 +99,12 @@ json slices_json(const fs::path& file) {
 json file_json(const fs::path& file) {
   const std::string extension = file.extension().string();
   if (extension == ".png") return {{"kind", "picture"}, {"picture", cli::picture_url(file, kPicture_px)}};
-  if (extension == ".ply" || extension == ".stl") return mesh_json(file);
-  if (extension == ".mha") return slices_json(file);
+  if (extension == ".ply" || extension == ".stl") return mesh_json(files::read_mesh_file(file, 1));
   std::string text = read_text_file(file, kMostRecordBytes);
   if (extension == ".json") {
     const json content = json::parse(text, nullptr, false);
+    if (content.is_object() && content.contains("marrow-scene"))
+      return {{"kind", "text"}, {"text", "a scene in 3D; the report of a run shows it"}};
     if (content.is_object() && content.contains("metrics") && content["metrics"].is_array())
       return {{"kind", "figures"}, {"figures", content["metrics"]}};
   }
@@ -131,6 +130,12 @@ json shown_item(const Value& value, const fs::path& folder, const Catalogue& cat
     return json::array({{{"kind", "text"}, {"text", value.missing.empty() ? "nothing" : "nothing: " + value.missing}}});
   if (value.type.is_function)
     return json::array({{{"kind", "text"}, {"text", "a function that other nodes call; it has no picture"}}});
+  // A large value needs no way through a file.
+  if (value.type == TypeInfo::of<Mesh>()) return json::array({mesh_json(value.as<Mesh>())});
+  if (value.type == TypeInfo::of<Volume>())
+    return json::array({slices_json(value.as<Volume>().grid, value.as<Volume>().values)});
+  if (value.type == TypeInfo::of<SignedField>())
+    return json::array({slices_json(value.as<SignedField>().grid, value.as<SignedField>().values_mm)});
   const WriterInfo* writer = catalogue.find_writer(value.type);
   if (!writer) return json::array({{{"kind", "text"}, {"text", "no library writes values of this type"}}});
   const fs::path place = folder / ("item" + writer->extension);

@@ -63,7 +63,8 @@ void add_results_page(Server& server, Workbench& workbench) {
   server.post("/api/results/report", [&](const Request& request) {
     const std::string result = request.text("folder");
     report_of(workbench.folder, result);
-    return json_answer({{"command", in_folder(workbench, "show " + cli::shell_path(result.empty() ? "." : result))}});
+    const bool is_run = fs::exists(workbench.folder.inside(result) / "run.json");  // a comparison writes its own report
+    return json_answer({{"command", is_run ? in_folder(workbench, "show " + cli::shell_path(result)) : ""}});
   });
   server.get("/results/report.html", [&](const Request& request) { return report_answer(workbench, request); });
   server.get("/results/picture.png", [&](const Request& request) { return picture_answer(workbench, request); });

@@ -141,7 +141,10 @@ struct Server::Parts {
     if (at_once > kMostAtOnce) return refuse(response, 503, "too many requests at once; try again");
     try {
       Answer answer = handler(request_of(asked));
-      for (const auto& [name, value] : answer.headers) response.set_header(name, value);
+      for (const auto& [name, value] : answer.headers) {
+        response.headers.erase(name);  // the default one, which would count as well
+        response.set_header(name, value);
+      }
       response.set_content(std::move(answer.body), answer.type);
     } catch (const Conflict& error) {
       refuse(response, 409, error.what());

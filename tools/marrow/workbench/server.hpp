@@ -29,7 +29,7 @@ struct Request {
 struct Answer {
   std::string body;
   std::string type = "application/json";
-  std::vector<std::pair<std::string, std::string>> headers = {};
+  std::vector<std::pair<std::string, std::string>> headers = {};  ///< in the place of the server's own of that name
 };
 Answer json_answer(const nlohmann::json& value);
 /// Bytes as they are, for pixels. `about` goes into the header X-Marrow-About as JSON.
