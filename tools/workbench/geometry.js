@@ -4,8 +4,8 @@
 'use strict';
 
 const Geometry = (() => {
-  // Over the length of `a`: the rows of a motion have a fourth number.
-  const dot = (a, b) => a.reduce((sum, value, i) => sum + value * b[i], 0);
+  // A row of a motion has a fourth number, which belongs to the shift.
+  const dot = (a, b) => b.reduce((sum, value, i) => sum + value * a[i], 0);
   const plus = (a, b) => a.map((value, i) => value + b[i]);
   const minus = (a, b) => a.map((value, i) => value - b[i]);
   const times = (a, factor) => a.map((value) => value * factor);
@@ -15,8 +15,8 @@ const Geometry = (() => {
 
   const identity = () => [[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]];
   const multiply = (a, b) => a.map((row) => [0, 1, 2, 3].map((j) => row.reduce((sum, x, k) => sum + x * b[k][j], 0)));
-  const moved = (motion, point) => motion.slice(0, 3).map((row) => dot(point, row) + row[3]);
-  const turned = (motion, vector) => motion.slice(0, 3).map((row) => dot(vector, row));
+  const moved = (motion, point) => motion.slice(0, 3).map((row) => dot(row, point) + row[3]);
+  const turned = (motion, vector) => motion.slice(0, 3).map((row) => dot(row, vector));
   // For rigid motions only.
   function inverse(motion) {
     const columns = [0, 1, 2].map((j) => motion.slice(0, 3).map((row) => row[j]));
