@@ -110,7 +110,9 @@ const PlacePage = (() => {
     }
 
     dragEnded(drag) {
-      if (drag.moved) this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
+      if (!drag.moved) return;
+      for (const view of this.views) view.want(this.placed, false);
+      this.keep(drag.kind === 'shift' ? 'move' : drag.kind === 'roll' ? 'turn about the long axis of' : 'turn');
     }
 
     // A key or a notch of the wheel. What follows within a moment belongs to the same step.
@@ -204,7 +206,7 @@ const PlacePage = (() => {
           if (noted) noted.costs = costs;
           this.steps.showCosts(costs, (this.bones()[0] || this.about.bones[0]).name);
           if (noted) this.steps.show();
-          await new Promise((resolve) => setTimeout(resolve, 120));
+          await new Promise((resolve) => setTimeout(resolve, 250));
         }
       } catch (error) {
         this.failed(error);

@@ -41,24 +41,22 @@ class PlaceSteps {
     const {el} = Dom;
     this.present = {costs, bone};
     if (!costs || !costs[bone]) return this.costTable.replaceChildren();
-    const names = Object.keys(costs[bone].contour.views);
-    const row = (measure, title) => {
-      const {value, views} = costs[bone][measure], best = this.best(bone, measure);
-      const factor = value / best;
-      return el(
-          'tr', {}, el('th', {scope: 'row'}, title), el('td', {'data-cost': measure}, Dom.number(value)),
-          el('td', {},
-             !Number.isFinite(best)     ? '–' :
-                 value <= best * 1.0005 ? 'best so far' :
-                                          Dom.number(factor) + ' × best'),
-          names.map((name) => el('td', {}, Dom.number(views[name]))));
-    };
+    const measures = [['contour', 'contour'], ['grey_values', 'grey values']];
+    const row = (title, cell) =>
+        el('tr', {}, el('th', {scope: 'row'}, title), measures.map(([measure]) => cell(measure, costs[bone][measure])));
     this.costTable.replaceChildren(
         el('caption', {}, 'How badly ' + bone + ' fits here'),
-        el('thead', {},
-           el('tr', {}, el('td', {}), el('th', {scope: 'col'}, 'all views'), el('th', {scope: 'col'}, 'against steps'),
-              names.map((name) => el('th', {scope: 'col'}, name)))),
-        el('tbody', {}, row('contour', 'contour'), row('grey_values', 'grey values')));
+        el('thead', {}, el('tr', {}, el('td', {}), measures.map(([, title]) => el('th', {scope: 'col'}, title)))),
+        el('tbody', {}, row('all views', (measure, {value}) => el('td', {'data-cost': measure}, Dom.number(value))),
+           row('against the best step', (measure, {value}) => el('td', {}, this.comparison(value, bone, measure))),
+           Object.keys(costs[bone].contour.views)
+               .map((name) => row(name, (measure, {views}) => el('td', {}, Dom.number(views[name]))))));
+  }
+
+  comparison(value, bone, measure) {
+    const best = this.best(bone, measure);
+    if (!Number.isFinite(best)) return '–';
+    return value <= best * 1.0005 ? 'the best' : Dom.number(value / best) + ' × it';
   }
 
   showVerdict(verdicts, note) {

@@ -96,6 +96,17 @@ class PlaceView {
     this.page.dragEnded(drag);
   }
 
+  // While a bone moves, every second pixel must do where all of them take too long. On release all are drawn.
+  judgeSpeed(took_ms, isMoving) {
+    const LONG_MS = 40, SHORT_MS = 8;
+    if (!isMoving) return;
+    this.usual_ms = 0.8 * (this.usual_ms || took_ms) + 0.2 * took_ms;
+    if (this.usual_ms > LONG_MS && !this.isSlow)
+      Object.assign(this, {isSlow: true, usual_ms: LONG_MS / 2});
+    else if (this.usual_ms < SHORT_MS && this.isSlow)
+      Object.assign(this, {isSlow: false, usual_ms: LONG_MS / 2});
+  }
+
   // Asks for bones: {BONE: pose}. There is one request at a time; after it, the newest wish is asked for.
   want(poses, isMoving) {
     this.wanted = {poses: {...(this.wanted || {}).poses, ...poses}, isMoving, since: performance.now()};
@@ -106,18 +117,19 @@ class PlaceView {
     this.inFlight = true;
     try {
       while (this.wanted) {
-        const {poses, since} = this.wanted, style = this.page.style();
+        const {poses, since, isMoving} = this.wanted, style = this.page.style(), begin = performance.now();
         this.wanted = null;
         const what = {edges: 'edges', outline: 'outline'}[style.mode] || 'radiograph';
         const answer = await Ask.postForBytes('api/place/overlay', {
           case: this.page.casePath,
           view: this.name,
           what,
-          step_px: what === 'outline' ? 1 : this.step_px,
+          step_px: what === 'outline' ? 1 : this.step_px * (isMoving && this.isSlow ? 2 : 1),
           poses
         });
         this.take(answer);
         this.draw();
+        this.judgeSpeed(performance.now() - begin, isMoving);
         this.page.painted(this, since);
       }
     } catch (error) {
