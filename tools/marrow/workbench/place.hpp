@@ -9,6 +9,7 @@
 
 #include "marrow/domain/functions.hpp"
 #include "marrow/domain/list.hpp"
+#include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
 
 namespace marrow::workbench {
@@ -54,7 +55,6 @@ class PlacedCases {
 
 /// A placement of a request: a 4 x 4 matrix as rows. Throws Error unless it is a rigid motion.
 RigidTransform placement_of(const nlohmann::json& matrix);
-nlohmann::json json_of(const RigidTransform& transform);
 
 /// The point nearest to the middle rays of all views: where the views look at.
 Eigen::Vector3d common_centre_mm(const List<View>& views);

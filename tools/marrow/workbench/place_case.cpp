@@ -155,13 +155,4 @@ RigidTransform placement_of(const json& matrix) {
   return placement;
 }
 
-json json_of(const RigidTransform& transform) {
-  json rows = json::array();
-  for (int i = 0; i < 3; ++i)
-    rows.push_back(
-        {transform.rotation(i, 0), transform.rotation(i, 1), transform.rotation(i, 2), transform.translation_mm(i)});
-  rows.push_back({0, 0, 0, 1});
-  return rows;
-}
-
 }  // namespace marrow::workbench

@@ -48,9 +48,7 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
     images.push_back(workbench.folder.inside(view.at("image").get<std::string>()).string());
     cameras.push_back(camera_file(workbench, view.at("camera")).string());
   }
-  return {{"views.names", set_text(names)},
-          {"views.images", set_text(images)},
-          {"views.cameras", set_text(cameras)}};
+  return {{"views.names", set_text(names)}, {"views.images", set_text(images)}, {"views.cameras", set_text(cameras)}};
 }
 
 namespace {
@@ -59,9 +57,9 @@ namespace {
 std::string shell_word(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  const bool is_plain = text.find_first_not_of(
-                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-") ==
-                        std::string::npos;
+  const bool is_plain =
+      text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-") ==
+      std::string::npos;
   return is_plain && !text.empty() ? text : word + "'";
 }
 
@@ -73,28 +71,6 @@ std::string command_of(const PipelineCall& call) {
   for (const Override& one : call.arguments.overrides) command += " --set " + shell_word(one.key + "=" + one.value);
   for (const std::string& output : call.only) command += " --only " + shell_word(output);
   return command;
-}
-
-json json_of(const RigidTransform& target_from_source) {
-  json rows = json::array();
-  for (int i = 0; i < 3; ++i) {
-    json row = json::array();
-    for (int k = 0; k < 3; ++k) row.push_back(target_from_source.rotation(i, k));
-    row.push_back(target_from_source.translation_mm[i]);
-    rows.push_back(row);
-  }
-  rows.push_back({0, 0, 0, 1});
-  return rows;
-}
-
-json json_of(const Camera& camera) {
-  json intrinsics = json::array();
-  for (int i = 0; i < 3; ++i)
-    intrinsics.push_back({camera.intrinsics(i, 0), camera.intrinsics(i, 1), camera.intrinsics(i, 2)});
-  return {{"intrinsics", intrinsics},
-          {"camera_from_world", json_of(camera.camera_from_world)},
-          {"width_px", camera.width_px},
-          {"height_px", camera.height_px}};
 }
 
 Ran run(const PipelineCall& call, const Workbench& workbench) {

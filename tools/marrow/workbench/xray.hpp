@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "marrow/domain/camera.hpp"
+#include "workbench/value_json.hpp"
 #include "workbench/workbench.hpp"
 
 namespace marrow::workbench {
@@ -25,10 +26,6 @@ std::vector<Override> overrides_of(const Workbench& workbench, const nlohmann::j
 
 /// The command that runs the pipeline in a shell.
 std::string command_of(const PipelineCall& call);
-
-/// {intrinsics, camera_from_world, width_px, height_px} with matrices as rows.
-nlohmann::json json_of(const Camera& camera);
-nlohmann::json json_of(const RigidTransform& target_from_source);  ///< 4 x 4, as rows
 
 /// A run of a small pipeline that is waited for: its outputs and its warnings.
 struct Ran {

@@ -127,11 +127,11 @@ std::vector<std::string> mirrored_views(const Workbench& workbench, const json& 
     const std::string name = view.at("name");
     try {
       const double width_px = view.value("width_px", 0.0);
-      const double other_px =
-          fit(workbench, views, mirrored(landmarks, name, width_px), fragment).pose.cost;
+      const double other_px = fit(workbench, views, mirrored(landmarks, name, width_px), fragment).pose.cost;
       if (kBetter * other_px < residual_px)
-        sentences.push_back("the image of '" + name + "' seems to be mirrored: the other way round, the landmarks fit " +
-                            "to " + short_text(other_px) + " px.");
+        sentences.push_back("the image of '" + name +
+                            "' seems to be mirrored: the other way round, the landmarks fit " + "to " +
+                            short_text(other_px) + " px.");
     } catch (const Error&) {
       // mirrored, the landmarks have no pose: then this is not the mistake
     }
