@@ -66,8 +66,10 @@ def two_balls(size, first, second, radius):
     ]
 
 
-def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1, series="7"):
-    """A CT series in explicit little endian with cubic voxels; its first voxel is the origin."""
+def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1, series="7", origin_mm=(0, 0, 0)):
+    """A CT series in explicit little endian; `spacing_mm` is one number or three. Values: a list, or an array of numpy
+    in 16 bits."""
+    spacing_mm = spacing_mm if hasattr(spacing_mm, "__len__") else (spacing_mm,) * 3
 
     def element(group, tag, kind, value):
         if isinstance(value, str):
@@ -105,20 +107,22 @@ def dicom_series(folder, size, values, patient="A^PATIENT", spacing_mm=1, series
             + element(0x20, 0xD, b"UI", series + ".1")
             + element(0x20, 0xE, b"UI", series + ".2")
             + element(0x20, 0x13, b"IS", str(number))
-            + element(0x20, 0x32, b"DS", "0\\0\\%g" % (number * spacing_mm))
+            + element(0x20, 0x32, b"DS", "%.9g\\%.9g\\%.9g" % (*origin_mm[:2], origin_mm[2] + number * spacing_mm[2]))
             + element(0x20, 0x37, b"DS", "1\\0\\0\\0\\1\\0")
             + short(2, 1)
             + element(0x28, 4, b"CS", "MONOCHROME2")
             + short(0x10, size[1])
             + short(0x11, size[0])
-            + element(0x28, 0x30, b"DS", "%g\\%g" % (spacing_mm, spacing_mm))
+            + element(0x28, 0x30, b"DS", "%g\\%g" % (spacing_mm[1], spacing_mm[0]))
             + short(0x100, 16)
             + short(0x101, 16)
             + short(0x102, 15)
             + short(0x103, 1)
             + element(0x28, 0x1052, b"DS", "0")
             + element(0x28, 0x1053, b"DS", "1")
-            + element(0x7FE0, 0x10, b"OW", struct.pack("<%dh" % plane, *part))
+            + element(
+                0x7FE0, 0x10, b"OW", part.tobytes() if hasattr(part, "tobytes") else struct.pack("<%dh" % plane, *part)
+            )
         )
 
 

@@ -155,7 +155,9 @@ class XrayTest(PageTest):
         self.browser.wait("return !!document.querySelector('[data-view=\"%s\"] canvas')?.width" % view)
         element = self.find('[data-view="%s"]' % view)
         self.browser.js("arguments[0].scrollIntoView({block: 'center'})", element)
-        return element, self.browser.js("const r = arguments[0].getBoundingClientRect(); return [r.left, r.top, r.width, r.height]", element)
+        return element, self.browser.js(
+            "const r = arguments[0].getBoundingClientRect(); return [r.left, r.top, r.width, r.height]", element
+        )
 
     def place(self, view, at):
         """Where a pixel of a whole image lies on the screen."""
@@ -225,7 +227,10 @@ class ViewsTest(XrayTest):
             self.document()["views"],
             [
                 {"name": "frontal", "image": "frontal.png", "camera": {"file": "frontal.camera.yaml"}},
-                {**self.views[1], "camera": {**self.views[1]["camera"], "c_arm": {"alpha_deg": 0, "beta_deg": 90, **ARM}}},
+                {
+                    **self.views[1],
+                    "camera": {**self.views[1]["camera"], "c_arm": {"alpha_deg": 0, "beta_deg": 90, **ARM}},
+                },
             ],
         )
         self.wait_text("[data-figures]", "90.0°")
@@ -236,7 +241,9 @@ class ViewsTest(XrayTest):
         self.no_faults()
 
     def test_views_are_renamed_moved_and_removed(self):
-        self.begin({"views": self.views, "landmarks": [{"name": "tip", "pixels": {"frontal": [1, 2], "lateral": [3, 4]}}]})
+        self.begin(
+            {"views": self.views, "landmarks": [{"name": "tip", "pixels": {"frontal": [1, 2], "lateral": [3, 4]}}]}
+        )
         self.click('[data-view-row="frontal"] [data-do="down"]')
         self.until(lambda: [one["name"] for one in self.document()["views"]] == ["lateral", "frontal"], "not moved")
         self.click('[data-view-row="frontal"] [data-do="rename"]')
@@ -347,7 +354,9 @@ class LandmarksTest(XrayTest):
         self.wait_text(rays, "4.8")  # 8 px, each 600/1000 mm at the isocentre
         self.assertEqual(self.landmark("tip")["pixels"], marks)
         self.mouse("mouseReleased", b)
-        self.until(lambda: abs(self.landmark("tip")["pixels"]["lateral"][1] - marks["lateral"][1] - 8) < 0.05, "not kept")
+        self.until(
+            lambda: abs(self.landmark("tip")["pixels"]["lateral"][1] - marks["lateral"][1] - 8) < 0.05, "not kept"
+        )
         self.assertEqual(self.landmark("tip")["note"], "kept")
 
     def test_by_the_keyboard_alone(self):
@@ -421,7 +430,9 @@ class MasksTest(XrayTest):
     def test_a_box_by_the_keyboard(self):
         self.begin({"views": self.views})
         self.tool("rectangle")
-        self.keys("frontal", Keys.ENTER, *[(Keys.SHIFT, Keys.ARROW_RIGHT)] * 3, (Keys.SHIFT, Keys.ARROW_DOWN), Keys.ENTER)
+        self.keys(
+            "frontal", Keys.ENTER, *[(Keys.SHIFT, Keys.ARROW_RIGHT)] * 3, (Keys.SHIFT, Keys.ARROW_DOWN), Keys.ENTER
+        )
         self.until(lambda: self.mask() is not None, "no mask")
         expected = numpy.full((HEIGHT, WIDTH), 255)
         expected[120:131, 160:191] = 0
@@ -458,7 +469,9 @@ class ExchangeTest(XrayTest):
         self.assertEqual(self.document()["landmarks"], [{**marked[0], "fragment": "distal"}])
 
     def test_seeds_and_starts_come_from_files(self):
-        (self.folder / "s.yaml").write_text("marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]], register: false}\n")
+        (self.folder / "s.yaml").write_text(
+            "marrow-seeds: 1\nfragments:\n  proximal: {seeds: [[1, 2, 3]], register: false}\n"
+        )
         matrix = [[1, 0, 0, 4], [0, 1, 0, 5], [0, 0, 1, 6], [0, 0, 0, 1]]
         (self.folder / "p.yaml").write_text("marrow-pose: 1\ntarget: world\nsource: ct\nmatrix: %s\n" % matrix)
         self.begin({"views": self.views})
@@ -483,7 +496,9 @@ class ExchangeTest(XrayTest):
             "no/s.yaml": "'no/s.yaml': there is no such folder; make it first",
         }.items():
             content = {"fragments": {"distal": {"seeds": [[1, 2, 3]]}}}
-            status, _, text = server.ask("POST", "/api/xray/export", {"what": "seeds", "path": path, "content": content})
+            status, _, text = server.ask(
+                "POST", "/api/xray/export", {"what": "seeds", "path": path, "content": content}
+            )
             self.assertEqual((status, json.loads(text)["error"]), (400, fault))
         status, _, text = server.ask("GET", "/api/xray/import?what=seeds&path=../s.yaml")
         self.assertIn("leads out of the folder that is open", json.loads(text)["error"])
