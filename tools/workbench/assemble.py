@@ -16,7 +16,8 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's lib
 SCRIPTS = [
     *(REPORT / name for name in ("dom.js", "orbit.js", "graph.js")),
     *(FOLDER / name for name in ("server.js", "geometry.js", "shell.js", "home.js", "draft.js", "case.js")),
-    *(FOLDER / name for name in ("slice_geometry.js", "ct_state.js", "slice_input.js", "slice_view.js", "ct_panel.js")),
+    *(FOLDER / name for name in ("slice_geometry.js", "ct_state.js", "slice_input.js", "slice_picture.js")),
+    *(FOLDER / name for name in ("slice_view.js", "ct_panel.js")),
     *(FOLDER / name for name in ("point_list.js", "fragments_panel.js", "surface_view.js", "segmentation_panel.js")),
     *(FOLDER / name for name in ("ct_landmarks.js", "save_panel.js")),
     FOLDER / "main.js",
