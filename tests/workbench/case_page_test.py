@@ -15,6 +15,14 @@ from bench import MARROW, SOURCE, PageTest
 SIZE = (40, 36, 44)
 LOWER, UPPER = (20, 18, 11), (20, 18, 32)
 NASTY = "<b>tip</b>"
+# Whether an outline in the colour of the first fragment is in the axial slice.
+OUTLINED = """
+  const canvas = document.querySelector('[data-slice="axial"]'), {width, height} = canvas;
+  const {data} = canvas.getContext('2d').getImageData(0, 0, width, height);
+  let count = 0;
+  for (let i = 0; i < data.length; i += 4)
+    count += Math.hypot(data[i] - 0x56, data[i + 1] - 0xb4, data[i + 2] - 0xe9) < 40;
+  return count > 300;"""
 
 
 class CasePageTest(PageTest):
@@ -143,16 +151,7 @@ class CasePageTest(PageTest):
         volume_ml = float(re.search(r"distal ([\d.]+) ml", text).group(1))
         self.assertAlmostEqual(volume_ml, 4 / 3 * 3.1416 * 8**3 / 1000, delta=0.35)
         self.wait("Number(document.querySelector('canvas.surface').dataset.triangles) > 100")
-        self.wait(
-            """(() => {  // its outline is in the slice, in the fragment's colour
-              const canvas = document.querySelector('[data-slice="axial"]'), {width, height} = canvas;
-              const {data} = canvas.getContext('2d').getImageData(0, 0, width, height);
-              let count = 0;
-              for (let i = 0; i < data.length; i += 4)
-                count += Math.hypot(data[i] - 0x56, data[i + 1] - 0xb4, data[i + 2] - 0xe9) < 40;
-              return count > 300;
-            })()"""
-        )
+        self.browser.wait(OUTLINED)
 
         self.click('[data-do="save"]')
         self.wait("!!document.querySelector('[data-saved] .command')")
@@ -162,6 +161,8 @@ class CasePageTest(PageTest):
         marks = yaml.safe_load((case / "landmarks.yaml").read_text())
         self.assertEqual(list(marks["fragments"]["distal"]["points"]), [NASTY])
         self.assertEqual(self.browser.js("return document.querySelectorAll('main b').length"), 0)
+        self.assertEqual(self.css("[data-ct]").text, "mine/ct")
+        self.assertEqual(self.browser.js(OUTLINED), True, "the copied CT is the same, so what is shown stays")
         commands = self.css("[data-saved]").text
         self.assertIn("bone.yaml case=%s" % case.resolve(), commands)
         environment = {**os.environ, "MARROW_CACHE": str(self.scratch / "store")}

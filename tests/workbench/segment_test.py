@@ -144,8 +144,8 @@ class SegmentTest(BenchTest):
         state = server.finish(self.segment(server, ct, fragments))
         self.assertRegex(
             state["error"],
-            r"^on the grid of the CT, 8 fragments would take 3\.4 GB of memory, and at most \d\.\d GB are used here; the "
-            r"result on the coarse grid stays\. Register fewer fragments, or cut the CT to the bone$",
+            r"^on the grid of the CT, 8 fragments would take 3\.4 GB of memory, and at most \d\.\d GB are used here; "
+            r"the result on the coarse grid stays\. Register fewer fragments, or cut the CT to the bone$",
         )
         self.assertEqual([event["stage"] for event in state["events"] if event["event"] == "grown"], ["coarse"])
 

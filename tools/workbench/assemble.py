@@ -15,7 +15,7 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's lib
 # In this order. Scripts of pages come before main.js, which starts them.
 FILES = """
     server geometry shell home draft case
-    slice_geometry ct_state slice_input slice_view ct_panel point_list fragments_panel
+    slice_geometry ct_state slice_input slice_picture slice_view ct_panel point_list fragments_panel
     surface_view segmentation_panel ct_landmarks save_panel
     viewport sight xray_images xray_frame xray_landmarks xray_table xray_masks xray_exchange xrays xray_add xray_views
     place_motion place_paint place_view place_steps place

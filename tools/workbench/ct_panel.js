@@ -159,6 +159,7 @@
         el('div', {class: 'toolbar'},
            Dom.button('Choose a CT …', () => Shell.guarded(() => choose(draft)), {'data-do': 'choose-ct'}),
            el('span', {}, name, ' ', facts));
+    let reset_for = null;  // the name of the CT
     function tell() {
       const {ct} = state, {ct: chosen} = draft.document;
       name.textContent = chosen ? chosen.file : 'No CT is chosen.';
@@ -174,7 +175,9 @@
       if (state.fault) options.element.open = true;
       command.replaceChildren(command.firstChild, Dom.command(state.command));
       shown.element.hidden = !ct;
-      shown.reset();
+      shown.element.inert = state.isReading;
+      if ((ct ? ct.name : '') !== reset_for) shown.reset();
+      reset_for = ct ? ct.name : '';
       if (ct) shown.update();
     }
     const viewed = () => state.ct && shown.update();

@@ -39,7 +39,8 @@ class CtState extends EventTarget {
     const wanted = JSON.stringify(this.draft.document.ct);
     if (wanted === this.read && !isAgain) return;
     this.read = wanted;
-    Object.assign(this, {isReading: wanted !== 'null', fault: '', ...(isAgain ? {} : {ct: null})});
+    const before = this.ct;
+    Object.assign(this, {isReading: wanted !== 'null', fault: '', ct: wanted === 'null' ? null : before});
     this.tell('ct');
     if (wanted === 'null') return;
     let ct = null, fault = '';
@@ -51,7 +52,7 @@ class CtState extends EventTarget {
       fault = error.message;
     }
     if (this.read !== wanted) return;  // another one was chosen in the meantime
-    const is_other = !isAgain && ct;
+    const is_other = !isAgain && ct && !(before && before.name === ct.name);
     Object.assign(this, {ct, fault, isReading: false});
     if (is_other) this.cursor_mm = SliceGeometry.point(ct, ct.size.map((n) => Math.floor(n / 2)));
     this.tell('ct');

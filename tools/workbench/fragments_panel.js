@@ -8,7 +8,6 @@
   const entries = (draft) => Object.entries(draft.document.fragments || {});
   const names = (draft) => entries(draft).map(([name]) => name);
 
-  // A seed may only be put inside the CT; the value there says whether it may be bone.
   function addSeed(draft, state, name, point_mm) {
     if (!SliceGeometry.isInside(state.ct, SliceGeometry.index(state.ct, point_mm)))
       return void Shell.notice('This is outside the CT.', 'fault');

@@ -8,7 +8,7 @@
   const STAGES = {coarse: 'on a coarse grid; the full one is being computed', full: 'on the grid of the CT'};
 
   // The outlines of one result, asked for slice by slice.
-  function outlines(state, segmentation, colourOf) {
+  function outlines(segmentation, colourOf) {
     const known = new Map(), asked = new Set();
     async function ask(key, axis, index, later) {
       asked.add(key);
@@ -54,85 +54,97 @@
     return meshes;
   }
 
-  function make(draft) {
-    const state = CtState.of(draft), solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
-    let method = 'bone', shown_for = '', is_running = false, turn = 0;
-    const threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
-    const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), threshold);
-    const how = Dom.select('how', METHODS, method, (value) => {
-      method = value;
-      field.hidden = value !== 'bone';
-    });
-    const button = Dom.button('Segment', () => run(), {'data-do': 'segment'});
-    const outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''}), old = el('p', {class: 'note'});
-    const command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
-    const colourOf = (name) => PointList.colour(Math.max(0, Object.keys(draft.document.fragments || {}).indexOf(name)));
-    solid.element.hidden = true;
-
-    async function take({segmentation, stage, volumes_ml}) {
-      const names = Object.keys(volumes_ml), mine = ++turn;
-      state.contours.set('segmentation', outlines(state, segmentation, colourOf));
-      state.tell('view');
-      outcome.textContent = 'Segmented ' + STAGES[stage] + ': ' +
-          names.map((name) => name + ' ' + Dom.number(volumes_ml[name]) + ' ml').join(', ');
-      outcome.dataset.segmented = stage;
-      const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
-      if (!meshes || mine !== turn) return;
-      solid.element.hidden = false;
-      solid.set(meshes);
+  class Panel {
+    constructor(draft) {
+      Object.assign(
+          this,
+          {draft, state: CtState.of(draft), method: 'bone', segmented: '', shownFor: '', isRunning: false, turn: 0});
+      this.solid = new SurfaceView('Surfaces of the fragments; arrow keys turn them');
+      this.solid.element.hidden = true;
+      this.threshold = el('input', {type: 'number', class: 'short', value: 250, step: 10});
+      const field = el('label', {class: 'field'}, el('span', {}, 'threshold, HU'), this.threshold);
+      const how = Dom.select('how', METHODS, this.method, (value) => {
+        this.method = value;
+        field.hidden = value !== 'bone';
+      });
+      this.button = Dom.button('Segment', () => this.run(), {'data-do': 'segment'});
+      this.outcome = el('p', {class: 'note', role: 'status', 'data-segmented': ''});
+      this.old = el('p', {class: 'note'});
+      this.command = el('details', {hidden: true}, el('summary', {}, 'The same in a shell, once the case is saved'));
+      this.element =
+          el('div', {}, el('div', {class: 'toolbar'}, how, field, this.button), this.outcome, this.old,
+             this.solid.element, this.command);
+      this.renewed = () => {
+        if (!this.state.ct || this.state.ct.name !== this.segmented) this.state.contours.delete('segmentation');
+        this.update();
+      };
+      this.state.addEventListener('ct', this.renewed);
     }
 
-    async function run() {
-      is_running = true;
-      update();
-      const fragments = structuredClone(draft.document.fragments || {});
+    dispose() {
+      this.state.removeEventListener('ct', this.renewed);
+      this.solid.dispose();
+    }
+
+    fragments() {
+      return this.draft.document.fragments || {};
+    }
+
+    // Shows a result: its outlines, volumes and surfaces.
+    async take({segmentation, stage, volumes_ml}) {
+      const names = Object.keys(volumes_ml), mine = ++this.turn;
+      const colourOf = (name) => PointList.colour(Math.max(0, Object.keys(this.fragments()).indexOf(name)));
+      this.state.contours.set('segmentation', outlines(segmentation, colourOf));
+      this.state.tell('view');
+      const volumes = names.map((name) => name + ' ' + Dom.number(volumes_ml[name]) + ' ml').join(', ');
+      this.outcome.textContent = 'Segmented ' + STAGES[stage] + ': ' + volumes;
+      this.outcome.dataset.segmented = stage;
+      const meshes = await Shell.guarded(() => surfaces(segmentation, names, colourOf));
+      if (!meshes || mine !== this.turn) return;
+      this.solid.element.hidden = false;
+      this.solid.set(meshes);
+    }
+
+    async run() {
+      this.isRunning = true;
+      this.segmented = this.state.ct.name;
+      this.update();
+      const asked = {ct: this.state.ct.name, fragments: structuredClone(this.fragments()), method: this.method};
+      if (this.method === 'bone') asked.threshold_hu = Number(this.threshold.value);
       try {
-        const asked = {ct: state.ct.name, fragments, method};
-        if (method === 'bone') asked.threshold_hu = Number(threshold.value);
         const {job, pipeline} = await Ask.post('api/segment', asked);
-        command.hidden = false;
-        command.replaceChildren(
-            command.firstChild,
-            Dom.command(
-                'marrow run ' + Dom.shellPath(pipeline) + ' ' +
-                'case=' + Dom.shellWord(draft.path || '.') +
-                (method === 'bone' ? ' threshold_hu=' + asked.threshold_hu : '')));
+        this.tellCommand(pipeline, asked);
         await Shell.follow('Segmenting', job, (event) => {
-          if (event.event === 'grown') take(event);
+          if (event.event === 'grown') this.take(event);
         });
-        shown_for = JSON.stringify([fragments, draft.document.ct]);
+        this.shownFor = JSON.stringify([asked.fragments, asked.ct]);
       } catch (error) {
         Shell.notice(error.message, 'fault');
-        if (error.status === 409) state.follow(true);
+        if (error.status === 409) this.state.follow(true);
       }
-      is_running = false;
-      update();
+      this.isRunning = false;
+      this.update();
     }
 
-    function update() {
-      const has_seeds = Object.values(draft.document.fragments || {}).some(({seeds}) => seeds && seeds.length);
-      button.disabled = is_running || !state.ct || !has_seeds;
-      button.title = has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
-      old.textContent = shown_for && shown_for !== JSON.stringify([draft.document.fragments, draft.document.ct]) ?
-          'The seeds or the CT have changed since; segment again.' :
-          '';
+    tellCommand(pipeline, {threshold_hu}) {
+      const words = ['marrow run', Dom.shellPath(pipeline), 'case=' + Dom.shellWord(this.draft.path || '.')];
+      if (threshold_hu !== undefined) words.push('threshold_hu=' + threshold_hu);
+      this.command.hidden = false;
+      this.command.replaceChildren(this.command.firstChild, Dom.command(words.join(' ')));
     }
-    const renewed = () => {
-      if (!state.ct) state.contours.delete('segmentation');
-      update();
-    };
-    state.addEventListener('ct', renewed);
-    return {
-      element:
-          el('div', {class: 'segmentation-panel'}, el('div', {class: 'toolbar'}, how, field, button), outcome, old,
-             solid.element, command),
-      update,
-      dispose() {
-        state.removeEventListener('ct', renewed);
-        solid.dispose();
-      }
-    };
+
+    update() {
+      const has_seeds = Object.values(this.fragments()).some(({seeds}) => seeds && seeds.length);
+      this.button.disabled = this.isRunning || !this.state.ct || !has_seeds;
+      this.button.title = has_seeds ? '' : 'Add a fragment and put seeds into its bone first';
+      const now = JSON.stringify([this.draft.document.fragments, this.state.ct && this.state.ct.name]);
+      this.old.textContent =
+          this.shownFor && this.shownFor !== now ? 'The seeds or the CT have changed since; segment again.' : '';
+    }
   }
 
-  CasePage.panel('Segmentation', 30, make);
+  CasePage.panel('Segmentation', 30, (draft) => {
+    const panel = new Panel(draft);
+    return {element: panel.element, update: () => panel.update(), dispose: () => panel.dispose()};
+  });
 })();

@@ -48,27 +48,39 @@ void CtMemory::check_size(std::uintmax_t file_bytes) const {
                 " are used for CTs here; cut it to the bone, or store it with larger voxels");
 }
 
-std::shared_ptr<const OpenCt> CtMemory::used(std::list<std::shared_ptr<const OpenCt>>::iterator ct) {
-  open_.splice(open_.begin(), open_, ct);
-  return open_.front();
+std::list<CtMemory::Entry>::iterator CtMemory::find(const std::string& content) {
+  return std::find_if(open_.begin(), open_.end(), [&](const Entry& entry) {
+    return std::find(entry.contents.begin(), entry.contents.end(), content) != entry.contents.end();
+  });
+}
+
+std::shared_ptr<const OpenCt> CtMemory::used(std::list<Entry>::iterator entry) {
+  open_.splice(open_.begin(), open_, entry);
+  return open_.front().ct;
 }
 
 std::shared_ptr<const OpenCt> CtMemory::by_content(const std::string& content) {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(open_.begin(), open_.end(), [&](const auto& ct) { return ct->content == content; });
+  const auto found = find(content);
   return found == open_.end() ? nullptr : used(found);
 }
 
 std::shared_ptr<const OpenCt> CtMemory::by_name(const std::string& name) {
   const std::lock_guard lock(mutex_);
-  const auto found = std::find_if(open_.begin(), open_.end(), [&](const auto& ct) { return ct->name == name; });
+  const auto found =
+      std::find_if(open_.begin(), open_.end(), [&](const Entry& entry) { return entry.ct->name == name; });
   if (found == open_.end()) throw Conflict("this CT is no longer in memory; it is opened again");
   return used(found);
 }
 
+void CtMemory::add_copy(const std::string& content, const std::string& same) {
+  const std::lock_guard lock(mutex_);
+  const auto found = find(content);
+  if (found != open_.end()) found->contents.push_back(same);
+}
+
 std::shared_ptr<const OpenCt> CtMemory::add(const std::string& content, Value value) {
   const auto ct = std::make_shared<OpenCt>();
-  ct->content = content;
   ct->value = std::move(value);
   if (ct->bytes() > most_bytes_)
     throw Error("this CT takes " + gigabytes(ct->bytes()) + " of memory, and at most " + gigabytes(most_bytes_) +
@@ -78,10 +90,10 @@ std::shared_ptr<const OpenCt> CtMemory::add(const std::string& content, Value va
   ct->highest_hu = *highest;
   const std::lock_guard lock(mutex_);
   ct->name = "ct-" + std::to_string(++count_);
-  open_.push_front(ct);
+  open_.push_front({{content}, ct});
   std::uintmax_t bytes = 0;
   for (auto one = open_.begin(); one != open_.end();) {
-    bytes += (*one)->bytes();
+    bytes += one->ct->bytes();
     one = bytes > most_bytes_ ? open_.erase(one) : std::next(one);
   }
   return ct;

@@ -15,9 +15,8 @@
 namespace marrow::workbench {
 
 struct OpenCt {
-  std::string name;     ///< of this copy, unique as long as the server runs
-  std::string content;  ///< says which files with which options it was read from
-  Value value;          ///< of type volume
+  std::string name;  ///< of this copy, unique as long as the server runs
+  Value value;       ///< of type volume
   float lowest_hu = 0, highest_hu = 0;
 
   const Volume& volume() const { return value.as<Volume>(); }
@@ -32,24 +31,31 @@ class CtMemory {
  public:
   explicit CtMemory(std::uintmax_t most_bytes = most_ct_bytes()) : most_bytes_(most_bytes) {}
 
-  /// nullptr if it is not here.
+  /// `content` says which files with which options it was read from. nullptr if it is not here.
   std::shared_ptr<const OpenCt> by_content(const std::string& content);
   /// Throws Conflict if it is no longer here: the page then opens it again.
   std::shared_ptr<const OpenCt> by_name(const std::string& name);
   /// Keeps it. CTs that were not looked at for the longest time make room. Throws Error if it alone is too large.
   std::shared_ptr<const OpenCt> add(const std::string& content, Value value);
+  /// Says that the files of `same` hold what those of `content` hold, because they were copied.
+  void add_copy(const std::string& content, const std::string& same);
   /// To be held while a CT is read, so that two tabs do not read the same one twice.
   std::timed_mutex& reading() { return reading_; }
   /// Throws Error if files of this size hold a volume that is too large.
   void check_size(std::uintmax_t file_bytes) const;
 
  private:
-  std::shared_ptr<const OpenCt> used(std::list<std::shared_ptr<const OpenCt>>::iterator ct);
+  struct Entry {
+    std::vector<std::string> contents;
+    std::shared_ptr<const OpenCt> ct;
+  };
+  std::list<Entry>::iterator find(const std::string& content);
+  std::shared_ptr<const OpenCt> used(std::list<Entry>::iterator entry);
 
   const std::uintmax_t most_bytes_;
   std::mutex mutex_;
   std::timed_mutex reading_;
-  std::list<std::shared_ptr<const OpenCt>> open_;  ///< the one that was used last comes first
+  std::list<Entry> open_;  ///< the one that was used last comes first
   int count_ = 0;
 };
 

@@ -11,41 +11,6 @@ namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMostSlices = 20'000;  // files of a series
-
-/// Size and time of change of a file, or of all files of a folder. If they are the same, so is the content.
-struct FilesOfCt {
-  std::uintmax_t bytes = 0;
-  std::string description;
-
-  explicit FilesOfCt(const fs::path& place) {
-    std::error_code error;
-    if (!fs::exists(place, error)) throw Error(printable(place.string()) + ": there is no such file or folder");
-    if (!fs::is_directory(place, error)) {
-      add(place);
-      return;
-    }
-    std::size_t count = 0;
-    for (fs::directory_iterator entry(place, error), end; !error && entry != end; entry.increment(error)) {
-      if (++count > kMostSlices)
-        throw Error(printable(place.string()) + ": this folder holds more than " + std::to_string(kMostSlices) +
-                    " files; choose the folder of one series");
-      std::error_code none;
-      if (entry->is_regular_file(none)) add(entry->path());
-    }
-    if (error) throw Error(printable(place.string()) + ": this folder cannot be read: " + error.message());
-  }
-
-  void add(const fs::path& file) {
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(file, error);
-    if (error) return;  // its reader says more
-    bytes += size;
-    const auto time = fs::last_write_time(file, error).time_since_epoch().count();
-    description += file.filename().string() + ' ' + std::to_string(size) + ' ' + std::to_string(time) + '\n';
-  }
-};
-
 /// The options of a CT that a case may give beside its file.
 constexpr const char* kOptions[] = {"voxel_size_mm", "flip", "value_offset_hu", "series_uid"};
 
@@ -79,7 +44,7 @@ std::shared_ptr<const OpenCt> opened(const fs::path& place, const json& ct, Work
   while (!reading.try_lock_for(std::chrono::milliseconds(100)))
     if (job.stopped()) throw Error("stopped");
   const FilesOfCt files(place);
-  const std::string content = place.string() + '\n' + ct.dump() + '\n' + files.description;
+  const std::string content = content_of_ct(place, ct, files);
   if (auto known = memory.by_content(content)) return known;
   memory.check_size(files.bytes);
   auto outputs = outputs_of(call_of(place, ct), workbench, job);
@@ -112,7 +77,7 @@ void add_ct_page(Server& server, Workbench& workbench) {
   const auto memory = std::make_shared<CtMemory>();
   add_ct_reading(server, workbench, memory);
   add_segmenting(server, workbench, memory);
-  add_saving(server, workbench);
+  add_saving(server, workbench, memory);
 }
 
 }  // namespace marrow::workbench

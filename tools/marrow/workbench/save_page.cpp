@@ -46,7 +46,7 @@ json document_after(const PlannedCase& plan, const std::string& case_path) {
   return document;
 }
 
-json save(const std::string& case_path, int revision, Workbench& workbench, Job& job) {
+json save(const std::string& case_path, int revision, Workbench& workbench, CtMemory& memory, Job& job) {
   json draft = workbench.drafts.open(case_path);
   if (draft["revision"] != revision) throw Conflict("this case was changed in another tab; look at it, and save again");
   const json& document = draft["document"];
@@ -54,8 +54,12 @@ json save(const std::string& case_path, int revision, Workbench& workbench, Job&
   const std::string landmarks = landmarks_yaml(document);
   const fs::path place = workbench.folder.inside(case_path);
   job.tell({{"event", "message"}, {"text", "writing and reading back"}});
+  const json& ct = document["ct"];
+  const fs::path old_ct = workbench.folder.inside(ct["file"]), new_ct = place / plan.document["ct"]["file"];
+  const std::string content = content_of_ct(old_ct, ct, FilesOfCt(old_ct));
   write_case_files(place, plan, case_yaml(plan), landmarks,
                    [&](const fs::path& staged) { check_case(staged, !landmarks.empty(), workbench, job); });
+  memory.add_copy(content, content_of_ct(new_ct, ct, FilesOfCt(new_ct)));  // so that it need not be read again
   json copied = json::array();
   for (const PlannedCase::File& file : plan.files)
     if (file.is_new) copied.push_back(file.name);
@@ -72,14 +76,14 @@ json save(const std::string& case_path, int revision, Workbench& workbench, Job&
 
 }  // namespace
 
-void add_saving(Server& server, Workbench& workbench) {
-  server.post("/api/case/save", [&](const Request& request) {
+void add_saving(Server& server, Workbench& workbench, const std::shared_ptr<CtMemory>& memory) {
+  server.post("/api/case/save", [&workbench, memory](const Request& request) {
     const std::string case_path = request.text("case");
     const int revision = request.body.value("revision", -1);
     workbench.folder.inside(case_path);
     return json_answer(
-        {{"job", workbench.jobs.start("Saving the case", "", [&workbench, case_path, revision](Job& job) {
-            return save(case_path, revision, workbench, job);
+        {{"job", workbench.jobs.start("Saving the case", "", [&workbench, memory, case_path, revision](Job& job) {
+            return save(case_path, revision, workbench, *memory, job);
           })}});
   });
 }
