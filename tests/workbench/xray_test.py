@@ -3,11 +3,9 @@
 """X-rays in the page "Case" by clicks and keys: views are added and checked, landmarks marked and fitted, masks painted,
 files exchanged. The X-rays are simulated: shadows of an ellipsoid through cameras that are known exactly."""
 import json
-import pathlib
 import struct
 import sys
 import time
-import unittest
 import zlib
 
 import numpy
@@ -15,7 +13,7 @@ from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 
-from bench import MARROW, PageTest, main
+from bench import PageTest, main
 
 WIDTH, HEIGHT = 320, 240
 ARM = {"source_to_detector_mm": 1000, "source_to_isocentre_mm": 600, "pixel_mm": 1.0}
@@ -117,6 +115,8 @@ class XrayTest(PageTest):
             self.server.address = "http://127.0.0.1:%d/" % self.server.port
         self.show(self.server, "case=knee", **how)
         self.browser.logs()
+        if document and document.get("views"):
+            self.find("[data-check] > *")  # what comes last on the page, and moves what is below it
 
     def document(self):
         """As the draft's file has it, which a crash would leave."""
@@ -128,7 +128,7 @@ class XrayTest(PageTest):
             at += ("redo" in line) - ("undo" in line)
         return steps[at]
 
-    def find(self, selector, seconds=30):
+    def find(self, selector, seconds=20):
         self.browser.wait("return !!document.querySelector(%s)" % json.dumps(selector), seconds)
         return self.driver.find_element(By.CSS_SELECTOR, selector)
 
@@ -140,12 +140,12 @@ class XrayTest(PageTest):
     def text(self, selector):
         return self.find(selector).text
 
-    def wait_text(self, selector, part, seconds=60):
+    def wait_text(self, selector, part, seconds=20):
         self.find(selector, seconds)
         script = "return [...document.querySelectorAll(%s)].some((one) => one.textContent.includes(%s))"
         self.browser.wait(script % (json.dumps(selector), json.dumps(part)), seconds)
 
-    def until(self, condition, what, seconds=30):
+    def until(self, condition, what, seconds=20):
         end = time.monotonic() + seconds
         while not condition():
             self.assertLess(time.monotonic(), end, what)

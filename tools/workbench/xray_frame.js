@@ -23,14 +23,15 @@ const XrayFrame = (() => {
     const frame =
         {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
 
+    // A new image gets a window of its own; one of the same size stays where it is.
     frame.show = (entry) => {
-      if (frame.entry === entry) return frame.draw();
-      const is_other = !frame.entry || frame.entry.width_px !== entry.width_px;
+      if (frame.entry !== entry) frame.picture = frame.shown = null;
       frame.entry = entry;
-      frame.picture = null;
-      if (entry.numbers && is_other) {
+      if (entry.numbers && !frame.shown) {
+        if (!frame.size || frame.size[0] !== entry.width_px || frame.size[1] !== entry.height_px) frame.port = null;
+        frame.size = [entry.width_px, entry.height_px];
         frame.window = [...entry.range];
-        frame.port = null;
+        frame.shown = true;
       }
       frame.draw();
     };

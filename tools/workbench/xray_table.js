@@ -38,6 +38,9 @@ const XrayTable = (() => {
     bench.choose(null);
   }
 
+  // Rounding leaves tiny numbers that mean nothing.
+  const figure = (value) => (value === null ? '–' : Math.abs(value) < 0.0005 ? '0.000' : Dom.number(value));
+
   // One row; update(landmark) shows its figures anew without touching its buttons.
   function row(bench, name) {
     const choose = Dom.button(name, () => bench.choose(bench.chosen === name ? null : name), {
@@ -50,17 +53,18 @@ const XrayTable = (() => {
     const [seen, world, rays, off, fit] = cells;
     const element =
         el('tr', {'data-landmark-row': name}, el('th', {scope: 'row'}, choose), cells,
-           el('td', {class: 'row-actions'}, Dom.button('Rename', () => rename(bench, name), {'aria-label': `Rename ${name}`}),
-              Dom.button('Remove', () => remove(bench, name), {'aria-label': `Remove ${name}`})));
+           el('td', {}, el('span', {class: 'row-actions'},
+                           Dom.button('Rename', () => rename(bench, name), {'aria-label': `Rename ${name}`}),
+                           Dom.button('Remove', () => remove(bench, name), {'aria-label': `Remove ${name}`}))));
     const update = (landmark) => {
       const place = XrayLandmarks.placeOf(bench, landmark), fit_off = XrayLandmarks.fitOff(bench, landmark);
       choose.setAttribute('aria-pressed', String(bench.chosen === name));
       element.classList.toggle('chosen', bench.chosen === name);
       seen.textContent = Object.entries(landmark.pixels).map(([view, at]) => `${view} (${at.map((one) => one.toFixed(1)).join(', ')})`).join(' · ') || 'nowhere yet';
       world.textContent = place ? place.world_mm.map((one) => one.toFixed(2)).join(', ') : '–';
-      rays.textContent = place ? Dom.number(place.distance_mm) : '–';
-      off.textContent = place ? Dom.number(Math.max(...place.residuals_px)) : '–';
-      fit.textContent = fit_off === null ? '–' : Dom.number(fit_off);
+      rays.textContent = figure(place && place.distance_mm);
+      off.textContent = figure(place && Math.max(...place.residuals_px));
+      fit.textContent = figure(fit_off);
     };
     return {element, update};
   }
@@ -74,7 +78,7 @@ const XrayTable = (() => {
       const {fit, fit_fault} = bench;
       state.className = fit_fault ? 'fault' : 'note';
       state.textContent = fit_fault ||
-          (fit ? `Fitted pose: ${Dom.number(fit.residual_px)} px root mean square` + (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
+          (fit ? `Fitted pose: ${figure(fit.residual_px)} px root mean square` + (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
                  'Landmarks that also have a place in the CT give the pose of the bone, if two views show three of them.');
       command.hidden = !fit;
       if (fit) command.replaceChildren(command.firstChild, Dom.command(fit.command));
@@ -127,5 +131,5 @@ const XrayTable = (() => {
     return {element, update, updateFit: fit.update};
   }
 
-  return {make, askName};
+  return {make, askName, figure};
 })();

@@ -89,7 +89,7 @@ const XrayViews = (() => {
     if (met)
       rows.push([
         'Central rays meet at',
-        `(${met.world_mm.map((one) => one.toFixed(1)).join(', ')}) mm in the world; they pass each other at ` +
+        `(${met.world_mm.map((one) => (one.toFixed(1) === '-0.0' ? '0.0' : one.toFixed(1))).join(', ')}) mm in the world; they pass each other at ` +
             millimetres(met.distance_mm)
       ]);
     if (met)
@@ -135,7 +135,7 @@ const XrayViews = (() => {
     if (!lines.length)
       lines.push(el('p', {class: 'note', 'data-good': ''},
                     error === undefined ? 'Nothing speaks against these cameras.' :
-                                          `Nothing speaks against these cameras; the marked landmarks are ${Dom.number(error)} px off.`));
+                                          `Nothing speaks against these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
     if (answer.command) lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
     return lines;
   }
