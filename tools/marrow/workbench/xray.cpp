@@ -48,9 +48,7 @@ std::vector<Override> overrides_of(const Workbench& workbench, const json& views
     images.push_back(workbench.folder.inside(view.at("image").get<std::string>()).string());
     cameras.push_back(camera_file(workbench, view.at("camera")).string());
   }
-  return {{"views.names", set_text(names)},
-          {"views.images", set_text(images)},
-          {"views.cameras", set_text(cameras)}};
+  return {{"views.names", set_text(names)}, {"views.images", set_text(images)}, {"views.cameras", set_text(cameras)}};
 }
 
 namespace {
@@ -59,9 +57,9 @@ namespace {
 std::string shell_word(const std::string& text) {
   std::string word = "'";
   for (const char c : text) word += c == '\'' ? "'\\''" : std::string(1, c);
-  const bool is_plain = text.find_first_not_of(
-                            "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-") ==
-                        std::string::npos;
+  const bool is_plain =
+      text.find_first_not_of("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_@%+=:,./-") ==
+      std::string::npos;
   return is_plain && !text.empty() ? text : word + "'";
 }
 

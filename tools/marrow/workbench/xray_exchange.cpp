@@ -31,7 +31,8 @@ json json_of_landmarks(const List<Landmarks>& fragments) {
   json list = json::array();
   for (std::size_t i = 0; i < fragments.size(); ++i)
     for (const Landmarks::Point& point : fragments[i].points) {
-      json landmark = {{"name", point.name}, {"fragment", fragments.name(i)}, {"model_mm", json_of_place(point.model_mm)}};
+      json landmark = {
+          {"name", point.name}, {"fragment", fragments.name(i)}, {"model_mm", json_of_place(point.model_mm)}};
       for (const Landmarks::Seen& seen : fragments[i].seen)
         if (seen.name == point.name) landmark["pixels"][seen.view] = {seen.pixel.x(), seen.pixel.y()};
       list.push_back(landmark);
@@ -83,7 +84,8 @@ std::string exported(const std::string& what, const json& content) {
     return with_version("marrow-" + what, {{"fragments", fragments}}).dump(1) + "\n";
   }
   if (what != "pose") throw Error("seeds, landmarks or a pose can be exported, not '" + printable(what) + "'");
-  return with_version("marrow-pose", {{"target", "world"}, {"source", "ct"}, {"matrix", content.at("matrix")}}).dump(1) +
+  return with_version("marrow-pose", {{"target", "world"}, {"source", "ct"}, {"matrix", content.at("matrix")}})
+             .dump(1) +
          "\n";
 }
 
