@@ -211,14 +211,15 @@ class GeometryTest(PageTest):
         ]
         (self.scratch / "points.yaml").write_text(json.dumps({"marrow-points": 1, "points": points}))
         files = lambda ending: json.dumps([str(self.scratch / (name + ending)) for name in names])
-        subprocess.run(
+        told = subprocess.run(
             [MARROW, "run", SOURCE / "pipelines/workbench/check-cameras.yaml", "--out", self.scratch / "out"]
-            + ["--only", "metrics", "points=%s" % (self.scratch / "points.yaml")]
+            + ["--only", "metrics", "--set", "check.points=%s" % (self.scratch / "points.yaml")]
             + ["--set", "views.names=" + json.dumps(names), "--set", "views.images=" + files(".png")]
             + ["--set", "views.cameras=" + files(".yaml")],
-            check=True,
-            stdout=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
         )
+        self.assertEqual(told.returncode, 0, told.stderr)
         metrics = json.loads((self.scratch / "out" / "outputs" / "metrics.json").read_text())["metrics"]
         error = next(one for one in metrics if one["name"] == "error")
         print("marrow and the page differ by %.2g px over %d views" % (error["value"], len(cameras)))

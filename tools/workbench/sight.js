@@ -20,8 +20,8 @@ const Sight = (() => {
   function triangulated(seen) {
     const rays = seen.map(({camera, pixel}) => Geometry.ray(camera, pixel));
     if (rays.length < 2) return null;
-    const across = rays.map(
-        ({direction: d}) => [0, 1, 2].map((i) => [0, 1, 2].map((j) => (i === j ? 1 : 0) - d[i] * d[j])));
+    const across =
+        rays.map(({direction: d}) => [0, 1, 2].map((i) => [0, 1, 2].map((j) => (i === j ? 1 : 0) - d[i] * d[j])));
     const apply = (rows, vector) => rows.map((row) => dot(row, vector));
     const sum = [0, 1, 2].map((i) => [0, 1, 2].map((j) => across.reduce((total, rows) => total + rows[i][j], 0)));
     const right = rays.map(({origin}, k) => apply(across[k], origin)).reduce(plus);
@@ -80,8 +80,7 @@ const Sight = (() => {
 
   // Where central rays meet: {world_mm, distance_mm} or null.
   function meeting(cameras) {
-    return triangulated(
-        cameras.map((camera) => ({camera, pixel: [camera.intrinsics[0][2], camera.intrinsics[1][2]]})));
+    return triangulated(cameras.map((camera) => ({camera, pixel: [camera.intrinsics[0][2], camera.intrinsics[1][2]]})));
   }
 
   return {triangulated, epipolarLine, centralRay, angle_deg, meeting};

@@ -12,7 +12,10 @@ const XrayAdd = (() => {
   // The keys of docs/case.md: [key, label, first value, least, most].
   const C_ARM = [
     ['alpha_deg', 'Cranio-caudal angle, degrees: positive if the detector is towards the head', 0, -90, 90],
-    ['beta_deg', 'Right/left anterior angle, degrees: positive if the detector is towards the patient’s left', 0, -180, 180],
+    [
+      'beta_deg', 'Right/left anterior angle, degrees: positive if the detector is on the patient’s left', 0, -180,
+      180
+    ],
     ['source_to_detector_mm', 'Source to detector, mm', 1000, 1, 10000],
     ['source_to_isocentre_mm', 'Source to isocentre, mm', 600, 1, 10000],
     ['pixel_mm', 'Size of a pixel on the detector, mm', 0.3, 0.001, 100]
@@ -54,35 +57,38 @@ const XrayAdd = (() => {
           return void (fault.textContent = `There is a view “${chosen}” already; give another name.`);
         const c_arm = arm.values();
         if (kind === 'c_arm' && !(c_arm.source_to_isocentre_mm < c_arm.source_to_detector_mm))
-          return void (fault.textContent =
-                           'The isocentre lies between source and detector, so its distance must be the smaller one.');
+          return void (
+              fault.textContent =
+                  'The isocentre lies between source and detector, so its distance must be the smaller one.');
         close({name: chosen, kind, c_arm});
       };
-      const form = el('form', {
-        onsubmit: (event) => {
-          event.preventDefault();
-          finish('c_arm');
-        }
-      },
-                      arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
+      const form =
+          el('form', {
+            onsubmit: (event) => {
+              event.preventDefault();
+              finish('c_arm');
+            }
+          },
+             arm.element, el('button', {type: 'submit', 'data-camera': 'c_arm'}, 'Use these angles and distances'));
       return el(
           'div', {class: 'add-view'}, el('p', {class: 'note'}, image),
           el('label', {class: 'field'}, el('span', {}, 'Name of the view'), box), fault,
           el('h3', {}, 'How was it taken?'),
-          el('p', {}, Dom.button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}),
-             ' ', el('span', {class: 'note'}, 'from a calibration: marrow’s YAML or XMALab’s text')),
+          el('p', {}, Dom.button('Choose a camera file', () => finish('file'), {'data-camera': 'file'}), ' ',
+             el('span', {class: 'note'}, 'from a calibration: marrow’s YAML or XMALab’s text')),
           /\.(dcm|dicom)$/i.test(image) &&
               el('p', {}, Dom.button('Read the DICOM header', () => finish('header'), {'data-camera': 'header'}), ' ',
                  el('span', {class: 'note'}, 'exact to about a degree at best')),
-          el('details', {open: Boolean(camera && camera.c_arm)}, el('summary', {}, 'Angles and distances of a C-arm'), form));
+          el('details', {open: Boolean(camera && camera.c_arm)}, el('summary', {}, 'Angles and distances of a C-arm'),
+             form));
     });
   }
 
   // What the document gets as the camera of an image, or undefined if the user leaves.
   async function cameraFor(answer, image) {
     if (answer.kind === 'file') {
-      const file = await Shell.choose(
-          `Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
+      const file =
+          await Shell.choose(`Camera of ${answer.name}`, {at: folderOf(image), accepts: (name) => !is_image(name)});
       return file && {file};
     }
     if (answer.kind === 'header') {

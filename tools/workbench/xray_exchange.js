@@ -11,8 +11,8 @@ const XrayExchange = (() => {
     return document.fragments[name] = document.fragments[name] || {seeds: [], register: true};
   };
 
-  // How the content of a file becomes a part of the document. Landmarks of the same name get the file's places, and keep
-  // what the file does not say.
+  // How the content of a file becomes a part of the document. Landmarks of the same name get the file's places, and
+  // keep what the file does not say.
   const PUT = {
     seeds(document, {seeds}) {
       for (const [name, one] of Object.entries(seeds)) Object.assign(fragmentOf(document, name), one);
@@ -21,8 +21,10 @@ const XrayExchange = (() => {
       document.landmarks = document.landmarks || [];
       for (const one of landmarks) {
         const old = document.landmarks.find((other) => other.name === one.name);
-        if (old) Object.assign(old, one, {pixels: {...(old.pixels || {}), ...(one.pixels || {})}});
-        else document.landmarks.push(one);
+        if (old)
+          Object.assign(old, one, {pixels: {...(old.pixels || {}), ...(one.pixels || {})}});
+        else
+          document.landmarks.push(one);
       }
     },
     pose(document, {world_from_ct}, fragment) {
@@ -44,8 +46,7 @@ const XrayExchange = (() => {
         if (!one.model_mm) continue;
         const name = one.fragment || fragment, to = fragments[name] = fragments[name] || {points: {}, seen: {}};
         to.points[one.name] = one.model_mm;
-        for (const [view, at] of Object.entries(one.pixels || {}))
-          (to.seen[view] = to.seen[view] || {})[one.name] = at;
+        for (const [view, at] of Object.entries(one.pixels || {})) (to.seen[view] = to.seen[view] || {})[one.name] = at;
       }
       return Object.keys(fragments).length ?
           {fragments} :
@@ -72,7 +73,8 @@ const XrayExchange = (() => {
     const content = GET[what](shared.draft.document, shared.fragment());
     if (typeof content === 'string') return void Shell.notice(content, 'fault');
     const beside = shared.draft.path ? shared.draft.path + '.' : '';
-    const path = await XrayTable.askName(`Export: ${TITLES[what].toLowerCase()}, to the file`, `${beside}${what}.yaml`, []);
+    const path =
+        await XrayTable.askName(`Export: ${TITLES[what].toLowerCase()}, to the file`, `${beside}${what}.yaml`, []);
     if (!path) return;
     await Shell.guarded(async () => {
       const {path: written} = await Ask.post('api/xray/export', {what, path, content});
@@ -82,12 +84,15 @@ const XrayExchange = (() => {
 
   function make(shared) {
     const rows = Object.keys(TITLES).map(
-        (what) => el('span', {class: 'field'}, el('span', {}, TITLES[what]),
-                     el('span', {class: 'pair'},
-                        Dom.button('Import', () => importFrom(shared, what),
-                                   {'data-import': what, 'aria-label': `Import ${TITLES[what].toLowerCase()}`}),
-                        Dom.button('Export', () => exportTo(shared, what),
-                                   {'data-export': what, 'aria-label': `Export ${TITLES[what].toLowerCase()}`}))));
+        (what) =>
+            el('span', {class: 'field'}, el('span', {}, TITLES[what]),
+               el('span', {class: 'pair'},
+                  Dom.button(
+                      'Import', () => importFrom(shared, what),
+                      {'data-import': what, 'aria-label': `Import ${TITLES[what].toLowerCase()}`}),
+                  Dom.button(
+                      'Export', () => exportTo(shared, what),
+                      {'data-export': what, 'aria-label': `Export ${TITLES[what].toLowerCase()}`}))));
     return {element: el('div', {class: 'exchange'}, el('h3', {}, 'Files'), el('div', {class: 'toolbar'}, rows))};
   }
 

@@ -6,31 +6,33 @@ const XrayFrame = (() => {
   const {el, svg} = Dom;
 
   // tool() gives the present tool: {press(pixel, event), key(name, step_px), marks(frame)} with optional functions.
-  // press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text) gets
-  // what is under the pointer.
+  // press() returns {move(pixel), end(pixel), cancel()}, or nothing if the image is to be moved instead. said(text)
+  // gets what is under the pointer.
   function make(name, tool) {
     const canvas = el('canvas', {});
     const overlay = svg('svg', {class: 'xray-marks', 'aria-hidden': 'true'});
-    const box = el('div', {
-      class: 'xray-box',
-      tabindex: 0,
-      role: 'application',
-      'data-view': name,
-      'aria-label': 'X-ray ' + name + '. Plus and minus zoom, W and L change window and level, arrows move.'
-    },
-                   canvas, overlay);
+    const box =
+        el('div', {
+          class: 'xray-box',
+          tabindex: 0,
+          role: 'application',
+          'data-view': name,
+          'aria-label': 'X-ray ' + name + '. Plus and minus zoom, W and L change window and level, arrows move.'
+        },
+           canvas, overlay);
     const value = el('span', {class: 'xray-value', 'data-value-of': name}, '');
     const frame =
         {name, box, overlay, value, entry: null, port: null, window: null, pointer: null, mask: null, element: null};
 
+    // A new image gets a window of its own; one of the same size stays where it is.
     frame.show = (entry) => {
-      if (frame.entry === entry) return frame.draw();
-      const is_other = !frame.entry || frame.entry.width_px !== entry.width_px;
+      if (frame.entry !== entry) frame.picture = frame.shown = null;
       frame.entry = entry;
-      frame.picture = null;
-      if (entry.numbers && is_other) {
+      if (entry.numbers && !frame.shown) {
+        if (!frame.size || frame.size[0] !== entry.width_px || frame.size[1] !== entry.height_px) frame.port = null;
+        frame.size = [entry.width_px, entry.height_px];
         frame.window = [...entry.range];
-        frame.port = null;
+        frame.shown = true;
       }
       frame.draw();
     };
@@ -96,11 +98,14 @@ const XrayFrame = (() => {
     frame.overlay.append(...tool().marks(frame).filter(Boolean));
   }
 
+  // Without the sign of a zero.
+  const tenths = (value) => value.toFixed(1).replace(/^-0\.0$/, '0.0');
+
   function tell(frame, pixel) {
     const grey = XrayImages.valueAt(frame.entry, pixel);
-    frame.value.textContent = grey === null ? '' :
-                                              `(${pixel[0].toFixed(1)}, ${pixel[1].toFixed(1)}) px: ` +
-            (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
+    frame.value.textContent = grey === null ?
+        '' :
+        `(${tenths(pixel[0])}, ${tenths(pixel[1])}) px: ` + (frame.entry.scale === 1 ? grey : grey.toPrecision(5));
   }
 
   // Pointers: one does what the tool says, or moves the image; two zoom and move it, on a touch screen.
@@ -159,8 +164,7 @@ const XrayFrame = (() => {
   }
 
   const panning = (frame) => ({
-    move: (pixel, place, last) =>
-        frame.change(Viewport.panned(frame.port, [place[0] - last[0], place[1] - last[1]]))
+    move: (pixel, place, last) => frame.change(Viewport.panned(frame.port, [place[0] - last[0], place[1] - last[1]]))
   });
 
   function pinch(frame, pointers, moved, place) {
@@ -209,10 +213,11 @@ const XrayFrame = (() => {
 
   const KEYS = [
     ['+ or -', 'in an X-ray: zoom'], ['0', 'in an X-ray: the whole image'],
-    ['w or W', 'in an X-ray: narrower or wider window'], ['l or L', 'in an X-ray: window up or down, darker or brighter'],
+    ['w or W', 'in an X-ray: narrower or wider window'],
+    ['l or L', 'in an X-ray: window up or down, darker or brighter'],
     ['m or M', 'in an X-ray: show it mirrored, left to right or top to bottom'],
     ['Arrows', 'in an X-ray: move the landmark, the brush or the image; Shift: 10 px, Alt: 0.1 px']
   ];
 
-  return {make, KEYS};
+  return {make, tenths, KEYS};
 })();

@@ -7,9 +7,9 @@ const XrayImages = (() => {
   const key = (view) => JSON.stringify([view.image, view.camera || null]);
 
   // What is known of a view: {is_ready, fault, width_px, height_px, numbers, offset, scale, camera, warnings, command}.
-  // The grey value of a number is offset + scale * number. `fault` says why there is no camera, or no image at all: then
-  // `numbers` is missing. changed() is called when it is ready.
-  function of(view, changed) {
+  // The grey value of a number is offset + scale * number. `fault` says why there is no camera, or no image at all:
+  // then `numbers` is missing. changed() is called when it is ready.
+  function of (view, changed) {
     const name = key(view);
     if (!known.has(name)) {
       const entry = {is_ready: false};
@@ -57,7 +57,8 @@ const XrayImages = (() => {
   // sides that face each other. A round field or a collimator is dark at all four sides, or only in the corners.
   function looksInverted({numbers, width_px, height_px, range: [low, high]}) {
     const median = (left, top, right, bottom) => {
-      const picked = [], step = Math.max(1, Math.floor(Math.sqrt((right - left) * (bottom - top) * width_px * height_px / 2000)));
+      const picked = [],
+            step = Math.max(1, Math.floor(Math.sqrt((right - left) * (bottom - top) * width_px * height_px / 2000)));
       for (let v = Math.floor(top * height_px); v < bottom * height_px; v += step)
         for (let u = Math.floor(left * width_px); u < right * width_px; u += step) picked.push(v * width_px + u);
       return (quantiles(numbers, picked)[1] - low) / (high - low);

@@ -8,8 +8,9 @@ const XrayLandmarks = (() => {
 
   const rounded = (pixel) => pixel.map((value) => Math.round(value * 1000) / 1000);
   // Inside the image, whose border lies half a pixel outside the centres of its outer pixels.
-  const inside = (entry, [u, v]) =>
-      [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
+  const inside = (entry, [
+    u, v
+  ]) => [Math.min(entry.width_px - 0.5, Math.max(-0.5, u)), Math.min(entry.height_px - 0.5, Math.max(-0.5, v))];
 
   // The document's landmarks, with the place that is being dragged.
   function all(bench) {
@@ -36,10 +37,9 @@ const XrayLandmarks = (() => {
   }
 
   // The views that show the landmark and have a camera: [{view, camera, pixel}].
-  const seenIn = (bench, landmark) =>
-      Object.entries(landmark.pixels)
-          .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
-          .filter(({camera}) => camera);
+  const seenIn = (bench, landmark) => Object.entries(landmark.pixels)
+                                          .map(([view, pixel]) => ({view, pixel, camera: bench.cameraOf(view)}))
+                                          .filter(({camera}) => camera);
 
   // {world_mm, distance_mm, off_px: by view} or null.
   function placeOf(bench, landmark) {
@@ -64,7 +64,8 @@ const XrayLandmarks = (() => {
     clearTimeout(bench.pause);
     const live = bench.live;
     if (!live) return Promise.resolve();
-    return bench.draft.change(`mark ${live.name} in ${live.view}`, (document) => put(document, live.name, live.view, live.pixel))
+    return bench.draft
+        .change(`mark ${live.name} in ${live.view}`, (document) => put(document, live.name, live.view, live.pixel))
         .then(() => {
           if (bench.live === live) bench.live = null;
           bench.refresh();
@@ -87,7 +88,8 @@ const XrayLandmarks = (() => {
     for (const one of all(bench)) {
       const at = one.pixels[frame.name];
       if (!at) continue;
-      const away = Geometry.length(Geometry.minus(Viewport.toScreen(frame.port, at), Viewport.toScreen(frame.port, pixel)));
+      const away =
+          Geometry.length(Geometry.minus(Viewport.toScreen(frame.port, at), Viewport.toScreen(frame.port, pixel)));
       if (away < least) [best, least] = [one.name, away];
     }
     return best;

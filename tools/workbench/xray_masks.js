@@ -20,8 +20,7 @@ const XrayMasks = (() => {
     if (right <= left || bottom <= top) return;
     const part = new ImageData(right - left, bottom - top), dots = new Uint32Array(part.data.buffer);
     for (let row = top, i = 0; row < bottom; ++row)
-      for (let column = left; column < right; ++column, ++i)
-        dots[i] = used[row * width_px + column] ? 0 : 0x800055ff;
+      for (let column = left; column < right; ++column, ++i) dots[i] = used[row * width_px + column] ? 0 : 0x800055ff;
     picture.getContext('2d').putImageData(part, left, top);
   }
 
@@ -59,13 +58,22 @@ const XrayMasks = (() => {
     return [...runs, length];
   }
 
+  // A mask is drawn on the image as its file stores it. If that is mirrored when it is read, the mask is mirrored, too;
+  // doing so twice gives the mask back.
+  function asStored(used, width_px, is_mirrored) {
+    if (!is_mirrored) return used;
+    return used.map((value, i) => used[i - i % width_px + width_px - 1 - i % width_px]);
+  }
+
   function make(shared) {
     const known = new Map();  // by the path of the file
     let working = null;       // {view, mask, what} while a stroke is being made or kept
 
-    async function read(path) {
-      const {bytes, about} = await Ask.bytes('api/xray/image', {path});
-      const mask = blank(about.width_px, about.height_px, Uint8Array.from(new Uint16Array(bytes), (n) => (n ? 255 : 0)));
+    async function read(path, view) {
+      const {bytes, about} = await Ask.bytes('api/xray/image', {path}), entry = shared.entryOf(view);
+      await entry.reading;
+      const stored = Uint8Array.from(new Uint16Array(bytes), (n) => (n ? 255 : 0));
+      const mask = blank(about.width_px, about.height_px, asStored(stored, about.width_px, entry.is_mirrored));
       known.set(path, mask);
       shared.refresh();
     }
@@ -73,7 +81,7 @@ const XrayMasks = (() => {
       if (!view.mask) return null;
       if (!known.has(view.mask)) {
         known.set(view.mask, null);
-        read(view.mask).catch((error) => Shell.notice(`${view.mask}: ${error.message}`, 'fault'));
+        read(view.mask, view.name).catch((error) => Shell.notice(`${view.mask}: ${error.message}`, 'fault'));
       }
       return known.get(view.mask);
     }
@@ -104,14 +112,17 @@ const XrayMasks = (() => {
       await Shell.guarded(async () => {
         let path = null;
         if (!is_all_used) {
-          const body = {width_px: mask.width_px, height_px: mask.height_px, runs: runsOf(mask.used)};
+          const stored = asStored(mask.used, mask.width_px, shared.entryOf(view).is_mirrored);
+          const body = {width_px: mask.width_px, height_px: mask.height_px, runs: runsOf(stored)};
           path = (await Ask.post('api/xray/mask', body)).mask;
           known.set(path, mask);
         }
         await shared.draft.change(`paint the mask of ${view}`, (document) => {
           const one = document.views.find((other) => other.name === view);
-          if (path) one.mask = path;
-          else delete one.mask;
+          if (path)
+            one.mask = path;
+          else
+            delete one.mask;
         });
       });
       if (working === done) working = null;
@@ -159,8 +170,10 @@ const XrayMasks = (() => {
           if (name !== 'Enter') return false;
           frame.cursor = cursorOf(frame);
           frame.is_down = !frame.is_down;
-          if (frame.is_down) paint(frame, frame.cursor, frame.cursor);
-          else keep();
+          if (frame.is_down)
+            paint(frame, frame.cursor, frame.cursor);
+          else
+            keep();
           return true;
         }
       };
@@ -198,8 +211,10 @@ const XrayMasks = (() => {
         }
         if (name !== 'Enter') return false;
         frame.cursor = cursorOf(frame);
-        if (frame.corner) box(frame, frame.cursor);
-        else frame.corner = frame.cursor;
+        if (frame.corner)
+          box(frame, frame.cursor);
+        else
+          frame.corner = frame.cursor;
         frame.draw();
         return true;
       }
@@ -246,5 +261,5 @@ const XrayMasks = (() => {
     return {tools: {brush: brush(0), eraser: brush(255), rectangle}, marks, update};
   }
 
-  return {make, runsOf};
+  return {make};
 })();

@@ -18,8 +18,9 @@ const XrayTable = (() => {
         close(name);
       };
       setTimeout(() => box.select());
-      return el('form', {onsubmit: submit}, el('label', {class: 'field'}, el('span', {}, 'Name'), box), fault,
-                el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'OK')));
+      return el(
+          'form', {onsubmit: submit}, el('label', {class: 'field'}, el('span', {}, 'Name'), box), fault,
+          el('div', {class: 'toolbar'}, el('button', {type: 'submit', 'data-do': 'ok'}, 'OK')));
     });
   }
 
@@ -38,29 +39,35 @@ const XrayTable = (() => {
     bench.choose(null);
   }
 
+  // Rounding leaves tiny numbers that mean nothing.
+  const figure = (value) => (value === null ? '–' : Math.abs(value) < 0.0005 ? '0.000' : Dom.number(value));
+
   // One row; update(landmark) shows its figures anew without touching its buttons.
   function row(bench, name) {
-    const choose = Dom.button(name, () => bench.choose(bench.chosen === name ? null : name), {
-      'data-choose-landmark': name,
-      'aria-pressed': 'false',
-      class: 'link'
-    });
+    const choose = Dom.button(
+        name, () => bench.choose(bench.chosen === name ? null : name),
+        {'data-choose-landmark': name, 'aria-pressed': 'false', class: 'link'});
     const cells = ['seen', 'world', 'rays', 'off', 'fit'].map(
         (what) => el('td', {class: what === 'seen' ? '' : 'number', 'data-cell': what}));
     const [seen, world, rays, off, fit] = cells;
     const element =
         el('tr', {'data-landmark-row': name}, el('th', {scope: 'row'}, choose), cells,
-           el('td', {class: 'row-actions'}, Dom.button('Rename', () => rename(bench, name), {'aria-label': `Rename ${name}`}),
-              Dom.button('Remove', () => remove(bench, name), {'aria-label': `Remove ${name}`})));
+           el('td', {},
+              el('span', {class: 'row-actions'},
+                 Dom.button('Rename', () => rename(bench, name), {'aria-label': `Rename ${name}`}),
+                 Dom.button('Remove', () => remove(bench, name), {'aria-label': `Remove ${name}`}))));
     const update = (landmark) => {
       const place = XrayLandmarks.placeOf(bench, landmark), fit_off = XrayLandmarks.fitOff(bench, landmark);
       choose.setAttribute('aria-pressed', String(bench.chosen === name));
       element.classList.toggle('chosen', bench.chosen === name);
-      seen.textContent = Object.entries(landmark.pixels).map(([view, at]) => `${view} (${at.map((one) => one.toFixed(1)).join(', ')})`).join(' · ') || 'nowhere yet';
+      seen.textContent = Object.entries(landmark.pixels)
+                             .map(([view, at]) => `${view} (${at.map((one) => one.toFixed(1)).join(', ')})`)
+                             .join(' · ') ||
+          'nowhere yet';
       world.textContent = place ? place.world_mm.map((one) => one.toFixed(2)).join(', ') : '–';
-      rays.textContent = place ? Dom.number(place.distance_mm) : '–';
-      off.textContent = place ? Dom.number(Math.max(...place.residuals_px)) : '–';
-      fit.textContent = fit_off === null ? '–' : Dom.number(fit_off);
+      rays.textContent = figure(place && place.distance_mm);
+      off.textContent = figure(place && Math.max(...place.residuals_px));
+      fit.textContent = figure(fit_off);
     };
     return {element, update};
   }
@@ -74,8 +81,10 @@ const XrayTable = (() => {
       const {fit, fit_fault} = bench;
       state.className = fit_fault ? 'fault' : 'note';
       state.textContent = fit_fault ||
-          (fit ? `Fitted pose: ${Dom.number(fit.residual_px)} px root mean square` + (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
-                 'Landmarks that also have a place in the CT give the pose of the bone, if two views show three of them.');
+          (fit ?
+               `Fitted pose: ${figure(fit.residual_px)} px root mean square` +
+                   (fit.warnings.length ? '. ' + fit.warnings.join(' ') : '') :
+               'Landmarks that also have a place in the CT give the pose of the bone, if two views show three of them.');
       command.hidden = !fit;
       if (fit) command.replaceChildren(command.firstChild, Dom.command(fit.command));
       place.replaceChildren(
@@ -103,13 +112,15 @@ const XrayTable = (() => {
 
   function make(bench) {
     const rows = new Map(), body = el('tbody', {});
-    const empty = el('p', {class: 'note'}, 'No landmark yet. Choose the tool “Landmark”, and click a point in an X-ray.');
+    const empty =
+        el('p', {class: 'note'}, 'No landmark yet. Choose the tool “Landmark”, and click a point in an X-ray.');
     const head = ['Landmark', 'Seen in (u, v) px', 'World, mm', 'Rays apart, mm', 'Off, px', 'Fit off, px'].map(
         (text, i) => el('th', {scope: 'col', class: i > 1 ? 'number' : ''}, text));
     const table =
         el('div', {class: 'scroll'},
            el('table', {class: 'landmarks'},
-              el('thead', {}, el('tr', {}, head, el('th', {scope: 'col'}, el('span', {class: 'unseen'}, 'Actions')))), body));
+              el('thead', {}, el('tr', {}, head, el('th', {scope: 'col'}, el('span', {class: 'unseen'}, 'Actions')))),
+              body));
     const fit = fitPart(bench);
     const update = () => {
       const landmarks = XrayLandmarks.all(bench);
@@ -122,10 +133,9 @@ const XrayTable = (() => {
       empty.hidden = landmarks.length > 0;
       table.hidden = !landmarks.length;
     };
-    const element =
-        el('div', {class: 'landmark-list'}, el('h3', {}, 'Landmarks'), empty, table, fit.element);
+    const element = el('div', {class: 'landmark-list'}, el('h3', {}, 'Landmarks'), empty, table, fit.element);
     return {element, update, updateFit: fit.update};
   }
 
-  return {make, askName};
+  return {make, askName, figure};
 })();

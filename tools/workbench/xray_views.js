@@ -41,7 +41,8 @@ const XrayViews = (() => {
       const at = document.views.findIndex((view) => view.name === name), [view] = document.views.splice(at, 1);
       document.views.splice(at + by, 0, view);
     });
-    const button = document.querySelector(`[data-view-row="${CSS.escape(name)}"] [data-do="${by < 0 ? 'up' : 'down'}"]`);
+    const button =
+        document.querySelector(`[data-view-row="${CSS.escape(name)}"] [data-do="${by < 0 ? 'up' : 'down'}"]`);
     if (button) button.focus();
   }
 
@@ -52,16 +53,21 @@ const XrayViews = (() => {
     return el(
         'li', {'data-view-row': view.name},
         el('div', {class: 'view-head'}, el('strong', {}, view.name),
-           el('span', {class: 'row-actions'},
-              button('Up', () => move(draft, view.name, -1), 'up', index === 0),
+           el('span', {class: 'row-actions'}, button('Up', () => move(draft, view.name, -1), 'up', index === 0),
               button('Down', () => move(draft, view.name, 1), 'down', index === count - 1),
               button('Rename', () => rename(draft, view.name), 'rename'),
               button('Camera', () => XrayAdd.edit(draft, view), 'camera'),
               button('Remove', () => remove(draft, view.name), 'remove'))),
         el('p', {class: 'note'}, view.image, ' · ', cameraText(view), view.mask ? ' · mask' : '',
-           view.mask && Dom.button('Remove mask', () => draft.change(`remove the mask of ${view.name}`, (document) => {
-             delete document.views.find((one) => one.name === view.name).mask;
-           }), {'aria-label': `Remove mask: ${view.name}`})),
+           view.mask &&
+               Dom.button(
+                   'Remove mask',
+                   () => draft.change(
+                       `remove the mask of ${view.name}`,
+                       (document) => {
+                         delete document.views.find((one) => one.name === view.name).mask;
+                       }),
+                   {'aria-label': `Remove mask: ${view.name}`})),
         faults.map((fault) => el('p', {class: 'fault', 'data-fault-of': view.name}, fault)));
   }
 
@@ -83,13 +89,14 @@ const XrayViews = (() => {
     for (let i = 0; i < views.length; ++i)
       for (let k = i + 1; k < views.length; ++k)
         rows.push([
-          `Between ${views[i].view.name} and ${views[k].view.name}`, degrees(Sight.angle_deg(views[i].camera, views[k].camera))
+          `Between ${views[i].view.name} and ${views[k].view.name}`,
+          degrees(Sight.angle_deg(views[i].camera, views[k].camera))
         ]);
     const met = views.length > 1 && Sight.meeting(views.map((one) => one.camera));
     if (met)
       rows.push([
         'Central rays meet at',
-        `(${met.world_mm.map((one) => one.toFixed(1)).join(', ')}) mm in the world; they pass each other at ` +
+        `(${met.world_mm.map(XrayFrame.tenths).join(', ')}) mm in the world; they pass each other at ` +
             millimetres(met.distance_mm)
       ]);
     if (met)
@@ -133,10 +140,13 @@ const XrayViews = (() => {
                                  answer.warnings.map((text) => el('p', {class: 'fault', 'data-warning': ''}, text));
     const error = answer.metrics && answer.metrics.error;
     if (!lines.length)
-      lines.push(el('p', {class: 'note', 'data-good': ''},
-                    error === undefined ? 'Nothing speaks against these cameras.' :
-                                          `Nothing speaks against these cameras; the marked landmarks are ${Dom.number(error)} px off.`));
-    if (answer.command) lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
+      lines.push(
+          el('p', {class: 'note', 'data-good': ''},
+             error === undefined ?
+                 'Nothing speaks against these cameras.' :
+                 `Nothing speaks against these cameras; the marked landmarks are ${XrayTable.figure(error)} px off.`));
+    if (answer.command)
+      lines.push(el('details', {}, el('summary', {}, 'The same in a shell'), Dom.command(answer.command)));
     return lines;
   }
 
@@ -153,8 +163,10 @@ const XrayViews = (() => {
         list.replaceChildren(...views.map((view, i) => item(draft, view, i, views.length, entries[i])));
       }
       const known = views.map((view, i) => ({view, camera: entries[i].camera})).filter((one) => one.camera);
-      figures.replaceChildren(el('tbody', {}, figuresOf(known).map(([what, figure]) =>
-                                                   el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
+      figures.replaceChildren(
+          el('tbody', {},
+             figuresOf(known).map(
+                 ([what, figure]) => el('tr', {}, el('th', {scope: 'row'}, what), el('td', {}, figure)))));
       if (entries.every((one) => one.is_ready)) ask(known);
     };
     const again = Dom.button('Read again', () => {
@@ -163,9 +175,11 @@ const XrayViews = (() => {
       draft.dispatchEvent(new Event('change'));
     }, {'data-do': 'read-again', title: 'Reads images and cameras from their files anew'});
     return {
-      element: el('div', {class: 'xray-views'}, el('div', {class: 'toolbar'},
-                                                   Dom.button('Add X-ray', () => XrayAdd.add(draft), {'data-do': 'add-view'}), again),
-                  list, figures, check),
+      element:
+          el('div', {class: 'xray-views'},
+             el('div', {class: 'toolbar'}, Dom.button('Add X-ray', () => XrayAdd.add(draft), {'data-do': 'add-view'}),
+                again),
+             list, figures, check),
       update
     };
   }

@@ -52,9 +52,10 @@ const Xrays = (() => {
   });
 
   function toolbar(shared, tools) {
-    const options =
-        [['look', 'Move'], ['window', 'Window'], ['landmark', 'Landmark'], ['brush', 'Mask'], ['rectangle', 'Mask box'],
-         ['eraser', 'Erase']];
+    const options = [
+      ['look', 'Move'], ['window', 'Window'], ['landmark', 'Landmark'], ['brush', 'Mask'], ['rectangle', 'Mask box'],
+      ['eraser', 'Erase']
+    ];
     const choice = Dom.choice('Tool', options, shared.tool, (name) => {
       shared.tool = name;
       shared.refresh();
@@ -72,7 +73,8 @@ const Xrays = (() => {
       }
     });
     const number = el('span', {class: 'note'}, size.value + ' px');
-    const brush = el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
+    const brush =
+        el('label', {class: 'field'}, el('span', {}, 'Brush'), el('span', {class: 'with-number'}, size, number));
     const all = Dom.button('Whole images', () => shared.frames.forEach((frame) => frame.fit()), {'data-do': 'fit'});
     const update = () => {
       brush.hidden = !['brush', 'eraser'].includes(shared.tool);
@@ -86,8 +88,9 @@ const Xrays = (() => {
     const frame = XrayFrame.make(view.name, tool);
     const fault = el('p', {class: 'fault', role: 'alert', hidden: true});
     const wait = el('p', {class: 'note'}, 'The image is being read …');
-    frame.element = el('figure', {class: 'xray', 'data-xray': view.name},
-                       el('figcaption', {}, el('span', {}, view.name), frame.value), fault, wait, frame.box);
+    frame.element =
+        el('figure', {class: 'xray', 'data-xray': view.name},
+           el('figcaption', {}, el('span', {}, view.name), frame.value), fault, wait, frame.box);
     frame.update = (next) => {
       const entry = XrayImages.of(next, shared.refresh);
       wait.hidden = entry.is_ready;
@@ -110,7 +113,8 @@ const Xrays = (() => {
             frame.dispose();
             shared.frames.delete(name);
           }
-        const kept = new Map(views.map((view) => [view.name, shared.frames.get(view.name) || figure(shared, view, tool)]));
+        const kept =
+            new Map(views.map((view) => [view.name, shared.frames.get(view.name) || figure(shared, view, tool)]));
         shared.frames.clear();
         kept.forEach((frame, name) => shared.frames.set(name, frame));
         place.replaceChildren(...[...shared.frames.values()].map((frame) => frame.element));
@@ -139,11 +143,12 @@ const Xrays = (() => {
     };
     return () => {
       const fragment = shared.fragment();
-      const landmarks = (shared.draft.document.landmarks || [])
-                            .filter((one) => one.model_mm && (!one.fragment || one.fragment === fragment));
-      const views = shared.views().filter((view) => shared.cameraOf(view.name)).map(({name, image, camera}) => ({
-        name, image, camera, width_px: shared.cameraOf(name).width_px
-      }));
+      const landmarks = (shared.draft.document.landmarks ||
+                         []).filter((one) => one.model_mm && (!one.fragment || one.fragment === fragment));
+      const views =
+          shared.views()
+              .filter((view) => shared.cameraOf(view.name))
+              .map(({name, image, camera}) => ({name, image, camera, width_px: shared.cameraOf(name).width_px}));
       const body = {fragment, landmarks, views}, text = JSON.stringify(body);
       if (text === asked) return;
       asked = text;

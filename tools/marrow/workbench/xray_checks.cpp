@@ -38,7 +38,8 @@ json checked(const Workbench& workbench, const Request& request) {
   PipelineCall call{workbench_pipeline("check-cameras"), {{}, overrides_of(workbench, views_of(request))}, {"metrics"}};
   const json points = points_of(landmarks_of(request));
   if (!points.is_null())
-    call.arguments.inputs.push_back({"points", working_file(workbench, "points", ".yaml", points.dump(1)).string()});
+    call.arguments.overrides.push_back(
+        {"check.points", set_text(working_file(workbench, "points", ".yaml", points.dump(1)).string())});
   const Ran ran = run(call, workbench);
   json metrics = json::object();
   for (const Metric& metric : ran.outputs.at("metrics").as<Metrics>().items) metrics[metric.name] = metric.value;
@@ -53,7 +54,8 @@ json landmarks_file(const json& landmarks, const std::string& fragment) {
     const std::string name = landmark.at("name");
     if (points.contains(name)) throw Error("two landmarks are named '" + name + "'; rename one of them");
     points[name] = landmark["model_mm"];
-    for (const auto& [view, pixel] : pixels_of(landmark).items()) seen[view][name] = pixel;
+    const json pixels = pixels_of(landmark);
+    for (const auto& [view, pixel] : pixels.items()) seen[view][name] = pixel;
   }
   if (points.size() < 3)
     throw Error("a pose takes three landmarks that have a place in the CT and that two views show; " +
@@ -118,25 +120,27 @@ std::string short_text(double value) {
   return characters;
 }
 
-/// A sentence for each view whose mirrored image would fit at least five times as well as `residual_px`.
-std::vector<std::string> mirrored_views(const Workbench& workbench, const json& views, const json& landmarks,
-                                        const std::string& fragment, double residual_px) {
+/// A sentence about the view whose mirrored image fits best, if it fits at least five times as well as `residual_px`.
+std::vector<std::string> mirrored_view(const Workbench& workbench, const json& views, const json& landmarks,
+                                       const std::string& fragment, double residual_px) {
   constexpr double kBetter = 5;
-  std::vector<std::string> sentences;
+  std::string best;
+  double least_px = residual_px / kBetter;
   for (const json& view : views) {
     const std::string name = view.at("name");
     try {
-      const double width_px = view.value("width_px", 0.0);
-      const double other_px = fit(workbench, views, mirrored(landmarks, name, width_px), fragment).pose.cost;
-      if (kBetter * other_px < residual_px)
-        sentences.push_back("the image of '" + name +
-                            "' seems to be mirrored: the other way round, the landmarks fit " + "to " +
-                            short_text(other_px) + " px.");
+      const json other = mirrored(landmarks, name, view.value("width_px", 0.0));
+      const double other_px = fit(workbench, views, other, fragment).pose.cost;
+      if (other_px >= least_px) continue;
+      least_px = other_px;
+      best = name;
     } catch (const Error&) {
       // mirrored, the landmarks have no pose: then this is not the mistake
     }
   }
-  return sentences;
+  if (best.empty()) return {};
+  return {"the image of '" + best + "' seems to be mirrored: the other way round, the landmarks fit to " +
+          short_text(least_px) + " px"};
 }
 
 json fitted(const Workbench& workbench, const Request& request) {
@@ -147,7 +151,7 @@ json fitted(const Workbench& workbench, const Request& request) {
     const Fit found = fit(workbench, views, landmarks, fragment);
     std::vector<std::string> warnings = found.pose.warnings;
     if (found.pose.cost > kDoubtful_px)
-      for (const std::string& sentence : mirrored_views(workbench, views, landmarks, fragment, found.pose.cost))
+      for (const std::string& sentence : mirrored_view(workbench, views, landmarks, fragment, found.pose.cost))
         warnings.push_back(sentence);
     return {{"world_from_ct", json_of(found.pose.world_from_model)},
             {"residual_px", found.pose.cost},
@@ -155,7 +159,7 @@ json fitted(const Workbench& workbench, const Request& request) {
             {"command", command_of(found.call)}};
   } catch (const Error& error) {
     std::string text = error.what();
-    for (const std::string& sentence : mirrored_views(workbench, views, landmarks, fragment, kNoPose_px))
+    for (const std::string& sentence : mirrored_view(workbench, views, landmarks, fragment, kNoPose_px))
       text += "\n" + sentence;
     throw Error(text);
   }

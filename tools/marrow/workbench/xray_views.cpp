@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "marrow/domain/printable.hpp"
+#include "marrow/toolbox/files/volume_file.hpp"
 #include "workbench/xray.hpp"
 
 namespace marrow::workbench {
@@ -57,14 +58,18 @@ Answer view_answer(const Workbench& workbench, const Request& request) {
     const View& view = ran.outputs.at("view").as<View>();
     about["camera"] = json_of(view.camera);
     about["warnings"] = ran.warnings;
-    return bytes_answer(pixels_of(view.image, about), about);
+    about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
+    std::string pixels = pixels_of(view.image, about);
+    return bytes_answer(std::move(pixels), about);
   } catch (const Error& error) {
     fault = error.what();
   }
   const PipelineCall call = image_call(workbench, image);
   about = {{"fault", printable_lines(fault)}, {"command", command_of(call)}, {"warnings", json::array()}};
   const Ran ran = run(call, workbench);
-  return bytes_answer(pixels_of(ran.outputs.at("image").as<Image>(), about), about);
+  about["is_mirrored"] = files::is_mirrored_as_read(workbench.folder.inside(image));
+  std::string pixels = pixels_of(ran.outputs.at("image").as<Image>(), about);
+  return bytes_answer(std::move(pixels), about);
 }
 
 }  // namespace
