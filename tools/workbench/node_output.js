@@ -102,7 +102,8 @@ const NodeOutput = (() => {
   const verdict = (part) => el(
       'div', {class: 'verdict ' + part.judgement},
       el('p', {class: 'verdict-head'}, el('strong', {}, part.judgement), ' ',
-         el('small', {}, part.failure_probability === null ? '' : 'failure ' + Dom.percent(part.failure_probability))),
+         el('small', {},
+            part.failure_probability === null ? '' : 'failure ' + (100 * part.failure_probability).toFixed(1) + ' %')),
       el('ul', {class: 'verdict-list'}, [...part.reasons, ...part.remedies].map((text) => el('li', {}, text))));
 
   function shown(part, what) {

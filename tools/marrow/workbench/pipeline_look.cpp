@@ -154,6 +154,7 @@ json shown_item(const Value& value, const fs::path& folder, const Catalogue& cat
   for (const auto& entry : fs::recursive_directory_iterator(place))
     if (entry.is_regular_file()) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
+  std::stable_partition(files.begin(), files.end(), [](const fs::path& file) { return file.extension() == ".png"; });
   for (std::size_t i = 0; i < std::min(files.size(), kMostFiles); ++i)
     shown.push_back(shown_file(files[i], files[i].lexically_relative(place).string()));
   return shown;
