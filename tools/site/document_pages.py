@@ -16,7 +16,7 @@ GROUPS = {
         "tutorials/reading-a-report",
         "faq",
     ],
-    "Guides": ["case", "comparing", "verdict", "repetition", "python", "simulation", "nailing", "guidance"],
+    "Guides": ["case", "workbench", "comparing", "verdict", "repetition", "python", "simulation", "nailing", "guidance"],
     "Method": ["method", "results"],
     "Development": ["plugins", "architecture", "testing", "site"],
 }
