@@ -209,7 +209,7 @@ class PipelinePageTest(PageTest, PipelineBench):
         self.assertEqual(sorted(drawn), ["bone", "cameras", "edges", "fracture", "truth", "views"])
         self.assertEqual(self.value("[data-do=text]"), PIPELINE)
         boxes = self.js(
-            "return ['.pipeline-graph', '.pipeline-text'].map((s) => document.querySelector(s).getBoundingClientRect().top)"
+            "return ['graph', 'text'].map((s) => document.querySelector('.pipeline-' + s).getBoundingClientRect().top)"
         )
         self.assertEqual(boxes[0], boxes[1])
         self.browser.key("ENTER", "[data-node=cameras]")
@@ -304,6 +304,36 @@ class PipelinePageTest(PageTest, PipelineBench):
         self.browser.wait("return !!document.querySelector('.outputs canvas.scene')", 60)
         self.assertIn("triangles", self.text_of(".outputs [data-kind=mesh]"))
         self.assertEqual(self.browser.logs()[0], [])
+
+    def test_a_path_is_chosen_in_the_folder(self):
+        (self.folder / "bones").mkdir()
+        (self.folder / "bones" / "a.stl").write_text("")
+        self.file.write_text(
+            "marrow: 1\ninputs:\n  surface: {type: path, help: a surface}\nnodes:\n"
+            "  bone: {uses: read.mesh, with: {path: $surface}}\noutputs: {bone: bone}\n"
+        )
+        self.show_pipeline()
+        self.browser.key("ENTER", "[data-choose-for=surface]")
+        self.browser.wait("return !!document.querySelector('[data-open=bones]')", 60)
+        self.browser.key("ENTER", "[data-open=bones]")
+        self.browser.wait("return !!document.querySelector('[data-choose=\"bones/a.stl\"]')", 60)
+        self.browser.key("ENTER", "[data-choose='bones/a.stl']")
+        self.browser.wait("return document.querySelector('[data-input=surface]').value === 'bones/a.stl'", 60)
+        self.browser.wait("return document.body.textContent.includes('run small.yaml surface=bones/a.stl')", 60)
+        self.click("[data-node=bone]")
+        self.assertEqual(self.value("[data-option=path]"), "$surface")
+
+    def test_a_run_that_fails_says_which_node(self):
+        (self.folder / "a.stl").write_text("no surface")
+        self.file.write_text(
+            "marrow: 1\nnodes:\n  bone: {uses: read.mesh, with: {path: a.stl}}\noutputs: {bone: bone}\n"
+        )
+        self.show_pipeline()
+        self.browser.wait("return !document.querySelector('[data-do=run]').disabled", 60)
+        self.click("[data-do=run]")
+        self.browser.wait("return document.documentElement.dataset.run === 'failed'", 60)
+        self.assertIn("bone: ", self.text_of(".run-result .reason"))
+        self.assertEqual(self.text_of(".run-result strong"), "Failed")
 
     def test_a_run_can_be_stopped(self):
         self.file.write_text(

@@ -169,7 +169,7 @@ class ResultsPageTest(PageTest, ResultsBench):
         )
         self.assertEqual(cells, ["edges", "option high", "5", "9", "the first difference"])
         self.browser.wait(
-            "return [...document.querySelectorAll('.overlays img')].filter((one) => one.naturalWidth === 96).length === 2"
+            "return [...document.querySelectorAll('.overlays img')].every((one) => one.naturalWidth === 96)"
         )
         self.assertIn("marrow diff runs/first runs/second", self.js("return document.body.textContent"))
         self.assertEqual(self.browser.logs()[0], [])

@@ -99,12 +99,20 @@ const NodeOutput = (() => {
                        el('tr', {}, el('th', {scope: 'row'}, one.name),
                           el('td', {class: 'number'}, Dom.withUnit(one.value, one.unit)))))));
 
+  const verdict = (part) => el(
+      'div', {class: 'verdict ' + part.judgement},
+      el('p', {class: 'verdict-head'}, el('strong', {}, part.judgement), ' ',
+         el('small', {},
+            part.failure_probability === null ? '' : 'failure ' + (100 * part.failure_probability).toFixed(1) + ' %')),
+      el('ul', {class: 'verdict-list'}, [...part.reasons, ...part.remedies].map((text) => el('li', {}, text))));
+
   function shown(part, what) {
     const name = part.name && el('p', {class: 'note'}, part.name);
     const content = part.kind === 'picture' ?
         el('img', {src: part.picture, alt: what + (part.name ? ', ' + part.name : '')}) :
         part.kind === 'slices'  ? slices(part) :
         part.kind === 'mesh'    ? surface(part) :
+        part.kind === 'verdict' ? verdict(part) :
         part.kind === 'figures' ? figures(part) :
                                   el('pre', {class: 'file', tabindex: 0}, part.text);
     return el('div', {class: 'part', 'data-kind': part.kind}, name || '', content);

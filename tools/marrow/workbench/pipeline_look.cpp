@@ -9,6 +9,7 @@
 #include "marrow/toolbox/files/mesh_file.hpp"
 #include "report/report.hpp"
 #include "runtime/text_file.hpp"
+#include "runtime/verdict_json.hpp"
 #include "workbench/pipeline_run.hpp"
 
 namespace fs = std::filesystem;
@@ -136,6 +137,11 @@ json shown_item(const Value& value, const fs::path& folder, const Catalogue& cat
     return json::array({slices_json(value.as<Volume>().grid, value.as<Volume>().values)});
   if (value.type == TypeInfo::of<SignedField>())
     return json::array({slices_json(value.as<SignedField>().grid, value.as<SignedField>().values_mm)});
+  if (value.type == TypeInfo::of<Verdict>()) {
+    json verdict = json_of(NamedVerdict{"", "", value.as<Verdict>()});
+    verdict["kind"] = "verdict";
+    return json::array({verdict});
+  }
   const WriterInfo* writer = catalogue.find_writer(value.type);
   if (!writer) return json::array({{{"kind", "text"}, {"text", "no library writes values of this type"}}});
   const fs::path place = folder / ("item" + writer->extension);
@@ -148,6 +154,7 @@ json shown_item(const Value& value, const fs::path& folder, const Catalogue& cat
   for (const auto& entry : fs::recursive_directory_iterator(place))
     if (entry.is_regular_file()) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
+  std::stable_partition(files.begin(), files.end(), [](const fs::path& file) { return file.extension() == ".png"; });
   for (std::size_t i = 0; i < std::min(files.size(), kMostFiles); ++i)
     shown.push_back(shown_file(files[i], files[i].lexically_relative(place).string()));
   return shown;
