@@ -195,7 +195,11 @@ class RequestsTest(Placing, BenchTest):
         self.assertEqual(server.finish(job)["state"], "stopped")
 
 
-class PageOfCaseTest(Placing, PageTest):
+class PageOfCase:
+    """The page with a case, and what a person does there."""
+
+    bone = "distal"
+
     def place(self, **options):
         server = self.open()
         self.browser.logs()  # those of the page before
@@ -208,12 +212,12 @@ class PageOfCaseTest(Placing, PageTest):
         return self.browser.js(text, *arguments)
 
     def pose(self):
-        return self.js("return PlacePage.current().placed.distal")
+        return self.js("return PlacePage.current().placed[arguments[0]]", self.bone)
 
     def kept(self):
         """The pose of the draft, after all changes were kept."""
         self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
-        return self.js("return PlacePage.current().draft.document.fragments.distal.start")
+        return self.js("return PlacePage.current().draft.document.fragments[arguments[0]].start", self.bone)
 
     def pointer(self, kind, view, pixel, button="left", modifiers=0):
         place = self.js(
@@ -249,6 +253,8 @@ class PageOfCaseTest(Placing, PageTest):
     def middle(self, pose):
         return at(pose, self.about["bones"][0]["middle_mm"])
 
+
+class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_what_is_under_the_pointer_stays_under_it(self):
         self.place()
         for view, begin, end in (("frontal", (250, 250), (310, 205)), ("lateral", (260, 240), (200, 290))):
