@@ -387,6 +387,39 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
             pictures.add(self.js("return document.querySelector('[data-view=frontal]').toDataURL()"))
         self.assertEqual(len(pictures), 5)
 
+    def test_the_bone_stays_under_the_pointer_in_a_larger_image(self):
+        self.place()
+        self.browser.key("z", "[data-view=frontal]")
+        camera, before = self.camera("frontal"), self.pose()
+        u, v, _ = seen(camera, self.middle(before))
+        self.drag("frontal", (u, v), (u + 20, v + 10), (u + 30, v - 15))
+        new = seen(camera, self.middle(self.kept()))
+        self.assertAlmostEqual(new[0] - u, 30, delta=0.5)
+        self.assertAlmostEqual(new[1] - v, -15, delta=0.5)
+
+    def test_bones_move_together_or_stay(self):
+        file = self.folder / "case" / "case.yaml"
+        file.write_text(file.read_text().replace("register: false", "register: true").split("    truth:")[0])
+        self.place()
+        self.assertEqual([bone["name"] for bone in self.about["bones"]], ["proximal", "distal"])
+        placed = lambda: self.js("return structuredClone(PlacePage.current().placed)")
+        begin = placed()
+        self.browser.key("ARROW_RIGHT", "[data-view=frontal]")
+        self.kept()
+        together = placed()
+        for bone in begin:
+            self.assertAlmostEqual(math.dist(*([pose[bone][i][3] for i in range(3)] for pose in (begin, together))), 1)
+        self.js("document.querySelector('.place-bones input').click()")
+        self.browser.key("ARROW_RIGHT", "[data-view=frontal]")
+        self.kept()
+        alone = placed()
+        self.assertEqual(alone["proximal"], together["proximal"])
+        self.assertNotEqual(alone["distal"], together["distal"])
+        layers = self.js("return [...PlacePage.current().views[0].paint.layers.keys()].sort()")
+        self.assertEqual(layers, ["distal", "proximal"])
+        fragments = self.js("return PlacePage.current().draft.document.fragments")
+        self.assertEqual({name: one["start"] for name, one in fragments.items()}, alone)
+
     def test_nothing_is_cut_off_on_a_narrow_page(self):
         for width_px in (1440, 1024, 400):
             self.place(width_px=width_px)

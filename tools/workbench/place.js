@@ -43,7 +43,7 @@ const PlacePage = (() => {
       if (!this.isOpen) return;
       this.active = this.views[0];
       this.fill(place);
-      this.steps.add(this.kept() ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
+      this.steps.add(this.kept() && !draft.is_saved ? 'begin: the draft' : 'begin: ' + about.bones[0].start_is, this.placed);
       draft.addEventListener('change', () => this.draftChanged());
       this.draftChanged();
       await this.redraw();
@@ -82,9 +82,14 @@ const PlacePage = (() => {
       return this.about.bones.filter((bone) => this.moving.has(bone.name));
     }
 
+    // The bones to look at when all are locked.
+    watched() {
+      return this.bones().length ? this.bones() : this.about.bones;
+    }
+
     // Where the bones are that are moved: the middle of all, and the long axis of the first.
     hold(poses) {
-      const bones = this.bones(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
+      const bones = this.watched(), middles = bones.map((bone) => Geometry.moved(poses[bone.name], bone.middle_mm));
       const middle = Geometry.times(middles.reduce(Geometry.plus, [0, 0, 0]), 1 / bones.length);
       return {middle, axis: Geometry.turned(poses[bones[0].name], bones[0].long_axis)};
     }
@@ -353,9 +358,16 @@ const PlacePage = (() => {
       this.stepChoice = Dom.choice(
           'step of keys (mm, °)', [['0.1', '0.1'], ['0.5', '0.5'], ['1', '1'], ['5', '5']], String(this.step),
           (step) => (this.step = Number(step)));
+      this.zoomChoice =
+          Dom.choice('zoom', [['1', '1'], ['2', '2'], ['4', '4']], '1', (factor) => this.zoom(Number(factor)));
       const bones = this.about.bones.length > 1 && el('fieldset', {class: 'place-bones'}, el('legend', {}, 'moved'),
                                                         this.about.bones.map((bone) => this.boneBox(bone)));
-      return el('div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.stepChoice, bones);
+      return el('div', {class: 'toolbar place-tools'}, this.modes, strength, wipe, this.zoomChoice, this.stepChoice, bones);
+    }
+
+    zoom(factor) {
+      const {middle} = this.hold(this.placed);
+      for (const view of this.views) view.zoom(factor, Geometry.pixel(view.camera, middle) || [0, 0]);
     }
 
     boneBox(bone) {
@@ -398,6 +410,11 @@ const PlacePage = (() => {
     const step = steps[Math.max(0, Math.min(3, steps.indexOf(String(page.step)) + by))];
     page.stepChoice.querySelector(`[data-value="${step}"]`).click();
   }
+  function nextZoom() {
+    if (!page || !page.zoomChoice) return;
+    const now = page.zoomChoice.querySelector('[aria-pressed="true"]').dataset.value;
+    page.zoomChoice.querySelector(`[data-value="${{1: 2, 2: 4, 4: 1}[now]}"]`).click();
+  }
   function nextMode() {
     if (!page || !page.modes) return;
     const at = MODES.findIndex(([mode]) => mode === page.mode);
@@ -423,7 +440,7 @@ const PlacePage = (() => {
       ['w or W', 'move away from the X-ray source', depth(1)], ['s or S', 'move towards it', depth(-1)],
       ['r or R', 'tip the upper end away', tip(1)], ['f or F', 'tip it towards the source', tip(-1)],
       ['v', 'the next view', nextView], ['m', 'show the bone in another way', nextMode],
-      ['+', 'larger steps', () => nextStep(1)], ['-', 'smaller steps', () => nextStep(-1)],
+      ['z', 'zoom in to the bone, and out', nextZoom], ['+', 'larger steps', () => nextStep(1)], ['-', 'smaller steps', () => nextStep(-1)],
       ['Enter', 'register from here', (event) => page && page.bar && event.target.matches('canvas') && page.fromHere()],
       ['Ctrl+z', 'undo', () => page && page.draft && page.draft.undo()],
       ['Ctrl+y or Ctrl+Z', 'redo', () => page && page.draft && page.draft.redo()],

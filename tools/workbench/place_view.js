@@ -31,7 +31,8 @@ class PlaceView {
     made.paint = new PlacePaint(
         made.canvas, new Uint8Array(bytes), Math.floor(camera.width_px / step_px),
         Math.floor(camera.height_px / step_px), step_px);
-    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.canvas);
+    made.window = Dom.el('div', {class: 'place-window'}, made.canvas);
+    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.window);
     made.listen();
     return made;
   }
@@ -48,6 +49,13 @@ class PlaceView {
       event.preventDefault();
       this.page.wheel(this, -Math.sign(event.deltaY));
     }, {passive: false});
+  }
+
+  // Shows the image larger, with a place of the X-ray in the middle.
+  zoom(factor, [u, v]) {
+    this.canvas.style.width = 100 * factor + '%';
+    const size = this.paint.width * this.step_px / this.canvas.getBoundingClientRect().width;
+    this.window.scrollTo(u / size - this.window.clientWidth / 2, v / size - this.window.clientHeight / 2);
   }
 
   // The place in the X-ray under the pointer.
