@@ -145,8 +145,7 @@ class RequestsTest(Placing, BenchTest):
                 "POST", "/api/place/register", {"case": "case", "pipeline": pipeline, "poses": {"distal": pose}}
             )
             self.assertEqual(
-                json.loads(answer[2])["error"],
-                "this pipeline cannot start from a placement; choose one of the list",
+                json.loads(answer[2])["error"], "this pipeline cannot start from a placement; choose one of the list"
             )
         answer = server.ask("POST", "/api/place/open", {"case": "../.."})
         self.assertIn(" leads out of the folder that is open, ", json.loads(answer[2])["error"])

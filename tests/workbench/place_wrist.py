@@ -73,11 +73,7 @@ def make_case(folder):
     start = {"target": "world", "source": "ct", "matrix": placement()}
     case = {
         "marrow-case": 1,
-        "ct": {
-            "file": "rad_dcm_cropped.tif",
-            "voxel_size_mm": [0.39625, 0.39625, 0.625],
-            "value_offset_hu": -1024,
-        },
+        "ct": {"file": "rad_dcm_cropped.tif", "voxel_size_mm": [0.39625, 0.39625, 0.625], "value_offset_hu": -1024},
         "views": views,
         "fragments": {"radius": {"seeds": fragment["seeds"], "register": True, "start": start}},
     }

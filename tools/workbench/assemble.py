@@ -16,7 +16,8 @@ THREE = pathlib.Path("/usr/share/javascript/three/three.min.js")  # Debian's lib
 SCRIPTS = [
     *(REPORT / name for name in ("dom.js", "orbit.js", "graph.js")),
     *(FOLDER / name for name in ("server.js", "geometry.js", "shell.js", "home.js", "draft.js", "case.js")),
-    *(FOLDER / name for name in ("place_motion.js", "place_paint.js", "place_view.js", "place_steps.js", "place.js")),
+    *(FOLDER / ("place_%s.js" % name) for name in ("motion", "paint", "view", "steps", "controls", "case")),
+    FOLDER / "place.js",
     FOLDER / "main.js",
 ]
 STYLES = [REPORT / "report.css", FOLDER / "workbench.css"]

@@ -19,8 +19,7 @@ class PlaceView {
       drag: null
     });
     const {camera, step_px} = made;
-    const {bytes} =
-        await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
+    const {bytes} = await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
     made.canvas = Dom.el('canvas', {
       class: 'place-canvas',
       tabindex: 0,
@@ -72,10 +71,10 @@ class PlaceView {
     this.canvas.focus({preventScroll: true});
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, this.pixel(event));
-    const kind = this.pointers.size > 1            ? 'two' :
-        event.altKey                               ? 'roll' :
-        event.shiftKey || event.button === 2       ? 'turn' :
-                                                     'shift';
+    const kind = this.pointers.size > 1      ? 'two' :
+        event.altKey                         ? 'roll' :
+        event.shiftKey || event.button === 2 ? 'turn' :
+                                               'shift';
     if (this.drag) this.page.dragEnded(this.drag);
     this.drag = {kind, view: this, from: this.pixel(event), to: this.pixel(event), poses: this.page.poses(), turned: 0};
   }
@@ -153,8 +152,7 @@ class PlaceView {
       const isOutline = layer.columns === undefined;
       const part = bytes.slice(at, at + layer.bytes);
       this.paint.layers.set(
-          layer.bone,
-          isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
+          layer.bone, isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
       at += layer.bytes;
     }
   }
