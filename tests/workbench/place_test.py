@@ -145,8 +145,7 @@ class RequestsTest(Placing, BenchTest):
                 "POST", "/api/place/register", {"case": "case", "pipeline": pipeline, "poses": {"distal": pose}}
             )
             self.assertEqual(
-                json.loads(answer[2])["error"],
-                "this pipeline cannot start from a placement; choose one of the list",
+                json.loads(answer[2])["error"], "this pipeline cannot start from a placement; choose one of the list"
             )
         answer = server.ask("POST", "/api/place/open", {"case": "../.."})
         self.assertIn(" leads out of the folder that is open, ", json.loads(answer[2])["error"])
@@ -195,7 +194,11 @@ class RequestsTest(Placing, BenchTest):
         self.assertEqual(server.finish(job)["state"], "stopped")
 
 
-class PageOfCaseTest(Placing, PageTest):
+class PageOfCase:
+    """The page with a case, and what a person does there."""
+
+    bone = "distal"
+
     def place(self, **options):
         server = self.open()
         self.browser.logs()  # those of the page before
@@ -208,12 +211,12 @@ class PageOfCaseTest(Placing, PageTest):
         return self.browser.js(text, *arguments)
 
     def pose(self):
-        return self.js("return PlacePage.current().placed.distal")
+        return self.js("return PlacePage.current().placed[arguments[0]]", self.bone)
 
     def kept(self):
         """The pose of the draft, after all changes were kept."""
         self.browser.wait("return !PlacePage.current().keyMoves && !PlacePage.current().isKeeping")
-        return self.js("return PlacePage.current().draft.document.fragments.distal.start")
+        return self.js("return PlacePage.current().draft.document.fragments[arguments[0]].start", self.bone)
 
     def pointer(self, kind, view, pixel, button="left", modifiers=0):
         place = self.js(
@@ -249,6 +252,8 @@ class PageOfCaseTest(Placing, PageTest):
     def middle(self, pose):
         return at(pose, self.about["bones"][0]["middle_mm"])
 
+
+class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_what_is_under_the_pointer_stays_under_it(self):
         self.place()
         for view, begin, end in (("frontal", (250, 250), (310, 205)), ("lateral", (260, 240), (200, 290))):
@@ -380,6 +385,39 @@ class PageOfCaseTest(Placing, PageTest):
             time.sleep(0.1)
             pictures.add(self.js("return document.querySelector('[data-view=frontal]').toDataURL()"))
         self.assertEqual(len(pictures), 5)
+
+    def test_the_bone_stays_under_the_pointer_in_a_larger_image(self):
+        self.place()
+        self.browser.key("z", "[data-view=frontal]")
+        camera, before = self.camera("frontal"), self.pose()
+        u, v, _ = seen(camera, self.middle(before))
+        self.drag("frontal", (u, v), (u + 20, v + 10), (u + 30, v - 15))
+        new = seen(camera, self.middle(self.kept()))
+        self.assertAlmostEqual(new[0] - u, 30, delta=0.5)
+        self.assertAlmostEqual(new[1] - v, -15, delta=0.5)
+
+    def test_bones_move_together_or_stay(self):
+        file = self.folder / "case" / "case.yaml"
+        file.write_text(file.read_text().replace("register: false", "register: true").split("    truth:")[0])
+        self.place()
+        self.assertEqual([bone["name"] for bone in self.about["bones"]], ["proximal", "distal"])
+        placed = lambda: self.js("return structuredClone(PlacePage.current().placed)")
+        begin = placed()
+        self.browser.key("ARROW_RIGHT", "[data-view=frontal]")
+        self.kept()
+        together = placed()
+        for bone in begin:
+            self.assertAlmostEqual(math.dist(*([pose[bone][i][3] for i in range(3)] for pose in (begin, together))), 1)
+        self.js("document.querySelector('.place-bones input').click()")
+        self.browser.key("ARROW_RIGHT", "[data-view=frontal]")
+        self.kept()
+        alone = placed()
+        self.assertEqual(alone["proximal"], together["proximal"])
+        self.assertNotEqual(alone["distal"], together["distal"])
+        layers = self.js("return [...PlacePage.current().views[0].paint.layers.keys()].sort()")
+        self.assertEqual(layers, ["distal", "proximal"])
+        fragments = self.js("return PlacePage.current().draft.document.fragments")
+        self.assertEqual({name: one["start"] for name, one in fragments.items()}, alone)
 
     def test_nothing_is_cut_off_on_a_narrow_page(self):
         for width_px in (1440, 1024, 400):

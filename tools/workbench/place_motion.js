@@ -69,15 +69,5 @@ const PlaceMotion = (() => {
     return Geometry.multiply(Geometry.shift(times(minus(b, a), fraction)), Geometry.multiply(turn, from));
   }
 
-  return {
-    direction,
-    shiftInView,
-    turnInView,
-    angleAbout,
-    shiftInDepth,
-    roll,
-    rollAngle,
-    tip,
-    between
-  };
+  return {direction, shiftInView, turnInView, angleAbout, shiftInDepth, roll, rollAngle, tip, between};
 })();

@@ -64,7 +64,8 @@ class PlacePaint {
         }
         const weight = weights[value], rest = 256 - weight, under = grey[at];
         out[at] = (0xff000000 | (under * rest + b * weight) >> 8 << 16 | (under * rest + g * weight) >> 8 << 8 |
-                   (under * rest + r * weight) >> 8) >>> 0;
+                   (under * rest + r * weight) >> 8) >>>
+            0;
       }
     }
   }
@@ -72,7 +73,8 @@ class PlacePaint {
   points({points}, [r, g, b]) {
     const colour = (0xff000000 | b << 16 | g << 8 | r) >>> 0, middle = (this.step_px - 1) / 2;
     for (let i = 0; i < points.length; i += 2) {
-      const x = Math.round((points[i] - middle) / this.step_px), y = Math.round((points[i + 1] - middle) / this.step_px);
+      const x = Math.round((points[i] - middle) / this.step_px),
+            y = Math.round((points[i + 1] - middle) / this.step_px);
       for (const [column, row] of [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]])
         if (column >= 0 && row >= 0 && column < this.width && row < this.height)
           this.out[row * this.width + column] = colour;

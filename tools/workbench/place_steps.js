@@ -63,14 +63,14 @@ class PlaceSteps {
     const {el} = Dom;
     if (!verdicts) return this.verdict.replaceChildren(el('p', {class: 'note'}, note || 'not judged yet'));
     this.verdict.replaceChildren(...Object.entries(verdicts).map(
-        ([bone, verdict]) => el(
-            'div', {'data-judgement': verdict.judgement},
-            el('p', {}, el('strong', {}, bone + ': ' + verdict.judgement),
-               verdict.failure_probability === null ?
-                   '' :
-                   ', probability of a failure ' + Dom.percent(verdict.failure_probability)),
-            el('ul', {}, verdict.reasons.map((reason) => el('li', {}, reason))),
-            verdict.remedies.length > 0 && el('p', {}, 'Would settle it: ' + verdict.remedies.join('; ')))));
+        ([bone, verdict]) =>
+            el('div', {'data-judgement': verdict.judgement},
+               el('p', {}, el('strong', {}, bone + ': ' + verdict.judgement),
+                  verdict.failure_probability === null ?
+                      '' :
+                      ', probability of a failure ' + Dom.percent(verdict.failure_probability)),
+               el('ul', {}, verdict.reasons.map((reason) => el('li', {}, reason))),
+               verdict.remedies.length > 0 && el('p', {}, 'Would settle it: ' + verdict.remedies.join('; ')))));
   }
 
   static deviationText(deviations) {
@@ -93,7 +93,8 @@ class PlaceSteps {
       const verdicts = step.verdicts && Object.values(step.verdicts).map((one) => one.judgement).join(', ');
       const deviations = PlaceSteps.deviationText(step.deviations);
       return el(
-          'li', {}, Dom.button(step.what, () => this.goTo(step), {'aria-current': step === this.current ? 'step' : null}),
+          'li', {},
+          Dom.button(step.what, () => this.goTo(step), {'aria-current': step === this.current ? 'step' : null}),
           el('small', {}, [costs && 'contour ' + costs, verdicts].filter(Boolean).join(' · ')),
           deviations && el('small', {class: 'deviations'}, deviations));
     }));

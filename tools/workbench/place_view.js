@@ -19,8 +19,7 @@ class PlaceView {
       drag: null
     });
     const {camera, step_px} = made;
-    const {bytes} =
-        await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
+    const {bytes} = await Ask.bytes('api/place/image', {case: page.casePath, view: view.name, step_px});
     made.canvas = Dom.el('canvas', {
       class: 'place-canvas',
       tabindex: 0,
@@ -31,7 +30,8 @@ class PlaceView {
     made.paint = new PlacePaint(
         made.canvas, new Uint8Array(bytes), Math.floor(camera.width_px / step_px),
         Math.floor(camera.height_px / step_px), step_px);
-    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.canvas);
+    made.window = Dom.el('div', {class: 'place-window'}, made.canvas);
+    made.element = Dom.el('figure', {class: 'place-view'}, Dom.el('figcaption', {}, view.name), made.window);
     made.listen();
     return made;
   }
@@ -50,6 +50,13 @@ class PlaceView {
     }, {passive: false});
   }
 
+  // Shows the image larger, with a place of the X-ray in the middle.
+  zoom(factor, [u, v]) {
+    this.canvas.style.width = 100 * factor + '%';
+    const size = this.paint.width * this.step_px / this.canvas.getBoundingClientRect().width;
+    this.window.scrollTo(u / size - this.window.clientWidth / 2, v / size - this.window.clientHeight / 2);
+  }
+
   // The place in the X-ray under the pointer.
   pixel(event) {
     const box = this.canvas.getBoundingClientRect();
@@ -64,10 +71,10 @@ class PlaceView {
     this.canvas.focus({preventScroll: true});
     this.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, this.pixel(event));
-    const kind = this.pointers.size > 1            ? 'two' :
-        event.altKey                               ? 'roll' :
-        event.shiftKey || event.button === 2       ? 'turn' :
-                                                     'shift';
+    const kind = this.pointers.size > 1      ? 'two' :
+        event.altKey                         ? 'roll' :
+        event.shiftKey || event.button === 2 ? 'turn' :
+                                               'shift';
     if (this.drag) this.page.dragEnded(this.drag);
     this.drag = {kind, view: this, from: this.pixel(event), to: this.pixel(event), poses: this.page.poses(), turned: 0};
   }
@@ -145,8 +152,7 @@ class PlaceView {
       const isOutline = layer.columns === undefined;
       const part = bytes.slice(at, at + layer.bytes);
       this.paint.layers.set(
-          layer.bone,
-          isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
+          layer.bone, isOutline ? {points: new Float32Array(part)} : {...layer, bytes: new Uint8Array(part)});
       at += layer.bytes;
     }
   }
