@@ -262,6 +262,14 @@ class PipelinePageTest(PageTest, PipelineBench):
         self.assertIn("hihg: 5", chosen)
         self.assertTrue(self.js("return document.querySelector('[data-do=run]').disabled"))
 
+    def test_a_file_that_is_not_there_is_told(self):
+        self.server = self.open()
+        self.show(self.server, "pipeline=nowhere.yaml")
+        self.assertEqual(
+            self.text_of("#page"), "%s/nowhere.yaml cannot be read: No such file or directory" % self.folder
+        )
+        self.browser.logs()
+
     def test_a_change_elsewhere_shows_here(self):
         self.show_pipeline()
         self.file.write_text(PIPELINE.replace("high: 5", "high: 8"))

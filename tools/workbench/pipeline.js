@@ -40,8 +40,8 @@ const PipelinePage = (() => {
              panel('What the node makes', 'output', this.outputBox), panel('Commands', 'commands', this.commands)));
     }
 
-    async load() {
-      this.take(await Ask.json('api/pipeline', {file: this.file}));
+    async load(state) {
+      this.take(state);
       await this.refreshPlan();
     }
 
@@ -340,10 +340,13 @@ const PipelinePage = (() => {
     title: 'Pipeline',
     async show(place, parameters, first) {
       if (!first) return list(place);
-      page = new Page(place, first, parameters);
-      await page.load();
-      page.look();
-      page.timer = setTimeout(() => page && page.poll(), 1000);
+      const state = await Ask.json('api/pipeline', {file: first});
+      if (!place.isConnected) return undefined;  // another page was opened in the meantime
+      const mine = page = new Page(place, first, parameters);
+      await mine.load(state);
+      if (mine !== page) return undefined;
+      mine.look();
+      mine.timer = setTimeout(() => mine.poll(), 1000);
       return undefined;
     },
     leave() {
