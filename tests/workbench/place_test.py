@@ -229,13 +229,15 @@ class PageOfCaseTest(PageOfCase, Placing, PageTest):
     def test_the_overlay_is_that_of_the_newest_pose(self):
         server = self.place()
         self.js(
-            "for (let i = 0; i < 30; ++i) PlacePage.current().move(PlacePage.current().placed, Geometry.shift([0.5, 0, 0]), true)"
+            "const page = PlacePage.current();"
+            "for (let i = 0; i < 30; ++i) page.move(page.placed, Geometry.shift([0.5, 0, 0]), true)"
         )
         self.browser.wait("return PlacePage.current().views.every((view) => !view.inFlight && !view.wanted)")
         server.cookie = "; ".join("%s=%s" % (c["name"], c["value"]) for c in self.browser.driver.get_cookies())
         _, headers, content = self.overlay(server, poses={"distal": self.pose()})
         drawn = self.js(
-            "const l = PlacePage.current().views[0].paint.layers.get('distal'); return [l.u_px, l.columns, [...l.bytes]]"
+            "const layer = PlacePage.current().views[0].paint.layers.get('distal');"
+            "return [layer.u_px, layer.columns, [...layer.bytes]]"
         )
         layer = json.loads(headers["X-Marrow-About"])["layers"][0]
         self.assertEqual(drawn[:2], [layer["u_px"], layer["columns"]])
